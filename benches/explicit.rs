@@ -3,7 +3,7 @@
 
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
 use leafdyn::internals::motion::{Explicit, Physics, TimeIntegrator};
-use leafdyn::internals::relax::start;
+use leafdyn::internals::relax::initial_state;
 use leafdyn::relax::{self, Options, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn_testing::bench::{figure, median, print_head};
@@ -36,7 +36,7 @@ fn rates(rods: usize, segments: usize, pools: &[rayon::ThreadPool]) -> Vec<f64> 
     let leaf = Leaf::new(&scenario);
     let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
     let physics = Physics::new(&leaf);
-    let state = start(&discrete);
+    let state = initial_state(&discrete);
     let steps = (WORK / (rods * segments)).max(STEPS);
     let mut found = vec![Vec::new(); pools.len()];
     for _ in 0..REPEATS {

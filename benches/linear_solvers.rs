@@ -2,8 +2,10 @@
 //! where the time of a whole run goes. One thread, all in the same run:
 //! `cargo bench --bench linear_solvers`.
 
-use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, Solved, State, System};
-use leafdyn::internals::relax::start;
+use leafdyn::internals::leaf::{
+    DirectSolver, DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, State, System,
+};
+use leafdyn::internals::relax::initial_state;
 use leafdyn::relax::{Equilibrium, Progress, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn_testing::bench::{figure, on_one_thread, print_head, to};
@@ -85,16 +87,16 @@ impl Parts {
     }
 }
 
-fn iterations(solved: Solved) -> usize {
+fn iterations(solved: LinearSolveOutcome) -> usize {
     match solved {
-        Solved::Yes(iterations) => iterations,
+        LinearSolveOutcome::Converged(iterations) => iterations,
         other => panic!("Fig. 4's leaf is positive definite: {other:?}"),
     }
 }
 
 /// The state after some Newton steps, and room for its equation.
 fn nearly_at_rest(leaf: &DiscreteLeaf) -> (State, System) {
-    let (mut state, mut system) = (start(leaf), System::new(leaf));
+    let (mut state, mut system) = (initial_state(leaf), System::new(leaf));
     let mut next = state.clone();
     for _ in 0..STEPS {
         leaf.assemble(&state, &mut system);
@@ -116,12 +118,12 @@ fn compare_solvers(rods: usize) {
     for _ in 0..ROUNDS {
         parts.round(&leaf, &state, &mut next, &mut system);
         // The first factorisation orders the unknowns, too.
-        let solver = DirectSolver::of_coupling(&system).expect("fits into memory");
+        let solver = DirectSolver::for_coupling_pattern(&system).expect("fits into memory");
         let sparse = || solver.factorize_sparse(&system, 0.0);
         first.time(sparse).expect("fits into memory");
         let mut factor = numeric.time(sparse).expect("fits into memory");
         solve.time(|| factor.solve(&mut system, None));
-        assert_eq!(factor.negative(), 0);
+        assert_eq!(factor.negative_eigenvalue_count(), 0);
     }
     let direct = numeric.0 + solve.0;
     println!(

@@ -4,7 +4,7 @@
 //! turns, and the medians are printed.
 
 use leafdyn::relax::{Options, relax};
-use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+use leafdyn::study::{BaseScenario, ParameterKeys, relax_with_sensitivities};
 use leafdyn_testing::bench::{median, on_one_thread, print_head, to};
 use std::time::Instant;
 
@@ -27,11 +27,11 @@ const KEYS: [&str; 10] = [
 
 fn main() {
     on_one_thread();
-    let keys = KEYS.map(|key| key.parse::<Keys>().expect("a key"));
+    let keys = KEYS.map(|key| key.parse::<ParameterKeys>().expect("a key"));
     let text = std::fs::read_to_string("scenarios/paper/fig04.toml");
     let text = text.expect("the scenario is there");
     let rods = ["leaf.rods=21".to_string(), "rest.bend_2=0.0".to_string()];
-    let base = Base::of_text(text, "fig04.toml".into(), &rods).expect("it is valid");
+    let base = BaseScenario::from_text(text, "fig04.toml".into(), &rods).expect("it is valid");
     println!(
         "N = 21, ten numbers. Milliseconds, medians of {TURNS}; the last column is what one number costs, as a part of the relaxation\n"
     );

@@ -2,7 +2,7 @@
 //! that grows with the number of veins: Fig. 4's leaf to 1e-10.
 //! `cargo bench --bench shooting`.
 
-use leafdyn::internals::shooting::{self, Solution, Start};
+use leafdyn::internals::shooting::{self, ShootingSolution, ShootingStart};
 use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
@@ -17,11 +17,15 @@ const ACCURACY: f64 = 1e-10;
 const RODS_IN_ALL: usize = 140;
 
 /// The fastest of several runs on so many threads, in milliseconds.
-fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solution) {
+fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, ShootingSolution) {
     let pool = leafdyn_testing::bench::threads(threads);
     let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
-    let start = Start::Leaf { stations, rods };
-    let options = shooting::Options::new(start, stations, shooting::Precision::Error(ACCURACY));
+    let start = ShootingStart::Leaf { stations, rods };
+    let options = shooting::ShootingOptions::new(
+        start,
+        stations,
+        shooting::RequiredPrecision::EstimatedError(ACCURACY),
+    );
     (0..2 + RODS_IN_ALL / leaf.rods.len())
         .map(|_| {
             let clock = Instant::now();

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
-use leafdyn::study::{Base, Data, FitRequest, Vary};
-use leafdyn_program::files::read_peers;
+use leafdyn::study::{BaseScenario, Data, FitRequest, ParameterSweep};
+use leafdyn_program::files::read_peer_measurements;
 
 /// A leaf with something of everything.
 pub const LEAF: &str = r#"
@@ -70,21 +70,21 @@ fn run(scenario: &Scenario) {
 
 /// An entry as behind `--set`, and numbers as behind `--vary`.
 pub fn typed(data: &[u8]) {
-    static BASE: LazyLock<Base> =
-        LazyLock::new(|| Base::of_text(LEAF.into(), "leaf".into(), &[]).unwrap());
+    static BASE: LazyLock<BaseScenario> =
+        LazyLock::new(|| BaseScenario::from_text(LEAF.into(), "leaf".into(), &[]).unwrap());
     let Ok(text) = std::str::from_utf8(data) else {
         return;
     };
-    if let Err(refused) = Base::of_text(LEAF.into(), "leaf".into(), &[text.into()]) {
+    if let Err(refused) = BaseScenario::from_text(LEAF.into(), "leaf".into(), &[text.into()]) {
         assert!(refused.to_string().len() < 4_000 + 4 * text.len());
     }
-    let Ok(vary) = text.parse::<Vary>() else {
+    let Ok(vary) = text.parse::<ParameterSweep>() else {
         return;
     };
     assert!(vary.values.iter().all(|value| value.is_finite()));
     let ends = [vary.values[0], vary.values[vary.values.len() - 1]];
     for value in ends.into_iter().filter(|value| value.abs() < 1e3) {
-        let _ = BASE.at(&[(&vary.keys, value)]);
+        let _ = BASE.scenario_with_values(&[(&vary.keys, value)]);
     }
 }
 
@@ -93,7 +93,7 @@ pub fn peers(data: &[u8]) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("peers.csv");
     fs::write(&file, data).unwrap();
-    match read_peers(&file) {
+    match read_peer_measurements(&file) {
         Ok(rows) => assert!(rows.iter().all(|row| row.seconds > 0.0)),
         Err(error) => assert!(error.to_string().len() < 1_000 + 4 * data.len()),
     }

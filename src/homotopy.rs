@@ -2,13 +2,13 @@
 //! become longer where they succeed, and shorter where they fail.
 
 /// A step longer than the shortest by no more than this factor counts as the shortest.
-const ROUNDED: f64 = 1.01;
+const SHORTEST_STEP_TOLERANCE: f64 = 1.01;
 
 /// How far along the path, and the next step.
 #[derive(Clone, Copy, Debug)]
 pub struct Homotopy {
     /// The part that is reached.
-    pub part: f64,
+    pub lambda: f64,
     step: f64,
     shortest: f64,
     longest: f64,
@@ -18,7 +18,7 @@ impl Homotopy {
     /// At the beginning, with the length of the first step and the limits of all others.
     pub fn new(first: f64, [shortest, longest]: [f64; 2]) -> Self {
         Homotopy {
-            part: 0.0,
+            lambda: 0.0,
             step: first,
             shortest,
             longest,
@@ -27,25 +27,25 @@ impl Homotopy {
 
     /// The part after the next step. What would remain to the end is not left to a further step if it
     /// is less than half of the shortest.
-    pub fn next(&self) -> f64 {
-        match self.part + self.step {
+    pub fn next_lambda(&self) -> f64 {
+        match self.lambda + self.step {
             next if next < 1.0 - 0.5 * self.shortest => next,
             _ => 1.0,
         }
     }
 
     /// The length of the next step.
-    pub fn length(&self) -> f64 {
-        self.next() - self.part
+    pub fn next_step_length(&self) -> f64 {
+        self.next_lambda() - self.lambda
     }
 
     pub fn is_shortest(&self) -> bool {
-        self.step <= ROUNDED * self.shortest
+        self.step <= SHORTEST_STEP_TOLERANCE * self.shortest
     }
 
     /// Makes the next step; the one after it has this length, within the limits.
     pub fn advance(&mut self, then: f64) {
-        self.part = self.next();
+        self.lambda = self.next_lambda();
         self.step = then.clamp(self.shortest, self.longest);
     }
 
@@ -54,7 +54,7 @@ impl Homotopy {
         if self.is_shortest() {
             return false;
         }
-        self.step = (factor * self.length()).max(self.shortest);
+        self.step = (factor * self.next_step_length()).max(self.shortest);
         true
     }
 }
@@ -69,11 +69,11 @@ mod tests {
         for count in 1..1000 {
             let mut path = Homotopy::new(1.0 / f64::from(count), [1e-6, 1.0]);
             let mut steps = 0;
-            while path.part < 1.0 {
-                path.advance(path.length());
+            while path.lambda < 1.0 {
+                path.advance(path.next_step_length());
                 steps += 1;
             }
-            assert_eq!((steps, path.part), (count, 1.0));
+            assert_eq!((steps, path.lambda), (count, 1.0));
         }
     }
 
@@ -83,10 +83,10 @@ mod tests {
         let mut path = Homotopy::new(1.0, [1.0 / 512.0, 0.5]);
         let (mut parts, mut failures) = (Vec::new(), 0);
         loop {
-            let next = path.next();
-            if next <= 0.6 || next <= 0.9 && path.length() <= 0.01 {
-                path.advance(2.0 * path.length());
-                parts.push(path.part);
+            let next = path.next_lambda();
+            if next <= 0.6 || next <= 0.9 && path.next_step_length() <= 0.01 {
+                path.advance(2.0 * path.next_step_length());
+                parts.push(path.lambda);
             } else if path.shorten(0.5) {
                 failures += 1;
             } else {
@@ -94,7 +94,7 @@ mod tests {
             }
         }
         assert_eq!(parts[0], 0.5);
-        assert!(path.is_shortest() && path.part > 0.9 - 1.01 / 512.0);
+        assert!(path.is_shortest() && path.lambda > 0.9 - 1.01 / 512.0);
         assert!(parts.is_sorted() && (40..80).contains(&parts.len()));
         assert!(failures < 60, "{failures}");
     }

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// When [`minimal_residual`] ends, and which directions it leaves out.
+/// When [`solve_minimal_residual`] ends, and which directions it leaves out.
 #[derive(Clone, Copy, Debug)]
 pub struct KrylovLimits {
     /// Norm of the residual, as a part of that of b.
@@ -13,13 +13,13 @@ pub struct KrylovLimits {
     pub most: usize,
     /// Directions of a singular value up to this are left out: A is singular in them, up to
     /// rounding. With zero none is.
-    pub singular: f64,
+    pub singular_value_limit: f64,
     /// The search ends where so many directions in a row leave more than this part of the residual.
-    pub stagnating: Option<(usize, f64)>,
+    pub stagnation_limit: Option<(usize, f64)>,
 }
 
 /// A solution as a sum over orthonormal directions.
-pub struct Expansion {
+pub struct KrylovSolution {
     /// The directions, in the order in which they were multiplied by A.
     pub directions: Vec<Vec<f64>>,
     /// The coefficient of each.
@@ -30,13 +30,13 @@ pub struct Expansion {
 
 /// Solves A x = `b`; `product` makes A times a direction. `None` if a product fails or is not
 /// finite. In directions in which A is singular the solution is zero.
-pub fn minimal_residual(
+pub fn solve_minimal_residual(
     b: &[f64],
     limits: KrylovLimits,
     product: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
-) -> Option<Expansion> {
+) -> Option<KrylovSolution> {
     let length = norm(b);
-    let mut found = Expansion {
+    let mut found = KrylovSolution {
         directions: Vec::new(),
         coefficients: Vec::new(),
         residual: 0.0,
@@ -53,7 +53,7 @@ pub fn minimal_residual(
     let mut remaining = vec![length];
     while found.directions.len() < limits.most {
         let k = triangle.len();
-        let stagnates = limits.stagnating.is_some_and(|(count, part)| {
+        let stagnates = limits.stagnation_limit.is_some_and(|(count, part)| {
             let before = k.checked_sub(count);
             before.is_some_and(|before| remaining[k].abs() > part * remaining[before].abs())
         });
@@ -108,7 +108,7 @@ pub fn minimal_residual(
     let coefficients = upper
         .clone()
         .svd(true, true)
-        .solve(&right, limits.singular)
+        .solve(&right, limits.singular_value_limit)
         .ok()?;
     let left_out = (&right - upper * &coefficients).norm();
     found.residual = remaining[count].hypot(left_out) / length;
@@ -117,9 +117,9 @@ pub fn minimal_residual(
     Some(found)
 }
 
-impl Expansion {
+impl KrylovSolution {
     /// The solution.
-    pub fn sum(&self) -> Option<Vec<f64>> {
+    pub fn solution(&self) -> Option<Vec<f64>> {
         let (first, rest) = self.directions.split_first()?;
         let mut sum: Vec<f64> = first.iter().map(|v| self.coefficients[0] * v).collect();
         for (direction, part) in rest.iter().zip(&self.coefficients[1..]) {
@@ -149,8 +149,8 @@ mod tests {
     const LIMITS: KrylovLimits = KrylovLimits {
         accuracy: 1e-12,
         most: 10,
-        singular: 1e-8,
-        stagnating: Some((3, 0.99)),
+        singular_value_limit: 1e-8,
+        stagnation_limit: Some((3, 0.99)),
     };
 
     /// The identity with one outlier of any size takes two directions.
@@ -163,9 +163,9 @@ mod tests {
                 Some(image)
             };
             let b = [1.0, -2.0, 0.5, 3.0];
-            let found = minimal_residual(&b, LIMITS, product).unwrap();
+            let found = solve_minimal_residual(&b, LIMITS, product).unwrap();
             assert_eq!(found.directions.len(), 2);
-            let x = found.sum().unwrap();
+            let x = found.solution().unwrap();
             for (k, b) in b.iter().enumerate() {
                 let exact = if k == 2 { b / outlier } else { *b };
                 assert!((x[k] / exact - 1.0).abs() < 1e-9, "{k}: {} {exact}", x[k]);
@@ -177,10 +177,10 @@ mod tests {
     #[test]
     fn a_singular_direction_is_left_out() {
         let product = &mut |v: &[f64]| Some(vec![v[0], 0.0]);
-        let found = minimal_residual(&[3.0, 4.0], LIMITS, product).unwrap();
+        let found = solve_minimal_residual(&[3.0, 4.0], LIMITS, product).unwrap();
         assert!((found.residual - 0.8).abs() < 1e-12, "{}", found.residual);
         let none = &mut |v: &[f64]| Some(vec![0.0 * v[0]]);
-        let found = minimal_residual(&[1.0], LIMITS, none).unwrap();
+        let found = solve_minimal_residual(&[1.0], LIMITS, none).unwrap();
         assert_eq!((found.residual, found.coefficients), (1.0, vec![0.0]));
     }
 }

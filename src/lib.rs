@@ -116,17 +116,36 @@ mod simd;
 pub mod simulate;
 pub mod study;
 
+#[doc(hidden)]
+#[deprecated(note = "is leafdyn::run")]
+pub mod clock {
+    pub use crate::run::Instant;
+}
+#[doc(hidden)]
+#[deprecated(note = "is leafdyn::numbers")]
+pub mod largest {
+    pub use crate::numbers::{larger, largest};
+}
+#[doc(hidden)]
+#[deprecated(note = "is leafdyn::shape")]
+pub mod undulation {
+    pub use crate::shape::Undulation;
+}
+
 /// Internals for this project's own tests and benchmarks: they may change with any release.
 #[doc(hidden)]
 pub mod internals {
     pub mod branch {
         pub use crate::branch::{
-            End, Equations, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, walk,
+            BranchEnd, BranchEquations, ContinuationOptions, CriticalKind, EquilibriumPoint,
+            ExtrapolatedPoint, LeafFamily, NestedBranchEquations, VerifiedBranch, begin_branch,
+            follow_branch,
         };
     }
     pub mod shooting {
         pub use crate::shooting::{
-            Failure, Neutral, Options, Precision, Reason, Solution, Start, Work, solve,
+            NeutralDirection, RequiredPrecision, ShootingCounts, ShootingFailure,
+            ShootingFailureReason, ShootingOptions, ShootingSolution, ShootingStart, solve,
         };
     }
     pub mod lanes {
@@ -134,27 +153,28 @@ pub mod internals {
     }
     pub mod leaf {
         pub use crate::leaf::{
-            DirectSolver, DiscreteLeaf, Grid, Leaf, Scale, Solved, State, System, shift, turn,
+            DirectSolver, DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, Scale, State, System,
+            displacement_part, rotation_part,
         };
     }
     pub mod modes {
-        pub use crate::modes::{Eigenpair, Wanted, lowest};
+        pub use crate::modes::{Eigenpair, ModeRequest, lowest};
     }
     pub mod motion {
         pub use crate::motion::{
-            Energy, Explicit, Inertia, Physics, SemiImplicit, Snapshot, Steps, Stopped,
+            Energy, Explicit, Inertia, Physics, SemiImplicit, Snapshot, StepControl, Stopped,
             TimeIntegrator,
         };
     }
     pub mod rod {
-        pub use crate::rod::{Ends, Section, Segment};
+        pub use crate::rod::{NodePair, Section, Segment};
     }
     pub mod rotation {
         pub use crate::rotation::{exp, log, outer};
     }
     pub mod relax {
-        pub use crate::relax::solve_on_grid::settle_from;
-        pub use crate::relax::solve_on_grid::start::start;
-        pub use crate::relax::stability::{index_near, project};
+        pub use crate::relax::solve_on_grid::relax_from_state;
+        pub use crate::relax::solve_on_grid::start::initial_state;
+        pub use crate::relax::stability::{index_near, state_from_rod_shapes};
     }
 }

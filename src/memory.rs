@@ -26,7 +26,7 @@ pub fn allowed() -> u64 {
             let group = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
             let bytes = [
                 machine_memory(),
-                group_limit(Path::new("/sys/fs/cgroup"), &group),
+                control_group_limit(Path::new("/sys/fs/cgroup"), &group),
             ];
             let bytes = bytes.into_iter().flatten().min();
             allow(bytes.map_or(u64::MAX, |bytes| bytes / 2));
@@ -48,7 +48,7 @@ fn machine_memory() -> Option<u64> {
 
 /// The smallest memory limit of the control groups in `groups`, the content of
 /// `/proc/self/cgroup`, and of their parents.
-fn group_limit(root: &Path, groups: &str) -> Option<u64> {
+fn control_group_limit(root: &Path, groups: &str) -> Option<u64> {
     let bytes = |file: &Path| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
     let limits = groups.lines().flat_map(|line| {
         let mut parts = line.splitn(3, ':').skip(1);
@@ -80,41 +80,41 @@ fn check(factors: &[usize], instead: &str, what: impl FnOnce() -> String) -> Res
         true => Err(TooMuch(format!(
             "{} would take about {} of memory, and {} are allowed: {instead}",
             what(),
-            size(needed),
-            size(allowed)
+            format_bytes(needed),
+            format_bytes(allowed)
         ))),
         false => Ok(()),
     }
 }
 
-const SMALLER_GRID: &str = "use fewer rods or segments";
+const SMALLER_GRID_ADVICE: &str = "use fewer rods or segments";
 
 /// A leaf on a grid.
-pub(crate) fn grid(rods: usize, segments: usize) -> Result<(), TooMuch> {
+pub(crate) fn check_grid_memory(rods: usize, segments: usize) -> Result<(), TooMuch> {
     // Measured: 1750 for one rod of many segments and 2700 for many rods of few; 5600 for
     // one rod with eigenvalues, which take up to 52 fields.
     let nodes = segments.saturating_add(1);
-    check(&[rods, nodes, 6_000], SMALLER_GRID, || {
+    check(&[rods, nodes, 6_000], SMALLER_GRID_ADVICE, || {
         format!("{rods} rods of {segments} segments")
     })
 }
 
 /// Branches of equilibria on a grid, which is refined twice.
-pub(crate) fn branches(rods: usize, segments: usize) -> Result<(), TooMuch> {
-    check(&[rods, segments, 27_000], SMALLER_GRID, || {
+pub(crate) fn check_branch_memory(rods: usize, segments: usize) -> Result<(), TooMuch> {
+    check(&[rods, segments, 27_000], SMALLER_GRID_ADVICE, || {
         format!("branches of {rods} rods of {segments} segments")
     })
 }
 
 /// The factorised sparse matrix of a leaf, of so many numbers.
-pub(crate) fn factor(numbers: usize) -> Result<(), TooMuch> {
-    check(&[numbers, 8], SMALLER_GRID, || {
+pub(crate) fn check_factor_memory(numbers: usize) -> Result<(), TooMuch> {
+    check(&[numbers, 8], SMALLER_GRID_ADVICE, || {
         format!("a factorised matrix of {numbers} numbers")
     })
 }
 
 /// The matrices of a shooting method.
-pub(crate) fn shooting(rods: usize, intervals: usize) -> Result<(), TooMuch> {
+pub(crate) fn check_shooting_memory(rods: usize, intervals: usize) -> Result<(), TooMuch> {
     // Measured: five matrices of (12 N)^2 numbers per interval.
     let matrices = [rods, rods, intervals.saturating_add(1), 5 * 144 * 8];
     let instead =
@@ -128,7 +128,7 @@ pub(crate) fn shooting(rods: usize, intervals: usize) -> Result<(), TooMuch> {
 ///
 /// # Errors
 /// If it would take more memory than is [`allowed`].
-pub fn stations(rods: usize, stations: usize) -> Result<(), TooMuch> {
+pub fn check_station_memory(rods: usize, stations: usize) -> Result<(), TooMuch> {
     // Measured: 580 for tables, 700 with those of modes, however many; 920 for a page, 1240
     // for that of a motion.
     let nodes = stations.saturating_add(1);
@@ -138,7 +138,7 @@ pub fn stations(rods: usize, stations: usize) -> Result<(), TooMuch> {
 }
 
 /// The rows of a map.
-pub(crate) fn map(cells: usize, methods: usize) -> Result<(), TooMuch> {
+pub(crate) fn check_map_memory(cells: usize, methods: usize) -> Result<(), TooMuch> {
     let instead = "lower the counts of the axes";
     check(&[cells, methods, 1_000], instead, || {
         format!("{cells} cells by {methods} methods")
@@ -147,7 +147,7 @@ pub(crate) fn map(cells: usize, methods: usize) -> Result<(), TooMuch> {
 
 /// A scenario as text, which is to be parsed. Keys and tables take most: 1,500 bytes each and 60 for
 /// every byte of the text are the most that was measured.
-pub(crate) fn text(text: &[u8]) -> Result<(), TooMuch> {
+pub(crate) fn check_text_memory(text: &[u8]) -> Result<(), TooMuch> {
     let signs = text.iter().filter(|byte| b"=:{[".contains(byte)).count();
     // Every part of a dotted key is a table.
     let dotted = |pair: &&[u8]| pair[0] == b'.' && !pair[1].is_ascii_digit();
@@ -162,7 +162,7 @@ pub(crate) fn text(text: &[u8]) -> Result<(), TooMuch> {
 const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
 
 /// Formats a number of bytes for people.
-pub fn size(bytes: u64) -> String {
+pub fn format_bytes(bytes: u64) -> String {
     let bytes = bytes as f64;
     let unit = UNITS.into_iter().find(|(_, unit)| bytes >= *unit);
     unit.map_or(format!("{bytes} bytes"), |(name, unit)| {
@@ -208,10 +208,10 @@ mod tests {
         for text in " GB -1GB 0 many nan inf 1e300 ä äB".split(' ') {
             assert!(parse(text).is_err(), "{text}");
         }
-        assert_eq!(size(5_700_000_000), "5.7 GB");
-        assert_eq!(size(12), "12 bytes");
-        let most = grid(usize::MAX, usize::MAX).unwrap_err();
-        assert!(most.0.contains(&size(u64::MAX)), "{most}");
+        assert_eq!(format_bytes(5_700_000_000), "5.7 GB");
+        assert_eq!(format_bytes(12), "12 bytes");
+        let most = check_grid_memory(usize::MAX, usize::MAX).unwrap_err();
+        assert!(most.0.contains(&format_bytes(u64::MAX)), "{most}");
     }
 
     #[test]
@@ -229,7 +229,7 @@ mod tests {
         at("a", "4000\n");
         at("a/b", "max\n");
         at("memory/c", "3000\n");
-        let limit = |groups: &str| group_limit(root.path(), groups);
+        let limit = |groups: &str| control_group_limit(root.path(), groups);
         assert_eq!(limit("0::/a/b\n"), Some(4000));
         assert_eq!(limit("0::/\n"), None);
         assert_eq!(limit("5:cpu:/a\n4:memory:/c\n0::/a\n"), Some(3000));

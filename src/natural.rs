@@ -13,10 +13,10 @@ use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
 
 /// Largest rotation in a step, in radians: its error is rounding.
-const TURN: f64 = 0.1;
+const MAX_STEP_ROTATION: f64 = 0.1;
 
 /// Longest step, so that profiles that bend little but vary are resolved.
-const STEP: f64 = 1.0 / 16.0;
+const MAX_STEP: f64 = 1.0 / 16.0;
 
 /// The natural leaf, in the units of the scenario.
 #[derive(Clone, Debug)]
@@ -25,11 +25,11 @@ pub struct Natural<'a> {
     /// Whether the rest lengths have grown.
     grown: bool,
     /// Of every vein the fractions of its length where a step ends, with the states there.
-    veins: Vec<Vec<(f64, Vein)>>,
+    veins: Vec<Vec<(f64, VeinPose)>>,
 }
 
 /// A vein at one sigma.
-type Vein = (DVec3, DQuat);
+type VeinPose = (DVec3, DQuat);
 
 impl<'a> Natural<'a> {
     /// Of this scenario, whose veins have `grown`, or not yet.
@@ -43,7 +43,7 @@ impl<'a> Natural<'a> {
     }
 
     /// Position and rotation of vein `j` at `sigma`.
-    pub fn at(&self, j: usize, sigma: f64) -> (DVec3, DQuat) {
+    pub fn vein_pose(&self, j: usize, sigma: f64) -> (DVec3, DQuat) {
         let vein = &self.veins[j];
         let before = vein.partition_point(|(end, _)| *end <= sigma).max(1) - 1;
         let (from, state) = vein[before];
@@ -61,7 +61,7 @@ impl<'a> Natural<'a> {
 }
 
 /// The steps along vein `j`, which end at every kink and seam of its rest shape.
-fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, Vein)> {
+fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, VeinPose)> {
     let rod = &scenario.rods[j];
     let shape = rod.rest_curvature.iter().chain([&rod.rest_stretch]);
     let mut kinks: Vec<f64> = (shape.clone())
@@ -71,7 +71,7 @@ fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, Vein)> {
     kinks.sort_by(f64::total_cmp);
     kinks.dedup();
     let turn: f64 = rod.rest_curvature.iter().map(|p| p.max_abs()).sum();
-    let longest = (TURN / (turn * rod.length)).min(STEP);
+    let longest = (MAX_STEP_ROTATION / (turn * rod.length)).min(MAX_STEP);
     let mut steps = vec![(0.0, scenario.base(j))];
     for end in kinks.into_iter().chain([1.0]) {
         let (mut from, mut state) = steps[steps.len() - 1];
@@ -91,9 +91,9 @@ fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, Vein)> {
 }
 
 /// A step of a vein from `sigma` by `width`.
-fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): Vein) -> Vein {
+fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): VeinPose) -> VeinPose {
     let mut slopes = [(DVec3::ZERO, DQuat::from_array([0.0; 4])); STAGES];
-    let combine = |slopes: &[Vein], weights: &[f64]| {
+    let combine = |slopes: &[VeinPose], weights: &[f64]| {
         let mut sum = (x, q);
         for ((dx, dq), weight) in slopes.iter().zip(weights) {
             sum.0 += *dx * (width * weight);
@@ -102,9 +102,9 @@ fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): Vein) -> Vein {
         sum
     };
     for i in 0..STAGES {
-        let (_, q) = combine(&slopes, A[i]);
-        let at = sigma + C[i] * width;
-        let u = DVec3::from_array(Profile::all(&rod.rest_curvature, at));
+        let (_, q) = combine(&slopes, STAGE_WEIGHTS[i]);
+        let at = sigma + STAGE_NODES[i] * width;
+        let u = DVec3::from_array(Profile::values_of_three(&rod.rest_curvature, at));
         let q = q.normalize();
         let spin = 0.5 * rod.length * u;
         slopes[i] = (
@@ -112,7 +112,7 @@ fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): Vein) -> Vein {
             q * DQuat::from_xyzw(spin.x, spin.y, spin.z, 0.0),
         );
     }
-    let (x, q) = combine(&slopes, &B);
+    let (x, q) = combine(&slopes, &RESULT_WEIGHTS);
     (x, q.normalize())
 }
 
@@ -121,7 +121,7 @@ pub const STAGES: usize = 12;
 
 /// Nodes of the stages.
 #[rustfmt::skip]
-pub const C: [f64; STAGES] = [
+pub const STAGE_NODES: [f64; STAGES] = [
     0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274,
     0.2816496580927726, 0.3333333333333333, 0.25, 0.3076923076923077,
     0.6512820512820513, 0.6, 0.8571428571428571, 1.0,
@@ -129,7 +129,7 @@ pub const C: [f64; STAGES] = [
 
 /// Weights of earlier slopes in each stage.
 #[rustfmt::skip]
-pub const A: [&[f64]; STAGES] = [
+pub const STAGE_WEIGHTS: [&[f64]; STAGES] = [
     &[],
     &[0.05260015195876773],
     &[0.0197250569845379, 0.0591751709536137],
@@ -164,7 +164,7 @@ pub const A: [&[f64]; STAGES] = [
 
 /// Weights of the result, of order 8.
 #[rustfmt::skip]
-pub const B: [f64; STAGES] = [
+pub const RESULT_WEIGHTS: [f64; STAGES] = [
     0.054293734116568765, 0.0, 0.0,
     0.0, 0.0, 4.450312892752409,
     1.8915178993145003, -5.801203960010585, 0.3111643669578199,
@@ -173,7 +173,7 @@ pub const B: [f64; STAGES] = [
 
 /// Weights of the error estimate of order 5.
 #[rustfmt::skip]
-pub const E5: [f64; STAGES] = [
+pub const ERROR_WEIGHTS_5: [f64; STAGES] = [
     0.01312004499419488, 0.0, 0.0,
     0.0, 0.0, -1.2251564463762044,
     -0.4957589496572502, 1.6643771824549864, -0.35032884874997366,
@@ -182,7 +182,7 @@ pub const E5: [f64; STAGES] = [
 
 /// Weights of the error estimate of order 3.
 #[rustfmt::skip]
-pub const E3: [f64; STAGES] = [
+pub const ERROR_WEIGHTS_3: [f64; STAGES] = [
     -0.18980075407240762, 0.0, 0.0,
     0.0, 0.0, 4.450312892752409,
     1.8915178993145003, -5.801203960010585, -0.42268232132379197,
@@ -205,7 +205,7 @@ mod tests {
         "#;
         let scenario = Scenario::from_toml(text).unwrap();
         let natural = Natural::new(&scenario, true);
-        let (x, q) = natural.at(0, 0.77);
+        let (x, q) = natural.vein_pose(0, 0.77);
         let (u, s) = (DVec3::new(1.2, 0.7, -0.4), 0.77 * 2.0);
         let (_, base) = scenario.base(0);
         let turned = base * crate::rotation::exp(s * u);
@@ -219,7 +219,7 @@ mod tests {
         assert!((x - base * (1.1 * integral)).length() < 1e-13);
 
         for (from, to) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.61)] {
-            let (mut state, width) = (natural.at(1, from), (to - from) / 100.0);
+            let (mut state, width) = (natural.vein_pose(1, from), (to - from) / 100.0);
             for k in 0..100 {
                 state = step(
                     &scenario.rods[1],
@@ -229,7 +229,7 @@ mod tests {
                     state,
                 );
             }
-            let (x, q) = natural.at(1, to);
+            let (x, q) = natural.vein_pose(1, to);
             assert!((x - state.0).length() < 1e-13);
             assert!((q.dot(state.1).abs() - 1.0).abs() < 1e-14);
         }
@@ -244,19 +244,28 @@ mod tableau_tests {
     #[test]
     fn the_result_is_of_order_8() {
         let zero = |what: &str, off: f64| assert!(off.abs() < 1e-13, "{what}: {off:e}");
-        let inner =
-            |i: usize, k: i32| -> f64 { (A[i].iter().zip(C)).map(|(a, c)| a * c.powi(k)).sum() };
+        let inner = |i: usize, k: i32| -> f64 {
+            (STAGE_WEIGHTS[i].iter().zip(STAGE_NODES))
+                .map(|(a, c)| a * c.powi(k))
+                .sum()
+        };
         for k in 0..8 {
             let sum = |value: &dyn Fn(usize) -> f64| -> f64 {
-                (0..STAGES).map(|i| B[i] * value(i)).sum()
+                (0..STAGES).map(|i| RESULT_WEIGHTS[i] * value(i)).sum()
             };
-            zero("b c^k", sum(&|i| C[i].powi(k)) - 1.0 / f64::from(k + 1));
+            zero(
+                "b c^k",
+                sum(&|i| STAGE_NODES[i].powi(k)) - 1.0 / f64::from(k + 1),
+            );
             for l in 0..7 - k {
                 let wanted = 1.0 / f64::from((k + 1) * (k + 2 + l));
-                zero("b c^l a c^k", sum(&|i| C[i].powi(l) * inner(i, k)) - wanted);
+                zero(
+                    "b c^l a c^k",
+                    sum(&|i| STAGE_NODES[i].powi(l) * inner(i, k)) - wanted,
+                );
             }
         }
-        (0..STAGES).for_each(|i| zero("node", inner(i, 0) - C[i]));
+        (0..STAGES).for_each(|i| zero("node", inner(i, 0) - STAGE_NODES[i]));
     }
 
     /// The error estimates vanish for what methods of order 5 and 3 integrate exactly, and not
@@ -264,9 +273,11 @@ mod tableau_tests {
     #[test]
     fn the_estimates_are_of_orders_5_and_3() {
         let sum = |weights: &[f64; STAGES], k: i32| -> f64 {
-            (0..STAGES).map(|i| weights[i] * C[i].powi(k)).sum()
+            (0..STAGES)
+                .map(|i| weights[i] * STAGE_NODES[i].powi(k))
+                .sum()
         };
-        for (weights, order) in [(&E5, 5), (&E3, 3)] {
+        for (weights, order) in [(&ERROR_WEIGHTS_5, 5), (&ERROR_WEIGHTS_3, 3)] {
             for k in 0..order {
                 assert!(sum(weights, k).abs() < 1e-13, "e c^{k}");
             }

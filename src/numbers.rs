@@ -8,7 +8,7 @@
 
 /// Formats an upper bound with two digits, rounded up so that it stays a bound, as in
 /// `3.1×10⁻⁹`.
-pub fn power_of_ten(bound: f64) -> String {
+pub fn format_error_bound(bound: f64) -> String {
     if !bound.is_finite() {
         return "∞".into();
     }
@@ -27,7 +27,7 @@ pub fn power_of_ten(bound: f64) -> String {
 }
 
 /// A positive number with two digits, as in `0.87`, `2100` and `2.8×10⁷`.
-pub fn two_digits(number: f64) -> String {
+pub fn format_two_digits(number: f64) -> String {
     let rounded = format!("{number:.1e}");
     match rounded.split_once('e') {
         Some((digits, power)) if !(1e-3..1e4).contains(&number.abs()) => match power.parse() {
@@ -69,17 +69,18 @@ mod tests {
 
     #[test]
     fn bounds_are_rounded_up() {
-        let bounds = [3.01e-9, 9.99e-12, 2.0, 3e-9, f64::INFINITY, 0.0].map(power_of_ten);
+        let bounds = [3.01e-9, 9.99e-12, 2.0, 3e-9, f64::INFINITY, 0.0].map(format_error_bound);
         let wanted = ["3.1×10⁻⁹", "1.0×10⁻¹¹", "2.0×10⁰", "3.0×10⁻⁹", "∞", "0"];
         assert_eq!(bounds, wanted);
     }
 
     #[test]
     fn two_digits_are_rounded_to_the_nearest() {
-        let numbers = [0.8749, 2149.0, 28_400_000.0, 0.099_9, 9999.0, 3e-7, -12.0].map(two_digits);
+        let numbers =
+            [0.8749, 2149.0, 28_400_000.0, 0.099_9, 9999.0, 3e-7, -12.0].map(format_two_digits);
         let wanted = ["0.87", "2100", "2.8×10⁷", "0.1", "10000", "3.0×10⁻⁷", "-12"];
         assert_eq!(numbers, wanted);
-        assert_eq!(two_digits(f64::INFINITY), "inf");
+        assert_eq!(format_two_digits(f64::INFINITY), "inf");
     }
 }
 

@@ -42,12 +42,12 @@ const SINC: [f64; 9] = [
 ];
 
 /// Up to this squared half angle they are accurate to rounding: a rotation by 1.09.
-const SMALL: f64 = 0.3;
+const SERIES_LIMIT: f64 = 0.3;
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being y/sin y of a half angle
 /// y, and delta = 2 (1 - cos y), the squared distance of two unit quaternions:
 /// interpolated at Chebyshev's nodes on 0..2/3, largest error of sigma 1.7e-16.
-pub const B: [f64; 11] = [
+pub const HALF_ANGLE_POLYNOMIAL: [f64; 11] = [
     0.16666666666666688,
     0.03333333333325741,
     0.007142857147397268,
@@ -62,7 +62,7 @@ pub const B: [f64; 11] = [
 ];
 
 /// Up to there: a rotation by 1.68, a little more than what counts as resolved.
-const NEAR: f64 = 2.0 / 3.0;
+const POLYNOMIAL_LIMIT: f64 = 2.0 / 3.0;
 
 /// The unit quaternion of the rotation vector `theta` (angle times axis).
 #[inline]
@@ -77,12 +77,12 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
     let quarter = Lanes::splat(simd, 0.25);
     let squared = theta.dot(theta) * quarter;
     let (mut sinc, mut cos) = (squared.polynomial(&SINC), squared.polynomial(&COS));
-    if squared.largest() > SMALL {
+    if squared.largest() > SERIES_LIMIT {
         let half = squared.sqrt();
         // Series where they are accurate: no quotient that tends to 0/0.
-        let large = squared - Lanes::splat(simd, SMALL);
-        sinc = (half.each(f64::sin) * half.recip()).where_positive(large, sinc);
-        cos = half.each(f64::cos).where_positive(large, cos);
+        let large = squared - Lanes::splat(simd, SERIES_LIMIT);
+        sinc = (half.each(f64::sin) * half.recip()).select_where_positive(large, sinc);
+        cos = half.each(f64::cos).select_where_positive(large, cos);
     }
     (theta.scale(sinc * Lanes::splat(simd, 0.5)), cos)
 }
@@ -115,7 +115,7 @@ pub fn to_quaternion((v, w): Quaternions<Scalar>) -> DQuat {
 pub fn log(q: DQuat) -> DVec3 {
     let (w, cos) = from_quaternion(if q.w < 0.0 { -q } else { q });
     let off = cos - Lanes::from(1.0);
-    let [sigma, ..] = series(off.mul_add(off, w.dot(w)));
+    let [sigma, ..] = half_angle_series(off.mul_add(off, w.dot(w)));
     w.scale(sigma + sigma).into()
 }
 
@@ -154,17 +154,17 @@ pub fn directors<S: Simd>((s, sw): Quaternions<S>, scale: Lanes<S>) -> [Vectors<
 /// sigma = y/sin y of half angles y up to a right one, b = (sigma - 1)/delta and
 /// c = (b - 1/6)/delta from delta = 2 (1 - cos y).
 #[inline(always)]
-pub fn series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
+pub fn half_angle_series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
     let simd = delta.simd;
     let (one, sixth) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 1.0 / 6.0));
-    let [_, after @ ..] = B;
+    let [_, after @ ..] = HALF_ANGLE_POLYNOMIAL;
     let mut c = delta.polynomial(&after);
-    if delta.largest() > NEAR {
+    if delta.largest() > POLYNOMIAL_LIMIT {
         let far = delta.each(|delta| {
             let (cos, sin) = (1.0 - 0.5 * delta, (delta - 0.25 * delta * delta).sqrt());
             ((sin.atan2(cos) / sin - 1.0) / delta - 1.0 / 6.0) / delta
         });
-        c = far.where_positive(delta - Lanes::splat(simd, NEAR), c);
+        c = far.select_where_positive(delta - Lanes::splat(simd, POLYNOMIAL_LIMIT), c);
     }
     let b = c.mul_add(delta, sixth);
     [b.mul_add(delta, one), b, c]
@@ -191,7 +191,7 @@ pub fn series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
 ///
 /// k = -b g,  2 c1 = -(1/2 + b) g/2,  c2 = (sigma/2 - b) g/2,  c3 = -(b - 3 c) g^2/4.
 #[derive(Clone, Copy, Debug)]
-pub struct Relative<S: Simd> {
+pub struct RelativeRotation<S: Simd> {
     /// Rotation vector; the same in the frames of both ends and of the middle.
     pub psi: Vectors<S>,
     /// tan(|psi|/4) along the axis.
@@ -203,10 +203,10 @@ pub struct Relative<S: Simd> {
     /// The coefficient k of S.
     pub k: Lanes<S>,
     /// 2 c1, c2, c3.
-    pub second: [Lanes<S>; 3],
+    pub second_coefficients: [Lanes<S>; 3],
 }
 
-impl<S: Simd> Relative<S> {
+impl<S: Simd> RelativeRotation<S> {
     /// Between two rotations given as unit quaternions of any sign; also the
     /// directors of their geodesic midpoint.
     #[inline(always)]
@@ -215,24 +215,24 @@ impl<S: Simd> Relative<S> {
         let simd = aw.simd;
         let (one, half) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.5));
         let cos = aw.mul_add(bw, a.dot(b));
-        let sign = one.where_positive(cos + Lanes::splat(simd, f64::MIN_POSITIVE), -one);
+        let sign = one.select_where_positive(cos + Lanes::splat(simd, f64::MIN_POSITIVE), -one);
         let (b, bw) = (b.scale(sign), bw * sign);
         let (d, dw) = (b - a, bw - aw);
         let delta = dw.mul_add(dw, d.dot(d));
-        let [sigma, series_b, series_c] = series(delta);
+        let [sigma, series_b, series_c] = half_angle_series(delta);
         // 1/|s|^2 of the sum s of both.
         let inverse = (Lanes::splat(simd, 4.0) - delta).recip();
         let (twice, g) = (inverse + inverse, inverse * Lanes::splat(simd, 4.0));
         let w = a.neg_mul_add(bw, b.scale(aw)) - a.cross(b);
         let half_g = g * half;
         let three = Lanes::splat(simd, 3.0);
-        let relative = Relative {
+        let relative = RelativeRotation {
             psi: w.scale(sigma + sigma),
             tau: w.scale(twice),
             w,
             sigma,
             k: -(series_b * g),
-            second: [
+            second_coefficients: [
                 -((half + series_b) * half_g),
                 sigma.mul_add(half, -series_b) * half_g,
                 series_c.mul_add(three, -series_b) * half_g * half_g,
@@ -243,7 +243,7 @@ impl<S: Simd> Relative<S> {
 
     /// S a.
     #[inline(always)]
-    pub fn derivative(&self, a: Vectors<S>) -> Vectors<S> {
+    pub fn apply_derivative(&self, a: Vectors<S>) -> Vectors<S> {
         self.w.mul_add(self.k * self.w.dot(a), a.scale(self.sigma))
     }
 
@@ -256,7 +256,7 @@ impl<S: Simd> Relative<S> {
         a: Vectors<S>,
         m: Vectors<S>,
     ) -> (Vectors<S>, Lanes<S>, Vectors<S>) {
-        let (w, k, [twice_c1, c2, c3]) = (self.w, self.k, self.second);
+        let (w, k, [twice_c1, c2, c3]) = (self.w, self.k, self.second_coefficients);
         let half = Lanes::splat(k.simd, 0.5);
         let (aw, along) = (a * w, w.dot(m));
         let v = aw.scale(self.sigma * k);
@@ -310,8 +310,8 @@ mod tests {
 
     #[test]
     fn series_and_closed_form_meet() {
-        let at = |delta: f64| series(delta.into()).map(f64::from);
-        let (near, far) = (at(NEAR), at(NEAR * (1.0 + 1e-15)));
+        let at = |delta: f64| half_angle_series(delta.into()).map(f64::from);
+        let (near, far) = (at(POLYNOMIAL_LIMIT), at(POLYNOMIAL_LIMIT * (1.0 + 1e-15)));
         for (near, far) in near.into_iter().zip(far) {
             assert!((near - far).abs() < 3e-15, "{near} {far}");
         }

@@ -29,7 +29,7 @@ pub struct Limit {
 
 impl Limit {
     /// A limit at a time.
-    pub fn at(deadline: Instant) -> Self {
+    pub fn with_deadline(deadline: Instant) -> Self {
         Limit {
             deadline: Some(deadline),
             cancel: None,
@@ -76,7 +76,7 @@ impl RefusedOption {
 /// What a scenario has and a method or a question does not take into account: an answer to it would
 /// be that of another scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unmodelled {
+pub enum UnmodelledFeature {
     /// Grips along veins.
     #[error(
         "[[grip]]: {what} does not take grips along veins into account, as relaxation and following do; leave them out, or hold the tip by [tip]"
@@ -109,6 +109,19 @@ pub struct UnknownWord {
     pub found: String,
     /// The allowed words.
     pub allowed: Vec<&'static str>,
+}
+
+/// Names of the release before, for one more release.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! renamed {
+    ($($old:ident => $new:ident,)+) => {
+        $(
+            #[doc = concat!("Renamed to [`", stringify!($new), "`].")]
+            #[deprecated(note = "renamed: its documentation has the new name")]
+            pub type $old = $new;
+        )+
+    };
 }
 
 /// Declares an enum by the words for its variants, with `ALL` and `word()`, on which everything

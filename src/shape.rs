@@ -110,7 +110,7 @@ impl Difference {
 }
 
 /// Stations (fractions of a vein's length) that are closer than this are one.
-pub(crate) const SAME_STATION: f64 = 1e-14;
+pub(crate) const STATION_TOLERANCE: f64 = 1e-14;
 
 /// Stations that divide the length into `parts` equal parts.
 pub fn equally_spaced(parts: usize) -> Vec<f64> {
@@ -119,7 +119,7 @@ pub fn equally_spaced(parts: usize) -> Vec<f64> {
 
 /// Interpolation at `at` by the polynomial through `count` neighbouring `nodes`: the index
 /// of the first of them, and their weights.
-pub fn weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
+pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
     let count = count.min(nodes.len());
     let right = nodes.partition_point(|node| *node < at);
     let first = right
@@ -167,15 +167,15 @@ pub const LEAST_HEIGHT: f64 = 1e-3;
 
 /// Smallest height of a half-wave that counts, in error estimates: it is a difference of three
 /// positions.
-const ERRORS: f64 = 4.0;
+const HEIGHT_ERROR_MULTIPLE: f64 = 4.0;
 
 /// Sine of the angle between a vein and the line between the margins below which the
 /// margins coincide.
-const SAME_PLACE: f64 = 1e-6;
+const COINCIDENT_MARGINS_SINE: f64 = 1e-6;
 
 /// Smaller turns at a node, in radians, are rounding: not even thousands of them make a
 /// half-wave that counts.
-const STRAIGHT: f64 = 1e-10;
+const TURN_ROUNDING: f64 = 1e-10;
 
 /// Smaller mean twists, in radians, have no handedness.
 const LEAST_TWIST: f64 = 1e-3;
@@ -183,7 +183,7 @@ const LEAST_TWIST: f64 = 1e-3;
 /// The handedness of the mean twist from base to tip; in lower case in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Hand {
+pub enum Handedness {
     /// Right-handed: the mean twist is positive.
     Right,
     /// Left-handed: the mean twist is negative.
@@ -194,7 +194,7 @@ pub enum Hand {
 
 /// The undulation of one vein.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Vein {
+pub struct VeinUndulation {
     /// Half-waves along it: alternating extrema.
     pub half_waves: usize,
     /// Largest half of a height from crest to trough, in units of length; 0
@@ -212,7 +212,7 @@ pub struct Vein {
     pub load_number: f64,
 }
 
-impl Vein {
+impl VeinUndulation {
     /// Number of waves, a multiple of 1/2; a single half-wave does not count.
     pub fn waves(&self) -> f64 {
         match self.half_waves {
@@ -231,7 +231,7 @@ impl Vein {
     }
 }
 
-impl Serialize for Vein {
+impl Serialize for VeinUndulation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map([
             ("waves", Some(self.waves())),
@@ -249,15 +249,15 @@ impl Serialize for Vein {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Undulation {
     /// One entry per vein.
-    pub veins: Vec<Vein>,
+    pub veins: Vec<VeinUndulation>,
 }
 
 /// The margin with more waves, or higher ones, in JSON.
-struct Margin<'a>(&'a Vein);
+struct SerializedMargin<'a>(&'a VeinUndulation);
 
-impl Serialize for Margin<'_> {
+impl Serialize for SerializedMargin<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Margin(vein) = self;
+        let SerializedMargin(vein) = self;
         serializer.collect_map([
             ("waves", Some(vein.waves())),
             ("amplitude", Some(vein.amplitude)),
@@ -272,7 +272,7 @@ impl Serialize for Undulation {
         let mut object = serializer.serialize_struct("Undulation", 4)?;
         object.serialize_field("handedness", &self.hand())?;
         object.serialize_field("twist", &self.twist())?;
-        object.serialize_field("margins", &self.margin().map(Margin))?;
+        object.serialize_field("margins", &self.margin().map(SerializedMargin))?;
         object.serialize_field("veins", &self.veins)?;
         object.end()
     }
@@ -285,7 +285,7 @@ impl Undulation {
     /// The undulation of a leaf at rest: waves and twist from its `lines`, one per rod with
     /// nodes at the same fractions of the length; forces from its `rods` at the `stations`.
     /// `error` bounds the error of positions, if known.
-    pub fn of(
+    pub fn from_centerlines(
         scenario: &Scenario,
         lines: &[Centerline],
         stations: &[f64],
@@ -293,7 +293,7 @@ impl Undulation {
         error: Option<f64>,
     ) -> Self {
         let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
-        let least = (LEAST_HEIGHT * longest).max(ERRORS * error.unwrap_or(0.0));
+        let least = (LEAST_HEIGHT * longest).max(HEIGHT_ERROR_MULTIPLE * error.unwrap_or(0.0));
         let veins = (0..lines.len().min(rods.len()))
             .map(|j| {
                 let half_waves = half_waves(lines, j, least);
@@ -302,7 +302,7 @@ impl Undulation {
                 let grown = material.rest_stretch.integral(1.0);
                 let tension = mean(stations, rods[j].nodes.iter().map(|node| node.n.x));
                 let bending = material.couple_stiffness[1].integral(1.0);
-                Vein {
+                VeinUndulation {
                     amplitude: amplitude(&half_waves),
                     wavelength: wavelength(&half_waves),
                     half_waves: half_waves.len(),
@@ -327,16 +327,16 @@ impl Undulation {
             nodes.map(|node| (node.position, node.rotation)).collect()
         };
         let lines: Vec<Centerline> = rods.iter().map(line).collect();
-        Undulation::of(scenario, &lines, stations, rods, error)
+        Undulation::from_centerlines(scenario, &lines, stations, rods, error)
     }
 
     /// The first and the last vein, which are the same in a leaf of one vein.
-    pub fn margins(&self) -> Option<[&Vein; 2]> {
+    pub fn margins(&self) -> Option<[&VeinUndulation; 2]> {
         Some([self.veins.first()?, self.veins.last()?])
     }
 
     /// The margin that has more waves, or higher ones.
-    pub fn margin(&self) -> Option<&Vein> {
+    pub fn margin(&self) -> Option<&VeinUndulation> {
         let [first, last] = self.margins()?;
         let more = last.half_waves.cmp(&first.half_waves);
         match more.then(last.amplitude.total_cmp(&first.amplitude)) {
@@ -352,11 +352,11 @@ impl Undulation {
     }
 
     /// Its handedness.
-    pub fn hand(&self) -> Hand {
+    pub fn hand(&self) -> Handedness {
         match self.twist() {
-            twist if twist > LEAST_TWIST => Hand::Right,
-            twist if twist < -LEAST_TWIST => Hand::Left,
-            _ => Hand::None,
+            twist if twist > LEAST_TWIST => Handedness::Right,
+            twist if twist < -LEAST_TWIST => Handedness::Left,
+            _ => Handedness::None,
         }
     }
 }
@@ -382,22 +382,22 @@ struct HalfWave {
     /// Height of its extremum over the chord.
     height: f64,
     /// Arc length up to the extremum.
-    place: f64,
+    arc_length: f64,
 }
 
 /// A vein developed into a plane by its normal curvature alone: its bending within the
 /// surface is left out.
-struct Curve {
+struct DevelopedCurve {
     /// Turn out of the surface at each inner node, in radians.
     turns: Vec<f64>,
     points: Vec<DVec2>,
     /// Arc length of the polyline up to each node.
-    along: Vec<f64>,
+    arc_lengths: Vec<f64>,
 }
 
-impl Curve {
+impl DevelopedCurve {
     /// The curve of vein `j`, which has at least three nodes.
-    fn of(lines: &[Centerline], j: usize) -> Self {
+    fn from_vein(lines: &[Centerline], j: usize) -> Self {
         let line = &lines[j];
         let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
         let (mut turns, mut last) = (Vec::new(), None);
@@ -407,7 +407,7 @@ impl Curve {
             let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
             let mut normal = tangent.cross(across.normalize_or_zero());
             // Where the margins meet, the section defines the surface.
-            if normal.length() < SAME_PLACE {
+            if normal.length() < COINCIDENT_MARGINS_SINE {
                 normal = tangent.cross(line[i + 1].1 * DVec3::Y);
             }
             normal = normal.normalize_or_zero();
@@ -425,10 +425,10 @@ impl Curve {
             along.push(along[k] + length);
             angle += turns.get(i).copied().unwrap_or(0.0);
         }
-        Curve {
+        DevelopedCurve {
             turns,
             points,
-            along,
+            arc_lengths: along,
         }
     }
 
@@ -444,7 +444,7 @@ impl Curve {
         let mut found = Vec::new();
         let mut last: Option<(usize, f64)> = None;
         let turns = self.turns.iter().enumerate();
-        for (i, &turn) in turns.filter(|(_, turn)| turn.abs() > STRAIGHT) {
+        for (i, &turn) in turns.filter(|(_, turn)| turn.abs() > TURN_ROUNDING) {
             if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
                 let part = before / (before - turn);
                 found.push((k + 1) as f64 + part * (i - k) as f64);
@@ -458,17 +458,17 @@ impl Curve {
         let [from, to] = ends.map(|end| self.point(end));
         let chord = (to - from).normalize_or_zero();
         let first = ends[0].ceil() as usize;
-        let (mut height, mut place) = (0.0, self.along[first]);
+        let (mut height, mut place) = (0.0, self.arc_lengths[first]);
         for i in first..=ends[1].floor() as usize {
             let off = chord.perp_dot(self.points[i] - from).abs();
             if off > height {
-                (height, place) = (off, self.along[i]);
+                (height, place) = (off, self.arc_lengths[i]);
             }
         }
         HalfWave {
             ends,
             height,
-            place,
+            arc_length: place,
         }
     }
 }
@@ -478,7 +478,7 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
     if lines[j].len() < 4 {
         return Vec::new();
     }
-    let curve = Curve::of(lines, j);
+    let curve = DevelopedCurve::from_vein(lines, j);
     let mut ends = vec![0.0];
     ends.extend(curve.inflections());
     ends.push((curve.points.len() - 1) as f64);
@@ -510,6 +510,13 @@ fn amplitude(waves: &[HalfWave]) -> f64 {
 fn wavelength(waves: &[HalfWave]) -> Option<f64> {
     match waves {
         [] | [_] => None,
-        [first, .., last] => Some(2.0 * (last.place - first.place) / (waves.len() - 1) as f64),
+        [first, .., last] => {
+            Some(2.0 * (last.arc_length - first.arc_length) / (waves.len() - 1) as f64)
+        }
     }
+}
+
+crate::renamed! {
+    Hand => Handedness,
+    Vein => VeinUndulation,
 }

@@ -14,12 +14,12 @@ pub const GROUP: usize = 4;
 /// The numbers of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(32))]
-pub struct Four(pub [f64; GROUP]);
+pub struct NumberGroup(pub [f64; GROUP]);
 
-impl Four {
+impl NumberGroup {
     /// The same number everywhere.
     pub fn splat(value: f64) -> Self {
-        Four([value; GROUP])
+        NumberGroup([value; GROUP])
     }
 
     /// Sum of all.
@@ -29,7 +29,7 @@ impl Four {
 }
 
 /// Largest number of lanes of an instruction.
-pub const WIDTH: usize = 8;
+pub const MAX_LANES: usize = 8;
 
 /// The widest instructions available.
 pub fn widest_arch() -> Arch {
@@ -37,16 +37,16 @@ pub fn widest_arch() -> Arch {
 }
 
 /// A loop over groups.
-pub trait Kernel {
+pub trait GroupKernel {
     /// Processes the lanes from `part` on, as many as an instruction has.
     fn run<S: Simd>(&mut self, simd: S, part: usize);
 }
 
 /// Runs a loop with the instructions of `arch` or, if these are wider than a group, with the
 /// widest that are not.
-pub fn run(arch: Arch, kernel: &mut impl Kernel) {
+pub fn run(arch: Arch, kernel: &mut impl GroupKernel) {
     struct Parts<'a, K>(&'a mut K);
-    impl<K: Kernel> pulp::WithSimd for Parts<'_, K> {
+    impl<K: GroupKernel> pulp::WithSimd for Parts<'_, K> {
         type Output = ();
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
@@ -90,7 +90,10 @@ pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64
 /// The same part of several arrays. (Written out, as compilers do not inline `map` here:
 /// measured at a twentieth of the time of short rods.)
 #[inline(always)]
-pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize)) -> [&[f64]; K] {
+pub fn array_chunks<const K: usize>(
+    arrays: &[impl AsRef<[f64]>; K],
+    place: (usize, usize),
+) -> [&[f64]; K] {
     let mut parts: [&[f64]; K] = [&[]; K];
     for k in 0..K {
         parts[k] = slice(arrays[k].as_ref(), place);
@@ -100,7 +103,10 @@ pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize
 
 /// The same part of three arrays, mutably.
 #[inline(always)]
-pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&mut [f64]; 3] {
+pub fn array_chunks_mut(
+    arrays: &mut [impl AsMut<[f64]>; 3],
+    place: (usize, usize),
+) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;
     [
         slice_mut(x.as_mut(), place),
@@ -126,7 +132,7 @@ impl<S: Simd> Lanes<S> {
 
     /// Another value for the same instructions.
     #[inline(always)]
-    fn with(self, v: S::f64s) -> Self {
+    fn with_value(self, v: S::f64s) -> Self {
         Lanes { v, ..self }
     }
 
@@ -146,57 +152,57 @@ impl<S: Simd> Lanes<S> {
 
     /// Reads a group from the lane `part` on.
     #[inline(always)]
-    pub fn of(simd: S, group: &Four, part: usize) -> Self {
+    pub fn load_group(simd: S, group: &NumberGroup, part: usize) -> Self {
         Lanes::load(simd, &group.0, part)
     }
 
     /// Writes a group from the lane `part` on.
     #[inline(always)]
-    pub fn put(self, group: &mut Four, part: usize) {
+    pub fn store_group(self, group: &mut NumberGroup, part: usize) {
         self.store(&mut group.0, part);
     }
 
     /// `self` where `test` is positive, `otherwise` elsewhere and where `test` is NaN.
     #[inline(always)]
-    pub fn where_positive(self, test: Self, otherwise: Self) -> Self {
+    pub fn select_where_positive(self, test: Self, otherwise: Self) -> Self {
         let zero = self.simd.splat_f64s(0.0);
         let positive = self.simd.less_than_f64s(zero, test.v);
-        self.with(self.simd.select_f64s(positive, self.v, otherwise.v))
+        self.with_value(self.simd.select_f64s(positive, self.v, otherwise.v))
     }
 
     /// self * factor + term.
     #[inline(always)]
     pub fn mul_add(self, factor: Self, term: Self) -> Self {
-        self.with(self.simd.mul_add_e_f64s(self.v, factor.v, term.v))
+        self.with_value(self.simd.mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
     /// term - self * factor.
     #[inline(always)]
     pub fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        self.with(self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v))
+        self.with_value(self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
     /// 1 / self.
     #[inline(always)]
     pub fn recip(self) -> Self {
         let one = self.simd.splat_f64s(1.0);
-        self.with(self.simd.div_f64s(one, self.v))
+        self.with_value(self.simd.div_f64s(one, self.v))
     }
 
     /// The larger of two sizes; infinite where one of them is not a number.
     #[inline(always)]
-    pub fn larger(self, other: Self) -> Self {
+    pub fn larger_or_infinite(self, other: Self) -> Self {
         let sum = (self + other).v;
         let known = self.simd.equal_f64s(sum, sum);
         let most = self.simd.max_f64s(self.v, other.v);
         let infinite = self.simd.splat_f64s(f64::INFINITY);
-        self.with(self.simd.select_f64s(known, most, infinite))
+        self.with_value(self.simd.select_f64s(known, most, infinite))
     }
 
     /// The larger one, where both are numbers.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        self.with(self.simd.max_f64s(self.v, other.v))
+        self.with_value(self.simd.max_f64s(self.v, other.v))
     }
 
     /// The largest of all.
@@ -208,18 +214,18 @@ impl<S: Simd> Lanes<S> {
     /// Square root.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        self.with(self.simd.sqrt_f64s(self.v))
+        self.with_value(self.simd.sqrt_f64s(self.v))
     }
 
     /// Applies `f` to every number.
     #[inline(always)]
     pub fn each(self, f: impl Fn(f64) -> f64) -> Self {
-        let mut numbers = Four::default();
+        let mut numbers = NumberGroup::default();
         self.store(&mut numbers.0[..S::F64_LANES], 0);
         for number in &mut numbers.0[..S::F64_LANES] {
             *number = f(*number);
         }
-        Lanes::of(self.simd, &numbers, 0)
+        Lanes::load_group(self.simd, &numbers, 0)
     }
 
     /// The smallest of all.
@@ -273,7 +279,7 @@ macro_rules! lanes_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.with(self.simd.$instruction(self.v, other.v))
+                self.with_value(self.simd.$instruction(self.v, other.v))
             }
         }
     };
@@ -291,7 +297,7 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.with(self.simd.neg_f64s(self.v))
+        self.with_value(self.simd.neg_f64s(self.v))
     }
 }
 
@@ -388,7 +394,7 @@ impl<S: Simd> Vectors<S> {
 
     /// self - a x b.
     #[inline(always)]
-    pub fn less_cross(self, a: Self, b: Self) -> Self {
+    pub fn subtract_cross(self, a: Self, b: Self) -> Self {
         Vectors::new(
             a.y.neg_mul_add(b.z, a.z.mul_add(b.y, self.x)),
             a.z.neg_mul_add(b.x, a.x.mul_add(b.z, self.y)),
@@ -398,7 +404,7 @@ impl<S: Simd> Vectors<S> {
 
     /// The vector with these components along `directors`.
     #[inline(always)]
-    pub fn along(self, directors: [Self; 3]) -> Self {
+    pub fn from_director_components(self, directors: [Self; 3]) -> Self {
         let [d1, d2, d3] = directors;
         d1.mul_add(self.x, d2.mul_add(self.y, d3.scale(self.z)))
     }
@@ -411,7 +417,7 @@ impl<S: Simd> Vectors<S> {
 
     /// The components along `directors`.
     #[inline(always)]
-    pub fn onto(self, directors: [Self; 3]) -> Self {
+    pub fn director_components(self, directors: [Self; 3]) -> Self {
         let [d1, d2, d3] = directors;
         Vectors::new(d1.dot(self), d2.dot(self), d3.dot(self))
     }
@@ -421,9 +427,9 @@ impl<S: Simd> Vectors<S> {
     pub fn gather(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
         let [a, b, c, d] = vectors;
         Vectors::new(
-            Lanes::of(simd, &Four([a.x, b.x, c.x, d.x]), part),
-            Lanes::of(simd, &Four([a.y, b.y, c.y, d.y]), part),
-            Lanes::of(simd, &Four([a.z, b.z, c.z, d.z]), part),
+            Lanes::load_group(simd, &NumberGroup([a.x, b.x, c.x, d.x]), part),
+            Lanes::load_group(simd, &NumberGroup([a.y, b.y, c.y, d.y]), part),
+            Lanes::load_group(simd, &NumberGroup([a.z, b.z, c.z, d.z]), part),
         )
     }
 
@@ -492,7 +498,7 @@ mod tests {
 
     struct Count(usize);
 
-    impl Kernel for Count {
+    impl GroupKernel for Count {
         fn run<S: Simd>(&mut self, _: S, _: usize) {
             self.0 += 1;
         }
@@ -519,7 +525,7 @@ mod tests {
     fn a_lane_that_is_no_number_stays_the_largest() {
         let largest = |sizes: [f64; 3]| {
             let [a, b, c] = sizes.map(Lanes::from);
-            f64::from(a.larger(b).larger(c))
+            f64::from(a.larger_or_infinite(b).larger_or_infinite(c))
         };
         assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
         for at in 0..3 {

@@ -11,7 +11,7 @@ const PAGE: Option<&str> = Some(include_str!("../../web/dist/live.html"));
 const PAGE: Option<&str> = None;
 
 /// Where a scenario stands in it.
-const GIVEN: &str = "<script id=\"given\" type=\"application/json\">null</script>";
+const SCENARIO_PLACEHOLDER: &str = "<script id=\"given\" type=\"application/json\">null</script>";
 
 /// Why there is no page.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
@@ -19,11 +19,11 @@ const GIVEN: &str = "<script id=\"given\" type=\"application/json\">null</script
     "this program was built without the live page: run web/build.sh and build it again with --features live, \
      or open web/dist/live.html and drop the scenario on it"
 )]
-pub struct NotBuilt;
+pub struct LivePageNotBuilt;
 
 /// A slider of the page: a number with the ends of its range.
 #[derive(Clone, Debug, Serialize)]
-pub struct Slider {
+pub struct LiveSlider {
     /// The path of the number.
     pub key: String,
     /// The lowest value.
@@ -39,14 +39,18 @@ pub struct Slider {
 ///
 /// # Errors
 /// If there is none.
-pub fn page(text: &str, name: &str, sliders: &[Slider]) -> Result<String, NotBuilt> {
+pub fn live_page(
+    text: &str,
+    name: &str,
+    sliders: &[LiveSlider],
+) -> Result<String, LivePageNotBuilt> {
     #[derive(Serialize)]
     struct Given<'g> {
         text: &'g str,
         name: &'g str,
-        sliders: &'g [Slider],
+        sliders: &'g [LiveSlider],
     }
-    let page = PAGE.ok_or(NotBuilt)?;
+    let page = PAGE.ok_or(LivePageNotBuilt)?;
     let given = Given {
         text,
         name,
@@ -57,7 +61,11 @@ pub fn page(text: &str, name: &str, sliders: &[Slider]) -> Result<String, NotBui
     let _ = report::write_json(&given, &mut data);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
-    Ok(page.replacen(GIVEN, &GIVEN.replace("null", &data), 1))
+    Ok(page.replacen(
+        SCENARIO_PLACEHOLDER,
+        &SCENARIO_PLACEHOLDER.replace("null", &data),
+        1,
+    ))
 }
 
 #[cfg(all(test, feature = "live"))]

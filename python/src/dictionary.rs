@@ -72,7 +72,7 @@ impl Document {
             let table = table.iter().cloned().collect();
             (key.clone(), Value::Table(table))
         });
-        Entries::of_table(self.top.iter().cloned().chain(tables).collect()).ok()
+        Entries::from_table(self.top.iter().cloned().chain(tables).collect()).ok()
     }
 
     /// Its text: first the entries outside of tables, then the tables, one entry per line.

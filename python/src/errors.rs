@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use leafdyn::scenario::{Key, Place, ScenarioError};
+use leafdyn::scenario::{Key, ScenarioError, SourceLocation};
 use leafdyn::study::VaryError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,8 +17,8 @@ static SCENARIO_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 /// `leafdyn.ScenarioError`, for a refused scenario.
 pub fn scenario_error(py: Python, error: &ScenarioError) -> PyErr {
     let (file, line) = match &error.place {
-        Place::File { file, line } => (Some(file.as_str()), *line),
-        Place::Set { .. } => (None, None),
+        SourceLocation::File { file, line } => (Some(file.as_str()), *line),
+        SourceLocation::Set { .. } => (None, None),
     };
     let class = match SCENARIO_ERROR.import(py, "leafdyn._errors", "ScenarioError") {
         Ok(class) => class,
@@ -45,9 +45,9 @@ fn key_of(error: &ScenarioError) -> Option<&str> {
         return Some(&rest[..end.unwrap_or(rest.len())]);
     }
     match &error.place {
-        Place::Set { given } => given.split(['[', '=']).next(),
+        SourceLocation::Set { given } => given.split(['[', '=']).next(),
         // A value in place of a table.
-        Place::File { .. } => {
+        SourceLocation::File { .. } => {
             let (start, _) = sentence.split_once(" = ")?;
             (!start.contains(": ")).then_some(start)
         }
@@ -86,8 +86,8 @@ fn remedy(sentence: &str) -> Option<&str> {
 /// The exception for an entry of a dictionary, or of `set`, that cannot be converted to TOML.
 pub fn entry_error(py: Python, key: &str, in_set: bool, problem: String) -> PyErr {
     let place = match in_set {
-        true => Place::Set { given: key.into() },
-        false => Place::File {
+        true => SourceLocation::Set { given: key.into() },
+        false => SourceLocation::File {
             file: TEXT.into(),
             line: None,
         },

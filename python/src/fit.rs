@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use leafdyn::scenario;
 use leafdyn::study::{
-    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
+    self, Data, DataReadingOptions, Experiment, FitError, FitRequest, FitStep, FreeParameter,
+    MeasuredColumn, RowFilter,
 };
 use pyo3::prelude::*;
 
@@ -64,9 +65,9 @@ pub fn fit(
     let columns: Result<Vec<MeasuredColumn>, FitError> =
         columns.iter().map(|column| column.parse()).collect();
     let columns = columns.map_err(|error| fit_error(py, error))?;
-    let rows: Result<Vec<RowChoice>, FitError> = rows.iter().map(|choice| choice.parse()).collect();
+    let rows: Result<Vec<RowFilter>, FitError> = rows.iter().map(|choice| choice.parse()).collect();
     let mut measured = Data {
-        reading: Reading {
+        reading: DataReadingOptions {
             columns: columns.clone(),
             every,
             rows: rows.map_err(|error| fit_error(py, error))?,
@@ -79,7 +80,8 @@ pub fn fit(
             .read(bytes, &name, rods)
             .map_err(|error| fit_error(py, error))?;
     }
-    let free: Result<Vec<Free>, FitError> = free.iter().map(|number| number.parse()).collect();
+    let free: Result<Vec<FreeParameter>, FitError> =
+        free.iter().map(|number| number.parse()).collect();
     let candidates: Option<Vec<Experiment>> = match candidates {
         None => None,
         Some(table) => {

@@ -1,7 +1,7 @@
 //! The live page with a scenario in it.
 
-use leafdyn::study::Keys;
-use leafdyn_program::live::{self, Slider};
+use leafdyn::study::ParameterKeys;
+use leafdyn_program::live::{self, LiveSlider};
 use pyo3::prelude::*;
 
 use crate::errors::{value_error, vary_error};
@@ -17,12 +17,13 @@ pub fn live_page(
 ) -> PyResult<String> {
     let base = scenario.base(py)?;
     for (key, ..) in &sliders {
-        let keys: Keys = key.parse().map_err(|error| vary_error(py, error))?;
-        base.value(&keys).map_err(|error| vary_error(py, error))?;
+        let keys: ParameterKeys = key.parse().map_err(|error| vary_error(py, error))?;
+        base.differentiable_value(&keys)
+            .map_err(|error| vary_error(py, error))?;
     }
     let sliders = sliders.into_iter();
-    let sliders: Vec<Slider> = sliders
-        .map(|(key, low, high, log)| Slider {
+    let sliders: Vec<LiveSlider> = sliders
+        .map(|(key, low, high, log)| LiveSlider {
             key,
             low,
             high,
@@ -34,5 +35,5 @@ pub fn live_page(
         false => base.toml(&[]).unwrap_or_default(),
     };
     let name = format!("{}.toml", base.scenario().name);
-    live::page(&text, &name, &sliders).map_err(value_error)
+    live::live_page(&text, &name, &sliders).map_err(value_error)
 }

@@ -7,10 +7,10 @@ use std::time::Instant;
 
 use leafdyn::scenario;
 use leafdyn::simulate::{
-    Frame, Moment, Options, Record, Refinement, Refused, Scheme, Simulation, Still, Stopped, film,
-    stills,
+    Frame, Options, OutputSample, Record, Refinement, Scheme, ShapeSnapshot, Simulation,
+    SimulationError, Stopped, film_indices, snapshot_indices,
 };
-use leafdyn_program::files::{Document, Recording, Selection};
+use leafdyn_program::files::{FileSelection, MotionRecording, ResultDocument};
 use leafdyn_program::page;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -50,15 +50,15 @@ impl Motion {
     }
 
     fn record(&self, state: &State, with_film: bool) -> Record {
-        let moments: Vec<Moment> = (state.frames.iter())
-            .map(|frame| Moment::of(frame, self.joined()))
+        let moments: Vec<OutputSample> = (state.frames.iter())
+            .map(|frame| OutputSample::from_frame(frame, self.joined()))
             .collect();
         let longest = self.scenario.rods.iter().map(|rod| rod.length);
-        let chosen = stills(&moments, STILLS, longest.fold(0.0, f64::max));
+        let chosen = snapshot_indices(&moments, STILLS, longest.fold(0.0, f64::max));
         let still = |moment: usize| {
             let frame = &state.frames[moment];
             let curves = (0..frame.rods).map(|rod| frame.centerline(rod).to_vec());
-            Still {
+            ShapeSnapshot {
                 moment,
                 curves: curves.collect(),
             }
@@ -68,7 +68,7 @@ impl Motion {
         if with_film {
             let nodes = state.frames.first();
             let nodes = nodes.map_or(0, |frame| frame.positions.len());
-            let film = film(state.frames.len(), nodes).into_iter();
+            let film = film_indices(state.frames.len(), nodes).into_iter();
             record.film = film.map(still).collect();
         }
         record
@@ -147,7 +147,7 @@ impl Motion {
                     stopped,
                 };
             }
-            Ok::<(), Refused>(())
+            Ok::<(), SimulationError>(())
         })?;
         followed.map_err(value_error)
     }
@@ -237,14 +237,14 @@ impl Motion {
 
     /// The page that plays them in space.
     fn page(&self, py: Python) -> String {
-        py.detach(|| page::page(&self.record(&self.state(), true), &self.scenario))
+        py.detach(|| page::html_page(&self.record(&self.state(), true), &self.scenario))
     }
 
     /// Writes the files of the program of these kinds into a folder.
     fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
-        let selection = Selection {
+        let selection = FileSelection {
             kinds: chosen(&kinds),
-            ..Selection::default()
+            ..FileSelection::default()
         };
         let written = on_pool(py, || {
             let State {
@@ -253,12 +253,13 @@ impl Motion {
                 stopped,
             } = &mut *self.state();
             let (first, others) = frames.split_first().ok_or("there are no outputs")?;
-            let mut recording = Recording::begin_with(&folder, simulation, &selection, first)?;
+            let mut recording =
+                MotionRecording::begin_with_frame(&folder, simulation, &selection, first)?;
             for frame in others {
-                recording.add(simulation, frame)?;
+                recording.add_output(simulation, frame)?;
             }
-            let record = recording.record(simulation, *stopped)?;
-            Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)
+            let record = recording.finished_record(simulation, *stopped)?;
+            Ok(recording.finish(&ResultDocument::new(&record, &self.scenario, None))?)
         })?;
         written.map_err(|error: Box<dyn Error + Send + Sync>| write_error(error))
     }

@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use leafdyn::relax::{
-    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, RodShape, Route, Settings,
+    self, CorrectionProgress, Equilibrium, Method, Options, Progress, RelaxError, RodShape, Route,
+    Settings,
 };
 use leafdyn::scenario;
-use leafdyn::study::{self, Keys, MarginProgress, SensitivityError};
+use leafdyn::study::{self, MarginProgress, ParameterKeys, SensitivityError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -111,7 +112,7 @@ impl Asked {
 pub fn reporter<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
     move |progress| {
         let (Progress::Relaxing { step, .. }
-        | Progress::Shooting(Correction {
+        | Progress::Shooting(CorrectionProgress {
             iteration: step, ..
         })) = progress;
         monitor.report(*step as f64, None, || format!("{name}: {progress}"));
@@ -219,7 +220,8 @@ pub fn relax_one(
         })?;
         found.map_err(value_error)?
     } else {
-        let keys: Result<Vec<Keys>, _> = asked.sensitivity.iter().map(|key| key.parse()).collect();
+        let keys: Result<Vec<ParameterKeys>, _> =
+            asked.sensitivity.iter().map(|key| key.parse()).collect();
         let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
         let found = run(py, progress, move |monitor| {

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use leafdyn::relax::{Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses};
 use leafdyn::scenario::{Scenario, Stress};
-use leafdyn_program::files::{self, Document, FileError, Kind, Written};
+use leafdyn_program::files::{self, FileError, FileKind, ResultDocument, WrittenResult};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -19,23 +19,23 @@ use crate::run::on_pool;
 trait Contents: Send + Sync {
     fn names(&self) -> Vec<&'static str>;
     fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>>;
-    fn save(&self, input: &Scenario, folder: &Path, kinds: &[Kind]) -> Saved;
+    fn save(&self, input: &Scenario, folder: &Path, kinds: &[FileKind]) -> Saved;
 }
 
 /// The paths of the files, or why one cannot be written.
 type Saved = Result<Vec<PathBuf>, FileError>;
 
-impl<R: Written + Send> Contents for R {
+impl<R: WrittenResult + Send> Contents for R {
     fn names(&self) -> Vec<&'static str> {
-        files::names(self)
+        files::result_file_names(self)
     }
 
     fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>> {
-        files::contents(&Document::new(self, input, None), name)
+        files::result_file_contents(&ResultDocument::new(self, input, None), name)
     }
 
-    fn save(&self, input: &Scenario, folder: &Path, kinds: &[Kind]) -> Saved {
-        files::write_all(folder, &Document::new(self, input, None), kinds)
+    fn save(&self, input: &Scenario, folder: &Path, kinds: &[FileKind]) -> Saved {
+        files::write_result_files(folder, &ResultDocument::new(self, input, None), kinds)
     }
 }
 
@@ -59,9 +59,9 @@ pub fn write_error(error: impl ToString) -> PyErr {
 }
 
 /// Kinds of files by their names.
-pub fn chosen(words: &[String]) -> Vec<Kind> {
-    let wanted = |kind: &Kind| words.iter().any(|word| word == kind.word());
-    Kind::ALL.into_iter().filter(wanted).collect()
+pub fn chosen(words: &[String]) -> Vec<FileKind> {
+    let wanted = |kind: &FileKind| words.iter().any(|word| word == kind.word());
+    FileKind::ALL.into_iter().filter(wanted).collect()
 }
 
 /// The contents of a file, made without the interpreter's lock, as pictures take long.
@@ -79,7 +79,7 @@ fn read<'py>(
 /// The kind of a file, by its name: a word that `--write` knows.
 #[pyfunction]
 pub fn kind(file: &str) -> &'static str {
-    Kind::of(file).word()
+    FileKind::from_file_name(file).word()
 }
 
 /// The files of a result.
@@ -91,7 +91,7 @@ pub struct Files {
 
 impl Files {
     /// The files of a result of the scenario `input`.
-    pub fn of(result: impl Written + Send, input: Arc<Scenario>) -> Self {
+    pub fn of(result: impl WrittenResult + Send, input: Arc<Scenario>) -> Self {
         let result = Box::new(result);
         Files { result, input }
     }
@@ -170,7 +170,7 @@ impl Leaf {
 impl Leaf {
     /// The names of the files.
     fn names(&self) -> Vec<&'static str> {
-        files::names(&self.found)
+        files::result_file_names(&self.found)
     }
 
     /// What stands in the file of this name.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use leafdyn::scenario::{self, Entries};
-use leafdyn::study::Base;
+use leafdyn::study::BaseScenario;
 use pyo3::prelude::*;
 
 use crate::dictionary::Document;
@@ -53,14 +53,14 @@ impl Source {
         // Settings of methods are not entries of the scenario, but are kept with it.
         let of_method = |entry: &String| entry.trim_start().starts_with("method.");
         if overrides.iter().any(of_method) {
-            let base = Base::of_text(self.text().into(), self.file.clone(), overrides);
+            let base = BaseScenario::from_text(self.text().into(), self.file.clone(), overrides);
             let base = base.map_err(|error| vary_error(py, error))?;
             return Ok(base.scenario().clone());
         }
         let check = |entries: &Entries| entries.replaced(overrides)?.check();
         let read = || match &self.document {
             Some(document) => document.entries(),
-            None => Entries::of_text(self.text(), &self.file).ok(),
+            None => Entries::from_text(self.text(), &self.file).ok(),
         };
         let direct = match overrides {
             [] => read().as_ref().map(check),
@@ -70,7 +70,7 @@ impl Source {
         if let Some(Ok(found)) = direct {
             return Ok(found);
         }
-        let found = Entries::of_text(self.text(), &self.file).and_then(|all| check(&all));
+        let found = Entries::from_text(self.text(), &self.file).and_then(|all| check(&all));
         found.map_err(|error| scenario_error(py, &error))
     }
 }
@@ -168,9 +168,9 @@ impl Scenario {
     }
 
     /// The scenario as a base for varied numbers.
-    pub fn base(&self, py: Python) -> PyResult<Base> {
+    pub fn base(&self, py: Python) -> PyResult<BaseScenario> {
         let (text, file) = (self.source.text().to_string(), self.source.file.clone());
-        let base = Base::of_text(text, file, &self.overrides);
+        let base = BaseScenario::from_text(text, file, &self.overrides);
         base.map_err(|error| vary_error(py, error))
     }
 }

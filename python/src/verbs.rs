@@ -6,8 +6,9 @@ use std::time::Instant;
 use leafdyn::relax::{Limit, SemiImplicit};
 use leafdyn::scenario;
 use leafdyn::study::{
-    self, BoundaryRequest, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender,
-    MOST_POINTS, Map, MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn,
+    self, BoundaryRequest, ChartError, ChartOptions, ChartProgress, CheckOptions,
+    DEFAULT_CELL_SECONDS, MOST_POINTS, Map, MapMethod, MapRequest, MapShow, SolverConfig,
+    TraceError, TraceRequest,
 };
 use pyo3::prelude::*;
 
@@ -192,7 +193,7 @@ pub fn boundary<'py>(
                 format!("{what}, {points} points, at {first:.6}, {second:.6}")
             });
         };
-        study::boundary(&request, &mut report)
+        study::trace_stability_boundary(&request, &mut report)
     })?;
     let boundary = found.map_err(|error| trace_error(py, error))?;
     let lines: PyResult<Vec<Vec<_>>> = (boundary.curves.iter())
@@ -232,7 +233,7 @@ pub fn map(
         axes?,
         methods.transpose()?,
         tolerance,
-        cell_seconds.unwrap_or(CELL_SECONDS),
+        cell_seconds.unwrap_or(DEFAULT_CELL_SECONDS),
     );
     let mut request = request.map_err(value_error)?;
     let mut map = run(py, progress, move |monitor| {
@@ -279,7 +280,7 @@ pub fn chart(
     let mut options = ChartOptions::default();
     options.seconds = seconds.unwrap_or(options.seconds);
     if let Some(words) = methods {
-        let wanted: Result<Vec<Contender>, _> = words.iter().map(|word| word.parse()).collect();
+        let wanted: Result<Vec<SolverConfig>, _> = words.iter().map(|word| word.parse()).collect();
         let wanted = wanted.or_else(|error| refuse(format!("methods = {error}")))?;
         options.contenders.retain(|who| wanted.contains(who));
     }
@@ -289,15 +290,15 @@ pub fn chart(
     let scenario = scenario.checked.clone();
     let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
-        let mut report = |turn: &Turn| {
+        let mut report = |turn: &ChartProgress| {
             monitor.report_or_end(turn.round as f64, Some(turn.rounds as f64), || {
-                let Turn {
+                let ChartProgress {
                     rods,
                     round,
                     rounds,
                     ..
                 } = turn;
-                format!("{rods} veins, {}, round {round} of {rounds}", turn.knob)
+                format!("{rods} veins, {}, round {round} of {rounds}", turn.setting)
             });
         };
         let mut chart = study::chart(&scenario, &options, &mut report)?;
@@ -308,7 +309,7 @@ pub fn chart(
         Ok::<_, ChartError>(chart)
     })?;
     let chart = found.map_err(value_error)?;
-    let (confirmed, remarks) = (chart.confirmed(), chart.remarks.clone());
+    let (confirmed, remarks) = (chart.is_reference_confirmed(), chart.remarks.clone());
     let scaling = chart.scaling.clone();
     let scaling = scaling.map(|scaling| Files::of(scaling, input.clone()));
     Ok((Files::of(chart, input), scaling, confirmed, remarks))

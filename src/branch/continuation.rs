@@ -5,16 +5,24 @@
 //! The first points of branches: the equilibrium that a relaxation found, and those beside a
 //! branch point.
 
-use crate::branch::correct::Found;
-use crate::branch::critical::{Critical, Kind, crossing_at_vertex, locate};
-use crate::branch::equations::{Equations, Stuck};
-use crate::branch::family::Family;
-use crate::branch::refine::{Doubt, Refined, on_finer, refine, refine_critical};
-use crate::branch::{Direction, Point, add, between, plus};
+use crate::branch::correct::SteppedPoint;
+use crate::branch::critical::{
+    CriticalKind, CriticalPoint, locate_critical_points, locate_pitchfork_vertex,
+};
+use crate::branch::equations::{BranchEquations, CorrectorFailure};
+use crate::branch::family::LeafFamily;
+use crate::branch::refine::{
+    ExtrapolatedPoint, VerificationFailure, on_finer, refine_critical, verify_regular_point,
+};
+use crate::branch::{
+    BranchDirection, EquilibriumPoint, add_scaled, increments_between, scaled_sum,
+};
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::numbers::larger;
 use crate::relax::accuracy::transfer::prolong;
-use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
+use crate::relax::{
+    Equilibrium, Options, SolverCounts, converge_saddle, relax, state_from_rod_shapes,
+};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -27,105 +35,105 @@ const SHORTEST: f64 = 1e-5;
 /// and the cosine of the branch's turn exceeds `STRAIGHT`.
 const GROWTH: f64 = 1.5;
 
-const FEW: usize = 4;
+const STEP_GROWTH_ITERATIONS: usize = 4;
 
-const STRAIGHT: f64 = 0.97;
+const STEP_GROWTH_COSINE: f64 = 0.97;
 
 /// A step in which the cosine of the branch's turn is below this is rejected.
-const BENT: f64 = 0.85;
+const SMALLEST_ACCEPTED_COSINE: f64 = 0.85;
 
 /// Largest distance of a point from its prediction, as a part of the step.
-const DRIFT: f64 = 0.5;
+const LARGEST_PREDICTION_ERROR: f64 = 0.5;
 
 /// A chord is parallel to the mean of the tangents at its ends up to third order. If a larger
 /// part of it than this is transverse, the step has led to another branch.
-const ACROSS: f64 = 0.1;
+const LARGEST_TRANSVERSE_FRACTION: f64 = 0.1;
 
 /// A step with more sign changes of eigenvalues than this is rejected, until it
 /// is as short as this part of the longest.
-const MOST_CHANGES: usize = 2;
+const MAX_EIGENVALUE_SIGN_CHANGES: usize = 2;
 
-const SHORT_ENOUGH: f64 = 0.02;
+const SIGN_CHANGE_STEP_FRACTION: f64 = 0.02;
 
 /// An unexplained change of the index is accepted if steps
 /// are shorter than this part of the longest.
-const UNEXPLAINED: f64 = 1e-3;
+const UNEXPLAINED_CHANGE_STEP_FRACTION: f64 = 1e-3;
 
 /// A branch that comes to within this part of a step of its first point is
-/// tested for closure, after so many points: in at most `CLOSING` corrections to the plane
+/// tested for closure, after so many points: in at most `MAX_CLOSURE_CORRECTIONS` corrections to the plane
 /// through the first point normal to the branch. The two must then agree
 /// within `SAME` (radians, lengths, fractions).
-const CLOSED: f64 = 1.0;
+const CLOSURE_TEST_DISTANCE: f64 = 1.0;
 
-const CLOSED_AFTER: usize = 8;
+const CLOSURE_TEST_POINTS: usize = 8;
 
-const CLOSING: usize = 5;
+const MAX_CLOSURE_CORRECTIONS: usize = 5;
 
-const SAME: f64 = 1e-7;
+const CLOSURE_TOLERANCE: f64 = 1e-7;
 
 /// Least number of grids for a critical point.
 const CRITICAL_GRIDS: usize = 4;
 
 /// Predicate on the points so far: whether to stop.
-type Enough<'a> = dyn Fn(&[Point]) -> bool + 'a;
+type StopCriterion<'a> = dyn Fn(&[EquilibriumPoint]) -> bool + 'a;
 
 /// How to follow a branch: step control and stopping.
 #[derive(Clone, Copy)]
-pub struct Walk<'a> {
+pub struct ContinuationOptions<'a> {
     /// The longest step; the range of the parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
-    pub longest: f64,
+    pub longest_step: f64,
     /// Largest number of points.
-    pub most: usize,
+    pub max_points: usize,
     /// Least number of grids for a critical point.
     pub critical_grids: usize,
     /// Stops the branch once it returns true.
-    pub enough: Option<&'a Enough<'a>>,
+    pub stop_criterion: Option<&'a StopCriterion<'a>>,
 }
 
-impl Walk<'_> {
+impl ContinuationOptions<'_> {
     /// Without a stopping criterion.
     pub fn new(longest: f64, most: usize) -> Self {
-        Walk {
-            longest,
-            most,
+        ContinuationOptions {
+            longest_step: longest,
+            max_points: most,
             critical_grids: CRITICAL_GRIDS,
-            enough: None,
+            stop_criterion: None,
         }
     }
 }
 
 /// How a branch ended, or a boundary on one of its sides.
 #[derive(Clone, Debug, PartialEq)]
-pub enum End {
+pub enum BranchEnd {
     /// At the end of the range; of a boundary, at an end of one of the ranges.
-    Reached,
+    RangeEndReached,
     /// Back at the start of the range.
-    Returned,
+    RangeStartReached,
     /// Where it began.
-    Closed,
+    LoopClosed,
     /// On a boundary that was followed before.
-    Met,
+    KnownBoundaryMet,
     /// After as many points as were allowed.
-    MostPoints,
+    PointLimitReached,
     /// Where the stopping criterion was met.
-    Enough,
+    StopCriterionMet,
     /// Where it loses its stability, as requested.
-    Unstable,
+    StabilityLost,
     /// Where the limit of the run was reached.
-    Stopped,
+    RunLimitReached,
     /// The step could not be made however short.
-    Stuck(Stuck),
+    StepFailed(CorrectorFailure),
     /// The next point is not verified on any grid up to the finest.
-    Unverified(Doubt),
+    PointUnverified(VerificationFailure),
 }
 
-impl End {
+impl BranchEnd {
     /// That of a branch which has reached this end of the range.
-    fn at_edge(edge: f64) -> Self {
+    fn at_range_end(edge: f64) -> Self {
         match edge {
-            1.0 => End::Reached,
-            _ => End::Returned,
+            1.0 => BranchEnd::RangeEndReached,
+            _ => BranchEnd::RangeStartReached,
         }
     }
 }
@@ -134,18 +142,18 @@ impl End {
 #[derive(Clone, Debug)]
 pub struct Branch {
     /// Its points, in order.
-    pub points: Vec<Point>,
+    pub points: Vec<EquilibriumPoint>,
     /// Critical points, each with the number of the point before it.
-    pub critical: Vec<(usize, Critical)>,
+    pub critical: Vec<(usize, CriticalPoint)>,
     /// Changes of the index that could not be located, by the number of the point before.
-    pub missed: Vec<usize>,
+    pub unlocated_index_changes: Vec<usize>,
     /// Vertices of pitchforks at which no branch was found to cross, by the number of the point
     /// before.
-    pub unmet: Vec<usize>,
+    pub unmatched_vertices: Vec<usize>,
     /// How it ended, once it has.
-    pub end: Option<End>,
+    pub end: Option<BranchEnd>,
     /// The first point on the present grid, if it was found there.
-    first: Option<Point>,
+    first: Option<EquilibriumPoint>,
     /// Length of the next step, and of all previous ones.
     step: f64,
     steps: Vec<f64>,
@@ -154,28 +162,28 @@ pub struct Branch {
 /// Follows a branch on one grid from its first point in the direction of its
 /// tangent, as long as the parameter is within its range. `progress` is called after
 /// each point with the number of points and the parameter.
-pub fn walk(
-    equations: &mut Equations,
-    first: Point,
-    how: &Walk,
+pub fn follow_branch(
+    equations: &mut BranchEquations,
+    first: EquilibriumPoint,
+    how: &ContinuationOptions,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Branch {
     let mut branch = Branch::new(first, how);
-    branch.extend_to(equations, how, how.most, progress);
+    branch.extend_to(equations, how, how.max_points, progress);
     branch
 }
 
 impl Branch {
     /// A branch with one point.
-    pub fn new(first: Point, how: &Walk) -> Self {
+    pub fn new(first: EquilibriumPoint, how: &ContinuationOptions) -> Self {
         Branch {
             points: vec![first.clone()],
             critical: Vec::new(),
-            missed: Vec::new(),
-            unmet: Vec::new(),
+            unlocated_index_changes: Vec::new(),
+            unmatched_vertices: Vec::new(),
             end: None,
             first: Some(first),
-            step: FIRST * how.longest,
+            step: FIRST * how.longest_step,
             steps: Vec::new(),
         }
     }
@@ -183,28 +191,31 @@ impl Branch {
     /// Continues until there are `until` points, or the branch ends.
     pub fn extend_to(
         &mut self,
-        equations: &mut Equations,
-        how: &Walk,
+        equations: &mut BranchEquations,
+        how: &ContinuationOptions,
         until: usize,
         progress: &mut dyn FnMut(usize, f64),
     ) {
-        while self.end.is_none() && self.points.len() < until.min(how.most) {
+        while self.end.is_none() && self.points.len() < until.min(how.max_points) {
             if equations.leaves.family.limit.reached() {
-                self.end = Some(End::Stopped);
+                self.end = Some(BranchEnd::RunLimitReached);
                 return;
             }
-            if how.enough.is_some_and(|enough| enough(&self.points)) {
-                self.end = Some(End::Enough);
+            if how
+                .stop_criterion
+                .is_some_and(|enough| enough(&self.points))
+            {
+                self.end = Some(BranchEnd::StopCriterionMet);
                 return;
             }
             if let Err(stuck) = self.try_step(equations, how) {
-                self.end = Some(End::Stuck(stuck));
+                self.end = Some(BranchEnd::StepFailed(stuck));
             }
             let now = &self.points[self.points.len() - 1];
             progress(self.points.len(), now.fraction);
         }
-        if self.end.is_none() && self.points.len() >= how.most {
-            self.end = Some(End::MostPoints);
+        if self.end.is_none() && self.points.len() >= how.max_points {
+            self.end = Some(BranchEnd::PointLimitReached);
         }
     }
 
@@ -216,14 +227,14 @@ impl Branch {
         self.points.truncate(to + 1);
         self.steps.truncate(to);
         self.critical.retain(|(after, _)| *after < to);
-        self.missed.retain(|after| *after < to);
-        self.unmet.retain(|after| *after < to);
+        self.unlocated_index_changes.retain(|after| *after < to);
+        self.unmatched_vertices.retain(|after| *after < to);
         self.end = None;
     }
 
     /// Whether it ended where a branch is known as far as requested.
     pub fn is_complete(&self) -> bool {
-        self.end.as_ref().is_some_and(End::complete)
+        self.end.as_ref().is_some_and(BranchEnd::is_complete)
     }
 
     pub fn shorten(&mut self, part: f64) {
@@ -235,7 +246,10 @@ impl Branch {
         self.points.remove(number);
         self.steps[number - 1] += self.steps.remove(number);
         let after = self.critical.iter_mut().map(|(after, _)| after);
-        for after in after.chain(&mut self.missed).chain(&mut self.unmet) {
+        for after in after
+            .chain(&mut self.unlocated_index_changes)
+            .chain(&mut self.unmatched_vertices)
+        {
             *after -= usize::from(*after >= number);
         }
     }
@@ -247,7 +261,7 @@ impl Branch {
     }
 
     /// Transfers the last point to the grid with all segments halved.
-    pub fn refine(&mut self, equations: &mut Equations) -> Result<(), Stuck> {
+    pub fn refine(&mut self, equations: &mut BranchEquations) -> Result<(), CorrectorFailure> {
         let last = self.points.len() - 1;
         let (_, finer) = on_finer(equations, &self.points[last])?;
         let first = self.first.take();
@@ -261,66 +275,77 @@ impl Branch {
 
     /// Makes a step from the last point, or shortens the next attempt. Fails if that
     /// is too short.
-    fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
+    fn try_step(
+        &mut self,
+        equations: &mut BranchEquations,
+        how: &ContinuationOptions,
+    ) -> Result<(), CorrectorFailure> {
         let now = &self.points[self.points.len() - 1];
         let step = self.step;
-        let found = Found::by_step(equations, now, step).and_then(|found| {
+        let found = SteppedPoint::step_from(equations, now, step).and_then(|found| {
             match how.accepts(equations, now, &found, step) {
                 true => Ok(found),
-                false => Err(Stuck::NotConverged),
+                false => Err(CorrectorFailure::NotConverged),
             }
         });
         let mut next = match found {
             Ok(found) => found,
-            Err(_) if 0.5 * step >= SHORTEST * how.longest => {
+            Err(_) if 0.5 * step >= SHORTEST * how.longest_step => {
                 self.step = 0.5 * step;
                 return Ok(());
             }
             Err(stuck) => return Err(stuck),
         };
-        let turn = equations.inner(&now.tangent, &next.point.tangent);
-        let easy = next.point.iterations <= FEW && turn > STRAIGHT;
-        let mut end = next.stop_at_edge(equations, now, step)?.map(End::at_edge);
+        let turn = equations.direction_product(&now.tangent, &next.point.tangent);
+        let easy = next.point.iterations <= STEP_GROWTH_ITERATIONS && turn > STEP_GROWTH_COSINE;
+        let mut end = next
+            .stop_at_range_end(equations, now, step)?
+            .map(BranchEnd::at_range_end);
         if let Some(first) = &self.first
             && end.is_none()
-            && self.points.len() > CLOSED_AFTER
-            && distance(first, &next.point) < CLOSED * step
-            && let Some(point) = closed_at(equations, first, &next.point, step)
+            && self.points.len() > CLOSURE_TEST_POINTS
+            && distance(first, &next.point) < CLOSURE_TEST_DISTANCE * step
+            && let Some(point) = close_branch(equations, first, &next.point, step)
         {
             next.point = point;
-            end = Some(End::Closed);
+            end = Some(BranchEnd::LoopClosed);
         }
         let turned = now.tangent.params[0] * next.point.tangent.params[0] < 0.0;
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
-            let distance = equations.inner(&chord(equations, now, &next.point), &now.tangent);
-            let found = locate(equations, now, &next.point, distance);
+            let distance = equations.direction_product(
+                &direction_between(equations, now, &next.point),
+                &now.tangent,
+            );
+            let found = locate_critical_points(equations, now, &next.point, distance);
             // If the branch turns back and no eigenvalue changes sign, it touches another one
             // where that crosses: the vertex of a pitchfork.
             let is_vertex = turned
                 && next.point.index == now.index
                 && found.as_ref().is_ok_and(|found| found.is_empty());
             let vertex =
-                is_vertex.then(|| crossing_at_vertex(equations, now, &next.point, distance));
+                is_vertex.then(|| locate_pitchfork_vertex(equations, now, &next.point, distance));
             let mut found = found.unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
-            let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
+            let folds = found
+                .iter()
+                .filter(|critical| critical.kind == CriticalKind::Fold);
             let explained = changes == next.point.index.abs_diff(now.index)
                 && (folds.count() % 2 == 1) == turned;
             if let Some(Ok(vertex)) = vertex {
                 let known = self.critical.last().map(|(_, last)| last);
-                let again = known.is_some_and(|known| known.is_at(&vertex));
+                let again = known.is_some_and(|known| known.is_same_point(&vertex));
                 found.extend((!again).then_some(vertex));
             } else if !explained {
                 // An unexplained change of the index: the step has led to another branch
                 // nearby.
-                if next.step > UNEXPLAINED * how.longest {
+                if next.step > UNEXPLAINED_CHANGE_STEP_FRACTION * how.longest_step {
                     self.step = 0.5 * next.step;
                     return Ok(());
                 }
                 match is_vertex {
-                    true => self.unmet.push(after),
-                    false => self.missed.push(after),
+                    true => self.unmatched_vertices.push(after),
+                    false => self.unlocated_index_changes.push(after),
                 }
             }
             let all = found.into_iter();
@@ -330,76 +355,98 @@ impl Branch {
         self.points.push(next.point);
         self.end = end;
         if easy {
-            self.step = (GROWTH * step).min(how.longest);
+            self.step = (GROWTH * step).min(how.longest_step);
         }
         Ok(())
     }
 }
 
-impl Walk<'_> {
+impl ContinuationOptions<'_> {
     /// Whether a step has presumably stayed on the branch.
-    fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
+    fn accepts(
+        &self,
+        equations: &BranchEquations,
+        now: &EquilibriumPoint,
+        found: &SteppedPoint,
+        step: f64,
+    ) -> bool {
         let changes = found.point.index.abs_diff(now.index);
-        equations.inner(&now.tangent, &found.point.tangent) > BENT
-            && found.drift < DRIFT * step
-            && (changes <= MOST_CHANGES || step < SHORT_ENOUGH * self.longest)
-            && transverse_part(equations, now, &found.point) < ACROSS
+        equations.direction_product(&now.tangent, &found.point.tangent) > SMALLEST_ACCEPTED_COSINE
+            && found.drift < LARGEST_PREDICTION_ERROR * step
+            && (changes <= MAX_EIGENVALUE_SIGN_CHANGES
+                || step < SIGN_CHANGE_STEP_FRACTION * self.longest_step)
+            && transverse_part(equations, now, &found.point) < LARGEST_TRANSVERSE_FRACTION
     }
 }
 
 /// The difference of two points.
-fn chord(equations: &Equations, a: &Point, b: &Point) -> Direction {
-    Direction {
-        increments: between(&a.state, &b.state, equations.first_node()),
+fn direction_between(
+    equations: &BranchEquations,
+    a: &EquilibriumPoint,
+    b: &EquilibriumPoint,
+) -> BranchDirection {
+    BranchDirection {
+        increments: increments_between(&a.state, &b.state, equations.first_node()),
         params: [b.fraction - a.fraction],
     }
 }
 
 /// The part of the chord between two points that is transverse to the mean of their
 /// tangents.
-fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
-    let mean = equations.normalised(Direction {
-        increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
+fn transverse_part(equations: &BranchEquations, a: &EquilibriumPoint, b: &EquilibriumPoint) -> f64 {
+    let mean = equations.normalize_direction(BranchDirection {
+        increments: scaled_sum(&a.tangent.increments, 1.0, &b.tangent.increments),
         params: [a.tangent.params[0] + b.tangent.params[0]],
     });
-    let mut rest = chord(equations, a, b);
-    let length = equations.inner(&rest, &rest).sqrt();
-    let along = equations.inner(&rest, &mean);
-    add(&mut rest.increments, -along, &mean.increments);
+    let mut rest = direction_between(equations, a, b);
+    let length = equations.direction_product(&rest, &rest).sqrt();
+    let along = equations.direction_product(&rest, &mean);
+    add_scaled(&mut rest.increments, -along, &mean.increments);
     rest.params[0] -= along * mean.params[0];
-    equations.inner(&rest, &rest).sqrt() / length
+    equations.direction_product(&rest, &rest).sqrt() / length
 }
 
 /// Corrects a point near the first one until both agree in parameter, shape, tangent and
 /// index; none if they do not.
-fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
+fn close_branch(
+    equations: &mut BranchEquations,
+    first: &EquilibriumPoint,
+    near: &EquilibriumPoint,
+    step: f64,
+) -> Option<EquilibriumPoint> {
     let mut near = near.clone();
-    for _ in 0..CLOSING {
-        let same = equations.inner(&near.tangent, &first.tangent);
-        if same < BENT || near.index != first.index {
+    for _ in 0..MAX_CLOSURE_CORRECTIONS {
+        let same = equations.direction_product(&near.tangent, &first.tangent);
+        if same < SMALLEST_ACCEPTED_COSINE || near.index != first.index {
             return None;
         }
-        if distance(&near, first) < SAME {
+        if distance(&near, first) < CLOSURE_TOLERANCE {
             return Some(near);
         }
-        let shift = equations.inner(&chord(equations, &near, first), &first.tangent) / same;
+        let shift = equations
+            .direction_product(&direction_between(equations, &near, first), &first.tangent)
+            / same;
         if shift.abs() > 2.0 * step {
             return None;
         }
-        let moved = (equations.moved(&near.solution(), &near.tangent, shift)).ok()?;
+        let moved =
+            (equations.displace_along_direction(&near.solution(), &near.tangent, shift)).ok()?;
         near = (equations.correct(&moved.state, moved.params[0], Some(&first.tangent))).ok()?;
     }
     None
 }
 
 /// Distance of two points: the larger of those of shape and parameter.
-fn distance(a: &Point, b: &Point) -> f64 {
-    larger(a.state.shift_to(&b.state), (a.fraction - b.fraction).abs())
+fn distance(a: &EquilibriumPoint, b: &EquilibriumPoint) -> f64 {
+    larger(
+        a.state.largest_displacement_to(&b.state),
+        (a.fraction - b.fraction).abs(),
+    )
 }
 
-impl Direction {
+impl BranchDirection {
     /// The direction in which the parameter grows.
-    pub fn growing(self) -> Self {
+    pub fn towards_larger_parameter(self) -> Self {
         match self.params[0] >= 0.0 {
             true => self,
             false => self.reversed(),
@@ -408,61 +455,61 @@ impl Direction {
 }
 
 /// The finest grid to follow a branch on, in segments and in nodes.
-const FINEST: usize = 512;
+const FINEST_CONTINUATION_GRID: usize = 512;
 
 const MOST_NODES: usize = 20_000;
 
 /// Least and largest number of points computed before they are verified in parallel.
-const FEWEST: usize = 2;
+const MIN_VERIFICATION_BATCH: usize = 2;
 
-const MOST: usize = 16;
+const MAX_VERIFICATION_BATCH: usize = 16;
 
 /// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
-const TRIES: usize = 4;
+const MAX_FINEST_GRID_ATTEMPTS: usize = 4;
 
-const SHORTER: f64 = 0.4;
+const FINEST_GRID_STEP_FACTOR: f64 = 0.4;
 
 /// Largest number of consecutive points dropped next to a critical point: that lies elsewhere
 /// on every grid, so that a point may be before it on one grid and beyond it on another.
-const DROPPED: usize = 4;
+const MAX_CONSECUTIVE_DROPPED_POINTS: usize = 4;
 
 /// From the grid on which they were found to the finest, neighbouring points move alike: the
 /// difference is at most this part of their distance plus this part of the larger displacement,
 /// plus `SMALL`. The part is large, since they are sought in different planes.
-const ALIKE: f64 = 0.8;
+const SIMILAR_DISPLACEMENT_FRACTION: f64 = 0.8;
 
-const SMALL: f64 = 1e-6;
+const NEGLIGIBLE_DISPLACEMENT_DIFFERENCE: f64 = 1e-6;
 
 /// The equations of a family on successively refined grids, each of which halves the
 /// segments of the one before.
-pub struct Grids<'a> {
-    equations: Vec<Equations<'a>>,
+pub struct NestedBranchEquations<'a> {
+    equations: Vec<BranchEquations<'a>>,
 }
 
 /// A branch with only verified points.
-pub struct Followed {
+pub struct VerifiedBranch {
     /// The branch as found on its grids.
     pub branch: Branch,
     /// How it ended.
-    pub end: End,
+    pub end: BranchEnd,
     /// Its points, extrapolated over grids.
-    pub points: Vec<Refined>,
+    pub points: Vec<ExtrapolatedPoint>,
     /// Its critical points, likewise.
-    pub critical: Vec<Refined>,
+    pub critical: Vec<ExtrapolatedPoint>,
     /// What was found of critical points beyond the last point.
-    beyond: Vec<Result<Refined, Doubt>>,
+    beyond: Vec<Result<ExtrapolatedPoint, VerificationFailure>>,
 }
 
-impl<'a> Grids<'a> {
+impl<'a> NestedBranchEquations<'a> {
     /// Starts with one grid.
-    pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
-        Grids {
-            equations: vec![Equations::new(family, grid)],
+    pub fn new(family: &'a LeafFamily<'a>, grid: Grid) -> Self {
+        NestedBranchEquations {
+            equations: vec![BranchEquations::new(family, grid)],
         }
     }
 
     /// The equations on the grid of a state, which must be one of these.
-    pub fn of(&mut self, state: &State) -> &mut Equations<'a> {
+    pub fn on_grid_of(&mut self, state: &State) -> &mut BranchEquations<'a> {
         let level = (state.segments() / self.equations[0].grid().segments()).ilog2();
         &mut self.equations[level as usize]
     }
@@ -470,7 +517,7 @@ impl<'a> Grids<'a> {
     /// Creates the next finer grid if needed; false if that is too fine.
     fn refine(&mut self, state: &State) -> bool {
         let finer = 2 * state.segments();
-        if finer > FINEST || finer * state.rods() > MOST_NODES {
+        if finer > FINEST_CONTINUATION_GRID || finer * state.rods() > MOST_NODES {
             return false;
         }
         let last = &self.equations[self.equations.len() - 1];
@@ -492,23 +539,23 @@ impl<'a> Grids<'a> {
     /// and the parameter.
     pub fn follow(
         &mut self,
-        first: Point,
-        how: &Walk,
+        first: EquilibriumPoint,
+        how: &ContinuationOptions,
         accuracy: f64,
         progress: &mut dyn FnMut(usize, f64),
-    ) -> Followed {
-        let mut known = Followed {
+    ) -> VerifiedBranch {
+        let mut known = VerifiedBranch {
             branch: Branch::new(first, how),
-            end: End::MostPoints,
+            end: BranchEnd::PointLimitReached,
             points: Vec::new(),
             critical: Vec::new(),
             beyond: Vec::new(),
         };
-        let (mut ahead, mut tries) = (MOST / 2, 0);
+        let (mut ahead, mut tries) = (MAX_VERIFICATION_BATCH / 2, 0);
         loop {
             let now = &known.branch.points[known.branch.points.len() - 1];
             let (before, now) = (known.points.len(), now.state.clone());
-            let equations = self.of(&now);
+            let equations = self.on_grid_of(&now);
             (known.branch).extend_to(equations, how, before + ahead, progress);
             let leaves = &equations.leaves;
             let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
@@ -518,33 +565,46 @@ impl<'a> Grids<'a> {
             if leaves.family.limit.reached() && !(doubt.is_none() && known.branch.is_complete()) {
                 let last = known.points.len().saturating_sub(1);
                 known.branch.truncate_at(last);
-                known.end = End::Stopped;
+                known.end = BranchEnd::RunLimitReached;
                 return known;
             }
             match (doubt, &known.branch.end) {
                 (None, None) => {
-                    ahead = (2 * ahead).min(MOST);
+                    ahead = (2 * ahead).min(MAX_VERIFICATION_BATCH);
                     continue;
                 }
                 (Some(_), _)
-                | (None, Some(End::Stuck(Stuck::NotConverged | Stuck::Unresolved))) => {}
+                | (
+                    None,
+                    Some(BranchEnd::StepFailed(
+                        CorrectorFailure::NotConverged | CorrectorFailure::Unresolved,
+                    )),
+                ) => {}
                 (None, Some(end)) => {
                     known.end = end.clone();
                     return known;
                 }
             }
             let end = known.branch.end.clone();
-            ahead = FEWEST;
+            ahead = MIN_VERIFICATION_BATCH;
             tries += 1;
             let last = known.points.len().saturating_sub(1);
             known.branch.truncate_at(last);
             let here = known.branch.points[last].state.clone();
-            let refined = self.refine(&here) && known.branch.refine(self.of(&here)).is_ok();
-            known.branch.shorten(if refined { 1.0 } else { SHORTER });
-            if !refined && (tries > TRIES || known.points.is_empty() || doubt.is_none()) {
+            let refined = self.refine(&here) && known.branch.refine(self.on_grid_of(&here)).is_ok();
+            known.branch.shorten(if refined {
+                1.0
+            } else {
+                FINEST_GRID_STEP_FACTOR
+            });
+            if !refined
+                && (tries > MAX_FINEST_GRID_ATTEMPTS || known.points.is_empty() || doubt.is_none())
+            {
                 known.end = match (doubt, end) {
                     (None, Some(end)) => end,
-                    (doubt, _) => End::Unverified(doubt.unwrap_or(Doubt::Unsolved)),
+                    (doubt, _) => {
+                        BranchEnd::PointUnverified(doubt.unwrap_or(VerificationFailure::Unsolved))
+                    }
                 };
                 return known;
             }
@@ -552,23 +612,24 @@ impl<'a> Grids<'a> {
     }
 }
 
-impl Followed {
+impl VerifiedBranch {
     /// Verifies the remaining points, all on one grid; stops at the first that
     /// fails, and returns why.
     fn verify(
         &mut self,
-        family: &Family,
+        family: &LeafFamily,
         grid: &Grid,
         (accuracy, grids): (f64, usize),
-    ) -> Option<Doubt> {
+    ) -> Option<VerificationFailure> {
         let mut singular = std::mem::take(&mut self.beyond);
         let critical = &self.branch.critical[self.critical.len() + singular.len()..];
         let points = &self.branch.points[self.points.len()..];
         // Points and critical points in one list, to keep all threads busy.
-        let mut found: Vec<Result<Refined, Doubt>> = (0..points.len() + critical.len())
+        let mut found: Vec<Result<ExtrapolatedPoint, VerificationFailure>> = (0..points.len()
+            + critical.len())
             .into_par_iter()
             .map(|k| match points.get(k) {
-                Some(point) => refine(family, grid, point, accuracy),
+                Some(point) => verify_regular_point(family, grid, point, accuracy),
                 None => {
                     let critical = &critical[k - points.len()].1;
                     refine_critical(family, grid, critical, accuracy, grids)
@@ -576,14 +637,14 @@ impl Followed {
             })
             .collect();
         singular.append(&mut found.split_off(points.len()));
-        self.forget_vertices(&mut singular);
+        self.drop_unverified_vertices(&mut singular);
         let mut critical = singular.into_iter();
         let mut dropped = 0;
         for point in found {
             let number = self.points.len();
             let near = number > 0 && self.branch.is_near_critical(number);
-            let near = near && matches!(point, Err(Doubt::OtherIndex));
-            if near && dropped < DROPPED {
+            let near = near && matches!(point, Err(VerificationFailure::OtherIndex));
+            if near && dropped < MAX_CONSECUTIVE_DROPPED_POINTS {
                 if number + 1 < self.branch.points.len() {
                     self.branch.drop_point(number);
                     dropped += 1;
@@ -599,7 +660,8 @@ impl Followed {
             let count = number
                 .checked_sub(1)
                 .map_or(0, |before| self.critical_after(before));
-            let singular: Result<Vec<Refined>, Doubt> = critical.by_ref().take(count).collect();
+            let singular: Result<Vec<ExtrapolatedPoint>, VerificationFailure> =
+                critical.by_ref().take(count).collect();
             if let Err(doubt) = self.add(point, singular) {
                 self.points.truncate(number);
                 self.critical.truncate(known);
@@ -611,12 +673,15 @@ impl Followed {
 
     /// Moves vertices of pitchforks that are not verified from the last critical points, and from
     /// what is `found` of these, to those of which no crossing branch is known.
-    fn forget_vertices(&mut self, found: &mut Vec<Result<Refined, Doubt>>) {
+    fn drop_unverified_vertices(
+        &mut self,
+        found: &mut Vec<Result<ExtrapolatedPoint, VerificationFailure>>,
+    ) {
         let known = self.critical.len();
         for k in (0..found.len()).rev() {
             if found[k].is_err() && self.branch.critical[known + k].1.is_vertex() {
                 let (after, _) = self.branch.critical.remove(known + k);
-                self.branch.unmet.push(after);
+                self.branch.unmatched_vertices.push(after);
                 drop(found.remove(k));
             }
         }
@@ -631,28 +696,28 @@ impl Followed {
     /// Adds a point with the critical points before it.
     fn add(
         &mut self,
-        point: Result<Refined, Doubt>,
-        critical: Result<Vec<Refined>, Doubt>,
-    ) -> Result<(), Doubt> {
+        point: Result<ExtrapolatedPoint, VerificationFailure>,
+        critical: Result<Vec<ExtrapolatedPoint>, VerificationFailure>,
+    ) -> Result<(), VerificationFailure> {
         let number = self.points.len();
-        if number > 0 && self.branch.missed.contains(&(number - 1)) {
-            return Err(Doubt::Unexplained);
+        if number > 0 && self.branch.unlocated_index_changes.contains(&(number - 1)) {
+            return Err(VerificationFailure::Unexplained);
         }
         let critical = critical?;
         // A point next to the range's end is on the other side of it, in truth.
-        if !critical.iter().all(Refined::is_inside) {
-            return Err(Doubt::OtherIndex);
+        if !critical.iter().all(ExtrapolatedPoint::may_be_in_range) {
+            return Err(VerificationFailure::OtherIndex);
         }
         self.critical.extend(critical);
         self.points.push(point?);
-        match number == 0 || self.displaced_alike(number) {
+        match number == 0 || self.has_similar_displacement(number) {
             true => Ok(()),
-            false => Err(Doubt::OtherBranch),
+            false => Err(VerificationFailure::OtherBranch),
         }
     }
 
     /// Whether a point and its predecessor are displaced alike on the finest grids.
-    fn displaced_alike(&self, number: usize) -> bool {
+    fn has_similar_displacement(&self, number: usize) -> bool {
         let [before, now] = [number - 1, number].map(|k| {
             let (coarse, fine) = (&self.branch.points[k].state, &self.points[k].state);
             (coarse, displacements(coarse, fine))
@@ -662,9 +727,11 @@ impl Followed {
         };
         let differences = before.1.iter().zip(&now.1).map(|(a, b)| *b - *a);
         let differences: Vec<DVec3> = differences.collect();
-        let distance = before.0.shift_to(now.0);
+        let distance = before.0.largest_displacement_to(now.0);
         largest(&differences)
-            <= ALIKE * distance + ALIKE * largest(&before.1).max(largest(&now.1)) + SMALL
+            <= SIMILAR_DISPLACEMENT_FRACTION * distance
+                + SIMILAR_DISPLACEMENT_FRACTION * largest(&before.1).max(largest(&now.1))
+                + NEGLIGIBLE_DISPLACEMENT_DIFFERENCE
     }
 }
 
@@ -682,22 +749,22 @@ const FINEST_FIRST_POINT: usize = 512;
 
 /// Largest distance between the tips of one grid and the extrapolated ones, relative to
 /// the length.
-const SAME_LEAF: f64 = 0.02;
+const SAME_TIPS_TOLERANCE: f64 = 0.02;
 
 /// A relaxation on fewer segments counts as one on this many.
-const COARSEST: usize = 8;
+const COARSEST_RELAXATION_GRID: usize = 8;
 
 /// Distances from the branch point at which the other branch is sought, in this order.
-const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+const BRANCH_SWITCHING_DISTANCES: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// Where the first of these distances leads out of the range of the parameter, it is shortened by
 /// this factor, fewer times than that.
-const NEARER: f64 = 0.3;
+const SWITCHING_DISTANCE_FACTOR: f64 = 0.3;
 
-const NEARER_TRIES: i32 = 8;
+const MAX_SWITCHING_REDUCTIONS: i32 = 8;
 
 /// Fractions of the range by which a point may be beyond an end of it, due to rounding.
-const WITHIN: f64 = 1e-12;
+const RANGE_END_ROUNDING: f64 = 1e-12;
 
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
@@ -706,16 +773,16 @@ const WITHIN: f64 = 1e-12;
 ///
 /// # Errors
 /// The failure on the finest grid, if Newton's method converges on none.
-pub fn begin<'a>(
-    family: &'a Family<'a>,
+pub fn begin_branch<'a>(
+    family: &'a LeafFamily<'a>,
     (rest, fraction): (&Equilibrium, f64),
     options: &Options,
     segments: Option<usize>,
-) -> Result<(Grids<'a>, Point), Stuck> {
-    let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
+) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
+    let coarsest = (rest.shape.stations.len() - 1).max(COARSEST_RELAXATION_GRID);
     let least = segments.unwrap_or(2 * coarsest);
     let rest_at = (rest, fraction);
-    search(family, rest_at, least, segments.is_some()).or_else(|stuck| {
+    find_first_point(family, rest_at, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();
@@ -728,9 +795,9 @@ pub fn begin<'a>(
             return Err(stuck);
         };
         let mut tips = rest.tips.iter().zip(&alone.tips);
-        let near = SAME_LEAF * family.scale().length;
+        let near = SAME_TIPS_TOLERANCE * family.scale().length;
         match tips.all(|(a, b)| a.distance(*b) < near) {
-            true => search(
+            true => find_first_point(
                 family,
                 (&alone, fraction),
                 alone.shape.stations.len() - 1,
@@ -743,27 +810,32 @@ pub fn begin<'a>(
 
 /// The first point on a grid of at least `least` segments; of any index, or on the first grid
 /// with the index of `rest`.
-fn search<'a>(
-    family: &'a Family<'a>,
+fn find_first_point<'a>(
+    family: &'a LeafFamily<'a>,
     (rest, fraction): (&Equilibrium, f64),
     least: usize,
     any_index: bool,
-) -> Result<(Grids<'a>, Point), Stuck> {
+) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
     let leaf = &family.leaf([fraction])?;
-    let mut grid = Grid::through(&rest.shape.stations, leaf.kinks());
+    let mut grid = Grid::from_stations(&rest.shape.stations, leaf.kinks());
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
-    let mut state = project(leaf, &discrete, &rest.shape.rods);
-    let mut found = Err(Stuck::NotConverged);
+    let mut state = state_from_rod_shapes(leaf, &discrete, &rest.shape.rods);
+    let mut found = Err(CorrectorFailure::NotConverged);
     loop {
         if grid.segments() >= least {
-            let mut grids = Grids::new(family, grid.clone());
+            let mut grids = NestedBranchEquations::new(family, grid.clone());
             let point = grids
-                .of(&state)
+                .on_grid_of(&state)
                 .correct(&state, fraction, None)
                 .or_else(|_| {
                     let mut system = System::new(&discrete);
-                    polish(&discrete, &mut state, &mut system, &mut Work::default());
-                    grids.of(&state).correct(&state, fraction, None)
+                    converge_saddle(
+                        &discrete,
+                        &mut state,
+                        &mut system,
+                        &mut SolverCounts::default(),
+                    );
+                    grids.on_grid_of(&state).correct(&state, fraction, None)
                 });
             match point {
                 Ok(point) => {
@@ -777,7 +849,7 @@ fn search<'a>(
                 Err(_) => {}
             }
             if grid.segments() >= FINEST_FIRST_POINT {
-                return found.and(Err(Stuck::BesideBifurcation));
+                return found.and(Err(CorrectorFailure::BesideBifurcation));
             }
         }
         state = prolong(&discrete, &state);
@@ -790,33 +862,40 @@ fn search<'a>(
 /// the first of its neutral modes, one on either side: as near as possible, but so far from the
 /// branch point that finer grids have them too, with this accuracy of their tips. A side is
 /// missing where its branch leaves the range of the parameter at once.
-pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
-    let across = critical.across(equations);
+pub fn switch_branches(
+    equations: &mut BranchEquations,
+    critical: &CriticalPoint,
+    accuracy: f64,
+) -> Vec<EquilibriumPoint> {
+    let across = critical.branching_direction(equations);
     [across.clone(), across.reversed()]
         .iter()
-        .filter_map(|direction| first_beside(equations, critical, direction, accuracy))
+        .filter_map(|direction| first_point_off_branch(equations, critical, direction, accuracy))
         .collect()
 }
 
 /// The first point of the branch that leaves a branch point in this direction, within the range.
-fn first_beside(
-    equations: &mut Equations,
-    critical: &Critical,
-    direction: &Direction,
+fn first_point_off_branch(
+    equations: &mut BranchEquations,
+    critical: &CriticalPoint,
+    direction: &BranchDirection,
     accuracy: f64,
-) -> Option<Point> {
+) -> Option<EquilibriumPoint> {
     let (family, grid) = (equations.leaves.family, equations.grid().clone());
     let mut at = |away: f64| {
-        let point = critical.beside(equations, direction, away).ok()?;
+        let point = critical
+            .equilibrium_along_direction(equations, direction, away)
+            .ok()?;
         let beyond = larger(-point.fraction, point.fraction - 1.0);
-        (beyond <= WITHIN).then_some(point)
+        (beyond <= RANGE_END_ROUNDING).then_some(point)
     };
     let mut nearest = None;
-    for (k, away) in AWAY.into_iter().enumerate() {
+    for (k, away) in BRANCH_SWITCHING_DISTANCES.into_iter().enumerate() {
         let Some(point) = at(away) else {
             if k == 0 {
                 // Over a short range the parameter changes by more than all of it there.
-                let nearer = (1..NEARER_TRIES).map(|k| away * NEARER.powi(k));
+                let nearer =
+                    (1..MAX_SWITCHING_REDUCTIONS).map(|k| away * SWITCHING_DISTANCE_FACTOR.powi(k));
                 let found = nearer.into_iter().find_map(&mut at);
                 if found.is_some() {
                     return found;
@@ -824,7 +903,7 @@ fn first_beside(
             }
             continue;
         };
-        if refine(family, &grid, &point, accuracy).is_ok() {
+        if verify_regular_point(family, &grid, &point, accuracy).is_ok() {
             return Some(point);
         }
         nearest = nearest.or(Some(point));

@@ -3,70 +3,75 @@
 //! One step along a branch, which may end where the range of the parameter does.
 
 use crate::branch::equations::{
-    ACCURACY, Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized,
+    ACCURACY, AssembledForces, BranchEquations, CorrectorFailure, ITERATIONS,
+    LARGEST_CORRECTOR_INCREMENT, factorize_matrix, has_converged,
 };
-use crate::branch::family::{OutOfRange, clamp, rate};
+use crate::branch::family::{OutOfRange, force_parameter_derivative, place_supports};
 use crate::branch::{
-    Direction, Point, Solution, add, at_same_nodes, between, dot, is_finite, largest, plus,
+    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
+    inject_forces, is_finite, largest, scaled_sum,
 };
-use crate::leaf::{DiscreteLeaf, Field, Solved, State, System};
-use crate::newton::ForceProgress;
+use crate::leaf::{DiscreteLeaf, LinearSolveOutcome, NodalField, State, System};
+use crate::newton::ForceConvergence;
 use crate::numbers::larger;
-use crate::relax::NOISY;
+use crate::relax::NOISY_EIGENVALUE_THRESHOLD;
 use crate::relax::accuracy::transfer::prolong;
 use glam::DVec3;
 
 const CG_TOLERANCE: f64 = 1e-11;
 
 /// A step too small to change the sign of any eigenvalue, even of a nearly neutral one.
-const SAME_INDEX: f64 = 1e-9;
+const INDEX_PRESERVING_STEP: f64 = 1e-9;
 
 /// Iterations go on while an increment is at most this part of the one before, up to so many.
-const CONTRACTING: f64 = 0.5;
+const CONTRACTION_LIMIT: f64 = 0.5;
 
-const MOST_ITERATIONS: usize = 50;
+const MAX_CONTRACTING_ITERATIONS: usize = 50;
 
 /// A hyperplane in which a point is sought.
-pub(super) struct Plane {
+pub(super) struct ArclengthConstraint {
     /// Its normal: the increments times the mass matrix, per unit of the leaf's mass, and the
     /// component along the parameter.
-    pub dual: Field,
-    pub own: f64,
+    pub state_gradient: NodalField,
+    pub parameter_gradient: f64,
     /// A state in it; if none, the initial state of the search.
-    pub through: Option<State>,
+    pub reference_state: Option<State>,
 }
 
-impl Plane {
+impl ArclengthConstraint {
     /// The plane through a point normal to the branch without its parameter: a given displacement
     /// along the branch, measured by the shifts and turns of the nodes of this grid only, lest it
     /// depend on how states are interpolated.
-    pub fn across(equations: &Equations, point: &Point) -> Self {
-        let direction = equations.normalised(Direction {
+    pub fn normal_to_branch(equations: &BranchEquations, point: &EquilibriumPoint) -> Self {
+        let direction = equations.normalize_direction(BranchDirection {
             increments: point.tangent.increments.clone(),
             params: [0.0],
         });
-        Plane {
-            dual: equations.momentum(&direction.increments),
-            own: 0.0,
-            through: Some(point.state.clone()),
+        ArclengthConstraint {
+            state_gradient: equations.multiply_by_mass(&direction.increments),
+            parameter_gradient: 0.0,
+            reference_state: Some(point.state.clone()),
         }
     }
 
     /// The same on the grid with all segments halved; `leaf` is on this one.
     pub fn refined(&self, leaf: &DiscreteLeaf) -> Self {
-        Plane {
-            dual: at_same_nodes(&self.dual, leaf.first_node()),
-            own: self.own,
-            through: (self.through.as_ref()).map(|state| prolong(leaf, state)),
+        ArclengthConstraint {
+            state_gradient: inject_forces(&self.state_gradient, leaf.first_node()),
+            parameter_gradient: self.parameter_gradient,
+            reference_state: (self.reference_state.as_ref()).map(|state| prolong(leaf, state)),
         }
     }
 
     /// Signed distance of a state from it, without the parameter.
     fn distance(&self, state: &State) -> f64 {
-        let through = self.through.as_ref();
+        let through = self.reference_state.as_ref();
         through.map_or(0.0, |through| {
-            let first = state.segments() + 1 - self.dual[0].len();
-            dot(&self.dual, &between(through, state, first))
+            let first = state.segments() + 1 - self.state_gradient[0].len();
+            dot(
+                &self.state_gradient,
+                &increments_between(through, state, first),
+            )
         })
     }
 }
@@ -75,47 +80,51 @@ impl Plane {
 struct CorrectorStep {
     /// The increments that balance the forces, and the forces of the segments that complete the law
     /// of nearly rigid ones in them.
-    forces: Field,
+    forces: NodalField,
     law_forces: Vec<DVec3>,
     /// The rate of the increments with the parameter.
-    rate: Field,
+    rate: NodalField,
     /// Negative eigenvalues, if they were counted.
     counted: Option<usize>,
 }
 
-impl Equations<'_> {
+impl BranchEquations<'_> {
     /// Derivative, with respect to the parameter, of the positions of held nodes that have equations,
     /// which the forces do not contain; `None` if there are none.
-    fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
-        let leaf = &self.leaves.at([fraction])?.leaf;
-        if !leaf.is_held() && !leaf.hinged() {
+    fn support_position_rate(
+        &mut self,
+        state: &State,
+        fraction: f64,
+    ) -> Result<Option<NodalField>, OutOfRange> {
+        let leaf = &self.leaves.leaf_at([fraction])?.leaf;
+        if !leaf.has_placed_supports() && !leaf.hinged() {
             return Ok(None);
         }
         let first = self.first_node();
         let held = |step: f64| {
             let mut held = state.clone();
-            clamp(self.leaves.at([fraction + step])?, &mut held);
-            Ok(between(state, &held, first))
+            place_supports(self.leaves.leaf_at([fraction + step])?, &mut held);
+            Ok(increments_between(state, &held, first))
         };
-        rate(held).map(Some)
+        force_parameter_derivative(held).map(Some)
     }
 
     /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
     /// else by a direct factorisation, which also counts the negative eigenvalues.
     fn solve(
         &mut self,
-        at: &Solution,
-        linear: &Linear,
-        rate: &Field,
-    ) -> Result<CorrectorStep, Stuck> {
+        at: &ParametrizedState,
+        linear: &AssembledForces,
+        rate: &NodalField,
+    ) -> Result<CorrectorStep, CorrectorFailure> {
         let shift = linear.shift;
         self.factorizations += 1;
-        if self.rodwise {
+        if self.solves_rod_by_rod {
             if self.system.factorize(shift) {
-                let mut solved = |system: &mut System, rhs: &Field| {
+                let mut solved = |system: &mut System, rhs: &NodalField| {
                     system.set_rhs(rhs);
                     let found = system.solve(None, CG_TOLERANCE);
-                    matches!(found, Solved::Yes(_)).then(|| system.solution())
+                    matches!(found, LinearSolveOutcome::Converged(_)).then(|| system.solution())
                 };
                 let found = [&linear.forces, rate].map(|rhs| solved(&mut self.system, rhs));
                 if let [Some(mut forces), Some(rate)] = found {
@@ -128,12 +137,12 @@ impl Equations<'_> {
                     });
                 }
             }
-            self.rodwise = false;
+            self.solves_rod_by_rod = false;
             self.factorizations += 1;
         }
         let pattern = self.pattern(0)?;
-        let mut factor = factorized(&pattern, &self.system, shift)?;
-        let mut solved = |rhs: &Field| factor.solve_bordered(rhs, &[]).increments;
+        let mut factor = factorize_matrix(&pattern, &self.system, shift)?;
+        let mut solved = |rhs: &NodalField| factor.solve_bordered(rhs, &[]).increments;
         let [mut forces, rate] = [&linear.forces, rate].map(&mut solved);
         let (_, law_forces) =
             self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
@@ -141,7 +150,7 @@ impl Equations<'_> {
             forces,
             law_forces,
             rate,
-            counted: Some(factor.negative()),
+            counted: Some(factor.negative_eigenvalue_count()),
         })
     }
 
@@ -152,16 +161,16 @@ impl Equations<'_> {
         &mut self,
         state: &State,
         fraction: f64,
-        normal: Option<&Direction>,
-    ) -> Result<Point, Stuck> {
-        let plane = normal.map(|t| Plane {
-            dual: self.momentum(&t.increments),
-            own: t.params[0],
-            through: None,
+        normal: Option<&BranchDirection>,
+    ) -> Result<EquilibriumPoint, CorrectorFailure> {
+        let plane = normal.map(|t| ArclengthConstraint {
+            state_gradient: self.multiply_by_mass(&t.increments),
+            parameter_gradient: t.params[0],
+            reference_state: None,
         });
         let mut point = self.correct_within(state, fraction, plane.as_ref())?;
         if let Some(normal) = normal {
-            point.tangent = self.oriented(point.tangent, normal);
+            point.tangent = self.orient_direction(point.tangent, normal);
         }
         Ok(point)
     }
@@ -172,9 +181,9 @@ impl Equations<'_> {
         &mut self,
         state: &State,
         fraction: f64,
-        plane: Option<&Plane>,
-    ) -> Result<Point, Stuck> {
-        let mut now = Solution {
+        plane: Option<&ArclengthConstraint>,
+    ) -> Result<EquilibriumPoint, CorrectorFailure> {
+        let mut now = ParametrizedState {
             state: state.clone(),
             params: [fraction],
         };
@@ -182,7 +191,7 @@ impl Equations<'_> {
         let mut progress = None;
         for iterations in 1.. {
             self.check_limit()?;
-            let rates = self.rates(&now, false)?;
+            let rates = self.parameter_derivatives(&now, false)?;
             let linear = self.assemble(&mut now, false)?;
             let CorrectorStep {
                 forces,
@@ -190,39 +199,40 @@ impl Equations<'_> {
                 mut rate,
                 counted,
             } = self.solve(&now, &linear, &rates[0])?;
-            if let Some(held) = self.held_rate(&now.state, now.params[0])? {
-                add(&mut rate, 1.0, &held);
+            if let Some(held) = self.support_position_rate(&now.state, now.params[0])? {
+                add_scaled(&mut rate, 1.0, &held);
             }
             self.exclude_turn(&now, &mut rate)?;
             let step = plane.map_or(0.0, |plane| {
-                let off = plane.distance(&now.state) + dot(&plane.dual, &forces);
-                -off / (dot(&plane.dual, &rate) + plane.own)
+                let off = plane.distance(&now.state) + dot(&plane.state_gradient, &forces);
+                -off / (dot(&plane.state_gradient, &rate) + plane.parameter_gradient)
             });
-            let increments = plus(&forces, step, &rate);
+            let increments = scaled_sum(&forces, step, &rate);
             let size = larger(largest(&increments), step.abs());
-            if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
-                return Err(Stuck::NotConverged);
+            if !is_finite(&increments) || !step.is_finite() || size > LARGEST_CORRECTOR_INCREMENT {
+                return Err(CorrectorFailure::NotConverged);
             }
             now.params[0] += step;
-            let next = self.corrected(&now.state, now.params, (&increments, &law_forces))?;
+            let next =
+                self.state_after_newton_step(&now.state, now.params, (&increments, &law_forces))?;
             let progress = match &mut progress {
                 Some(progress) => progress,
-                none => none.insert(ForceProgress::new(self.leaves.at(now.params)?)),
+                none => none.insert(ForceConvergence::new(self.leaves.leaf_at(now.params)?)),
             };
-            progress.observe(size, &now.state, &next);
+            progress.record_step(size, &now.state, &next);
             now.state = next;
-            if at_rest(size, previous) && progress.at_rest(ACCURACY) {
-                clamp(self.leaves.at(now.params)?, &mut now.state);
-                let tangent = self.normalised(Direction {
+            if has_converged(size, previous) && progress.has_converged(ACCURACY) {
+                place_supports(self.leaves.leaf_at(now.params)?, &mut now.state);
+                let tangent = self.normalize_direction(BranchDirection {
                     increments: rate,
                     params: [1.0],
                 });
                 // The factorised matrix is that of the previous state.
                 let index = match counted {
-                    Some(index) if size < SAME_INDEX => index,
+                    Some(index) if size < INDEX_PRESERVING_STEP => index,
                     _ => self.index(&now)?,
                 };
-                return Ok(Point {
+                return Ok(EquilibriumPoint {
                     state: now.state,
                     fraction: now.params[0],
                     tangent,
@@ -231,24 +241,32 @@ impl Equations<'_> {
                 });
             }
             // Where the matrix is that of a softer leaf, the method converges linearly.
-            if iterations >= ITERATIONS && size > CONTRACTING * previous
-                || iterations >= MOST_ITERATIONS
+            if iterations >= ITERATIONS && size > CONTRACTION_LIMIT * previous
+                || iterations >= MAX_CONTRACTING_ITERATIONS
             {
                 break;
             }
             previous = size;
         }
-        Err(Stuck::NotConverged)
+        Err(CorrectorFailure::NotConverged)
     }
 
     /// Subtracts the turns of veins that can turn without resistance, so that a tangent does not
     /// depend on where the turns are held.
-    fn exclude_turn(&mut self, at: &Solution, increments: &mut Field) -> Result<(), OutOfRange> {
-        let mut excluded: Vec<Field> = Vec::new();
-        for mut turn in self.leaves.at(at.params)?.turns(&at.state) {
-            let without = |field: &mut Field, other: &Field| {
-                let amount = self.product(other, field) / self.product(other, other);
-                add(field, -amount, other);
+    fn exclude_turn(
+        &mut self,
+        at: &ParametrizedState,
+        increments: &mut NodalField,
+    ) -> Result<(), OutOfRange> {
+        let mut excluded: Vec<NodalField> = Vec::new();
+        for mut turn in self
+            .leaves
+            .leaf_at(at.params)?
+            .zero_energy_fields(&at.state)
+        {
+            let without = |field: &mut NodalField, other: &NodalField| {
+                let amount = self.mass_product(other, field) / self.mass_product(other, other);
+                add_scaled(field, -amount, other);
             };
             excluded.iter().for_each(|other| without(&mut turn, other));
             without(increments, &turn);
@@ -258,61 +276,69 @@ impl Equations<'_> {
     }
 
     /// Morse index of an equilibrium, without neutral modes.
-    fn index(&mut self, solution: &Solution) -> Result<usize, Stuck> {
-        let shift = self.leaves.at(solution.params)?.neutral_shift();
+    fn index(&mut self, solution: &ParametrizedState) -> Result<usize, CorrectorFailure> {
+        let shift = self.leaves.leaf_at(solution.params)?.neutral_shift();
         let index = self.index_below(solution, shift)?;
-        if shift > NOISY && index != self.index_below(solution, -shift)? {
-            return Err(Stuck::Rounding);
+        if shift > NOISY_EIGENVALUE_THRESHOLD && index != self.index_below(solution, -shift)? {
+            return Err(CorrectorFailure::Rounding);
         }
         Ok(index)
     }
 
     /// Number of eigenvalues below minus `shift`.
-    fn index_below(&mut self, solution: &Solution, shift: f64) -> Result<usize, Stuck> {
-        let leaf = self.leaves.at(solution.params)?;
+    fn index_below(
+        &mut self,
+        solution: &ParametrizedState,
+        shift: f64,
+    ) -> Result<usize, CorrectorFailure> {
+        let leaf = self.leaves.leaf_at(solution.params)?;
         let system = &mut self.system;
         self.factorizations += 1;
         system.set_coupling(leaf);
         leaf.assemble(&solution.state, system);
-        leaf.hold_turn(&solution.state, system);
-        if system.stable_without_coupling(shift) {
+        leaf.add_phase_conditions(&solution.state, system);
+        if system.is_definite_without_coupling(shift) {
             return Ok(0);
         }
         leaf.assemble(&solution.state, system);
-        leaf.hold_turn(&solution.state, system);
+        leaf.add_phase_conditions(&solution.state, system);
         self.factorizations += 1;
         let pattern = self.pattern(0)?;
-        Ok(factorized(&pattern, &self.system, shift)?.negative())
+        Ok(factorize_matrix(&pattern, &self.system, shift)?.negative_eigenvalue_count())
     }
 }
 
 /// A point found by a step.
-pub struct Found {
-    pub point: Point,
+pub struct SteppedPoint {
+    pub point: EquilibriumPoint,
     /// Length of the step along the tangent at its start.
     pub step: f64,
     /// Distance between the predicted and the corrected point.
     pub drift: f64,
 }
 
-impl Found {
+impl SteppedPoint {
     /// Makes a step of this length, or a shorter one to the end of the range: beyond the end there
     /// may be no leaf.
-    pub fn by_step(equations: &mut Equations, now: &Point, step: f64) -> Result<Self, Stuck> {
+    pub fn step_from(
+        equations: &mut BranchEquations,
+        now: &EquilibriumPoint,
+        step: f64,
+    ) -> Result<Self, CorrectorFailure> {
         match advance(equations, now, step) {
-            Err(Stuck::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
+            Err(CorrectorFailure::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
             found => found,
         }
     }
 
     /// If a step of this length leaves the range, shortens it to the end of the range;
     /// returns that end.
-    pub fn stop_at_edge(
+    pub fn stop_at_range_end(
         &mut self,
-        equations: &mut Equations,
-        now: &Point,
+        equations: &mut BranchEquations,
+        now: &EquilibriumPoint,
         step: f64,
-    ) -> Result<Option<f64>, Stuck> {
+    ) -> Result<Option<f64>, CorrectorFailure> {
         let edge = match self.point.fraction {
             1.0 if now.fraction < 1.0 => return Ok(Some(1.0)),
             0.0 if now.fraction > 0.0 => return Ok(Some(0.0)),
@@ -321,30 +347,34 @@ impl Found {
             _ => return Ok(None),
         };
         let part = (edge - now.fraction) / (self.point.fraction - now.fraction);
-        (self.point, _) = at_edge(equations, now, edge, part * step)?;
+        (self.point, _) = correct_at_range_end(equations, now, edge, part * step)?;
         self.step = part * step;
         Ok(Some(edge))
     }
 }
 
-fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
-    let near = equations.moved(&now.solution(), &now.tangent, step)?;
+fn advance(
+    equations: &mut BranchEquations,
+    now: &EquilibriumPoint,
+    step: f64,
+) -> Result<SteppedPoint, CorrectorFailure> {
+    let near = equations.displace_along_direction(&now.solution(), &now.tangent, step)?;
     let [fraction] = near.params;
     let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
     let drift = larger(
-        near.state.shift_to(&point.state),
+        near.state.largest_displacement_to(&point.state),
         (point.fraction - fraction).abs(),
     );
-    Ok(Found { point, step, drift })
+    Ok(SteppedPoint { point, step, drift })
 }
 
 /// A step to the end of the range, if one of this length would leave it.
 fn advance_to_edge(
-    equations: &mut Equations,
-    now: &Point,
+    equations: &mut BranchEquations,
+    now: &EquilibriumPoint,
     step: f64,
     out: OutOfRange,
-) -> Result<Found, Stuck> {
+) -> Result<SteppedPoint, CorrectorFailure> {
     let edge = if now.tangent.params[0] > 0.0 {
         1.0
     } else {
@@ -354,9 +384,9 @@ fn advance_to_edge(
     if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let (point, drift) = at_edge(equations, now, edge, length)?;
+    let (point, drift) = correct_at_range_end(equations, now, edge, length)?;
     let part = length / step;
-    Ok(Found {
+    Ok(SteppedPoint {
         drift: drift / part,
         point,
         step: length,
@@ -365,15 +395,16 @@ fn advance_to_edge(
 
 /// The point at an end of the range, predicted `length` along the tangent, and its distance from
 /// the prediction.
-fn at_edge(
-    equations: &mut Equations,
-    now: &Point,
+fn correct_at_range_end(
+    equations: &mut BranchEquations,
+    now: &EquilibriumPoint,
     edge: f64,
     length: f64,
-) -> Result<(Point, f64), Stuck> {
-    let state = equations.advanced(&now.state, [edge], &now.tangent.increments, length)?;
+) -> Result<(EquilibriumPoint, f64), CorrectorFailure> {
+    let state =
+        equations.state_after_increments(&now.state, [edge], &now.tangent.increments, length)?;
     let mut point = equations.correct(&state, edge, None)?;
-    point.tangent = equations.oriented(point.tangent, &now.tangent);
-    let drift = state.shift_to(&point.state);
+    point.tangent = equations.orient_direction(point.tangent, &now.tangent);
+    let drift = state.largest_displacement_to(&point.state);
     Ok((point, drift))
 }

@@ -7,14 +7,17 @@
 //! is interpolated from points on either side, and the singular point is that of the other branch,
 //! with the bordered matrix, which is regular.
 
-use crate::branch::equations::{Equations, Sample, Stuck};
+use crate::branch::equations::{BorderedLinearization, BranchEquations, CorrectorFailure};
 use crate::branch::family::eigenvalue_rounding;
-use crate::branch::{Direction, Point, add, between, combined, dot, plus, times};
-use crate::leaf::{Field, State};
+use crate::branch::{
+    BranchDirection, EquilibriumPoint, add_scaled, combine_fields, dot, increments_between,
+    scale_field, scaled_sum,
+};
+use crate::leaf::{NodalField, State};
 use crate::numbers::larger;
 
 /// Additional modes in the border: others may be nearly neutral.
-pub(super) const MORE: usize = 2;
+pub(super) const EXTRA_BORDER_MODES: usize = 2;
 
 /// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 40;
@@ -23,31 +26,31 @@ const EVALUATIONS: usize = 40;
 const ACCURACY: f64 = 1e-13;
 
 /// Differences over less than this part of a step do not give a reliable slope.
-const LOCAL: f64 = 1e-6;
+const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-6;
 
 /// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
-const NEUTRAL: f64 = 1e-6;
+const NEUTRAL_EIGENVALUE: f64 = 1e-6;
 
 /// At a zero an eigenvalue is smaller than this part of its values at the ends of the step, or than
 /// so many times its rounding error: where the step has led across a gap to another branch, it
 /// jumps.
-const CONTINUOUS: f64 = 1e-6;
+const ZERO_EIGENVALUE_FRACTION: f64 = 1e-6;
 
-const ROUNDINGS: f64 = 100.0;
+const ZERO_ROUNDING_FACTOR: f64 = 100.0;
 
 /// Zeros closer than this part of a step are the same.
-const SAME: f64 = 1e-6;
+const COINCIDENT_ZERO_TOLERANCE: f64 = 1e-6;
 
 /// The search ends within this part of the step from the point that the step reached, if both
 /// are on the same branch.
-const ARRIVES: f64 = 0.05;
+const SEARCH_END_TOLERANCE: f64 = 0.05;
 
 /// Two vertices nearer to each other than this are the same.
-const REPEATED: f64 = 1e-4;
+const SAME_VERTEX_DISTANCE: f64 = 1e-4;
 
 /// Kind of a critical point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum CriticalKind {
     /// The branch turns back in the parameter.
     Fold,
     /// Other branches cross.
@@ -56,22 +59,22 @@ pub enum Kind {
 
 /// A point of a branch at which the matrix is singular.
 #[derive(Clone, Debug)]
-pub struct Critical {
+pub struct CriticalPoint {
     pub state: State,
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    pub tangent: Direction,
-    pub kind: Kind,
+    pub tangent: BranchDirection,
+    pub kind: CriticalKind,
     /// Morse index before and after; the same at the vertex of a pitchfork.
     pub indices: [usize; 2],
     /// The neutral modes, of mass one.
-    pub modes: Vec<Field>,
+    pub modes: Vec<NodalField>,
     /// All modes used for the border.
-    pub soft: Vec<Field>,
+    pub border_modes: Vec<NodalField>,
     /// Position of the vanishing one among the sorted eigenvalues of H, and its derivative with
     /// respect to arclength along the tangent.
-    pub which: usize,
-    pub slope: f64,
+    pub eigenvalue_position: usize,
+    pub eigenvalue_slope: f64,
     /// Error of the fraction of a fold due to rounding of the forces: they balance along the
     /// neutral mode to rounding only.
     pub rounding: f64,
@@ -79,31 +82,43 @@ pub struct Critical {
 
 /// The critical points between two points of a branch, the second of them `step` along the
 /// tangent of the first.
-pub fn locate(
-    equations: &mut Equations,
-    a: &Point,
-    b: &Point,
+pub fn locate_critical_points(
+    equations: &mut BranchEquations,
+    a: &EquilibriumPoint,
+    b: &EquilibriumPoint,
     step: f64,
-) -> Result<Vec<Critical>, Stuck> {
-    let count = a.index.abs_diff(b.index) + MORE;
+) -> Result<Vec<CriticalPoint>, CorrectorFailure> {
+    let count = a.index.abs_diff(b.index) + EXTRA_BORDER_MODES;
     let soft = equations.soft_modes(a, count)?;
-    let mut search = Search {
+    let mut search = CriticalPointSearch {
         equations,
         from: a,
         soft: &soft,
-        exactly: false,
+        parameter_only: false,
     };
-    let ends = [search.at(0.0)?, search.at(step)?];
-    if ends[1].sample.solution.state.shift_to(&b.state) > ARRIVES * step {
-        return Err(Stuck::NotConverged);
+    let ends = [
+        search.eigenvalues_at_distance(0.0)?,
+        search.eigenvalues_at_distance(step)?,
+    ];
+    if ends[1]
+        .sample
+        .solution
+        .state
+        .largest_displacement_to(&b.state)
+        > SEARCH_END_TOLERANCE * step
+    {
+        return Err(CorrectorFailure::NotConverged);
     }
-    let mut found: Vec<(f64, Critical)> = Vec::new();
+    let mut found: Vec<(f64, CriticalPoint)> = Vec::new();
     for which in 0..ends[0].eigenvalues.len() {
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
-        let large = values[0].abs().max(values[1].abs()) > NEUTRAL;
+        let large = values[0].abs().max(values[1].abs()) > NEUTRAL_EIGENVALUE;
         if values[0] * values[1] < 0.0 && large {
-            let (at, critical) = search.zero(which, [0.0, step], values)?;
-            match found.iter_mut().find(|(s, _)| (s - at).abs() < SAME * step) {
+            let (at, critical) = search.find_eigenvalue_zero(which, [0.0, step], values)?;
+            match found
+                .iter_mut()
+                .find(|(s, _)| (s - at).abs() < COINCIDENT_ZERO_TOLERANCE * step)
+            {
                 Some((_, same)) => same.modes.extend(critical.modes),
                 None => found.push((at, critical)),
             }
@@ -121,42 +136,46 @@ pub fn locate(
         critical.indices = [before, after];
         before = after;
         if change > 1 {
-            critical.kind = Kind::Branching;
+            critical.kind = CriticalKind::Branching;
         }
     }
     Ok(found.into_iter().map(|(_, critical)| critical).collect())
 }
 
 /// Evaluates points along the tangent of one, and the eigenvalues of H there.
-pub(super) struct Search<'s, 'a> {
-    pub equations: &'s mut Equations<'a>,
-    pub from: &'s Point,
-    pub soft: &'s [Field],
+pub(super) struct CriticalPointSearch<'s, 'a> {
+    pub equations: &'s mut BranchEquations<'a>,
+    pub from: &'s EquilibriumPoint,
+    pub soft: &'s [NodalField],
     /// The parameter of a fold is known better than its shape.
-    pub exactly: bool,
+    pub parameter_only: bool,
 }
 
-pub(super) struct Evaluated {
-    sample: Sample,
+pub(super) struct EvaluatedEigenvalues {
+    sample: BorderedLinearization,
     pub eigenvalues: Vec<f64>,
     /// Eigenvectors of H, in the order of the eigenvalues.
     vectors: Vec<Vec<f64>>,
 }
 
 /// A parameter's work on a mode, relative to the largest possible, below which it is rounding.
-const FORCED: f64 = 1e-6;
+const ROUNDING_FORCING: f64 = 1e-6;
 
-impl Search<'_, '_> {
-    pub fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
+impl CriticalPointSearch<'_, '_> {
+    pub fn eigenvalues_at_distance(
+        &mut self,
+        distance: f64,
+    ) -> Result<EvaluatedEigenvalues, CorrectorFailure> {
         let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
-        let moved = equations.moved(&self.from.solution(), tangent, distance)?;
-        let border = equations.momenta(self.soft);
-        let sample = equations.bordered(moved, [tangent], &border, None, self.exactly)?;
+        let moved = equations.displace_along_direction(&self.from.solution(), tangent, distance)?;
+        let border = equations.multiply_all_by_mass(self.soft);
+        let sample =
+            equations.correct_bordered(moved, [tangent], &border, None, self.parameter_only)?;
         let eigen = sample.solved.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let vector = |&k: &usize| eigen.eigenvectors.column(k).iter().copied().collect();
-        Ok(Evaluated {
+        Ok(EvaluatedEigenvalues {
             eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
             vectors: order.iter().map(vector).collect(),
             sample,
@@ -164,23 +183,23 @@ impl Search<'_, '_> {
     }
 
     /// The zero of one eigenvalue by the Anderson-Bjorck method.
-    pub fn zero(
+    pub fn find_eigenvalue_zero(
         &mut self,
         which: usize,
         mut distance: [f64; 2],
         mut value: [f64; 2],
-    ) -> Result<(f64, Critical), Stuck> {
+    ) -> Result<(f64, CriticalPoint), CorrectorFailure> {
         let whole = distance[1] - distance[0];
         let largest = larger(value[0].abs(), value[1].abs());
         let mut slope = (value[1] - value[0]) / whole;
-        let mut best: Option<(f64, Evaluated)> = None;
+        let mut best: Option<(f64, EvaluatedEigenvalues)> = None;
         let (mut last, mut last_value) = (distance[1], value[1]);
         for _ in 0..EVALUATIONS {
             let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
-            let next = self.at(at)?;
+            let next = self.eigenvalues_at_distance(at)?;
             let now = next.eigenvalues[which];
             let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
-            if (at - last).abs() > LOCAL * whole {
+            if (at - last).abs() > SHORTEST_SLOPE_DIFFERENCE * whole {
                 slope = (now - last_value) / (at - last);
             }
             let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
@@ -200,30 +219,43 @@ impl Search<'_, '_> {
             }
             (distance[1], value[1]) = (at, now);
         }
-        let (at, best) = best.ok_or(Stuck::NotConverged)?;
+        let (at, best) = best.ok_or(CorrectorFailure::NotConverged)?;
         let params = best.sample.solution.params;
         let stiffest = self.equations.stiffest_condensed(params)?;
         let rounding = eigenvalue_rounding(stiffest, self.from.state.segments());
         let least = best.eigenvalues[which].abs();
-        let vanishes = least <= larger(CONTINUOUS * largest, ROUNDINGS * rounding);
+        let vanishes = least
+            <= larger(
+                ZERO_EIGENVALUE_FRACTION * largest,
+                ZERO_ROUNDING_FACTOR * rounding,
+            );
         if !vanishes {
-            return Err(Stuck::NotConverged);
+            return Err(CorrectorFailure::NotConverged);
         }
-        Ok((at, self.critical(best, which, slope)))
+        Ok((at, self.critical_point_at_zero(best, which, slope)))
     }
 
     /// The critical point from what was evaluated at a zero.
-    fn critical(&self, zero: Evaluated, which: usize, slope: f64) -> Critical {
+    fn critical_point_at_zero(
+        &self,
+        zero: EvaluatedEigenvalues,
+        which: usize,
+        slope: f64,
+    ) -> CriticalPoint {
         let (vector, sample) = (&zero.vectors[which], zero.sample);
-        let mode = combined(vector, &sample.solved.modes);
-        let norm = self.equations.product(&mode, &mode).sqrt();
+        let mode = combine_fields(vector, &sample.solved.modes);
+        let norm = self.equations.mass_product(&mode, &mode).sqrt();
         let parts = vector.iter().zip(&sample.solved.rates[0].multipliers);
         let forcing: f64 = parts.map(|(v, d)| v * d).sum();
         let rate = &sample.rates[0];
         let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
-        let fold = forcing.abs() > FORCED * most.max(slope.abs());
-        Critical {
-            kind: if fold { Kind::Fold } else { Kind::Branching },
+        let fold = forcing.abs() > ROUNDING_FORCING * most.max(slope.abs());
+        CriticalPoint {
+            kind: if fold {
+                CriticalKind::Fold
+            } else {
+                CriticalKind::Branching
+            },
             rounding: if fold {
                 sample.noise / forcing.abs()
             } else {
@@ -233,68 +265,71 @@ impl Search<'_, '_> {
             fraction: sample.solution.params[0],
             tangent: self.from.tangent.clone(),
             indices: [self.from.index; 2],
-            modes: vec![times(&mode, 1.0 / norm)],
-            soft: self.soft.to_vec(),
-            which,
-            slope,
+            modes: vec![scale_field(&mode, 1.0 / norm)],
+            border_modes: self.soft.to_vec(),
+            eigenvalue_position: which,
+            eigenvalue_slope: slope,
         }
     }
 }
 
-impl Critical {
+impl CriticalPoint {
     /// Whether the index does not change along the branch: see [`crate::branch::critical`].
     pub fn is_vertex(&self) -> bool {
         self.indices[0] == self.indices[1]
     }
 
     /// Whether this is the same point, found again after a step that the walk gave up.
-    pub fn is_at(&self, other: &Critical) -> bool {
-        let apart = self.state.shift_to(&other.state);
-        larger(apart, (self.fraction - other.fraction).abs()) < REPEATED
+    pub fn is_same_point(&self, other: &CriticalPoint) -> bool {
+        let apart = self.state.largest_displacement_to(&other.state);
+        larger(apart, (self.fraction - other.fraction).abs()) < SAME_VERTEX_DISTANCE
     }
 
     /// The same critical point on another grid or of a softened matrix, by a secant method from
     /// the known state.
-    pub fn relocated(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
-        let from = Point {
+    pub fn relocate(
+        &self,
+        equations: &mut BranchEquations,
+    ) -> Result<CriticalPoint, CorrectorFailure> {
+        let from = EquilibriumPoint {
             state: self.state.clone(),
             fraction: self.fraction,
             tangent: self.tangent.clone(),
             index: self.indices[0],
             iterations: 0,
         };
-        let mut search = Search {
+        let mut search = CriticalPointSearch {
             equations,
             from: &from,
-            soft: &self.soft,
-            exactly: self.kind == Kind::Fold,
+            soft: &self.border_modes,
+            parameter_only: self.kind == CriticalKind::Fold,
         };
         let least = match self.kind {
             // Shorter steps follow the rounding of the eigenvalue, and the parameter of a fold
             // depends on their squares.
-            Kind::Fold => {
+            CriticalKind::Fold => {
                 let stiffest = search.equations.stiffest_condensed([self.fraction])?;
                 let rounding = eigenvalue_rounding(stiffest, self.state.segments());
-                (rounding / self.slope.abs()).max(ACCURACY)
+                (rounding / self.eigenvalue_slope.abs()).max(ACCURACY)
             }
-            Kind::Branching => ACCURACY,
+            CriticalKind::Branching => ACCURACY,
         };
-        let (mut distance, mut slope) = (0.0, self.slope);
-        let mut best = search.at(distance)?;
-        let mut value = best.eigenvalues[self.which];
+        let (mut distance, mut slope) = (0.0, self.eigenvalue_slope);
+        let mut best = search.eigenvalues_at_distance(distance)?;
+        let mut value = best.eigenvalues[self.eigenvalue_position];
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || step.abs() > 1.0 {
-                return Err(Stuck::NotConverged);
+                return Err(CorrectorFailure::NotConverged);
             }
-            let next = search.at(distance + step)?;
-            let after = next.eigenvalues[self.which];
-            if step.abs() > LOCAL {
+            let next = search.eigenvalues_at_distance(distance + step)?;
+            let after = next.eigenvalues[self.eigenvalue_position];
+            if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
                 slope = (after - value) / step;
             }
             (distance, value) = (distance + step, after);
-            match after.abs() < best.eigenvalues[self.which].abs() {
+            match after.abs() < best.eigenvalues[self.eigenvalue_position].abs() {
                 true => best = next,
                 false => worse += 1,
             }
@@ -302,45 +337,46 @@ impl Critical {
                 break;
             }
         }
-        Ok(Critical {
+        Ok(CriticalPoint {
             kind: self.kind,
             indices: self.indices,
-            ..search.critical(best, self.which, slope)
+            ..search.critical_point_at_zero(best, self.eigenvalue_position, slope)
         })
     }
 
     /// The equilibrium at a distance from it along a direction, in the plane normal to that.
-    pub fn beside(
+    pub fn equilibrium_along_direction(
         &self,
-        equations: &mut Equations,
-        to: &Direction,
+        equations: &mut BranchEquations,
+        to: &BranchDirection,
         distance: f64,
-    ) -> Result<Point, Stuck> {
-        let [fraction] = to.further([self.fraction], distance);
-        let state = equations.advanced(&self.state, [fraction], &to.increments, distance)?;
+    ) -> Result<EquilibriumPoint, CorrectorFailure> {
+        let [fraction] = to.parameters_after_step([self.fraction], distance);
+        let state =
+            equations.state_after_increments(&self.state, [fraction], &to.increments, distance)?;
         equations.correct(&state, fraction, Some(to))
     }
 
     /// Derivative of the eigenvalue with respect to the parameter; infinite at a fold, where the
     /// parameter has no first-order error.
-    pub fn steepness(&self) -> f64 {
+    pub fn eigenvalue_parameter_derivative(&self) -> f64 {
         match self.kind {
-            Kind::Fold => f64::INFINITY,
-            Kind::Branching => (self.slope / self.tangent.params[0]).abs(),
+            CriticalKind::Fold => f64::INFINITY,
+            CriticalKind::Branching => (self.eigenvalue_slope / self.tangent.params[0]).abs(),
         }
     }
 
     /// A direction along which another branch may leave: the first neutral mode
     /// orthogonalised against this branch; at the vertex of a pitchfork the tangent, that of the
     /// other branch.
-    pub fn across(&self, equations: &Equations) -> Direction {
+    pub fn branching_direction(&self, equations: &BranchEquations) -> BranchDirection {
         if self.is_vertex() {
             return self.tangent.clone();
         }
         let mode = &self.modes[0];
-        let part = equations.product(&self.tangent.increments, mode);
-        equations.normalised(Direction {
-            increments: plus(mode, -part, &self.tangent.increments),
+        let part = equations.mass_product(&self.tangent.increments, mode);
+        equations.normalize_direction(BranchDirection {
+            increments: scaled_sum(mode, -part, &self.tangent.increments),
             params: [-part * self.tangent.params[0]],
         })
     }
@@ -348,32 +384,33 @@ impl Critical {
 
 /// Distances (arclength) from the vertex of a pitchfork between which the branch that crosses there
 /// is searched for its singular point.
-const BESIDE: [f64; 3] = [0.01, 0.003, 0.001];
+const VERTEX_SEARCH_DISTANCES: [f64; 3] = [0.01, 0.003, 0.001];
 
 /// The crossing is that of the vertex if it is within this part of the step from where a cubic
 /// through the points on either side has it.
-const NEAR: f64 = 0.1;
+const LARGEST_VERTEX_OFFSET: f64 = 0.1;
 
 /// The point at which a branch turns back because it crosses another one there, the vertex of a
 /// pitchfork: no eigenvalue changes its sign along this branch, but one does along the other, which
 /// goes on beyond the vertex. The points are on either side of the vertex, `step` apart; the
 /// tangent of the result is that of the other branch. Fails if that is not found.
-pub fn crossing_at_vertex(
-    equations: &mut Equations,
-    a: &Point,
-    b: &Point,
+pub fn locate_pitchfork_vertex(
+    equations: &mut BranchEquations,
+    a: &EquilibriumPoint,
+    b: &EquilibriumPoint,
     step: f64,
-) -> Result<Critical, Stuck> {
+) -> Result<CriticalPoint, CorrectorFailure> {
     let vertex = vertex_between(equations, [a, b], step)?;
-    let soft = equations.soft_modes(&vertex, 1 + MORE)?;
+    let soft = equations.soft_modes(&vertex, 1 + EXTRA_BORDER_MODES)?;
     let across = crossing_direction(equations, &vertex, &soft)?;
-    let mut stuck = Stuck::NotConverged;
-    for beside in BESIDE {
-        match crossing_beside(equations, (&vertex, &across), &soft, beside) {
+    let mut stuck = CorrectorFailure::NotConverged;
+    for beside in VERTEX_SEARCH_DISTANCES {
+        match locate_on_crossing_branch(equations, (&vertex, &across), &soft, beside) {
             Ok(mut critical) => {
-                let shift = vertex.state.shift_to(&critical.state);
+                let shift = vertex.state.largest_displacement_to(&critical.state);
                 let apart = larger(shift, (critical.fraction - vertex.fraction).abs());
-                if apart < NEAR * step && critical.kind == Kind::Branching {
+                if apart < LARGEST_VERTEX_OFFSET * step && critical.kind == CriticalKind::Branching
+                {
                     critical.indices = [a.index, b.index];
                     return Ok(critical);
                 }
@@ -387,10 +424,10 @@ pub fn crossing_at_vertex(
 /// The point between two others, `step` apart, at which the parameter of the cubic through them,
 /// with their tangents, is stationary.
 fn vertex_between(
-    equations: &mut Equations,
-    [a, b]: [&Point; 2],
+    equations: &mut BranchEquations,
+    [a, b]: [&EquilibriumPoint; 2],
     step: f64,
-) -> Result<Point, Stuck> {
+) -> Result<EquilibriumPoint, CorrectorFailure> {
     let rates = [a, b].map(|point| step * point.tangent.params[0]);
     let chord = b.fraction - a.fraction;
     // The derivative of the cubic, from one rate to the other.
@@ -405,15 +442,15 @@ fn vertex_between(
         part * (1.0 - part) * (1.0 - part),
         -part * part * (1.0 - part),
     ];
-    let mut increments = times(
-        &between(&a.state, &b.state, equations.first_node()),
+    let mut increments = scale_field(
+        &increments_between(&a.state, &b.state, equations.first_node()),
         hermite[0],
     );
-    add(&mut increments, step * hermite[1], &a.tangent.increments);
-    add(&mut increments, step * hermite[2], &b.tangent.increments);
+    add_scaled(&mut increments, step * hermite[1], &a.tangent.increments);
+    add_scaled(&mut increments, step * hermite[2], &b.tangent.increments);
     let fraction = a.fraction + hermite[0] * chord + hermite[1] * rates[0] + hermite[2] * rates[1];
-    Ok(Point {
-        state: equations.advanced(&a.state, [fraction], &increments, 1.0)?,
+    Ok(EquilibriumPoint {
+        state: equations.state_after_increments(&a.state, [fraction], &increments, 1.0)?,
         fraction,
         ..a.clone()
     })
@@ -422,14 +459,16 @@ fn vertex_between(
 /// The direction in which the other branch leaves the vertex of a pitchfork, to growing values of
 /// the parameter: that in which the neutral mode, the tangent of this branch, is not excited.
 fn crossing_direction(
-    equations: &mut Equations,
-    vertex: &Point,
-    soft: &[Field],
-) -> Result<Direction, Stuck> {
+    equations: &mut BranchEquations,
+    vertex: &EquilibriumPoint,
+    soft: &[NodalField],
+) -> Result<BranchDirection, CorrectorFailure> {
     let solution = vertex.solution();
-    let border = equations.momenta(soft);
-    let rates = equations.rates(&solution, false)?;
-    let solved = equations.sample(solution, &border, rates, false)?.solved;
+    let border = equations.multiply_all_by_mass(soft);
+    let rates = equations.parameter_derivatives(&solution, false)?;
+    let solved = equations
+        .linearize_bordered(solution, &border, rates, false)?
+        .solved;
     let eigen = solved.h.clone().symmetric_eigen();
     let neutral = eigen.eigenvalues.map(f64::abs).imin();
     let mut increments = solved.rates[0].increments.clone();
@@ -439,39 +478,42 @@ fn crossing_direction(
             let forcing: f64 = parts.map(|(v, d)| v * d).sum();
             let part = -forcing / eigen.eigenvalues[k];
             let parts: Vec<f64> = vector.iter().map(|v| part * v).collect();
-            add(&mut increments, 1.0, &combined(&parts, &solved.modes));
+            add_scaled(&mut increments, 1.0, &combine_fields(&parts, &solved.modes));
         }
     }
-    Ok(equations.normalised(Direction {
+    Ok(equations.normalize_direction(BranchDirection {
         increments,
         params: [1.0],
     }))
 }
 
 /// The singular point of a branch that has this direction at a vertex, at most so far from that.
-fn crossing_beside(
-    equations: &mut Equations,
-    (vertex, across): (&Point, &Direction),
-    soft: &[Field],
+fn locate_on_crossing_branch(
+    equations: &mut BranchEquations,
+    (vertex, across): (&EquilibriumPoint, &BranchDirection),
+    soft: &[NodalField],
     beside: f64,
-) -> Result<Critical, Stuck> {
-    let border = equations.momenta(soft);
-    let moved = equations.moved(&vertex.solution(), across, -beside)?;
-    let sample = equations.bordered(moved, [across], &border, None, false)?;
-    let from = Point {
+) -> Result<CriticalPoint, CorrectorFailure> {
+    let border = equations.multiply_all_by_mass(soft);
+    let moved = equations.displace_along_direction(&vertex.solution(), across, -beside)?;
+    let sample = equations.correct_bordered(moved, [across], &border, None, false)?;
+    let from = EquilibriumPoint {
         state: sample.solution.state,
         fraction: sample.solution.params[0],
         tangent: across.clone(),
         ..vertex.clone()
     };
-    let mut search = Search {
+    let mut search = CriticalPointSearch {
         equations,
         from: &from,
         soft,
-        exactly: false,
+        parameter_only: false,
     };
     let ends = [0.0, 2.0 * beside];
-    let [before, after] = [search.at(ends[0])?, search.at(ends[1])?];
+    let [before, after] = [
+        search.eigenvalues_at_distance(ends[0])?,
+        search.eigenvalues_at_distance(ends[1])?,
+    ];
     let values = before.eigenvalues.iter().zip(&after.eigenvalues);
     let values: Vec<[f64; 2]> = values.map(|(a, b)| [*a, *b]).collect();
     let changing: Vec<usize> = (0..values.len())
@@ -479,7 +521,7 @@ fn crossing_beside(
         .collect();
     // Eigenvalues of other modes keep their signs.
     match changing[..] {
-        [which] => Ok(search.zero(which, ends, values[which])?.1),
-        _ => Err(Stuck::NotConverged),
+        [which] => Ok(search.find_eigenvalue_zero(which, ends, values[which])?.1),
+        _ => Err(CorrectorFailure::NotConverged),
     }
 }

@@ -2,15 +2,17 @@
 //!
 //! Bordered equations of a branch: where the matrix is singular, or nearly so.
 
-pub use crate::branch::Stuck;
+pub use crate::branch::CorrectorFailure;
 use crate::branch::family::{
-    Family, Leaves, OutOfRange, advanced, clamp, forces_on, rate, stiffest_condensed,
+    LeafFamily, Leaves, OutOfRange, force_parameter_derivative, place_supports, state_after_step,
+    stiffest_condensed, unbalanced_forces,
 };
 use crate::branch::{
-    Direction, Point, Solution, add, combined, dot, is_finite, largest, plus, prolong_field, times,
+    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, combine_fields, dot,
+    is_finite, largest, prolong_field, scale_field, scaled_sum,
 };
-use crate::leaf::{Bordered, DirectSolver, Factors, Field, Grid, State, System};
-use crate::newton::{Contraction, converged};
+use crate::leaf::{BorderedSolution, DirectSolver, Grid, MatrixFactors, NodalField, State, System};
+use crate::newton::{Contraction, remaining_error};
 use crate::numbers::larger;
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
@@ -22,81 +24,81 @@ use std::sync::Arc;
 pub(super) const ITERATIONS: usize = 10;
 
 /// Largest increment (radians, lengths, fractions) of an iteration.
-pub(super) const LARGEST: f64 = 1.0;
+pub(super) const LARGEST_CORRECTOR_INCREMENT: f64 = 1.0;
 
 /// Accuracy of a point (radians, lengths).
 pub(super) const ACCURACY: f64 = 1e-10;
 
 /// Increments below this that do not shrink are due to rounding.
-const ROUNDED: f64 = 1e-8;
+const ROUNDING_INCREMENT: f64 = 1e-8;
 
 /// Rounding error of a force, in units of epsilon times the largest stiffness.
 const ROUNDING: f64 = 10.0;
 
 /// The equations of a family of leaves on a grid, with workspace.
-pub struct Equations<'a, const N: usize = 1> {
+pub struct BranchEquations<'a, const N: usize = 1> {
     /// The leaves.
     pub leaves: Leaves<'a, N>,
     /// The same with softened matrices, if these determine what is critical.
     /// Newton's method needs the true ones: near singular points of the softened it
     /// would not converge.
-    softened: Option<Leaves<'a, N>>,
+    regularized_leaves: Option<Leaves<'a, N>>,
     /// The mass of the leaf without its base.
     pub(super) mass: f64,
     pub(super) system: System,
     /// Whether the equations are solved rod by rod, which needs a positive definite matrix.
-    pub(super) rodwise: bool,
+    pub(super) solves_rod_by_rod: bool,
     /// Matrices factorised so far.
     pub factorizations: usize,
 }
 
 /// A state whose matrix is in the system.
-pub(super) struct Linear {
-    pub forces: Field,
+pub(super) struct AssembledForces {
+    pub forces: NodalField,
     /// The shift that keeps neutral modes from counting as unstable.
     pub(super) shift: f64,
     /// Rounding error of the forces.
-    pub noise: f64,
+    pub rounding_error: f64,
 }
 
-impl<'a, const N: usize> Equations<'a, N> {
+impl<'a, const N: usize> BranchEquations<'a, N> {
     /// Allocates the equations of `family` on `grid`.
-    pub fn new(family: &'a Family<'a, N>, grid: Grid) -> Self {
-        Equations::of(Leaves::new(family, grid))
+    pub fn new(family: &'a LeafFamily<'a, N>, grid: Grid) -> Self {
+        BranchEquations::from_leaves(Leaves::new(family, grid))
     }
 
-    fn of(leaves: Leaves<'a, N>) -> Self {
+    fn from_leaves(leaves: Leaves<'a, N>) -> Self {
         let system = leaves.family.system(&leaves.grid);
         let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
         let ones = vec![vec![one; system.nodes()]; system.rods()];
-        Equations {
+        BranchEquations {
             leaves,
-            softened: None,
-            mass: dot(&system.momentum(&ones), &ones),
+            regularized_leaves: None,
+            mass: dot(&system.mass_product(&ones), &ones),
             system,
-            rodwise: true,
+            solves_rod_by_rod: true,
             factorizations: 0,
         }
     }
 
     /// Fails once the limit of the run is reached.
-    pub(super) fn check_limit(&self) -> Result<(), Stuck> {
+    pub(super) fn check_limit(&self) -> Result<(), CorrectorFailure> {
         match self.leaves.family.limit.reached() {
-            true => Err(Stuck::Stopped),
+            true => Err(CorrectorFailure::Stopped),
             false => Ok(()),
         }
     }
 
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
-        Equations::of(self.leaves.refined())
+        BranchEquations::from_leaves(self.leaves.refined())
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:
     /// see [`Leaves::softened`].
-    pub(super) fn soften(&mut self, softening: f64) {
+    pub(super) fn regularize(&mut self, softening: f64) {
         let (family, grid) = (self.leaves.family, self.grid().clone());
-        self.softened = Some(Leaves::softened(family, grid, softening));
+        self.regularized_leaves = Some(Leaves::with_regularization(family, grid, softening));
     }
 
     /// The grid.
@@ -105,18 +107,18 @@ impl<'a, const N: usize> Equations<'a, N> {
     }
 
     /// Inner product of two increments over the mass matrix, per unit of the leaf's mass.
-    pub fn product(&self, a: &Field, b: &Field) -> f64 {
-        dot(&self.system.momentum(a), b) / self.mass
+    pub fn mass_product(&self, a: &NodalField, b: &NodalField) -> f64 {
+        dot(&self.system.mass_product(a), b) / self.mass
     }
 
     /// The mass matrix times increments, per unit of the leaf's mass.
-    pub fn momentum(&self, a: &Field) -> Field {
-        times(&self.system.momentum(a), 1.0 / self.mass)
+    pub fn multiply_by_mass(&self, a: &NodalField) -> NodalField {
+        scale_field(&self.system.mass_product(a), 1.0 / self.mass)
     }
 
     /// The same for each of these.
-    pub(super) fn momenta(&self, all: &[Field]) -> Vec<Field> {
-        all.iter().map(|a| self.momentum(a)).collect()
+    pub(super) fn multiply_all_by_mass(&self, all: &[NodalField]) -> Vec<NodalField> {
+        all.iter().map(|a| self.multiply_by_mass(a)).collect()
     }
 
     /// The first node of a rod with equations, with which increments begin.
@@ -129,70 +131,80 @@ impl<'a, const N: usize> Equations<'a, N> {
     }
 
     /// Inner product of two directions.
-    pub fn inner(&self, a: &Direction<N>, b: &Direction<N>) -> f64 {
+    pub fn direction_product(&self, a: &BranchDirection<N>, b: &BranchDirection<N>) -> f64 {
         let params = a.params.iter().zip(b.params).map(|(a, b)| a * b);
-        self.product(&a.increments, &b.increments) + params.sum::<f64>()
+        self.mass_product(&a.increments, &b.increments) + params.sum::<f64>()
     }
 
     /// Scales a direction to length one.
-    pub fn normalised(&self, direction: Direction<N>) -> Direction<N> {
-        let length = self.inner(&direction, &direction).sqrt();
-        Direction {
-            increments: times(&direction.increments, 1.0 / length),
+    pub fn normalize_direction(&self, direction: BranchDirection<N>) -> BranchDirection<N> {
+        let length = self.direction_product(&direction, &direction).sqrt();
+        BranchDirection {
+            increments: scale_field(&direction.increments, 1.0 / length),
             params: direction.params.map(|part| part / length),
         }
     }
 
     /// The one of two opposite directions that is more along another one.
-    pub(super) fn oriented(&self, direction: Direction<N>, along: &Direction<N>) -> Direction<N> {
-        match self.inner(&direction, along) < 0.0 {
+    pub(super) fn orient_direction(
+        &self,
+        direction: BranchDirection<N>,
+        along: &BranchDirection<N>,
+    ) -> BranchDirection<N> {
+        match self.direction_product(&direction, along) < 0.0 {
             true => direction.reversed(),
             false => direction,
         }
     }
 
     /// A direction on the grid of which this one halves all segments.
-    pub(super) fn prolonged(&self, coarse: &Direction<N>) -> Direction<N> {
-        self.normalised(Direction {
+    pub(super) fn prolong_direction(&self, coarse: &BranchDirection<N>) -> BranchDirection<N> {
+        self.normalize_direction(BranchDirection {
             increments: prolong_field(&coarse.increments, self.first_node()),
             params: coarse.params,
         })
     }
 
     /// State and parameters `step` further along a direction.
-    pub fn moved(
+    pub fn displace_along_direction(
         &mut self,
-        solution: &Solution<N>,
-        to: &Direction<N>,
+        solution: &ParametrizedState<N>,
+        to: &BranchDirection<N>,
         step: f64,
-    ) -> Result<Solution<N>, OutOfRange> {
-        let params = to.further(solution.params, step);
-        let state = self.advanced(&solution.state, params, &to.increments, step)?;
-        Ok(Solution { state, params })
+    ) -> Result<ParametrizedState<N>, OutOfRange> {
+        let params = to.parameters_after_step(solution.params, step);
+        let state = self.state_after_increments(&solution.state, params, &to.increments, step)?;
+        Ok(ParametrizedState { state, params })
     }
 
     /// A state after `step` times these increments, for the leaf at these parameters.
-    pub fn advanced(
+    pub fn state_after_increments(
         &mut self,
         state: &State,
         params: [f64; N],
-        increments: &Field,
+        increments: &NodalField,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        let (leaf, increments) = (self.leaves.at(params)?, (increments, [].as_slice()));
-        Ok(advanced(leaf, state, &mut self.system, increments, step))
+        let (leaf, increments) = (self.leaves.leaf_at(params)?, (increments, [].as_slice()));
+        Ok(state_after_step(
+            leaf,
+            state,
+            &mut self.system,
+            increments,
+            step,
+        ))
     }
 
     /// The same after a step of Newton's method, with the forces that complete the law of nearly
     /// rigid segments.
-    pub(super) fn corrected(
+    pub(super) fn state_after_newton_step(
         &mut self,
         state: &State,
         params: [f64; N],
-        step: (&Field, &[DVec3]),
+        step: (&NodalField, &[DVec3]),
     ) -> Result<State, OutOfRange> {
-        let leaf = self.leaves.at(params)?;
-        Ok(advanced(leaf, state, &mut self.system, step, 1.0))
+        let leaf = self.leaves.leaf_at(params)?;
+        Ok(state_after_step(leaf, state, &mut self.system, step, 1.0))
     }
 
     /// Completes the law of nearly rigid segments in the increments under the forces assembled at
@@ -200,11 +212,11 @@ impl<'a, const N: usize> Equations<'a, N> {
     /// it does so, and those of the segments.
     pub(super) fn complete_law(
         &mut self,
-        at: &Solution<N>,
-        increments: &mut Field,
-        solve: &mut dyn FnMut(&mut System, &Field) -> Option<Field>,
-    ) -> Result<(Option<Field>, Vec<DVec3>), OutOfRange> {
-        let leaf = self.leaves.at(at.params)?;
+        at: &ParametrizedState<N>,
+        increments: &mut NodalField,
+        solve: &mut dyn FnMut(&mut System, &NodalField) -> Option<NodalField>,
+    ) -> Result<(Option<NodalField>, Vec<DVec3>), OutOfRange> {
+        let leaf = self.leaves.leaf_at(at.params)?;
         if !leaf.is_nearly_rigid() {
             return Ok((None, Vec::new()));
         }
@@ -218,60 +230,68 @@ impl<'a, const N: usize> Equations<'a, N> {
     /// the system.
     pub(super) fn assemble(
         &mut self,
-        solution: &mut Solution<N>,
+        solution: &mut ParametrizedState<N>,
         soft: bool,
-    ) -> Result<Linear, Stuck> {
-        let leaf = chosen(&mut self.leaves, &mut self.softened, soft).at(solution.params)?;
-        clamp(leaf, &mut solution.state);
+    ) -> Result<AssembledForces, CorrectorFailure> {
+        let leaf = leaves_to_assemble(&mut self.leaves, &mut self.regularized_leaves, soft)
+            .leaf_at(solution.params)?;
+        place_supports(leaf, &mut solution.state);
         self.system.set_coupling(leaf);
-        let turn = leaf.assemble(&solution.state, &mut self.system).turn;
-        leaf.hold_turn(&solution.state, &mut self.system);
+        let turn = leaf
+            .assemble(&solution.state, &mut self.system)
+            .largest_turn;
+        leaf.add_phase_conditions(&solution.state, &mut self.system);
         if !turn.is_finite() || turn > RESOLVED_TURN {
-            return Err(Stuck::Unresolved);
+            return Err(CorrectorFailure::Unresolved);
         }
         let stiffest = stiffest_condensed(leaf).max(1.0);
-        Ok(Linear {
+        Ok(AssembledForces {
             forces: self.system.rhs(),
             shift: leaf.neutral_shift(),
-            noise: ROUNDING * f64::EPSILON * stiffest,
+            rounding_error: ROUNDING * f64::EPSILON * stiffest,
         })
     }
 
     /// The largest stiffness in stretch and shear with which segment forces are condensed out, in
     /// the matrix that determines what is singular.
     pub(super) fn stiffest_condensed(&mut self, params: [f64; N]) -> Result<f64, OutOfRange> {
-        let leaf = chosen(&mut self.leaves, &mut self.softened, true).at(params)?;
+        let leaf = leaves_to_assemble(&mut self.leaves, &mut self.regularized_leaves, true)
+            .leaf_at(params)?;
         Ok(stiffest_condensed(leaf))
     }
 
     /// Derivatives of the forces with respect to all parameters; `soft` as in
     /// [`Equations::assemble`].
-    pub(super) fn rates(
+    pub(super) fn parameter_derivatives(
         &mut self,
-        solution: &Solution<N>,
+        solution: &ParametrizedState<N>,
         soft: bool,
-    ) -> Result<Vec<Field>, OutOfRange> {
-        let leaves = chosen(&mut self.leaves, &mut self.softened, soft);
+    ) -> Result<Vec<NodalField>, OutOfRange> {
+        let leaves = leaves_to_assemble(&mut self.leaves, &mut self.regularized_leaves, soft);
         let rate_of = |which: usize| {
-            rate(|step| {
+            force_parameter_derivative(|step| {
                 let mut params = solution.params;
                 params[which] += step;
-                let leaf = leaves.at(params)?;
-                Ok(forces_on(leaf, &solution.state, &mut self.system))
+                let leaf = leaves.leaf_at(params)?;
+                Ok(unbalanced_forces(leaf, &solution.state, &mut self.system))
             })
         };
         (0..N).map(rate_of).collect()
     }
 
     /// The sparsity pattern of the matrix with so many border rows.
-    pub(super) fn pattern(&self, border: usize) -> Result<Arc<DirectSolver>, Stuck> {
-        let pattern = self.leaves.family.patterns.of(&self.system, border);
-        pattern.ok_or(Stuck::TooLarge)
+    pub(super) fn pattern(&self, border: usize) -> Result<Arc<DirectSolver>, CorrectorFailure> {
+        let pattern = self
+            .leaves
+            .family
+            .patterns
+            .pattern_of_system(&self.system, border);
+        pattern.ok_or(CorrectorFailure::TooLarge)
     }
 }
 
 /// The leaves whose matrices are assembled.
-fn chosen<'l, 'a, const N: usize>(
+fn leaves_to_assemble<'l, 'a, const N: usize>(
     leaves: &'l mut Leaves<'a, N>,
     softened: &'l mut Option<Leaves<'a, N>>,
     soft: bool,
@@ -283,22 +303,29 @@ fn chosen<'l, 'a, const N: usize>(
 }
 
 /// A direct factorisation of the assembled matrix K + `shift` M.
-pub(super) fn factorized(
+pub(super) fn factorize_matrix(
     pattern: &DirectSolver,
     system: &System,
     shift: f64,
-) -> Result<Factors, Stuck> {
+) -> Result<MatrixFactors, CorrectorFailure> {
     Ok(pattern.factorize(system, shift)?)
 }
 
 /// Whether the iteration has converged with a Newton step of this size after `previous`.
-pub(super) fn at_rest(size: f64, previous: f64) -> bool {
+pub(super) fn has_converged(size: f64, previous: f64) -> bool {
     let first = Contraction::default().error_after_first(size, 0.0);
-    converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED), first).is_some()
+    remaining_error(
+        size,
+        previous,
+        [0.0; 2],
+        (ACCURACY, ROUNDING_INCREMENT),
+        first,
+    )
+    .is_some()
 }
 
 /// Singular values below this, relative to the largest, count as zero.
-const NEUTRAL: f64 = 1e-7;
+const NEUTRAL_SINGULAR_VALUE: f64 = 1e-7;
 
 /// Stiffness in stretch and shear, in units of A/L^2, above which segments count as stiff.
 pub const STIFF: f64 = 1e4;
@@ -311,80 +338,82 @@ const SUBSPACE_ITERATIONS: usize = 8;
 const SHIFT: f64 = 1e-9;
 
 /// Solutions of the bordered equations at a state and parameters.
-pub struct Sample<const N: usize = 1> {
-    pub solution: Solution<N>,
-    pub solved: Solved,
+pub struct BorderedLinearization<const N: usize = 1> {
+    pub solution: ParametrizedState<N>,
+    pub solved: BorderedResponses,
     /// Derivatives of the forces with respect to the parameters.
-    pub rates: Vec<Field>,
+    pub rates: Vec<NodalField>,
     /// Rounding error of the forces.
     pub noise: f64,
     /// Forces of the segments that complete the law of nearly rigid ones in the increments.
     law_forces: Vec<DVec3>,
 }
 
-impl<const N: usize> Equations<'_, N> {
+impl<const N: usize> BranchEquations<'_, N> {
     /// Newton's method to the equilibria within the planes normal to directions through a state.
     /// The matrix may be singular: it is bordered by `border`, and components that remain
     /// undetermined are left unchanged. The rates, if given, may be those of a nearby state: they
     /// only affect the rate of convergence, and leaves at other parameters cost more than an
     /// iteration. Unless `exactly`, a converged leaf with stiff segments is corrected once more:
     /// an error in the length of such a segment causes a large force.
-    pub fn bordered(
+    pub fn correct_bordered(
         &mut self,
-        mut solution: Solution<N>,
-        normals: [&Direction<N>; N],
-        border: &[Field],
-        rates: Option<&[Field]>,
+        mut solution: ParametrizedState<N>,
+        normals: [&BranchDirection<N>; N],
+        border: &[NodalField],
+        rates: Option<&[NodalField]>,
         exactly: bool,
-    ) -> Result<Sample<N>, Stuck> {
-        let duals = normals.map(|normal| self.momentum(&normal.increments));
+    ) -> Result<BorderedLinearization<N>, CorrectorFailure> {
+        let duals = normals.map(|normal| self.multiply_by_mass(&normal.increments));
         let normals: [_; N] = from_fn(|k| (&duals[k], normals[k].params.as_slice(), 0.0));
         let mut previous = f64::INFINITY;
         let mut finished = false;
         let mut corrected =
-            !exactly && self.leaves.at(solution.params)?.least_compliance() * STIFF > 1.0;
+            !exactly && self.leaves.leaf_at(solution.params)?.least_compliance() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
             self.check_limit()?;
             let rates = match rates {
                 Some(rates) => rates.to_vec(),
-                None => self.rates(&solution, finished)?,
+                None => self.parameter_derivatives(&solution, finished)?,
             };
-            let sample = self.sample(solution, border, rates, finished)?;
+            let sample = self.linearize_bordered(solution, border, rates, finished)?;
             if finished {
                 return Ok(sample);
             }
             let (next, size) = self.newton_step(&sample, &normals)?;
             solution = next;
-            let rests = at_rest(size, previous);
+            let rests = has_converged(size, previous);
             finished = rests && corrected;
             corrected |= rests;
             previous = size;
         }
-        Err(Stuck::NotConverged)
+        Err(CorrectorFailure::NotConverged)
     }
 
     /// The state and parameters after the step of [`Solved::step`], and its size.
     pub(super) fn newton_step(
         &mut self,
-        sample: &Sample<N>,
-        functions: &[(&Field, &[f64], f64)],
-    ) -> Result<(Solution<N>, f64), Stuck> {
-        let Solution { state, params } = &sample.solution;
-        let (increments, changes, size) = sample.solved.step(functions, sample.noise)?;
+        sample: &BorderedLinearization<N>,
+        functions: &[(&NodalField, &[f64], f64)],
+    ) -> Result<(ParametrizedState<N>, f64), CorrectorFailure> {
+        let ParametrizedState { state, params } = &sample.solution;
+        let (increments, changes, size) =
+            sample.solved.newton_increments(functions, sample.noise)?;
         let params = from_fn(|i| params[i] + changes[i]);
-        let state = self.corrected(state, params, (&increments, &sample.law_forces))?;
-        Ok((Solution { state, params }, size))
+        let state =
+            self.state_after_newton_step(state, params, (&increments, &sample.law_forces))?;
+        Ok((ParametrizedState { state, params }, size))
     }
 
     /// Solves the bordered equations at a state, in equilibrium or not, given the rates of the
     /// parameters; `soft` as in [`Equations::assemble`].
-    pub(super) fn sample(
+    pub(super) fn linearize_bordered(
         &mut self,
-        mut solution: Solution<N>,
-        border: &[Field],
-        rates: Vec<Field>,
+        mut solution: ParametrizedState<N>,
+        border: &[NodalField],
+        rates: Vec<NodalField>,
         soft: bool,
-    ) -> Result<Sample<N>, Stuck> {
+    ) -> Result<BorderedLinearization<N>, CorrectorFailure> {
         let linear = self.assemble(&mut solution, soft)?;
         let (mut solved, mut factor) = self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
         let none = vec![0.0; border.len()];
@@ -397,13 +426,14 @@ impl<const N: usize> Equations<'_, N> {
             })?,
         };
         if let Some(completing) = completing {
-            solved.forces = factor.solve_bordered(&plus(&linear.forces, 1.0, &completing), &none);
+            solved.forces =
+                factor.solve_bordered(&scaled_sum(&linear.forces, 1.0, &completing), &none);
         }
-        Ok(Sample {
+        Ok(BorderedLinearization {
             solved,
             solution,
             rates,
-            noise: linear.noise,
+            noise: linear.rounding_error,
             law_forces,
         })
     }
@@ -412,23 +442,23 @@ impl<const N: usize> Equations<'_, N> {
     /// forces, their rates, and the unit vectors of the border. Also returns the factors.
     pub(super) fn solve_bordered(
         &mut self,
-        border: &[Field],
-        forces: &Field,
-        rates: &[Field],
+        border: &[NodalField],
+        forces: &NodalField,
+        rates: &[NodalField],
         shift: f64,
-    ) -> Result<(Solved, Factors), Stuck> {
+    ) -> Result<(BorderedResponses, MatrixFactors), CorrectorFailure> {
         let p = border.len();
         let pattern = self.pattern(p)?;
         self.factorizations += 1;
         let factor = pattern.factorize_bordered(&self.system, shift, border);
-        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        let mut factor = factor.map_err(|_| CorrectorFailure::TooLarge)?;
         let none = vec![0.0; p];
-        let zero = times(forces, 0.0);
+        let zero = scale_field(forces, 0.0);
         let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
         let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
-        let columns: Vec<Bordered> = columns.collect();
-        let solved = Solved {
+        let columns: Vec<BorderedSolution> = columns.collect();
+        let solved = BorderedResponses {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
@@ -437,23 +467,29 @@ impl<const N: usize> Equations<'_, N> {
             rates: (rates.iter())
                 .map(|rate| factor.solve_bordered(rate, &none))
                 .collect(),
-            negative: factor.negative(),
+            negative: factor.negative_eigenvalue_count(),
         };
         Ok((solved, factor))
     }
 }
 
-impl Equations<'_> {
+impl BranchEquations<'_> {
     /// The `count` modes whose eigenvalues are nearest to zero at a point, by
     /// subspace inverse iteration; of mass one, in the order of these eigenvalues.
-    pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
+    pub fn soft_modes(
+        &mut self,
+        point: &EquilibriumPoint,
+        count: usize,
+    ) -> Result<Vec<NodalField>, CorrectorFailure> {
         self.assemble(&mut point.solution(), false)?;
         let count = count
             .min(6 * self.rods() * self.grid().segments() / 2)
             .max(1);
         let pattern = self.pattern(0)?;
-        let mut factor = factorized(&pattern, &self.system, SHIFT)?;
-        let mut modes: Vec<Field> = (0..count).map(|k| seed(&mut self.system, k)).collect();
+        let mut factor = factorize_matrix(&pattern, &self.system, SHIFT)?;
+        let mut modes: Vec<NodalField> = (0..count)
+            .map(|k| seed_forces(&mut self.system, k))
+            .collect();
         for _ in 0..SUBSPACE_ITERATIONS {
             for mode in &mut modes {
                 *mode = factor.solve_bordered(mode, &[]).increments;
@@ -462,16 +498,16 @@ impl Equations<'_> {
             // K^-1 M, whose largest eigenvalues belong to the softest modes.
             for k in 0..count {
                 for l in 0..k {
-                    let part = self.product(&modes[l], &modes[k]);
+                    let part = self.mass_product(&modes[l], &modes[k]);
                     let other = modes[l].clone();
-                    add(&mut modes[k], -part, &other);
+                    add_scaled(&mut modes[k], -part, &other);
                 }
-                let norm = self.product(&modes[k], &modes[k]).sqrt();
-                modes[k] = times(&modes[k], 1.0 / norm);
+                let norm = self.mass_product(&modes[k], &modes[k]).sqrt();
+                modes[k] = scale_field(&modes[k], 1.0 / norm);
             }
-            let momenta = self.momenta(&modes);
+            let momenta = self.multiply_all_by_mass(&modes);
             let image = |momentum| factor.solve_bordered(momentum, &[]).increments;
-            let images: Vec<Field> = momenta.iter().map(image).collect();
+            let images: Vec<NodalField> = momenta.iter().map(image).collect();
             let ritz = DMatrix::from_fn(count, count, |r, c| {
                 0.5 * (dot(&momenta[r], &images[c]) + dot(&momenta[c], &images[r]))
             });
@@ -479,18 +515,18 @@ impl Equations<'_> {
             let mut order: Vec<usize> = (0..count).collect();
             let size = |k: usize| eigen.eigenvalues[k].abs();
             order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
-            let mode = |&k: &usize| combined(eigen.eigenvectors.column(k).as_slice(), &modes);
+            let mode = |&k: &usize| combine_fields(eigen.eigenvectors.column(k).as_slice(), &modes);
             modes = order.iter().map(mode).collect();
             // Back to forces, for the next inverse iteration.
             if !modes.iter().all(is_finite) {
-                return Err(Stuck::NotConverged);
+                return Err(CorrectorFailure::NotConverged);
             }
-            modes = self.momenta(&modes);
+            modes = self.multiply_all_by_mass(&modes);
         }
         let modes = modes.iter().map(|momentum| {
             let mode = factor.solve_bordered(momentum, &[]).increments;
-            let norm = self.product(&mode, &mode).sqrt();
-            times(&mode, 1.0 / norm)
+            let norm = self.mass_product(&mode, &mode).sqrt();
+            scale_field(&mode, 1.0 / norm)
         });
         let modes = modes.collect();
         Ok(modes)
@@ -498,28 +534,28 @@ impl Equations<'_> {
 }
 
 /// Solutions of the bordered equations at some state.
-pub struct Solved {
+pub struct BorderedResponses {
     /// For the forces, and for their rates with respect to each parameter.
-    pub forces: Bordered,
-    pub rates: Vec<Bordered>,
+    pub forces: BorderedSolution,
+    pub rates: Vec<BorderedSolution>,
     /// H and X of the border.
     pub h: DMatrix<f64>,
-    pub modes: Vec<Field>,
+    pub modes: Vec<NodalField>,
     /// Negative eigenvalues of the bordered matrix: those of the matrix and those of H
     /// together.
     pub negative: usize,
 }
 
-impl Solved {
+impl BorderedResponses {
     /// Newton increments and changes of the parameters by which as many additional functions
     /// become zero, and their size; fails if that is too large. Each function is given by its derivatives with respect to the increments and
     /// to the parameters, and its value: for the plane normal to a direction, the momentum of that
     /// direction, its parameter components, and zero.
-    pub fn step(
+    pub fn newton_increments(
         &self,
-        functions: &[(&Field, &[f64], f64)],
+        functions: &[(&NodalField, &[f64], f64)],
         noise: f64,
-    ) -> Result<(Field, Vec<f64>, f64), Stuck> {
+    ) -> Result<(NodalField, Vec<f64>, f64), CorrectorFailure> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
         let mut matrix = self.h.clone().resize(p + numbers, p + numbers, 0.0);
         let mut right = DVector::zeros(p + numbers);
@@ -543,28 +579,30 @@ impl Solved {
             right[p + k] = -value - dot(dual, &self.forces.increments);
         }
         let svd = matrix.svd(true, true);
-        let least = NEUTRAL * svd.singular_values.max();
-        let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
+        let least = NEUTRAL_SINGULAR_VALUE * svd.singular_values.max();
+        let solution = svd
+            .solve(&right, least)
+            .map_err(|_| CorrectorFailure::NotConverged)?;
         let mut increments = self.forces.increments.clone();
         for (i, rate) in self.rates.iter().enumerate() {
-            add(&mut increments, solution[p + i], &rate.increments);
+            add_scaled(&mut increments, solution[p + i], &rate.increments);
         }
         for (mode, part) in self.modes.iter().zip(solution.iter()) {
-            add(&mut increments, *part, mode);
+            add_scaled(&mut increments, *part, mode);
         }
         let changes: Vec<f64> = solution.iter().skip(p).copied().collect();
         let sizes = changes.iter().map(|v| v.abs());
         let size = sizes.fold(largest(&increments), larger);
-        match is_finite(&increments) && size <= LARGEST {
+        match is_finite(&increments) && size <= LARGEST_CORRECTOR_INCREMENT {
             true => Ok((increments, changes, size)),
-            false => Err(Stuck::NotConverged),
+            false => Err(CorrectorFailure::NotConverged),
         }
     }
 }
 
 /// Forces that excite many modes, with a different pattern along the rods for each `k`.
-fn seed(system: &mut System, k: usize) -> Field {
-    system.seed_mode();
+fn seed_forces(system: &mut System, k: usize) -> NodalField {
+    system.seed_inverse_iteration();
     let mut seed = system.rhs();
     for (j, rod) in seed.iter_mut().enumerate() {
         for (i, forces) in rod.iter_mut().enumerate() {

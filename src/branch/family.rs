@@ -5,8 +5,8 @@
 //! States of leaves that vary: the forces on them, the derivatives of these, and the states
 //! to which increments lead.
 
-use crate::branch::{plus, times};
-use crate::leaf::{DirectSolver, DiscreteLeaf, Field, Grid, Leaf, Scale, State, System};
+use crate::branch::{scale_field, scaled_sum};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, NodalField, Scale, State, System};
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use glam::DVec3;
@@ -15,13 +15,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Up to this stiffness in stretch and shear, in units of A/L^2, the matrix is that of the leaf:
 /// tangents and signs of eigenvalues are exact. The forces of stiffer, nearly rigid segments are
-/// condensed out with a lower one, `CONDENSING`: near singular points a larger one loses digits.
+/// condensed out with a lower one, `RIGID_CONDENSING_STIFFNESS`: near singular points a larger one loses digits.
 pub(super) const STIFFEST: f64 = 1e7;
 
-const CONDENSING: f64 = 1e5;
+const RIGID_CONDENSING_STIFFNESS: f64 = 1e5;
 
 /// The value at a fraction of a range, or of that of its logarithm.
-pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
+pub fn value_at_fraction([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
     match log {
         true => from * (to / from).powf(fraction),
         false => from + (to - from) * fraction,
@@ -29,43 +29,43 @@ pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
 }
 
 /// Fractions within this of an end of the range are at the end.
-const EXACT: f64 = 1e-12;
+const RANGE_END_TOLERANCE: f64 = 1e-12;
 
 /// Makes the scenario at values of the parameters.
-type Make<'a, const N: usize> = &'a (dyn Fn([f64; N]) -> Result<Scenario, String> + Sync);
+type MakeScenario<'a, const N: usize> = &'a (dyn Fn([f64; N]) -> Result<Scenario, String> + Sync);
 
 /// A leaf for all values of N parameters.
 #[derive(Clone)]
-pub struct Family<'a, const N: usize = 1> {
-    make: Make<'a, N>,
-    ranges: [Range; N],
+pub struct LeafFamily<'a, const N: usize = 1> {
+    make_scenario: MakeScenario<'a, N>,
+    ranges: [ParameterRange; N],
     /// The first leaf, in whose units all are.
     first: Leaf,
     /// A leaf with coupled veins, if there is one at an end of a range.
     coupled: Leaf,
     /// Sparsity patterns of their matrices.
-    pub patterns: Arc<Patterns>,
+    pub patterns: Arc<SparsityPatternCache>,
     /// When branches of these leaves are followed no further: every Newton iteration checks it.
     pub limit: Limit,
 }
 
 /// The range of a parameter.
 #[derive(Clone, Copy)]
-pub struct Range {
+pub struct ParameterRange {
     /// Values at the fractions 0 and 1.
     pub ends: [f64; 2],
     /// Whether fractions are those of the logarithm of the value.
     pub log: bool,
 }
 
-impl Range {
+impl ParameterRange {
     /// The value at a fraction.
     fn value(self, fraction: f64) -> f64 {
         // At an end, rounding must not lead beyond: there may be no leaf.
         match fraction {
-            part if part.abs() < EXACT => self.ends[0],
-            part if (part - 1.0).abs() < EXACT => self.ends[1],
-            part => between(self.ends, self.log, part),
+            part if part.abs() < RANGE_END_TOLERANCE => self.ends[0],
+            part if (part - 1.0).abs() < RANGE_END_TOLERANCE => self.ends[1],
+            part => value_at_fraction(self.ends, self.log, part),
         }
     }
 
@@ -84,12 +84,17 @@ impl Range {
 #[error("{0}")]
 pub struct OutOfRange(pub String);
 
-impl<'a> Family<'a> {
+impl<'a> LeafFamily<'a> {
     /// The leaves given by `make`, for values of the parameter in this range, in the units of the
     /// first.
-    pub fn new(make: Make<'a, 1>, ends: [f64; 2], log: bool) -> Result<Self, OutOfRange> {
+    pub fn new(make: MakeScenario<'a, 1>, ends: [f64; 2], log: bool) -> Result<Self, OutOfRange> {
         let scale = make([ends[0]]).map_err(OutOfRange)?.scale();
-        Family::of(make, [Range { ends, log }], scale, ends.map(|end| [end]))
+        LeafFamily::over_ranges(
+            make,
+            [ParameterRange { ends, log }],
+            scale,
+            ends.map(|end| [end]),
+        )
     }
 
     /// The parameter at a fraction of its range.
@@ -98,21 +103,30 @@ impl<'a> Family<'a> {
     }
 }
 
-impl<'a> Family<'a, 2> {
+impl<'a> LeafFamily<'a, 2> {
     /// The leaves given by `make`, for values of two parameters in these ranges, in the units of
     /// that at the start of the first and at `start` of the second.
-    pub fn plane(make: Make<'a, 2>, ranges: [Range; 2], start: f64) -> Result<Self, OutOfRange> {
+    pub fn over_two_parameters(
+        make: MakeScenario<'a, 2>,
+        ranges: [ParameterRange; 2],
+        start: f64,
+    ) -> Result<Self, OutOfRange> {
         let [[from, to], [low, high]] = ranges.map(|range| range.ends);
         let scale = make([from, start]).map_err(OutOfRange)?.scale();
         let ends = [[from, start], [to, start], [from, low], [from, high]];
-        Family::of(make, ranges, scale, ends)
+        LeafFamily::over_ranges(make, ranges, scale, ends)
     }
 
     /// Leaves of the same kind, in the same units, along a path with the parameter 0 to 1.
-    pub fn along_path<'b>(&self, make: Make<'b, 1>) -> Result<Family<'b>, OutOfRange> {
+    pub fn along_path<'b>(&self, make: MakeScenario<'b, 1>) -> Result<LeafFamily<'b>, OutOfRange> {
         let (ends, log) = ([0.0, 1.0], false);
-        let family = Family::of(make, [Range { ends, log }], self.scale(), [[0.0], [1.0]])?;
-        Ok(Family {
+        let family = LeafFamily::over_ranges(
+            make,
+            [ParameterRange { ends, log }],
+            self.scale(),
+            [[0.0], [1.0]],
+        )?;
+        Ok(LeafFamily {
             patterns: self.patterns.clone(),
             limit: self.limit.clone(),
             ..family
@@ -120,24 +134,24 @@ impl<'a> Family<'a, 2> {
     }
 }
 
-impl<'a, const N: usize> Family<'a, N> {
+impl<'a, const N: usize> LeafFamily<'a, N> {
     /// In these units, with leaves at these values of the parameters.
-    fn of<const ENDS: usize>(
-        make: Make<'a, N>,
-        ranges: [Range; N],
+    fn over_ranges<const ENDS: usize>(
+        make: MakeScenario<'a, N>,
+        ranges: [ParameterRange; N],
         scale: Scale,
         ends: [[f64; N]; ENDS],
     ) -> Result<Self, OutOfRange> {
         let leaf = |values| {
             let scenario = make(values).map_err(OutOfRange)?;
-            Ok(Leaf::in_units(Arc::new(scenario), scale))
+            Ok(Leaf::with_scale(Arc::new(scenario), scale))
         };
         let ends: Vec<Leaf> = ends.into_iter().map(leaf).collect::<Result<_, _>>()?;
         let is_coupled =
             |leaf: &&Leaf| (1..leaf.rods()).any(|g| leaf.coupling(g - 1) != DVec3::ZERO);
         let coupled = ends.iter().find(is_coupled);
-        Ok(Family {
-            make,
+        Ok(LeafFamily {
+            make_scenario: make,
             ranges,
             coupled: coupled.unwrap_or(&ends[1]).clone(),
             first: ends[0].clone(),
@@ -148,7 +162,7 @@ impl<'a, const N: usize> Family<'a, N> {
 
     /// The same leaves, whose branches are followed until this limit is reached.
     pub fn with_limit(self, limit: Limit) -> Self {
-        Family { limit, ..self }
+        LeafFamily { limit, ..self }
     }
 
     /// The units of all its leaves.
@@ -172,7 +186,7 @@ impl<'a, const N: usize> Family<'a, N> {
     }
 
     /// The leaf at the start of the ranges.
-    pub fn first(&self) -> &Leaf {
+    pub fn first_leaf(&self) -> &Leaf {
         &self.first
     }
 
@@ -183,12 +197,12 @@ impl<'a, const N: usize> Family<'a, N> {
 
     /// The scenario at fractions.
     pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
-        (self.make)(self.values(params)).map_err(OutOfRange)
+        (self.make_scenario)(self.values(params)).map_err(OutOfRange)
     }
 
     /// The leaf at fractions.
     pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
-        Ok(Leaf::in_units(
+        Ok(Leaf::with_scale(
             Arc::new(self.scenario(params)?),
             self.scale(),
         ))
@@ -196,19 +210,21 @@ impl<'a, const N: usize> Family<'a, N> {
 
     /// A system of equations for all its leaves on a grid.
     pub fn system(&self, grid: &Grid) -> System {
-        System::new(&discretised(&self.coupled, grid, None))
+        System::new(&discretize_leaf(&self.coupled, grid, None))
     }
 }
 
 /// A leaf on a grid, if requested softened: see [`Leaves::softened`].
-fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
+fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     for section in &mut discrete.sections {
         section.condensing = match softening {
             Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
             None => {
                 let exact = section.compliance.cmpge(DVec3::splat(1.0 / STIFFEST));
-                let least = section.condensing.min(DVec3::splat(CONDENSING));
+                let least = section
+                    .condensing
+                    .min(DVec3::splat(RIGID_CONDENSING_STIFFNESS));
                 DVec3::select(exact, section.condensing, least)
             }
         };
@@ -217,22 +233,22 @@ fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf
 }
 
 /// The same, with the sections of another leaf on this grid if its rods are the same.
-fn discretised_as(
+fn discretize_reusing_sections(
     other: Option<&DiscreteLeaf>,
     leaf: &Leaf,
     grid: &Grid,
     softening: Option<f64>,
 ) -> DiscreteLeaf {
     let copied = other.and_then(|other| other.with_same_rods(leaf));
-    copied.unwrap_or_else(|| discretised(leaf, grid, softening))
+    copied.unwrap_or_else(|| discretize_leaf(leaf, grid, softening))
 }
 
 /// Leaves of a family on one grid. The last few are cached: iterations
 /// return to them, and making a scenario costs more than assembling a small leaf.
 pub struct Leaves<'a, const N: usize = 1> {
-    pub family: &'a Family<'a, N>,
+    pub family: &'a LeafFamily<'a, N>,
     pub grid: Grid,
-    softening: Option<f64>,
+    regularization: Option<f64>,
     cache: LruCache<[f64; N], DiscreteLeaf, CACHED_LEAVES>,
 }
 
@@ -240,11 +256,11 @@ pub struct Leaves<'a, const N: usize = 1> {
 const CACHED_LEAVES: usize = 6;
 
 impl<'a, const N: usize> Leaves<'a, N> {
-    pub fn new(family: &'a Family<'a, N>, grid: Grid) -> Self {
+    pub fn new(family: &'a LeafFamily<'a, N>, grid: Grid) -> Self {
         Leaves {
             family,
             grid,
-            softening: None,
+            regularization: None,
             cache: LruCache::default(),
         }
     }
@@ -254,39 +270,44 @@ impl<'a, const N: usize> Leaves<'a, N> {
     /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
     /// the point at which they become neutral is analytic in the softening, and can be
     /// extrapolated to zero softening.
-    pub fn softened(family: &'a Family<'a, N>, grid: Grid, softening: f64) -> Self {
+    pub fn with_regularization(family: &'a LeafFamily<'a, N>, grid: Grid, softening: f64) -> Self {
         Leaves {
-            softening: Some(softening),
+            regularization: Some(softening),
             ..Leaves::new(family, grid)
         }
     }
 
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
-        let (grid, softening) = (self.grid.refined(), self.softening);
+        let (grid, softening) = (self.grid.refined(), self.regularization);
         let finer = |before: Option<&DiscreteLeaf>, coarse: &DiscreteLeaf| {
-            discretised_as(before, &coarse.leaf, &grid, softening)
+            discretize_reusing_sections(before, &coarse.leaf, &grid, softening)
         };
         Leaves {
             cache: self.cache.map(finer),
             family: self.family,
             grid,
-            softening,
+            regularization: softening,
         }
     }
 
     /// The leaf at these parameters, as fractions of their ranges.
-    pub fn at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
-        let (family, grid, softening) = (self.family, &self.grid, self.softening);
-        self.cache.at(params, |last| {
-            Ok(discretised_as(last, &family.leaf(params)?, grid, softening))
+    pub fn leaf_at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
+        let (family, grid, softening) = (self.family, &self.grid, self.regularization);
+        self.cache.get_or_make(params, |last| {
+            Ok(discretize_reusing_sections(
+                last,
+                &family.leaf(params)?,
+                grid,
+                softening,
+            ))
         })
     }
 }
 
 /// Puts the bases of all rods where the leaf holds them, and held tips where it holds them.
-pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
-    leaf.hold(state);
+pub fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
+    leaf.place_held_nodes(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
         let (x, q) = leaf.leaf.base(j);
@@ -309,7 +330,7 @@ impl<K, V, const MOST: usize> Default for LruCache<K, V, MOST> {
 impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
     /// The value of a key, computed by `make` if it is not cached; this takes the value that was
     /// used last.
-    pub fn at<E>(
+    pub fn get_or_make<E>(
         &mut self,
         key: K,
         make: impl FnOnce(Option<&V>) -> Result<V, E>,
@@ -341,19 +362,19 @@ const CACHED_SYSTEMS: usize = 10;
 /// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
 /// equally many segments, and ordering it takes as long as factorising a matrix.
 #[derive(Default)]
-pub struct Patterns(Mutex<LruCache<Shape, Arc<DirectSolver>, CACHED_SYSTEMS>>);
+pub struct SparsityPatternCache(Mutex<LruCache<PatternKey, Arc<DirectSolver>, CACHED_SYSTEMS>>);
 
 /// What determines the pattern of a system: its segments, whether its rods are coupled, and
 /// the number of border rows.
-type Shape = (usize, bool, usize);
+type PatternKey = (usize, bool, usize);
 
-impl Patterns {
+impl SparsityPatternCache {
     /// The pattern of a system with `border` border rows; `None` if memory is short.
-    pub fn of(&self, system: &System, border: usize) -> Option<Arc<DirectSolver>> {
+    pub fn pattern_of_system(&self, system: &System, border: usize) -> Option<Arc<DirectSolver>> {
         let shape = (system.segments(), system.coupled(), border);
         let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = |_: Option<&_>| DirectSolver::bordered(system, border).map(Arc::new);
-        cache.at(shape, made).ok().cloned()
+        let made = |_: Option<&_>| DirectSolver::with_border(system, border).map(Arc::new);
+        cache.get_or_make(shape, made).ok().cloned()
     }
 }
 
@@ -364,7 +385,7 @@ const DIFFERENCE: f64 = 1e-5;
 /// A value after and before the present one of a parameter, for a central difference; `value`
 /// takes the distance from it. At an end of the range, where there may be no leaf beyond, the
 /// present one takes the place of that.
-pub fn both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T; 2], E> {
+pub fn values_on_both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T; 2], E> {
     let sides = [DIFFERENCE, -DIFFERENCE];
     let [after, before] = sides.map(|step| value(step).or_else(|_| value(0.0)));
     Ok([after?, before?])
@@ -372,11 +393,13 @@ pub fn both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T
 
 /// Derivative of the forces with respect to a parameter, by central differences; `forces` takes
 /// the distance from the present value of the parameter.
-pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field, E> {
+pub fn force_parameter_derivative<E>(
+    mut forces: impl FnMut(f64) -> Result<NodalField, E>,
+) -> Result<NodalField, E> {
     let at = |step: f64| Ok((step, forces(step)?));
-    let [(after, forces_after), (before, forces_before)] = both_sides(at)?;
-    let rate = plus(&forces_after, -1.0, &forces_before);
-    Ok(times(&rate, 1.0 / (after - before)))
+    let [(after, forces_after), (before, forces_before)] = values_on_both_sides(at)?;
+    let rate = scaled_sum(&forces_after, -1.0, &forces_before);
+    Ok(scale_field(&rate, 1.0 / (after - before)))
 }
 
 /// The largest stiffness in stretch and shear with which segment forces are condensed out.
@@ -391,9 +414,9 @@ pub fn eigenvalue_rounding(stiffest: f64, segments: usize) -> f64 {
 }
 
 /// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
-pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
+pub fn unbalanced_forces(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> NodalField {
     let mut moved = state.clone();
-    clamp(leaf, &mut moved);
+    place_supports(leaf, &mut moved);
     leaf.assemble_forces(&moved, system);
     system.rhs()
 }
@@ -401,15 +424,15 @@ pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Fie
 /// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
 /// segments at a clamp depend on all of its displacement, however short the step. The segments
 /// change by `law_forces` in addition (none if empty).
-pub fn advanced(
+pub fn state_after_step(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (increments, law_forces): (&Field, &[DVec3]),
+    (increments, law_forces): (&NodalField, &[DVec3]),
     step: f64,
 ) -> State {
     let mut clamped = state.clone();
-    clamp(leaf, &mut clamped);
+    place_supports(leaf, &mut clamped);
     let mut next = clamped.clone();
     if clamped.x == state.x && clamped.q == state.q {
         // The rounding error in the lengths of nearly rigid segments is scaled down
@@ -418,10 +441,10 @@ pub fn advanced(
         leaf.advance(state, system, step, &mut next);
         return next;
     }
-    let mut increments = times(increments, step);
+    let mut increments = scale_field(increments, step);
     let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
-    for (j, i) in leaf.each(leaf.moving_nodes()) {
-        let [turns, shifts] = leaf.moves(j, i);
+    for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
+        let [turns, shifts] = leaf.allows_rotation_and_displacement(j, i);
         let increment = &mut increments[j][i - leaf.first_node()];
         if !shifts {
             increment[3..].fill(0.0);
@@ -444,13 +467,13 @@ mod tests {
         let mut lru_cache = LruCache::<i32, i32, 2>::default();
         let mut made = Vec::new();
         for key in [1, 2, 1, 3, 1, 2] {
-            let value = lru_cache.at(key, |_| {
+            let value = lru_cache.get_or_make(key, |_| {
                 made.push(key);
                 Ok::<_, ()>(10 * key)
             });
             assert_eq!(value, Ok(&(10 * key)));
         }
         assert_eq!(made, [1, 2, 3, 2]);
-        assert_eq!(lru_cache.at(4, |_| Err("none")), Err("none"));
+        assert_eq!(lru_cache.get_or_make(4, |_| Err("none")), Err("none"));
     }
 }

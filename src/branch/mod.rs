@@ -45,35 +45,38 @@ mod family;
 mod refine;
 mod saddle_search;
 
-pub use crate::branch::continuation::{End, Followed, Grids, Walk, begin, switch, walk};
-pub use crate::branch::critical::{Critical, Kind};
-pub use crate::branch::equations::Equations;
+pub use crate::branch::continuation::{
+    BranchEnd, ContinuationOptions, NestedBranchEquations, VerifiedBranch, begin_branch,
+    follow_branch, switch_branches,
+};
+pub use crate::branch::critical::{CriticalKind, CriticalPoint};
+pub use crate::branch::equations::BranchEquations;
 use crate::branch::family::OutOfRange;
-pub use crate::branch::family::{Family, Range, between as value_between};
-pub use crate::branch::refine::{Doubt, Refined};
-pub(crate) use crate::branch::refine::{NEARLY_RIGID, on_finer, refine_at};
-use crate::leaf::{DirectError, Field, Increment, State};
+pub use crate::branch::family::{LeafFamily, ParameterRange, value_at_fraction};
+pub use crate::branch::refine::{ExtrapolatedPoint, VerificationFailure};
+pub(crate) use crate::branch::refine::{NEARLY_RIGID, on_finer, verify_at_parameter};
+use crate::leaf::{DirectError, Increment, NodalField, State};
 use crate::relax::Stencil;
 
 /// A point of a branch on one grid.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct EquilibriumPoint {
     /// The state of the leaf.
     pub state: State,
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
     /// The unit tangent of the branch.
-    pub tangent: Direction,
+    pub tangent: BranchDirection,
     /// Morse index.
     pub index: usize,
     /// Newton iterations by which it was found.
     pub iterations: usize,
 }
 
-impl Point {
+impl EquilibriumPoint {
     /// Its state and parameter.
-    fn solution(&self) -> Solution {
-        Solution {
+    fn solution(&self) -> ParametrizedState {
+        ParametrizedState {
             state: self.state.clone(),
             params: [self.fraction],
         }
@@ -82,7 +85,7 @@ impl Point {
 
 /// A leaf in equilibrium, or nearly so, with its parameters as fractions of their ranges.
 #[derive(Clone, Debug)]
-pub struct Solution<const N: usize = 1> {
+pub struct ParametrizedState<const N: usize = 1> {
     /// The state of the leaf.
     pub state: State,
     /// The parameters.
@@ -91,30 +94,30 @@ pub struct Solution<const N: usize = 1> {
 
 /// A direction along which the state and the parameters change.
 #[derive(Clone, Debug)]
-pub struct Direction<const N: usize = 1> {
+pub struct BranchDirection<const N: usize = 1> {
     /// Increments of the nodes.
-    pub increments: Field,
+    pub increments: NodalField,
     /// Changes of the parameters, as fractions of their ranges.
     pub params: [f64; N],
 }
 
-impl<const N: usize> Direction<N> {
+impl<const N: usize> BranchDirection<N> {
     /// The opposite direction.
     pub fn reversed(&self) -> Self {
-        Direction {
-            increments: times(&self.increments, -1.0),
+        BranchDirection {
+            increments: scale_field(&self.increments, -1.0),
             params: self.params.map(|part| -part),
         }
     }
 
     /// Parameters `step` further along it than these.
-    fn further(&self, params: [f64; N], step: f64) -> [f64; N] {
+    fn parameters_after_step(&self, params: [f64; N], step: f64) -> [f64; N] {
         std::array::from_fn(|i| params[i] + step * self.params[i])
     }
 }
 
 /// The work of forces on increments.
-pub fn dot(forces: &Field, increments: &Field) -> f64 {
+pub fn dot(forces: &NodalField, increments: &NodalField) -> f64 {
     let mut sum = 0.0;
     for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
         sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
@@ -123,14 +126,14 @@ pub fn dot(forces: &Field, increments: &Field) -> f64 {
 }
 
 /// a + factor b.
-pub fn plus(a: &Field, factor: f64, b: &Field) -> Field {
+pub fn scaled_sum(a: &NodalField, factor: f64, b: &NodalField) -> NodalField {
     let mut sum = a.clone();
-    add(&mut sum, factor, b);
+    add_scaled(&mut sum, factor, b);
     sum
 }
 
 /// a <- a + factor b.
-pub fn add(a: &mut Field, factor: f64, b: &Field) {
+pub fn add_scaled(a: &mut NodalField, factor: f64, b: &NodalField) {
     for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
         for c in 0..6 {
             a[c] += factor * b[c];
@@ -139,45 +142,45 @@ pub fn add(a: &mut Field, factor: f64, b: &Field) {
 }
 
 /// a times a factor.
-pub fn times(a: &Field, factor: f64) -> Field {
+pub fn scale_field(a: &NodalField, factor: f64) -> NodalField {
     let of = |a: &Increment| a.map(|a| factor * a);
     a.iter().map(|rod| rod.iter().map(of).collect()).collect()
 }
 
 /// The linear combination of fields with these coefficients.
-pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
-    let mut sum = times(&fields[0], 0.0);
+pub fn combine_fields(parts: &[f64], fields: &[NodalField]) -> NodalField {
+    let mut sum = scale_field(&fields[0], 0.0);
     for (part, field) in parts.iter().zip(fields) {
-        add(&mut sum, *part, field);
+        add_scaled(&mut sum, *part, field);
     }
     sum
 }
 
-pub fn largest(a: &Field) -> f64 {
+pub fn largest(a: &NodalField) -> f64 {
     crate::numbers::largest(a.iter().flatten().flatten().map(|v| v.abs()))
 }
 
 /// The increments of the nodes from the `first` on that lead from one state to another on the same
 /// grid.
-pub fn between(a: &State, b: &State, first: usize) -> Field {
-    let mut field = Field::new();
+pub fn increments_between(a: &State, b: &State, first: usize) -> NodalField {
+    let mut field = NodalField::new();
     a.increments_to(b, first, &mut field);
     field
 }
 
-pub fn is_finite(a: &Field) -> bool {
+pub fn is_finite(a: &NodalField) -> bool {
     a.iter().flatten().flatten().all(|v| v.is_finite())
 }
 
 /// Increments on the grid with all segments halved: cubic interpolation, zero at clamped bases, where
 /// the `first` node of the field is the next.
-pub fn prolong_field(a: &Field, first: usize) -> Field {
+pub fn prolong_field(a: &NodalField, first: usize) -> NodalField {
     a.iter().map(|rod| prolong_rod(rod, first)).collect()
 }
 
 /// Nodal forces on the grid with all segments halved: the given ones at the nodes of this grid,
 /// zero at the new ones.
-pub fn at_same_nodes(a: &Field, first: usize) -> Field {
+pub fn inject_forces(a: &NodalField, first: usize) -> NodalField {
     // A new node precedes every one but a base.
     let all = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect::<Vec<_>>();
     let rod = |rod: &Vec<Increment>| all(rod).split_off(1 - first);
@@ -185,7 +188,7 @@ pub fn at_same_nodes(a: &Field, first: usize) -> Field {
 }
 
 /// Increments on the grid with every second node.
-pub fn every_second(a: &Field, first: usize) -> Field {
+pub fn restrict_field(a: &NodalField, first: usize) -> NodalField {
     let rod = |rod: &Vec<Increment>| rod.iter().skip(first).step_by(2).copied().collect();
     a.iter().map(rod).collect()
 }
@@ -215,7 +218,7 @@ fn prolong_rod(rod: &[Increment], first: usize) -> Vec<Increment> {
 
 /// Why no point is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Stuck {
+pub enum CorrectorFailure {
     /// The parameter has left its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
@@ -247,11 +250,11 @@ pub enum Stuck {
     Stopped,
 }
 
-impl From<DirectError> for Stuck {
+impl From<DirectError> for CorrectorFailure {
     fn from(error: DirectError) -> Self {
         match error {
-            DirectError::Memory => Stuck::TooLarge,
-            DirectError::NotFinite => Stuck::NotConverged,
+            DirectError::Memory => CorrectorFailure::TooLarge,
+            DirectError::NotFinite => CorrectorFailure::NotConverged,
         }
     }
 }
@@ -272,10 +275,13 @@ mod tests {
                 ]
             };
             let (coarse, fine) = (on(n), on(2 * n));
-            let difference = plus(&prolong_field(&coarse, first), -1.0, &fine);
+            let difference = scaled_sum(&prolong_field(&coarse, first), -1.0, &fine);
             assert!(largest(&difference) < 1e-14, "{n}");
-            assert_eq!(every_second(&fine, first), coarse);
-            assert_eq!(every_second(&at_same_nodes(&coarse, first), first), coarse);
+            assert_eq!(restrict_field(&fine, first), coarse);
+            assert_eq!(
+                restrict_field(&inject_forces(&coarse, first), first),
+                coarse
+            );
         }
     }
 }

@@ -11,9 +11,13 @@
 //! The descent follows the same floor, and takes Newton's steps once it is convex. The stiffness
 //! of the leaf is not reduced meanwhile, which near a fold would lead elsewhere.
 
-use crate::branch::equations::{Equations, Linear, Stuck, factorized};
-use crate::branch::{Point, Solution, add, largest, plus, times};
-use crate::leaf::{Field, State};
+use crate::branch::equations::{
+    AssembledForces, BranchEquations, CorrectorFailure, factorize_matrix,
+};
+use crate::branch::{
+    EquilibriumPoint, ParametrizedState, add_scaled, largest, scale_field, scaled_sum,
+};
+use crate::leaf::{NodalField, State};
 
 /// Largest number of steps of a climb, and the longest step (radians, lengths).
 const STEPS: usize = 60;
@@ -24,14 +28,14 @@ const LONGEST: f64 = 0.2;
 const FIRST: f64 = 0.01;
 
 /// Largest number of steps of a descent, its initial perturbation, and the growth of its steps.
-const DOWN: usize = 200;
+const MAX_DESCENT_STEPS: usize = 200;
 
-const PUSH: f64 = 0.01;
+const DESCENT_PERTURBATION: f64 = 0.01;
 
 const GROWTH: f64 = 1.5;
 
 /// Increments below this end with a Newton correction to the equilibrium.
-const NEAR: f64 = 1e-2;
+const FINAL_CORRECTION_INCREMENT: f64 = 1e-2;
 
 /// Shift (in squared frequencies, times the mass matrix) that makes the matrix across the
 /// path positive definite: the first tried, and that at which a climb is abandoned.
@@ -43,26 +47,26 @@ const LARGEST_SHIFT: f64 = 1e6;
 /// exceeds the magnitude of its eigenvalue.
 const INVERSE_ITERATIONS: usize = 4;
 
-const BELOW: f64 = 1.05;
+const EIGENVALUE_SHIFT_FACTOR: f64 = 1.05;
 
 /// Number of modes in the search for the softest.
-const SOFT: usize = 3;
+const SOFT_MODE_COUNT: usize = 3;
 
 /// The valley floor in a direction.
 struct Valley {
     /// X, and the force and the curvature of the energy along it.
-    along: Field,
+    along: NodalField,
     force: f64,
     curvature: f64,
     /// Newton's step across it.
-    across: Field,
+    across: NodalField,
     shift: f64,
 }
 
 impl Valley {
     /// Newton's step, along the floor as well as across it.
-    fn newton(&self) -> Field {
-        plus(&self.across, self.force / self.curvature, &self.along)
+    fn newton(&self) -> NodalField {
+        scaled_sum(&self.across, self.force / self.curvature, &self.along)
     }
 
     /// Distance to the maximum of the energy along the floor, where its slope is minus the force,
@@ -78,18 +82,18 @@ impl Valley {
     }
 }
 
-impl Equations<'_> {
+impl BranchEquations<'_> {
     /// A saddle of index one that is reached from `state` uphill, initially along
     /// `direction`; none if none is reached, or if `stop` returns true.
-    pub fn climb(
+    pub fn search_saddle(
         &mut self,
         state: &State,
         fraction: f64,
-        direction: &Field,
+        direction: &NodalField,
         stop: &dyn Fn() -> bool,
-    ) -> Option<Point> {
-        let mut direction = self.unit(direction);
-        let mut now = Solution {
+    ) -> Option<EquilibriumPoint> {
+        let mut direction = self.normalize_by_mass(direction);
+        let mut now = ParametrizedState {
             state: state.clone(),
             params: [fraction],
         };
@@ -113,7 +117,7 @@ impl Equations<'_> {
                 false => valley.across.clone(),
             };
             let size = largest(&increments);
-            let mut step = times(&increments, (LONGEST / size).min(1.0));
+            let mut step = scale_field(&increments, (LONGEST / size).min(1.0));
             if !newton && largest(&valley.across) < LONGEST {
                 let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(&valley.along));
                 let length = match before {
@@ -121,11 +125,13 @@ impl Equations<'_> {
                     Some(before) => valley.distance_to_maximum(before).clamp(shortest, longest),
                 };
                 before = Some((valley.curvature, length));
-                add(&mut step, length, &valley.along);
-                direction = self.unit(&valley.along);
+                add_scaled(&mut step, length, &valley.along);
+                direction = self.normalize_by_mass(&valley.along);
             }
-            now.state = self.advanced(&now.state, now.params, &step, 1.0).ok()?;
-            if newton && size < NEAR {
+            now.state = self
+                .state_after_increments(&now.state, now.params, &step, 1.0)
+                .ok()?;
+            if newton && size < FINAL_CORRECTION_INCREMENT {
                 let point = self.correct(&now.state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
@@ -134,26 +140,31 @@ impl Equations<'_> {
     }
 
     /// The eigenvalue nearest to zero at a point, with respect to the mass matrix.
-    pub fn softest(&mut self, point: &Point) -> Result<f64, Stuck> {
-        let modes = self.soft_modes(point, SOFT)?;
+    pub fn softest_eigenvalue(
+        &mut self,
+        point: &EquilibriumPoint,
+    ) -> Result<f64, CorrectorFailure> {
+        let modes = self.soft_modes(point, SOFT_MODE_COUNT)?;
         let linear = self.assemble(&mut point.solution(), false)?;
-        let border = [self.momentum(&modes[0])];
+        let border = [self.multiply_by_mass(&modes[0])];
         let (solved, _) = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
         Ok(-solved.h[(0, 0)] / self.mass)
     }
 
     /// The equilibria to which the leaf descends from a saddle along its unstable mode, on the side
     /// of `direction` and on the other: see [`Equations::descend`].
-    pub fn fall(
+    pub fn descend_both_sides(
         &mut self,
-        saddle: &Point,
-        direction: &Field,
+        saddle: &EquilibriumPoint,
+        direction: &NodalField,
         stop: &dyn Fn() -> bool,
-    ) -> Result<[Result<Point, State>; 2], Stuck> {
+    ) -> Result<[Result<EquilibriumPoint, State>; 2], CorrectorFailure> {
         self.assemble(&mut saddle.solution(), false)?;
-        let mode = self.lowest_mode(direction).ok_or(Stuck::NotConverged)?;
+        let mode = self
+            .lowest_mode(direction)
+            .ok_or(CorrectorFailure::NotConverged)?;
         Ok([1.0, -1.0].map(|sign| {
-            let direction = times(&mode, sign);
+            let direction = scale_field(&mode, sign);
             self.descend(&saddle.state, saddle.fraction, &direction, stop)
         }))
     }
@@ -164,16 +175,16 @@ impl Equations<'_> {
         &mut self,
         state: &State,
         fraction: f64,
-        direction: &Field,
+        direction: &NodalField,
         stop: &dyn Fn() -> bool,
-    ) -> Result<Point, State> {
-        let (mut direction, mut length) = (self.unit(direction), PUSH);
-        let push = times(&direction, PUSH / largest(&direction));
+    ) -> Result<EquilibriumPoint, State> {
+        let (mut direction, mut length) = (self.normalize_by_mass(direction), DESCENT_PERTURBATION);
+        let push = scale_field(&direction, DESCENT_PERTURBATION / largest(&direction));
         let params = [fraction];
-        let pushed = self.advanced(state, params, &push, 1.0);
+        let pushed = self.state_after_increments(state, params, &push, 1.0);
         let state = pushed.map_err(|_| state.clone())?;
-        let mut now = Solution { state, params };
-        for _ in 0..DOWN {
+        let mut now = ParametrizedState { state, params };
+        for _ in 0..MAX_DESCENT_STEPS {
             let next = match stop() {
                 true => None,
                 false => self.descend_step(&mut now, &mut direction, &mut length),
@@ -193,8 +204,8 @@ impl Equations<'_> {
     /// A step down the valley floor; the flag says whether it was a short Newton step.
     fn descend_step(
         &mut self,
-        now: &mut Solution,
-        direction: &mut Field,
+        now: &mut ParametrizedState,
+        direction: &mut NodalField,
         length: &mut f64,
     ) -> Option<(State, bool)> {
         let linear = self.assemble(now, false).ok()?;
@@ -205,20 +216,22 @@ impl Equations<'_> {
         } else if largest(&valley.across) < LONGEST {
             let part = length.copysign(valley.force) / largest(&valley.along);
             *length = (GROWTH * *length).min(LONGEST);
-            plus(&valley.across, part, &valley.along)
+            scaled_sum(&valley.across, part, &valley.along)
         } else {
             valley.across
         };
-        *direction = self.unit(&valley.along);
+        *direction = self.normalize_by_mass(&valley.along);
         let size = largest(&increments);
-        let step = times(&increments, (LONGEST / size).min(1.0));
-        let next = self.advanced(&now.state, now.params, &step, 1.0).ok()?;
-        Some((next, newton && size < NEAR))
+        let step = scale_field(&increments, (LONGEST / size).min(1.0));
+        let next = self
+            .state_after_increments(&now.state, now.params, &step, 1.0)
+            .ok()?;
+        Some((next, newton && size < FINAL_CORRECTION_INCREMENT))
     }
 
     /// The valley along `direction`, from the assembled matrix.
-    fn valley(&mut self, direction: &Field, linear: &Linear) -> Option<Valley> {
-        let border = [self.momentum(direction)];
+    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<Valley> {
+        let border = [self.multiply_by_mass(direction)];
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
             let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
@@ -226,7 +239,7 @@ impl Equations<'_> {
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {
                 let along = solved.modes.swap_remove(0);
-                let mass = self.mass * self.product(&along, &along);
+                let mass = self.mass * self.mass_product(&along, &along);
                 return Some(Valley {
                     along,
                     force: solved.forces.multipliers[0],
@@ -242,33 +255,38 @@ impl Equations<'_> {
 
     /// The mode of the lowest eigenvalue of the assembled matrix, oriented along `direction`, by
     /// inverse iteration from `direction`; the second time with a shift near that eigenvalue.
-    fn lowest_mode(&mut self, direction: &Field) -> Option<Field> {
+    fn lowest_mode(&mut self, direction: &NodalField) -> Option<NodalField> {
         let pattern = self.pattern(0).ok()?;
         let mut mode = direction.clone();
         let mut shift = FIRST_SHIFT;
         for _ in 0..2 {
-            let mut factor = factorized(&pattern, &self.system, shift).ok()?;
-            while factor.negative() > 0 {
+            let mut factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
+            while factor.negative_eigenvalue_count() > 0 {
                 shift *= 2.0;
                 if shift > LARGEST_SHIFT {
                     return None;
                 }
-                factor = factorized(&pattern, &self.system, shift).ok()?;
+                factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
             }
             let mut eigenvalue = 0.0;
             for _ in 0..INVERSE_ITERATIONS {
-                let next = factor.solve_bordered(&self.momentum(&mode), &[]).increments;
-                eigenvalue = 1.0 / (self.mass * self.product(&mode, &next)) - shift;
-                mode = self.unit(&next);
+                let next = factor
+                    .solve_bordered(&self.multiply_by_mass(&mode), &[])
+                    .increments;
+                eigenvalue = 1.0 / (self.mass * self.mass_product(&mode, &next)) - shift;
+                mode = self.normalize_by_mass(&next);
             }
-            shift = BELOW * eigenvalue.abs();
+            shift = EIGENVALUE_SHIFT_FACTOR * eigenvalue.abs();
         }
-        let same = self.product(&mode, direction) >= 0.0;
-        Some(if same { mode } else { times(&mode, -1.0) })
+        let same = self.mass_product(&mode, direction) >= 0.0;
+        Some(if same { mode } else { scale_field(&mode, -1.0) })
     }
 
     /// Scales a direction to mass one.
-    fn unit(&self, direction: &Field) -> Field {
-        times(direction, 1.0 / self.product(direction, direction).sqrt())
+    fn normalize_by_mass(&self, direction: &NodalField) -> NodalField {
+        scale_field(
+            direction,
+            1.0 / self.mass_product(direction, direction).sqrt(),
+        )
     }
 }

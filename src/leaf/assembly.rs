@@ -4,15 +4,19 @@
 //!
 //! The first-order response of a leaf to jumps of the fields along its rods.
 
-use crate::leaf::block_tridiagonal::{Increments, TURNS, group_and_lane, lanes_of};
+use crate::leaf::block_tridiagonal::{
+    GroupIncrements, ROTATION_UNKNOWNS, group_and_lane, lane_rods,
+};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
-use crate::leaf::state::{State, add};
-use crate::leaf::system::{Group, Sums, System, each_group, rods_of};
+use crate::leaf::loads::{GroupLoads, LaneRodLoads, group_loads};
+use crate::leaf::state::{State, add_to_increment};
+use crate::leaf::system::{AssemblyTotals, RodGroup, System, each_group, group_rods};
 use crate::numbers::{larger, largest};
-use crate::rod::{Blocks, Element, Nodes, Section, Sections, Segment, UNKNOWNS, on_nodes};
+use crate::rod::{
+    Element, LaneNodes, LaneSections, Section, Segment, SegmentHessian, UNKNOWNS, nodal_gradient,
+};
 use crate::rotation::{Quaternions, exp_each, multiply_each};
-use crate::simd::{Four, GROUP, Kernel, Lanes, Vectors, run};
+use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::Simd;
 use rayon::prelude::*;
@@ -21,43 +25,47 @@ use std::ops::Range;
 impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
-    pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
+    pub fn assemble(&self, state: &State, system: &mut System) -> AssemblyTotals {
         self.assemble_with::<true>(state, system)
     }
 
     /// Assembles the right-hand side alone; the matrix is unchanged.
-    pub fn assemble_forces(&self, state: &State, system: &mut System) -> Sums {
+    pub fn assemble_forces(&self, state: &State, system: &mut System) -> AssemblyTotals {
         self.assemble_with::<false>(state, system)
     }
 
-    fn assemble_with<const MATRIX: bool>(&self, state: &State, system: &mut System) -> Sums {
+    fn assemble_with<const MATRIX: bool>(
+        &self,
+        state: &State,
+        system: &mut System,
+    ) -> AssemblyTotals {
         let arch = system.arch;
         system.law_forces.clear();
         each_group(system.parallel, &mut system.groups, |g, group| {
-            let rods = Rods::new(self, state, g);
-            run(arch, &mut Assemble::<MATRIX> { rods, group });
+            let rods = GroupRods::new(self, state, g);
+            run(arch, &mut AssemblyKernel::<MATRIX> { rods, group });
         });
-        let mut total = Sums {
+        let mut total = AssemblyTotals {
             energy: self.add_tissue(state, system, MATRIX)
                 + self.add_own_loads(state, system)
                 + self.base_energy(state),
-            turn: 0.0,
+            largest_turn: 0.0,
         };
         self.add_moments(system);
         each_group(system.parallel, &mut system.groups, |g, group| {
-            for j in rods_of(g, self.rods()) {
+            for j in group_rods(g, self.rods()) {
                 self.clear_held_components(j, &mut group.rhs);
                 if MATRIX {
                     self.hold_components(j, &mut group.matrix);
                 }
             }
         });
-        if MATRIX && self.tied() {
-            self.hold_across(system);
+        if MATRIX && self.has_tissue() {
+            self.clear_held_gap_blocks(system);
         }
         for group in &system.groups {
             total.energy += group.sums.energy;
-            total.turn = larger(total.turn, group.sums.turn);
+            total.largest_turn = larger(total.largest_turn, group.sums.largest_turn);
         }
         total
     }
@@ -67,10 +75,10 @@ impl DiscreteLeaf {
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
         let arch = system.arch;
         each_group(system.parallel, &mut system.groups, |g, group| {
-            let rods = Rods::new(self, state, g);
-            let mut kernel = Stiffen {
+            let rods = GroupRods::new(self, state, g);
+            let mut kernel = StiffeningKernel {
                 rods,
-                dropped,
+                dropped_compliance: dropped,
                 group,
             };
             run(arch, &mut kernel);
@@ -92,9 +100,9 @@ impl DiscreteLeaf {
             let mut before = 0.0;
             for i in 0..=n {
                 let after = if i < n { excess(j, i) } else { 0.0 };
-                if self.moves(j, i)[0] {
+                if self.allows_rotation_and_displacement(j, i)[0] {
                     let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
-                    system.add(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
+                    system.add_to_node(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
                 }
                 before = after;
             }
@@ -105,15 +113,15 @@ impl DiscreteLeaf {
     /// rod, all nodes with equations), written over `next`.
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         next.clone_from(state);
-        if self.tied() {
+        if self.has_tissue() {
             self.advance_tissue(state, solution, step, next);
         }
         let (n, arch) = (self.segments(), solution.arch);
         let (nodes, forces) = (GROUP * (n + 1), GROUP * n);
         let advance = |(g, ((x, q), n)): (usize, ((&mut [_], &mut [_]), &mut [_]))| {
-            let rods = Rods::new(self, state, g);
+            let rods = GroupRods::new(self, state, g);
             let solution = &solution.groups[g].solution;
-            let mut kernel = Advance {
+            let mut kernel = StateAdvanceKernel {
                 rods,
                 solution,
                 step,
@@ -147,27 +155,27 @@ impl DiscreteLeaf {
         let mut largest = 0.0_f64;
         let mut tip = DVec3::ZERO;
         for j in 0..self.rods() {
-            let turned = self.tissue_load(state, j, 0).moment + self.moment_on(0);
+            let turned = self.tissue_load(state, j, 0).moment + self.node_dead_moment(0);
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
                 if i >= self.first_node() {
                     let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
-                    let [turned, held] = self.is_gripped(j, i);
+                    let [turned, held] = self.holds_rotation_and_position(j, i);
                     let forces = if held { 0.0 } else { forces };
                     let moments = if turned { 0.0 } else { moments };
                     largest = larger(largest, larger(forces, moments));
                 }
                 let load = self.load(state, j, i + 1);
                 force = load.force - g_x;
-                moment = load.moment + self.moment_on(i + 1) - g_b;
+                moment = load.moment + self.node_dead_moment(i + 1) - g_b;
                 largest = larger(largest, component(segment.gap));
             }
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
             // The holder balances the remaining force on a held tip.
-            let [turned, held] = self.is_gripped(j, n);
-            match &self.leaf.held {
+            let [turned, held] = self.holds_rotation_and_position(j, n);
+            match &self.leaf.tip_support {
                 _ if turned => continue,
                 _ if held => {}
                 Some(held) if held.clamps.is_some() => continue,
@@ -199,7 +207,7 @@ impl DiscreteLeaf {
     pub fn energy(&self, state: &State) -> f64 {
         let n = self.segments();
         let mut energy = self.base_energy(state);
-        for (j, i) in self.each(0..1) {
+        for (j, i) in self.rod_index_pairs(0..1) {
             energy += self.tissue_load(state, j, i).energy;
         }
         for j in 0..self.rods() {
@@ -219,7 +227,7 @@ pub(super) fn component(vector: DVec3) -> f64 {
 }
 
 /// The rods of a group in a state; lanes without a rod repeat the last.
-pub struct Rods<'a> {
+pub struct GroupRods<'a> {
     leaf: &'a DiscreteLeaf,
     group: usize,
     sections: [&'a [Section]; GROUP],
@@ -227,23 +235,23 @@ pub struct Rods<'a> {
     q: [&'a [DQuat]; GROUP],
     n: [&'a [DVec3]; GROUP],
     /// Positions of the previous and the next rods, or their own if there is none.
-    beside: [[&'a [DVec3]; GROUP]; 2],
+    neighbour_positions: [[&'a [DVec3]; GROUP]; 2],
     loads: GroupLoads,
 }
 
-impl<'a> Rods<'a> {
+impl<'a> GroupRods<'a> {
     pub fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
         let (n, last) = (leaf.segments(), leaf.rods() - 1);
-        let rods = lanes_of(group, leaf.rods());
+        let rods = lane_rods(group, leaf.rods());
         let x = |j: usize| &state.x[state.base(j)..][..=n];
-        Rods {
+        GroupRods {
             leaf,
             group,
             sections: rods.map(|j| &leaf.sections[j * n..][..n]),
             x: rods.map(x),
             q: rods.map(|j| &state.q[state.base(j)..][..=n]),
             n: rods.map(|j| &state.n[j * n..][..n]),
-            beside: [
+            neighbour_positions: [
                 rods.map(|j| x(j.saturating_sub(1))),
                 rods.map(|j| x((j + 1).min(last))),
             ],
@@ -257,19 +265,22 @@ impl<'a> Rods<'a> {
         let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
         let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
         let v = Vectors::gather(simd, [vector(a), vector(b), vector(c), vector(d)], part);
-        (v, Lanes::of(simd, &Four([a.w, b.w, c.w, d.w]), part))
+        (
+            v,
+            Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
+        )
     }
 
     #[inline(always)]
-    fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> Sections<S> {
+    fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> LaneSections<S> {
         let [a, b, c, d] = self.sections;
-        Sections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
+        LaneSections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
     }
 
     /// Segment `i` of every rod, and its sections.
     #[inline(always)]
-    fn element<S: Simd>(&self, simd: S, i: usize, part: usize) -> (Element<S>, Sections<S>) {
-        let nodes = Nodes {
+    fn element<S: Simd>(&self, simd: S, i: usize, part: usize) -> (Element<S>, LaneSections<S>) {
+        let nodes = LaneNodes {
             x: [
                 gather(simd, self.x, i, part),
                 gather(simd, self.x, i + 1, part),
@@ -290,37 +301,37 @@ fn gather<S: Simd>(simd: S, of: [&[DVec3]; GROUP], i: usize, part: usize) -> Vec
 }
 
 /// Right-hand side and energy, and the matrix if requested.
-pub struct Assemble<'a, const MATRIX: bool> {
-    pub rods: Rods<'a>,
-    pub group: &'a mut Group,
+pub struct AssemblyKernel<'a, const MATRIX: bool> {
+    pub rods: GroupRods<'a>,
+    pub group: &'a mut RodGroup,
 }
 
-impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
+impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let Group {
+        let RodGroup {
             matrix,
             rhs,
-            active,
+            active_lanes: active,
             sums,
             ..
         } = &mut *self.group;
-        let (rods, active) = (&self.rods, Lanes::of(simd, active, part));
+        let (rods, active) = (&self.rods, Lanes::load_group(simd, active, part));
         let zero = Lanes::splat(simd, 0.0);
-        let loads = RodLoads::of(simd, &rods.loads, part);
-        let stiffness = loads.stiffness().array();
+        let loads = LaneRodLoads::load_group(simd, &rods.loads, part);
+        let stiffness = loads.coupling_stiffness().array();
         let (mut energy, mut squared_turn) = (zero, zero);
         let (mut own, mut force) = ([[zero; UNKNOWNS]; UNKNOWNS], [zero; UNKNOWNS]);
         let (n, first) = (rods.leaf.segments(), rods.leaf.first_node());
         for i in 0..n {
             let (element, sections) = rods.element(simd, i, part);
             energy = energy + element.strain_energy(&sections);
-            squared_turn = squared_turn.larger(element.squared_turn());
-            let gradient = on_nodes(element.condensed(&sections));
+            squared_turn = squared_turn.larger_or_infinite(element.squared_turn());
+            let gradient = nodal_gradient(element.condensed(&sections));
             if i >= first {
                 for r in 0..UNKNOWNS {
                     let force = active * (force[r] - gradient[0][r]);
-                    force.put(&mut rhs[i - first][r], part);
+                    force.store_group(&mut rhs[i - first][r], part);
                 }
             }
             if MATRIX {
@@ -328,64 +339,74 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
                 if i >= first {
                     for r in 0..UNKNOWNS {
                         for c in r..UNKNOWNS {
-                            own[r][c] = own[r][c] + hessian.own[0][r][c];
+                            own[r][c] = own[r][c] + hessian.diagonal_blocks[0][r][c];
                         }
                     }
-                    matrix.put(i - first, &own, Some(&hessian.across), active, part);
+                    matrix.store_node_blocks(
+                        i - first,
+                        &own,
+                        Some(&hessian.off_diagonal_block),
+                        active,
+                        part,
+                    );
                 }
-                own = hessian.own[1];
+                own = hessian.diagonal_blocks[1];
             }
             let tip = i + 1 == n;
             let weights = [
-                rods.leaf.grid.weight(i + 1),
+                rods.leaf.grid.node_weight(i + 1),
                 rods.leaf.coupling_weight(i + 1),
             ];
-            let [previous, next] = rods.beside;
+            let [previous, next] = rods.neighbour_positions;
             let x = [
                 gather(simd, previous, i + 1, part),
                 gather(simd, rods.x, i + 1, part),
                 gather(simd, next, i + 1, part),
             ];
-            let (load, potential) = loads.at(x, weights, tip);
+            let (load, potential) = loads.node_forces(x, weights, tip);
             energy = energy + potential;
             let load = load.array();
             let coupling_weight = Lanes::splat(simd, weights[1]);
             for r in 0..UNKNOWNS {
                 force[r] = -gradient[1][r];
-                if r >= TURNS {
-                    let c = r - TURNS;
+                if r >= ROTATION_UNKNOWNS {
+                    let c = r - ROTATION_UNKNOWNS;
                     force[r] = force[r] + load[c];
                     own[r][r] = stiffness[c].mul_add(coupling_weight, own[r][r]);
                 }
             }
         }
         for r in 0..UNKNOWNS {
-            (active * force[r]).put(&mut rhs[n - first][r], part);
+            (active * force[r]).store_group(&mut rhs[n - first][r], part);
         }
         if MATRIX {
-            matrix.put(n - first, &own, None, active, part);
+            matrix.store_node_blocks(n - first, &own, None, active, part);
         }
         if part == 0 {
-            *sums = Sums::default();
+            *sums = AssemblyTotals::default();
         }
-        sums.energy += energy.where_positive(active, zero).sum();
-        sums.turn = larger(sums.turn, squared_turn.largest().sqrt());
+        sums.energy += energy.select_where_positive(active, zero).sum();
+        sums.largest_turn = larger(sums.largest_turn, squared_turn.largest().sqrt());
     }
 }
 
 /// The right-hand side of [`DiscreteLeaf::assemble_stiffening`].
-pub struct Stiffen<'a> {
-    pub rods: Rods<'a>,
-    pub dropped: DVec3,
-    pub group: &'a mut Group,
+pub struct StiffeningKernel<'a> {
+    pub rods: GroupRods<'a>,
+    pub dropped_compliance: DVec3,
+    pub group: &'a mut RodGroup,
 }
 
-impl Kernel for Stiffen<'_> {
+impl GroupKernel for StiffeningKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let Group { rhs, active, .. } = &mut *self.group;
-        let active = Lanes::of(simd, active, part);
-        let dropped = Vectors::splat(simd, self.dropped.to_array());
+        let RodGroup {
+            rhs,
+            active_lanes: active,
+            ..
+        } = &mut *self.group;
+        let active = Lanes::load_group(simd, active, part);
+        let dropped = Vectors::splat(simd, self.dropped_compliance.to_array());
         let none = [Lanes::splat(simd, 0.0); UNKNOWNS];
         let (n, first) = (self.rods.leaf.segments(), self.rods.leaf.first_node());
         let mut force = none;
@@ -393,14 +414,14 @@ impl Kernel for Stiffen<'_> {
             let gradient = match i < n {
                 true => {
                     let (element, sections) = self.rods.element(simd, i, part);
-                    on_nodes(element.stiffening(&sections, dropped))
+                    nodal_gradient(element.stiffening_gradient(&sections, dropped))
                 }
                 false => [none; 2],
             };
             for r in 0..UNKNOWNS {
                 if i >= first {
                     let force = active * (force[r] - gradient[0][r]);
-                    force.put(&mut rhs[i - first][r], part);
+                    force.store_group(&mut rhs[i - first][r], part);
                 }
                 force[r] = -gradient[1][r];
             }
@@ -409,20 +430,20 @@ impl Kernel for Stiffen<'_> {
 }
 
 /// The next state of a group, without clamped bases, which stay.
-pub struct Advance<'a> {
-    pub rods: Rods<'a>,
-    pub solution: &'a [Increments],
+pub struct StateAdvanceKernel<'a> {
+    pub rods: GroupRods<'a>,
+    pub solution: &'a [GroupIncrements],
     pub step: f64,
     pub x: &'a mut [DVec3],
     pub q: &'a mut [DQuat],
     pub n: &'a mut [DVec3],
 }
 
-impl Kernel for Advance<'_> {
+impl GroupKernel for StateAdvanceKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let step = Lanes::splat(simd, self.step);
-        let lanes = rods_of(self.rods.group, self.rods.leaf.rods()).len();
+        let lanes = group_rods(self.rods.group, self.rods.leaf.rods()).len();
         let lanes = part..lanes.min(part + S::F64_LANES);
         let none = Vectors::splat(simd, [0.0; 3]);
         let (mut turn, mut shift) = (none, none);
@@ -443,14 +464,14 @@ impl Kernel for Advance<'_> {
             let x = shift_after.mul_add(step, gather(simd, rods.x, i + 1, part));
             let turned = exp_each(turn_after.scale(step));
             let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
-            let mut numbers = [Four::default(); 10];
+            let mut numbers = [NumberGroup::default(); 10];
             let [n, x, q] = [n, x, q].map(Vectors::array);
             for c in 0..3 {
-                n[c].put(&mut numbers[c], part);
-                x[c].put(&mut numbers[3 + c], part);
-                q[c].put(&mut numbers[6 + c], part);
+                n[c].store_group(&mut numbers[c], part);
+                x[c].store_group(&mut numbers[3 + c], part);
+                q[c].store_group(&mut numbers[6 + c], part);
             }
-            qw.put(&mut numbers[9], part);
+            qw.store_group(&mut numbers[9], part);
             for lane in lanes.clone() {
                 let [n1, n2, n3, x1, x2, x3, q1, q2, q3, qw] = numbers.map(|four| four.0[lane]);
                 let node = lane * (segments + 1) + i + 1;
@@ -463,16 +484,16 @@ impl Kernel for Advance<'_> {
     }
 }
 
-impl Advance<'_> {
+impl StateAdvanceKernel<'_> {
     /// Turns the bases, which hinges hold in their places.
     #[inline(always)]
     fn turn_bases<S: Simd>(&mut self, turn: Vectors<S>, lanes: Range<usize>, part: usize) {
         let simd = turn.x.simd;
         let (q, qw) = multiply_each(exp_each(turn), self.rods.q(simd, 0, part));
-        let mut numbers = [Four::default(); 4];
+        let mut numbers = [NumberGroup::default(); 4];
         let [x, y, z] = q.array();
         for (number, four) in [x, y, z, qw].into_iter().zip(&mut numbers) {
-            number.put(four, part);
+            number.store_group(four, part);
         }
         let nodes = self.rods.leaf.segments() + 1;
         for lane in lanes {
@@ -483,35 +504,35 @@ impl Advance<'_> {
 
 /// The components of increments from `c` on.
 #[inline(always)]
-fn vectors<S: Simd>(simd: S, of: &Increments, c: usize, part: usize) -> Vectors<S> {
+fn vectors<S: Simd>(simd: S, of: &GroupIncrements, c: usize, part: usize) -> Vectors<S> {
     let [x, y, z] = [&of[c], &of[c + 1], &of[c + 2]];
     Vectors::new(
-        Lanes::of(simd, x, part),
-        Lanes::of(simd, y, part),
-        Lanes::of(simd, z, part),
+        Lanes::load_group(simd, x, part),
+        Lanes::load_group(simd, y, part),
+        Lanes::load_group(simd, z, part),
     )
 }
 
 /// Jumps of a rod's position, rotation, force and moment at a node: the values before the
 /// node, seen from the base, minus those beyond it.
-pub type Jump = [DVec3; 4];
+pub type FieldJump = [DVec3; 4];
 
 /// A segment with its derivatives.
-pub struct Tangent {
+pub struct SegmentTangent {
     /// The segment.
     pub segment: Segment,
     /// Derivatives of Pi with respect to its end position and the rotations of both nodes.
     pub first: (DVec3, DVec3, DVec3),
     /// Second derivatives, the force condensed out.
-    pub second: Blocks,
+    pub second: SegmentHessian,
 }
 
 impl DiscreteLeaf {
     /// Segment `i` of rod `j` with its derivatives.
-    pub fn tangent(&self, state: &State, j: usize, i: usize) -> Tangent {
+    pub fn tangent(&self, state: &State, j: usize, i: usize) -> SegmentTangent {
         let section = self.section(j, i);
         let segment = self.segment(state, j, i, state.n[j * self.segments() + i]);
-        Tangent {
+        SegmentTangent {
             first: segment.gradient(section),
             second: segment.hessian(section),
             segment,
@@ -521,10 +542,10 @@ impl DiscreteLeaf {
     /// Assembles the right-hand side for the first-order change that removes the `jumps` of a
     /// leaf, given rod after rod at the midpoints of equal parts; `tangents` are the segments
     /// that begin there.
-    pub fn assemble_jumps(
+    pub fn assemble_jump_correction(
         &self,
-        tangents: &[Vec<Tangent>],
-        jumps: &[Vec<Jump>],
+        tangents: &[Vec<SegmentTangent>],
+        jumps: &[Vec<FieldJump>],
         system: &mut System,
     ) {
         let (n, first) = (self.segments(), self.first_node());
@@ -543,8 +564,8 @@ impl DiscreteLeaf {
                 let at_begin =
                     second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
                 let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
-                add(&mut rhs[i - first], -at_begin - moment, pull - force);
-                add(&mut rhs[i + 1 - first], -at_end, -pull);
+                add_to_increment(&mut rhs[i - first], -at_begin - moment, pull - force);
+                add_to_increment(&mut rhs[i + 1 - first], -at_end, -pull);
             }
         }
         system.set_rhs(&rhs);
@@ -557,7 +578,7 @@ impl DiscreteLeaf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::leaf::{Grid, Leaf, Solved, shift};
+    use crate::leaf::{Grid, Leaf, LinearSolveOutcome, displacement_part};
     use crate::scenario::Scenario;
     use glam::DQuat;
 
@@ -570,7 +591,7 @@ mod tests {
 
     /// The displacements of a straight rod at rest, from its first node on, due to a jump at
     /// its midpoint.
-    fn displacements(jump: Jump) -> Vec<DVec3> {
+    fn displacements(jump: FieldJump) -> Vec<DVec3> {
         let rod = Scenario::from_toml(ROD).unwrap();
         let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(SEGMENTS, &[]));
         let x = leaf.grid.sigma().iter().map(|&sigma| sigma * DVec3::X);
@@ -579,12 +600,15 @@ mod tests {
         leaf.assemble(&state, &mut system);
         assert!(system.factorize(0.0));
         let tangent = leaf.tangent(&state, 0, SEGMENTS / 2);
-        leaf.assemble_jumps(&[vec![tangent]], &[vec![jump]], &mut system);
-        assert!(matches!(system.solve(None, 1e-12), Solved::Yes(_)));
-        system.solution()[0].iter().map(shift).collect()
+        leaf.assemble_jump_correction(&[vec![tangent]], &[vec![jump]], &mut system);
+        assert!(matches!(
+            system.solve(None, 1e-12),
+            LinearSolveOutcome::Converged(_)
+        ));
+        system.solution()[0].iter().map(displacement_part).collect()
     }
 
-    fn assert_moved(jump: Jump, expected: impl Fn(f64) -> DVec3) {
+    fn assert_moved(jump: FieldJump, expected: impl Fn(f64) -> DVec3) {
         for (i, found) in displacements(jump).into_iter().enumerate() {
             let expected = expected((i + 1) as f64 / SEGMENTS as f64);
             let off = (found - expected).length();

@@ -10,86 +10,86 @@
 
 use crate::leaf::state::Increment;
 use crate::rod;
-use crate::rod::{Block, UNKNOWNS};
-use crate::simd::{Four, GROUP, Kernel, Lanes, run};
+use crate::rod::{LaneBlock, UNKNOWNS};
+use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, run};
 use glam::DVec3;
 use pulp::{Arch, Simd};
 
 /// Increments of a node, or the forces dual to them, of all rods of a group.
-pub type Increments = [Four; 6];
+pub type GroupIncrements = [NumberGroup; 6];
 
 /// The increments of the rod in a lane.
-pub fn of_lane(increments: &Increments, lane: usize) -> Increment {
+pub fn lane_increment(increments: &GroupIncrements, lane: usize) -> Increment {
     increments.map(|four| four.0[lane])
 }
 
 /// Writes the increments of the rod in a lane.
-pub fn set_lane(increments: &mut Increments, lane: usize, of_rod: &Increment) {
+pub fn set_lane_increment(increments: &mut GroupIncrements, lane: usize, of_rod: &Increment) {
     for (four, value) in increments.iter_mut().zip(of_rod) {
         four.0[lane] = *value;
     }
 }
 
 /// A block of a chain, rows first.
-pub type ChainBlock = [[f64; UNKNOWNS]; UNKNOWNS];
+pub type RodBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 
 /// Number of rotations among the unknowns of a node; they come first.
-pub const TURNS: usize = 3;
+pub const ROTATION_UNKNOWNS: usize = 3;
 
 /// Entries of the upper triangle of a block.
 const TRIANGLE: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
 
 /// The entries of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
-type Entries = [Four; ENTRIES];
+type NodeEntries = [NumberGroup; ENTRIES];
 
 const ENTRIES: usize = TRIANGLE + UNKNOWNS * UNKNOWNS;
 
 /// Position of the entry (r, c) of a triangle, r <= c.
-const fn upper(r: usize, c: usize) -> usize {
+const fn triangle_index(r: usize, c: usize) -> usize {
     r * (2 * UNKNOWNS - r - 1) / 2 + c
 }
 
 /// Position of the entry (r, c) of a block (i, i + 1).
-const fn off(r: usize, c: usize) -> usize {
+const fn off_diagonal_index(r: usize, c: usize) -> usize {
     TRIANGLE + r * UNKNOWNS + c
 }
 
 /// The 3 x 3 matrix of a tip, rows first.
-pub type Tip = [[f64; 3]; 3];
+pub type TipMatrix = [[f64; 3]; 3];
 
 /// The matrices of a group of rods, nodes from the first with equations on (from 0), without the
 /// coupling to others, and their factorisations.
 #[derive(Clone, Debug)]
-pub struct Chain {
+pub struct BlockTridiagonal {
     /// Entries of all nodes.
-    matrix: Vec<Entries>,
+    matrix: Vec<NodeEntries>,
     /// L D L^T, with unit lower L: of every node L^T of its own block above the
     /// diagonal and 1/d on it, then L^-1 times the block (i, i + 1).
-    factor: Vec<Entries>,
+    factor: Vec<NodeEntries>,
     /// Number of eliminated unknowns of the last node: with a joint tip its rotations alone.
-    last: usize,
+    last_node_unknowns: usize,
 }
 
 /// The contribution of the masses to a matrix: `shift` times the masses per weight, rotary and
 /// translational, times the nodes' weights.
-pub struct Masses<'a> {
+pub struct ShiftedMasses<'a> {
     pub shift: f64,
-    pub per_weight: [Four; 2],
+    pub per_weight: [NumberGroup; 2],
     pub weights: &'a [f64],
 }
 
-impl Chain {
+impl BlockTridiagonal {
     /// Identity matrices, for rods with `nodes` nodes that have equations.
     pub fn new(nodes: usize, joined: bool) -> Self {
-        let zeros = [Four::default(); ENTRIES];
+        let zeros = [NumberGroup::default(); ENTRIES];
         let mut identity = zeros;
         for k in 0..UNKNOWNS {
-            identity[upper(k, k)] = Four::splat(1.0);
+            identity[triangle_index(k, k)] = NumberGroup::splat(1.0);
         }
-        Chain {
+        BlockTridiagonal {
             matrix: vec![identity; nodes],
             factor: vec![zeros; nodes],
-            last: if joined { TURNS } else { UNKNOWNS },
+            last_node_unknowns: if joined { ROTATION_UNKNOWNS } else { UNKNOWNS },
         }
     }
 
@@ -100,11 +100,11 @@ impl Chain {
     /// Writes the upper triangle of the block of node `i` (from 0), and the block
     /// between it and the next if there is one; identities in lanes without a rod.
     #[inline(always)]
-    pub fn put<S: Simd>(
+    pub fn store_node_blocks<S: Simd>(
         &mut self,
         i: usize,
-        own: &rod::Block<S>,
-        next: Option<&rod::Block<S>>,
+        own: &rod::LaneBlock<S>,
+        next: Option<&rod::LaneBlock<S>>,
         active: Lanes<S>,
         part: usize,
     ) {
@@ -112,41 +112,41 @@ impl Chain {
         let zero = Lanes::splat(active.simd, 0.0);
         let one = Lanes::splat(active.simd, 1.0);
         for r in 0..UNKNOWNS {
-            let own_r = own[r][r].where_positive(active, one);
-            own_r.put(&mut node[upper(r, r)], part);
+            let own_r = own[r][r].select_where_positive(active, one);
+            own_r.store_group(&mut node[triangle_index(r, r)], part);
             for c in r + 1..UNKNOWNS {
-                let own = own[r][c].where_positive(active, zero);
-                own.put(&mut node[upper(r, c)], part);
+                let own = own[r][c].select_where_positive(active, zero);
+                own.store_group(&mut node[triangle_index(r, c)], part);
             }
             if let Some(next) = next {
                 for c in 0..UNKNOWNS {
-                    let next = next[r][c].where_positive(active, zero);
-                    next.put(&mut node[off(r, c)], part);
+                    let next = next[r][c].select_where_positive(active, zero);
+                    next.store_group(&mut node[off_diagonal_index(r, c)], part);
                 }
             }
         }
     }
 
     /// Entry (r, c) of the block of node `i` (from 0), r <= c.
-    pub fn diagonal(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
-        &mut self.matrix[i][upper(r, c)]
+    pub fn diagonal_entry_mut(&mut self, i: usize, r: usize, c: usize) -> &mut NumberGroup {
+        &mut self.matrix[i][triangle_index(r, c)]
     }
 
     /// Entry (r, c) of the block between nodes `i` (from 0) and `i` + 1.
-    pub fn off(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
-        &mut self.matrix[i][off(r, c)]
+    pub fn off_diagonal_entry_mut(&mut self, i: usize, r: usize, c: usize) -> &mut NumberGroup {
+        &mut self.matrix[i][off_diagonal_index(r, c)]
     }
 
     /// The block of node `i` (from 0) of the rod in a lane, its upper triangle, and
     /// the one between it and the next.
-    pub fn blocks(&self, i: usize, lane: usize) -> (ChainBlock, ChainBlock) {
+    pub fn blocks(&self, i: usize, lane: usize) -> (RodBlock, RodBlock) {
         let node = &self.matrix[i];
         let (mut own, mut next) = ([[0.0; UNKNOWNS]; UNKNOWNS], [[0.0; UNKNOWNS]; UNKNOWNS]);
         for r in 0..UNKNOWNS {
             for c in 0..UNKNOWNS {
-                next[r][c] = node[off(r, c)].0[lane];
+                next[r][c] = node[off_diagonal_index(r, c)].0[lane];
                 if r <= c {
-                    own[r][c] = node[upper(r, c)].0[lane];
+                    own[r][c] = node[triangle_index(r, c)].0[lane];
                 }
             }
         }
@@ -155,7 +155,7 @@ impl Chain {
 
     /// Factorises the matrices plus `masses`. False if a pivot is not positive or, with
     /// `any_sign`, if one is zero.
-    pub fn factorize(&mut self, arch: Arch, masses: &Masses, any_sign: bool) -> bool {
+    pub fn factorize(&mut self, arch: Arch, masses: &ShiftedMasses, any_sign: bool) -> bool {
         let mut kernel = Factorize {
             chain: self,
             masses,
@@ -167,27 +167,34 @@ impl Chain {
     }
 
     /// The contribution of the rod in a lane to the matrix of the joint tip.
-    pub fn tip(&self, lane: usize) -> Tip {
+    pub fn tip(&self, lane: usize) -> TipMatrix {
         let node = &self.factor[self.nodes() - 1];
-        let entry = |r: usize, c: usize| node[upper(TURNS + r.min(c), TURNS + r.max(c))].0[lane];
+        let entry = |r: usize, c: usize| {
+            node[triangle_index(ROTATION_UNKNOWNS + r.min(c), ROTATION_UNKNOWNS + r.max(c))].0[lane]
+        };
         std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
     }
 
     /// Forward substitution L y = b. With a joint tip the last dx slots of y then hold the
     /// rods' contributions to the tip's right-hand side.
-    pub fn forward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) {
+    pub fn substitute_forward(&self, arch: Arch, b: &[GroupIncrements], y: &mut [GroupIncrements]) {
         let chain = self;
         run(arch, &mut Forward { chain, b, y });
     }
 
-    /// Backward substitution in place, from the result of [`Chain::forward`]; with a joint tip
+    /// Backward substitution in place, from the result of [`BlockTridiagonal::forward`]; with a joint tip
     /// the last dx slots must hold its displacement. Returns b . y.
-    pub fn backward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) -> f64 {
+    pub fn substitute_backward(
+        &self,
+        arch: Arch,
+        b: &[GroupIncrements],
+        y: &mut [GroupIncrements],
+    ) -> f64 {
         let mut kernel = Backward {
             chain: self,
             b,
             y,
-            product: Four::default(),
+            product: NumberGroup::default(),
         };
         run(arch, &mut kernel);
         kernel.product.sum()
@@ -196,10 +203,10 @@ impl Chain {
 
 /// Solves a symmetric 3 x 3 system by L D L^T; `None` if not positive definite.
 #[derive(Clone, Copy, Debug)]
-pub struct TipFactor(Tip);
+pub struct TipFactor(TipMatrix);
 
 impl TipFactor {
-    pub fn new(mut a: Tip) -> Option<Self> {
+    pub fn new(mut a: TipMatrix) -> Option<Self> {
         for k in 0..3 {
             if a[k][k].is_nan() || a[k][k] <= 0.0 {
                 return None;
@@ -234,26 +241,26 @@ pub fn group_and_lane(j: usize) -> (usize, usize) {
 
 /// The rods of a group, lane by lane; lanes without a rod repeat the last.
 #[inline(always)]
-pub fn lanes_of(group: usize, rods: usize) -> [usize; GROUP] {
+pub fn lane_rods(group: usize, rods: usize) -> [usize; GROUP] {
     std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
 }
 
-/// See [`Chain::factorize`].
+/// See [`BlockTridiagonal::factorize`].
 pub struct Factorize<'a> {
-    pub chain: &'a mut Chain,
-    pub masses: &'a Masses<'a>,
+    pub chain: &'a mut BlockTridiagonal,
+    pub masses: &'a ShiftedMasses<'a>,
     pub any_sign: bool,
     pub definite: bool,
 }
 
-impl Kernel for Factorize<'_> {
+impl GroupKernel for Factorize<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let shift = Lanes::splat(simd, self.masses.shift);
         let mut masses = [zero; 2];
         for k in 0..2 {
-            masses[k] = shift * Lanes::of(simd, &self.masses.per_weight[k], part);
+            masses[k] = shift * Lanes::load_group(simd, &self.masses.per_weight[k], part);
         }
         let n = self.chain.nodes();
         let mut schur = [[zero; UNKNOWNS]; UNKNOWNS];
@@ -264,20 +271,25 @@ impl Kernel for Factorize<'_> {
             let mut a = [[zero; UNKNOWNS]; UNKNOWNS];
             for r in 0..UNKNOWNS {
                 for c in r..UNKNOWNS {
-                    a[r][c] = Lanes::of(simd, &node[upper(r, c)], part) - schur[r][c];
+                    a[r][c] =
+                        Lanes::load_group(simd, &node[triangle_index(r, c)], part) - schur[r][c];
                 }
             }
             for k in 0..UNKNOWNS {
-                a[k][k] = masses[k / TURNS].mul_add(weight, a[k][k]);
+                a[k][k] = masses[k / ROTATION_UNKNOWNS].mul_add(weight, a[k][k]);
             }
             // Rows above the diagonal become L^T, the diagonal 1/d.
-            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            let count = if i + 1 < n {
+                UNKNOWNS
+            } else {
+                self.chain.last_node_unknowns
+            };
             let mut definite = one;
             for k in 0..UNKNOWNS {
                 if k < count {
                     let (row, d) = (a[k], a[k][k]);
                     let test = if self.any_sign { d * d } else { d };
-                    definite = definite.where_positive(test, zero);
+                    definite = definite.select_where_positive(test, zero);
                     let inverse = d.recip();
                     for r in k + 1..UNKNOWNS {
                         let l = row[r] * inverse;
@@ -295,11 +307,11 @@ impl Kernel for Factorize<'_> {
             }
             for r in 0..UNKNOWNS {
                 for c in r..UNKNOWNS {
-                    a[r][c].put(&mut factor[upper(r, c)], part);
+                    a[r][c].store_group(&mut factor[triangle_index(r, c)], part);
                 }
             }
             if i + 1 < n {
-                schur = substitute(simd, &a, node, factor, part);
+                schur = eliminate_off_diagonal(simd, &a, node, factor, part);
             }
         }
     }
@@ -308,18 +320,18 @@ impl Kernel for Factorize<'_> {
 /// Writes w = L^-1 times the block (i, i + 1); returns the upper triangle of
 /// w^T D^-1 w.
 #[inline(always)]
-fn substitute<S: Simd>(
+fn eliminate_off_diagonal<S: Simd>(
     simd: S,
-    a: &Block<S>,
-    node: &Entries,
-    factor: &mut Entries,
+    a: &LaneBlock<S>,
+    node: &NodeEntries,
+    factor: &mut NodeEntries,
     part: usize,
-) -> Block<S> {
+) -> LaneBlock<S> {
     let zero = Lanes::splat(simd, 0.0);
     let (mut w, mut schur) = ([[zero; UNKNOWNS]; UNKNOWNS], [[zero; UNKNOWNS]; UNKNOWNS]);
     for r in 0..UNKNOWNS {
         for c in 0..UNKNOWNS {
-            w[r][c] = Lanes::of(simd, &node[off(r, c)], part);
+            w[r][c] = Lanes::load_group(simd, &node[off_diagonal_index(r, c)], part);
         }
     }
     for k in 0..UNKNOWNS {
@@ -330,7 +342,7 @@ fn substitute<S: Simd>(
             }
         }
         for c in 0..UNKNOWNS {
-            row[c].put(&mut factor[off(k, c)], part);
+            row[c].store_group(&mut factor[off_diagonal_index(k, c)], part);
         }
     }
     for k in 0..UNKNOWNS {
@@ -344,14 +356,14 @@ fn substitute<S: Simd>(
     schur
 }
 
-/// See [`Chain::forward`].
+/// See [`BlockTridiagonal::forward`].
 pub struct Forward<'a> {
-    pub chain: &'a Chain,
-    pub b: &'a [Increments],
-    pub y: &'a mut [Increments],
+    pub chain: &'a BlockTridiagonal,
+    pub b: &'a [GroupIncrements],
+    pub y: &'a mut [GroupIncrements],
 }
 
-impl Kernel for Forward<'_> {
+impl GroupKernel for Forward<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let n = self.chain.nodes();
@@ -359,44 +371,48 @@ impl Kernel for Forward<'_> {
         let mut before = y;
         for i in 0..n {
             for k in 0..UNKNOWNS {
-                y[k] = Lanes::of(simd, &self.b[i][k], part);
+                y[k] = Lanes::load_group(simd, &self.b[i][k], part);
             }
             if i > 0 {
                 let w = &self.chain.factor[i - 1];
                 for k in 0..UNKNOWNS {
                     for c in 0..UNKNOWNS {
-                        let w = Lanes::of(simd, &w[off(k, c)], part);
+                        let w = Lanes::load_group(simd, &w[off_diagonal_index(k, c)], part);
                         y[c] = before[k].neg_mul_add(w, y[c]);
                     }
                 }
             }
             let own = &self.chain.factor[i];
-            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            let count = if i + 1 < n {
+                UNKNOWNS
+            } else {
+                self.chain.last_node_unknowns
+            };
             for k in 0..UNKNOWNS {
                 if k < count {
                     for r in k + 1..UNKNOWNS {
-                        let l = Lanes::of(simd, &own[upper(k, r)], part);
+                        let l = Lanes::load_group(simd, &own[triangle_index(k, r)], part);
                         y[r] = y[k].neg_mul_add(l, y[r]);
                     }
                 }
             }
             for k in 0..UNKNOWNS {
-                y[k].put(&mut self.y[i][k], part);
-                before[k] = y[k] * Lanes::of(simd, &own[upper(k, k)], part);
+                y[k].store_group(&mut self.y[i][k], part);
+                before[k] = y[k] * Lanes::load_group(simd, &own[triangle_index(k, k)], part);
             }
         }
     }
 }
 
-/// See [`Chain::backward`].
+/// See [`BlockTridiagonal::backward`].
 pub struct Backward<'a> {
-    pub chain: &'a Chain,
-    pub b: &'a [Increments],
-    pub y: &'a mut [Increments],
-    pub product: Four,
+    pub chain: &'a BlockTridiagonal,
+    pub b: &'a [GroupIncrements],
+    pub y: &'a mut [GroupIncrements],
+    pub product: NumberGroup,
 }
 
-impl Kernel for Backward<'_> {
+impl GroupKernel for Backward<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let n = self.chain.nodes();
@@ -405,33 +421,37 @@ impl Kernel for Backward<'_> {
         for i in (0..n).rev() {
             let own = &self.chain.factor[i];
             for k in 0..UNKNOWNS {
-                y[k] = Lanes::of(simd, &self.y[i][k], part);
+                y[k] = Lanes::load_group(simd, &self.y[i][k], part);
             }
             if i + 1 < n {
                 for k in 0..UNKNOWNS {
                     for c in 0..UNKNOWNS {
-                        let w = Lanes::of(simd, &own[off(k, c)], part);
+                        let w = Lanes::load_group(simd, &own[off_diagonal_index(k, c)], part);
                         y[k] = after[c].neg_mul_add(w, y[k]);
                     }
                 }
             }
-            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            let count = if i + 1 < n {
+                UNKNOWNS
+            } else {
+                self.chain.last_node_unknowns
+            };
             for k in (0..UNKNOWNS).rev() {
                 if k < count {
-                    y[k] = y[k] * Lanes::of(simd, &own[upper(k, k)], part);
+                    y[k] = y[k] * Lanes::load_group(simd, &own[triangle_index(k, k)], part);
                     for r in k + 1..UNKNOWNS {
-                        let l = Lanes::of(simd, &own[upper(k, r)], part);
+                        let l = Lanes::load_group(simd, &own[triangle_index(k, r)], part);
                         y[k] = y[r].neg_mul_add(l, y[k]);
                     }
                 }
             }
             for k in 0..UNKNOWNS {
-                let b = Lanes::of(simd, &self.b[i][k], part);
+                let b = Lanes::load_group(simd, &self.b[i][k], part);
                 product = b.mul_add(y[k], product);
-                y[k].put(&mut self.y[i][k], part);
+                y[k].store_group(&mut self.y[i][k], part);
             }
             after = y;
         }
-        product.put(&mut self.product, part);
+        product.store_group(&mut self.product, part);
     }
 }

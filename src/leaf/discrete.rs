@@ -2,11 +2,11 @@
 //!
 //! The grid: positions of the nodes along the rods.
 
-use crate::leaf::loads::{NodeLoad, RodLoad, RodLoads, group_loads};
+use crate::leaf::loads::{LaneRodLoads, NodeLoad, RodLoad, group_loads};
 use crate::leaf::state::State;
-use crate::leaf::{Gripped, Leaf, Loads};
+use crate::leaf::{GrippedNode, Leaf, Loads};
 use crate::numbers::largest;
-use crate::rod::{Section, Segment, Strip};
+use crate::rod::{Section, Segment, TissueStrip};
 use crate::rotation;
 use crate::simd::{GROUP, Vectors};
 use glam::DVec3;
@@ -27,19 +27,19 @@ pub struct DiscreteLeaf {
     pub grid: Grid,
     /// Sections of all segments, rod after rod.
     pub sections: Vec<Section>,
-    /// Their rest curvatures, whatever [`DiscreteLeaf::set_rest`] sets.
+    /// Their rest curvatures, whatever [`DiscreteLeaf::scale_rest_curvatures`] sets.
     rest_curvatures: Vec<DVec3>,
     /// Coupling of each gap, per unit of sigma; the last may be the one between
     /// a rod and its image.
     coupling: Vec<DVec3>,
     /// Tissue of each gap at every node; empty if there is none.
-    pub(super) strips: Vec<Strip>,
+    pub(super) strips: Vec<TissueStrip>,
     /// Forces on all nodes by loads of their veins alone; empty if there are none.
     pub(super) own_loads: Vec<DVec3>,
     /// Nodes and sizes of the dead moments on points of a single rod.
     pub(super) point_moments: Vec<(usize, DVec3)>,
     /// Nodes that grips hold.
-    pub(super) grips: Vec<Gripped>,
+    pub(super) grips: Vec<GrippedNode>,
     /// Part of the loads that acts: one, except during continuation in the loads.
     pub load_factor: f64,
     /// The loads.
@@ -52,7 +52,7 @@ impl DiscreteLeaf {
         let n = grid.segments();
         let mut sections: Vec<Section> = (0..leaf.rods())
             .flat_map(|j| (0..n).map(move |i| (j, i)))
-            .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
+            .map(|(j, i)| leaf.section(j, grid.segment_midpoint(i), grid.segment_width(i)))
             .collect();
         leaf.fit_rest_shapes(&grid, &mut sections);
         DiscreteLeaf::with_sections(leaf, grid, sections)
@@ -68,7 +68,7 @@ impl DiscreteLeaf {
     }
 
     fn with_sections(leaf: &Leaf, grid: Grid, sections: Vec<Section>) -> Self {
-        let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
+        let gaps = leaf.rods() - usize::from(!leaf.borders_own_image(leaf.rods() - 1));
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
         let mut discrete = DiscreteLeaf {
             leaf: leaf.clone(),
@@ -83,16 +83,16 @@ impl DiscreteLeaf {
             load_factor: 1.0,
             loads: leaf.loads,
         };
-        discrete.own_loads = discrete.own_loads_of(leaf);
-        discrete.point_moments = discrete.moments_on_nodes();
+        discrete.own_loads = discrete.nodal_own_loads(leaf);
+        discrete.point_moments = discrete.nodal_point_moments();
         let gripped = !leaf.scenario().grips.is_empty();
         if leaf.has_tissue() || gripped {
-            let natural = discrete.natural();
-            discrete.grips = discrete.gripped(&natural);
+            let natural = discrete.stress_free_state();
+            discrete.grips = discrete.find_gripped_nodes(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
                     true => discrete.strips(&natural),
-                    false => discrete.strips(&discrete.unstrained(false)),
+                    false => discrete.strips(&discrete.unstrained_state(false)),
                 };
             }
         }
@@ -100,8 +100,8 @@ impl DiscreteLeaf {
     }
 
     /// This leaf with its veins apart: [`Leaf::apart`].
-    pub fn apart(&self) -> Self {
-        let leaf = self.leaf.apart();
+    pub fn decoupled_leaf(&self) -> Self {
+        let leaf = self.leaf.decoupled_leaf();
         DiscreteLeaf {
             loads: leaf.loads,
             leaf,
@@ -111,12 +111,12 @@ impl DiscreteLeaf {
     }
 
     /// The natural leaf, unstrained rods: v = v0, u = u0, each from its base.
-    pub fn natural(&self) -> State {
-        self.unstrained(true)
+    pub fn stress_free_state(&self) -> State {
+        self.unstrained_state(true)
     }
 
     /// The same, or before the rods have `grown`.
-    fn unstrained(&self, grown: bool) -> State {
+    fn unstrained_state(&self, grown: bool) -> State {
         let (mut xs, mut qs) = (Vec::new(), Vec::new());
         for j in 0..self.rods() {
             let (mut x, mut q) = self.leaf.base(j);
@@ -143,7 +143,7 @@ impl DiscreteLeaf {
     }
 
     /// The same leaf with no compliance below `floor`, and no tissue stiffer than its inverse.
-    pub fn softened(&self, floor: f64) -> Self {
+    pub fn with_compliance_floor(&self, floor: f64) -> Self {
         let mut soft = self.clone();
         let n = self.segments();
         for (k, section) in soft.sections.iter_mut().enumerate() {
@@ -152,7 +152,7 @@ impl DiscreteLeaf {
             section.condensing = section.condensing.min(DVec3::splat(1.0 / floor));
         }
         for (k, strip) in soft.strips.iter_mut().enumerate() {
-            let stiffest = self.grid.weight(k % (n + 1)) / floor;
+            let stiffest = self.grid.node_weight(k % (n + 1)) / floor;
             strip.stiffness = strip.stiffness.min(DVec3::splat(stiffest));
         }
         soft
@@ -163,7 +163,7 @@ impl DiscreteLeaf {
     pub fn strain_forces(&self, state: &mut State) -> f64 {
         let (n, mut violation) = (self.segments(), 0.0_f64);
         state.tissue.clear();
-        for (j, i) in self.each(0..n) {
+        for (j, i) in self.rod_index_pairs(0..n) {
             let section = self.section(j, i);
             let rigid = section.compliance.cmpeq(DVec3::ZERO);
             let strained = self.strained_segment(state, j, i);
@@ -181,7 +181,7 @@ impl DiscreteLeaf {
         let n = self.segments();
         let open = |j: usize| -> f64 {
             let gap = |i: usize| {
-                let nearly_rigid = self.missing_part(j, i).cmpgt(DVec3::ZERO);
+                let nearly_rigid = self.missing_law_fraction(j, i).cmpgt(DVec3::ZERO);
                 if !nearly_rigid.any() {
                     return 0.0;
                 }
@@ -197,11 +197,11 @@ impl DiscreteLeaf {
     /// of any bending mode, and above the error of a neutral mode's zero eigenvalue by
     /// rounding and unfinished iterations.
     pub fn neutral_shift(&self) -> f64 {
-        1e-7 + 4.0 * self.rounding()
+        1e-7 + 4.0 * self.eigenvalue_rounding()
     }
 
     /// Rounding error of the eigenvalues of the matrix.
-    pub fn rounding(&self) -> f64 {
+    pub fn eigenvalue_rounding(&self) -> f64 {
         let sections = self.sections.iter();
         let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
         f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
@@ -230,7 +230,7 @@ impl DiscreteLeaf {
     }
 
     /// Rod and number of every node or segment whose number is in `of`.
-    pub fn each<I: Iterator<Item = usize> + Clone>(
+    pub fn rod_index_pairs<I: Iterator<Item = usize> + Clone>(
         &self,
         of: I,
     ) -> impl Iterator<Item = (usize, usize)> + use<I> {
@@ -250,7 +250,7 @@ impl DiscreteLeaf {
 
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
     /// joint tip, which all rods share.
-    pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {
+    pub(crate) fn node_coupling(&self, g: usize, i: usize) -> DVec3 {
         self.coupling[g] * self.coupling_weight(i)
     }
 
@@ -263,7 +263,7 @@ impl DiscreteLeaf {
     /// Whether all tips are one point that moves.
     pub fn tips_move_together(&self) -> bool {
         // The tip of a single rod is not shared, and a held tip does not move.
-        self.leaf.joined() && self.rods() > 1 && self.leaf.held.is_none()
+        self.leaf.joined() && self.rods() > 1 && self.leaf.tip_support.is_none()
     }
 
     /// The force on the holder of a held tip, and the moments of the rods on a clamp.
@@ -276,16 +276,16 @@ impl DiscreteLeaf {
             let (g_x, _, g_b) = segment.gradient(self.section(j, n - 1));
             let load = self.load(state, j, n);
             force += load.force - g_x;
-            moments.push(load.moment + self.moment_on(n) - g_b);
+            moments.push(load.moment + self.node_dead_moment(n) - g_b);
         }
         (force, moments)
     }
 
     /// Weight of node `i` in the masses: zero at a held tip, which does not move.
-    pub(super) fn moving_weight(&self, i: usize) -> f64 {
-        match self.leaf.held {
+    pub(super) fn mass_weight(&self, i: usize) -> f64 {
+        match self.leaf.tip_support {
             Some(_) if i == self.segments() => 0.0,
-            _ => self.grid.weight(i),
+            _ => self.grid.node_weight(i),
         }
     }
 
@@ -296,7 +296,7 @@ impl DiscreteLeaf {
 
     /// The same, carrying the force of its strains.
     pub fn strained_segment(&self, state: &State, j: usize, i: usize) -> Segment {
-        Segment::strained(self.section(j, i), &state.ends(j, i))
+        Segment::with_strain_force(self.section(j, i), &state.ends(j, i))
     }
 
     /// Section of segment `i` of rod `j`.
@@ -309,7 +309,7 @@ impl DiscreteLeaf {
     pub(super) fn coupling_weight(&self, i: usize) -> f64 {
         match self.leaf.joined() && i == self.segments() {
             true => 0.0,
-            false => self.grid.weight(i),
+            false => self.grid.node_weight(i),
         }
     }
 
@@ -332,13 +332,13 @@ impl DiscreteLeaf {
             tip: tip_share * self.load_factor * self.loads.tip_force,
             previous: gap(j > 0, j.wrapping_sub(1)),
             next: gap(j + 1 < self.rods(), j),
-            image: 2.0 * DVec3::Y * gap(self.leaf.beside_image(j), j),
+            image: 2.0 * DVec3::Y * gap(self.leaf.borders_own_image(j), j),
         }
     }
 
     /// Force on the tip of rod `j`: its share if the tips are one.
     pub fn tip_force(&self, j: usize) -> DVec3 {
-        self.rod_load(j).tip + self.force_on_points(j, 1.0)
+        self.rod_load(j).tip + self.point_force_at(j, 1.0)
     }
 
     /// Dead load, coupling and tissue on node `i` of rod `j`.
@@ -351,10 +351,10 @@ impl DiscreteLeaf {
             state.x[k],
             x(!last, k + nodes),
         ];
-        let load = RodLoads::of(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
-        let weights = [self.grid.weight(i), self.coupling_weight(i)];
-        let (force, energy) = load.at(x.map(Vectors::from), weights, i == self.segments());
-        let (tissue, own) = (self.tissue_load(state, j, i), self.own_load(j, i));
+        let load = LaneRodLoads::load_group(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
+        let weights = [self.grid.node_weight(i), self.coupling_weight(i)];
+        let (force, energy) = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
+        let (tissue, own) = (self.tissue_load(state, j, i), self.own_load_on_node(j, i));
         NodeLoad {
             moment: tissue.moment,
             force: DVec3::from(force) + tissue.force + own,
@@ -364,7 +364,7 @@ impl DiscreteLeaf {
 
     /// Potential energy of the dead loads in a state.
     pub fn potential(&self, state: &State) -> f64 {
-        self.each(0..self.segments() + 1)
+        self.rod_index_pairs(0..self.segments() + 1)
             .map(|(j, i)| self.load(state, j, i).energy - self.coupling_energy(state, j, i))
             .sum()
     }
@@ -376,11 +376,11 @@ impl DiscreteLeaf {
         }
         let k = state.base(j) + i;
         let stretch = state.x[k + self.segments() + 1] - state.x[k];
-        0.5 * stretch.dot(self.spring(j, i) * stretch) + self.tissue_load(state, j, i).energy
+        0.5 * stretch.dot(self.node_coupling(j, i) * stretch) + self.tissue_load(state, j, i).energy
     }
 
     /// Puts on parts of the loads and of the coupling of the `whole` leaf.
-    pub fn load_in_part(&mut self, whole: &DiscreteLeaf, [loads, coupling]: [f64; 2]) {
+    pub fn set_load_factors(&mut self, whole: &DiscreteLeaf, [loads, coupling]: [f64; 2]) {
         self.load_factor = loads * whole.load_factor;
         for (own, full) in self.coupling.iter_mut().zip(&whole.coupling) {
             *own = coupling * *full;
@@ -388,7 +388,7 @@ impl DiscreteLeaf {
     }
 
     /// Sets all rest curvatures to `factor` times those of the leaf.
-    pub fn set_rest(&mut self, factor: f64) {
+    pub fn scale_rest_curvatures(&mut self, factor: f64) {
         for (section, own) in self.sections.iter_mut().zip(&self.rest_curvatures) {
             section.rest_curvature = factor * *own;
         }
@@ -436,7 +436,7 @@ impl Grid {
 
     /// The grid whose nodes are `stations`: made with this number of segments, or with a half,
     /// a quarter ... of it and refined, which differs if there are kinks.
-    pub fn through(stations: &[f64], kinks: &[f64]) -> Self {
+    pub fn from_stations(stations: &[f64], kinks: &[f64]) -> Self {
         let segments = stations.len() - 1;
         let grid = Grid::new(segments, kinks);
         let apart = |grid: &Grid| {
@@ -455,12 +455,12 @@ impl Grid {
 
     /// The same grid with every segment halved.
     pub fn refined(&self) -> Self {
-        self.cut(|a, b, _| [a, 0.5 * (a + b)])
+        self.subdivided_grid(|a, b, _| [a, 0.5 * (a + b)])
     }
 
     /// The same grid with every segment cut in three.
     pub fn tripled(&self) -> Self {
-        self.cut(|a, b, third| [a, a + third, b - third])
+        self.subdivided_grid(|a, b, third| [a, a + third, b - third])
     }
 
     /// The grid with every second node; a kink may then lie inside a segment. `None` unless the
@@ -476,7 +476,7 @@ impl Grid {
 
     /// With every segment divided in N: `nodes` gives its first nodes from its ends and the
     /// new width.
-    fn cut<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {
+    fn subdivided_grid<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {
         let widths = self.widths.iter().map(|width| width / N as f64);
         let segments = self.sigma.windows(2).zip(widths.clone());
         let starts = segments.flat_map(|(ends, width)| nodes(ends[0], ends[1], width));
@@ -510,17 +510,17 @@ impl Grid {
     }
 
     /// Midpoint of segment `i`.
-    pub fn middle(&self, i: usize) -> f64 {
+    pub fn segment_midpoint(&self, i: usize) -> f64 {
         0.5 * (self.sigma[i] + self.sigma[i + 1])
     }
 
     /// Width of segment `i` as a fraction of the length.
-    pub fn width(&self, i: usize) -> f64 {
+    pub fn segment_width(&self, i: usize) -> f64 {
         self.widths[i]
     }
 
     /// Trapezoidal weight of node `i` as a fraction of the length.
-    pub fn weight(&self, i: usize) -> f64 {
+    pub fn node_weight(&self, i: usize) -> f64 {
         let width = |i: usize| self.widths.get(i).copied().unwrap_or(0.0);
         0.5 * (width(i.wrapping_sub(1)) + width(i))
     }
@@ -537,14 +537,14 @@ mod tests {
         for (grid, segments) in [(grid.refined(), 22), (grid.tripled(), 33), (grid, 11)] {
             assert_eq!(grid.segments(), segments);
             assert!(kinks.iter().all(|kink| grid.sigma().contains(kink)));
-            let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
+            let sum: f64 = (0..=segments).map(|i| grid.node_weight(i)).sum();
             assert!((sum - 1.0).abs() < 1e-15);
             assert_eq!(grid.refined().coarsened(), Some(grid));
         }
         assert_eq!(Grid::new(11, &kinks).coarsened(), None);
         let [fine, coarse] = [32, 8].map(|segments| Grid::new(segments, &[0.3404]));
         for grid in [fine, coarse.refined().refined()] {
-            let through = Grid::through(grid.sigma(), &[0.3404]);
+            let through = Grid::from_stations(grid.sigma(), &[0.3404]);
             let pairs = through.sigma().iter().zip(grid.sigma());
             assert!(pairs.map(|(a, b)| (a - b).abs()).all(|off| off < 1e-15));
             assert_eq!(through.segments(), grid.segments());

@@ -3,50 +3,52 @@
 //! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
 //! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
 //! that is limited, as larger ones lose the soft modes to rounding
-//! ([`Section::condense`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
+//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
 //! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
 //! determine the force that is next to nothing; where holders, or other rods, determine the strain,
 //! each solution gains only the part k/H of the force.
 //!
 //! So the missing lengths e are unknowns of their own: with them as additional gaps, a solution
-//! leaves G e missing in addition, and e = e0 + G e is solved by [`minimal_residual`]. But for the
+//! leaves G e missing in addition, and e = e0 + G e is solved by [`solve_minimal_residual`]. But for the
 //! rods whose strain is determined G is small, so that few solutions are enough at any stiffness.
 
-use crate::krylov::{KrylovLimits, minimal_residual};
-use crate::leaf::derivative::Response;
+use crate::krylov::{KrylovLimits, solve_minimal_residual};
+use crate::leaf::derivative::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{Field, State};
+use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;
 use crate::numbers::largest;
 use crate::rod::{Section, Segment};
 use glam::DVec3;
 
 /// Parts of the law of a segment below this are rounding.
-const CLOSED: f64 = 1e-12;
+const LAW_ROUNDING: f64 = 1e-12;
 
 /// Accuracy to which what is missing of the law is found. A force is undetermined where the law
 /// closes less than the part `singular` of what a step misses: at a stiffness of
 /// 10^12 A/L^2 it closes 10^-7 on branches, where k is 10^5.
-const COMPLETION: KrylovLimits = KrylovLimits {
+const LAW_COMPLETION_LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-9,
     most: 40,
-    singular: 1e-8,
-    stagnating: Some((3, 0.99)),
+    singular_value_limit: 1e-8,
+    stagnation_limit: Some((3, 0.99)),
 };
 
 impl DiscreteLeaf {
     /// The part of the law of segment `i` of rod `j` that a linear solution does not satisfy.
-    pub(super) fn missing_part(&self, j: usize, i: usize) -> DVec3 {
+    pub(super) fn missing_law_fraction(&self, j: usize, i: usize) -> DVec3 {
         let section = self.section(j, i);
         let left = DVec3::ONE - section.compliance * section.condensing;
-        DVec3::select(left.cmplt(DVec3::splat(CLOSED)), DVec3::ZERO, left)
+        DVec3::select(left.cmplt(DVec3::splat(LAW_ROUNDING)), DVec3::ZERO, left)
     }
 
     /// Whether some segment of finite stiffness is stiffer than its force is condensed out with.
     pub fn is_nearly_rigid(&self) -> bool {
-        let mut segments = self.each(0..self.segments());
-        segments
-            .any(|at| self.missing_part(at.0, at.1) * self.closed_part(at, false) != DVec3::ZERO)
+        let mut segments = self.rod_index_pairs(0..self.segments());
+        segments.any(|at| {
+            self.missing_law_fraction(at.0, at.1) * self.completed_law_fraction(at, false)
+                != DVec3::ZERO
+        })
     }
 
     /// The largest strain by which a step from one state to another misses the law of its nearly
@@ -56,10 +58,11 @@ impl DiscreteLeaf {
         let missing = |(j, i): (usize, usize)| {
             let section = self.section(j, i);
             let change = (after.n[j * n + i] - before.n[j * n + i]).length();
-            let missing = self.missing_part(j, i) * self.closed_part((j, i), false);
+            let missing =
+                self.missing_law_fraction(j, i) * self.completed_law_fraction((j, i), false);
             (missing / section.condensing).max_element() * change
         };
-        largest(self.each(0..n).map(missing))
+        largest(self.rod_index_pairs(0..n).map(missing))
     }
 
     /// Largest finite stiffness in stretch and shear of any segment; zero if all are rigid.
@@ -85,7 +88,7 @@ impl DiscreteLeaf {
     /// finite stiffness. A straight rigid rod between holders has no force of its own, and its
     /// length depends on its deflection in second order: Newton's method with its exact length
     /// would converge slowly there, where that with a limited stiffness keeps it straight.
-    fn closed_part(&self, (j, i): (usize, usize), rigid: bool) -> DVec3 {
+    fn completed_law_fraction(&self, (j, i): (usize, usize), rigid: bool) -> DVec3 {
         let is_rigid = self.section(j, i).compliance.cmpeq(DVec3::ZERO);
         match rigid {
             true => DVec3::ONE,
@@ -102,15 +105,15 @@ impl DiscreteLeaf {
     pub fn complete_law(
         &self,
         segments: &[Segment],
-        response: &mut Response,
+        response: &mut LinearResponse,
         gaps: &mut [DVec3],
         rigid: bool,
-        solve: &mut dyn FnMut(&Field) -> Option<Field>,
+        solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
     ) -> bool {
         let close = |gaps: &mut [DVec3]| {
-            let segments = self.each(0..self.segments());
+            let segments = self.rod_index_pairs(0..self.segments());
             for (gap, segment) in gaps.iter_mut().zip(segments) {
-                *gap *= self.closed_part(segment, rigid);
+                *gap *= self.completed_law_fraction(segment, rigid);
             }
         };
         close(gaps);
@@ -118,29 +121,32 @@ impl DiscreteLeaf {
         if missing.iter().all(|part| *part == 0.0) {
             return true;
         }
-        let none: Field = (response.nodes.iter())
+        let none: NodalField = (response.nodes.iter())
             .map(|rod| vec![[0.0; 6]; rod.len()])
             .collect();
-        let mut responses: Vec<Response> = Vec::new();
+        let mut responses: Vec<LinearResponse> = Vec::new();
         let product = &mut |direction: &[f64]| {
             let mut left: Vec<DVec3> = vectors(direction);
             let mut forces = none.clone();
             self.condense_gaps(segments, &left, &mut forces);
             let nodes = solve(&forces)?;
             let mut carried = vec![DVec3::ZERO; left.len()];
-            self.carried(segments, &nodes, &mut left, &mut carried);
+            self.carried_force_changes(segments, &nodes, &mut left, &mut carried);
             close(&mut left);
-            responses.push(Response { nodes, carried });
+            responses.push(LinearResponse {
+                nodes,
+                force_changes: carried,
+            });
             let left = left.iter().flat_map(|gap| gap.to_array());
             Some(direction.iter().zip(left).map(|(v, g)| v - g).collect())
         };
-        let Some(found) = minimal_residual(&missing, COMPLETION, product) else {
+        let Some(found) = solve_minimal_residual(&missing, LAW_COMPLETION_LIMITS, product) else {
             return false;
         };
         for (part, more) in found.coefficients.iter().zip(&responses) {
             response.add(*part, more);
         }
-        if let Some(sum) = found.sum() {
+        if let Some(sum) = found.solution() {
             gaps.copy_from_slice(&vectors(&sum));
         }
         true
@@ -155,15 +161,20 @@ impl System {
         &mut self,
         leaf: &DiscreteLeaf,
         state: &State,
-        solve: &mut dyn FnMut(&mut System, &Field) -> Option<Field>,
-    ) -> Option<Field> {
+        solve: &mut dyn FnMut(&mut System, &NodalField) -> Option<NodalField>,
+    ) -> Option<NodalField> {
         let segments = leaf.all_segments(state);
         let mut gaps: Vec<DVec3> = segments.iter().map(|segment| segment.gap).collect();
-        let mut response = Response {
+        let mut response = LinearResponse {
             nodes: self.solution(),
-            carried: vec![DVec3::ZERO; gaps.len()],
+            force_changes: vec![DVec3::ZERO; gaps.len()],
         };
-        leaf.carried(&segments, &response.nodes, &mut gaps, &mut response.carried);
+        leaf.carried_force_changes(
+            &segments,
+            &response.nodes,
+            &mut gaps,
+            &mut response.force_changes,
+        );
         let first = response.nodes.clone();
         let complete =
             leaf.complete_law(&segments, &mut response, &mut gaps, false, &mut |forces| {
@@ -175,12 +186,12 @@ impl System {
         }
         self.set_solution(&response.nodes);
         let n = leaf.segments();
-        let forces = leaf.each(0..n).map(|(j, i)| {
+        let forces = leaf.rod_index_pairs(0..n).map(|(j, i)| {
             let (section, k) = (leaf.section(j, i), j * n + i);
             segments[k].frame * (section.condensing * gaps[k] / section.ds)
         });
         self.law_forces.extend(forces);
-        let mut nodes: Field = first.iter().map(|rod| vec![[0.0; 6]; rod.len()]).collect();
+        let mut nodes: NodalField = first.iter().map(|rod| vec![[0.0; 6]; rod.len()]).collect();
         leaf.condense_gaps(&segments, &gaps, &mut nodes);
         Some(nodes)
     }
@@ -191,7 +202,7 @@ impl System {
     }
 
     /// Sets the solution, with these additional forces of the segments.
-    pub fn set_completed(&mut self, increments: &Field, law_forces: &[DVec3]) {
+    pub fn set_completed(&mut self, increments: &NodalField, law_forces: &[DVec3]) {
         self.set_solution(increments);
         self.law_forces.extend_from_slice(law_forces);
     }

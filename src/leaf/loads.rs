@@ -11,11 +11,11 @@
 //! nodes by unit moments on these and the skew S, the moments x that (1 + S C) x = S t of the
 //! rotations t without them are taken off.
 
-use crate::leaf::block_tridiagonal::{Increments, group_and_lane};
+use crate::leaf::block_tridiagonal::{GroupIncrements, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::system::{Group, System};
-use crate::leaf::{Leaf, Loads, SAME_NODE};
-use crate::simd::{Four, GROUP, Lanes, Vectors};
+use crate::leaf::system::{RodGroup, System};
+use crate::leaf::{Leaf, Loads, NODE_COINCIDENCE_TOLERANCE};
+use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
 use glam::DVec3;
 use pulp::{Arch, Simd};
 
@@ -45,7 +45,7 @@ pub struct NodeLoad {
 }
 
 /// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
-pub type GroupLoads = [[Four; 3]; 5];
+pub type GroupLoads = [[NumberGroup; 3]; 5];
 
 /// The loads on the rods of a group.
 #[inline(always)]
@@ -53,9 +53,9 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
     let vectors = |of_load: fn(&RodLoad) -> DVec3| {
         let [a, b, c, d] = of.each_ref().map(of_load);
         [
-            Four([a.x, b.x, c.x, d.x]),
-            Four([a.y, b.y, c.y, d.y]),
-            Four([a.z, b.z, c.z, d.z]),
+            NumberGroup([a.x, b.x, c.x, d.x]),
+            NumberGroup([a.y, b.y, c.y, d.y]),
+            NumberGroup([a.z, b.z, c.z, d.z]),
         ]
     };
     [
@@ -69,7 +69,7 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
 
 /// The loads on several rods.
 #[derive(Clone, Copy)]
-pub struct RodLoads<S: Simd> {
+pub struct LaneRodLoads<S: Simd> {
     dead: Vectors<S>,
     tip: Vectors<S>,
     previous: Vectors<S>,
@@ -77,15 +77,15 @@ pub struct RodLoads<S: Simd> {
     image: Vectors<S>,
 }
 
-impl<S: Simd> RodLoads<S> {
+impl<S: Simd> LaneRodLoads<S> {
     /// The loads on the lanes from `part` on.
     #[inline(always)]
-    pub fn of(simd: S, group: &GroupLoads, part: usize) -> Self {
+    pub fn load_group(simd: S, group: &GroupLoads, part: usize) -> Self {
         let vectors = |k: usize| {
-            let [x, y, z] = [0, 1, 2].map(|c| Lanes::of(simd, &group[k][c], part));
+            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &group[k][c], part));
             Vectors::new(x, y, z)
         };
-        RodLoads {
+        LaneRodLoads {
             dead: vectors(0),
             tip: vectors(1),
             previous: vectors(2),
@@ -98,7 +98,7 @@ impl<S: Simd> RodLoads<S> {
     /// lower rod), from the positions of the nodes on the previous rods, of these, and on the
     /// next rods, and from their weights in dead loads and in the coupling.
     #[inline(always)]
-    pub fn at(
+    pub fn node_forces(
         &self,
         [previous, x, next]: [Vectors<S>; 3],
         [weight, coupling_weight]: [f64; 2],
@@ -121,7 +121,7 @@ impl<S: Simd> RodLoads<S> {
 
     /// The contribution of the coupling to the diagonal of nodes, per weight.
     #[inline(always)]
-    pub fn stiffness(&self) -> Vectors<S> {
+    pub fn coupling_stiffness(&self) -> Vectors<S> {
         self.previous + self.next + self.image
     }
 }
@@ -129,38 +129,38 @@ impl<S: Simd> RodLoads<S> {
 impl Loads {
     /// Whether dead moments act.
     pub fn has_moments(&self) -> bool {
-        self.tip_moment != DVec3::ZERO || self.moments != 0.0
+        self.tip_moment != DVec3::ZERO || self.dead_moment_factor != 0.0
     }
 }
 
 impl Leaf {
     /// Sigma and size of every dead moment on a point.
-    pub(super) fn moments_on_points(&self) -> impl Iterator<Item = (f64, DVec3)> {
+    pub(super) fn point_dead_moments(&self) -> impl Iterator<Item = (f64, DVec3)> {
         let (points, unit) = (self.scenario().points.iter(), self.scale.moment());
         points.map(move |it| (it.at, DVec3::from_array(it.moment) / unit))
     }
 
     /// Sigma and size of every dead moment.
-    pub fn moments(&self) -> impl Iterator<Item = (f64, DVec3)> {
-        let (loads, points) = (&self.loads, self.moments_on_points());
-        let on_points = points.map(|(at, moment)| (at, loads.moments * moment));
+    pub fn dead_moments(&self) -> impl Iterator<Item = (f64, DVec3)> {
+        let (loads, points) = (&self.loads, self.point_dead_moments());
+        let on_points = points.map(|(at, moment)| (at, loads.dead_moment_factor * moment));
         let all = std::iter::once((1.0, loads.tip_moment)).chain(on_points);
         all.filter(|(_, moment)| *moment != DVec3::ZERO)
     }
 
     /// The size of the largest dead moment on a point.
-    pub fn largest_on_points(&self) -> f64 {
-        let sizes = self.moments_on_points().map(|(_, moment)| moment.length());
-        self.loads.moments * sizes.fold(0.0, f64::max)
+    pub fn largest_point_moment(&self) -> f64 {
+        let sizes = self.point_dead_moments().map(|(_, moment)| moment.length());
+        self.loads.dead_moment_factor * sizes.fold(0.0, f64::max)
     }
 
     /// Upper bound on the integral of the moment that the rod carries by the dead moments alone, over
     /// its length: a free rod carries each up to its place, one that is held elsewhere perhaps
     /// beyond it.
-    pub fn integral_of_moments(&self) -> f64 {
-        let held = self.is_held();
+    pub fn moment_integral_bound(&self) -> f64 {
+        let held = self.has_placed_supports();
         let reach = |at: f64| if held { 1.0 } else { at };
-        self.moments()
+        self.dead_moments()
             .map(|(at, moment)| moment.length() * reach(at))
             .sum()
     }
@@ -169,8 +169,8 @@ impl Leaf {
 impl DiscreteLeaf {
     /// Nodes and sizes of the dead moments on points; empty if there are none. What acts within
     /// rounding of a clamped base is left to its clamp.
-    pub(super) fn moments_on_nodes(&self) -> Vec<(usize, DVec3)> {
-        let points = self.leaf.moments_on_points();
+    pub(super) fn nodal_point_moments(&self) -> Vec<(usize, DVec3)> {
+        let points = self.leaf.point_dead_moments();
         let some = points.filter(|(_, moment)| *moment != DVec3::ZERO);
         some.map(|(at, moment)| (self.grid.nearest(at), moment))
             .filter(|(node, _)| *node >= self.first_node())
@@ -179,30 +179,31 @@ impl DiscreteLeaf {
 
     /// Whether dead moments act.
     pub fn has_moments(&self) -> bool {
-        self.moments().next().is_some()
+        self.dead_moments().next().is_some()
     }
 
     /// The same leaf without dead moments.
     pub fn without_moments(&self) -> Self {
         let mut without = self.clone();
         without.loads.tip_moment = DVec3::ZERO;
-        without.loads.moments = 0.0;
+        without.loads.dead_moment_factor = 0.0;
         without
     }
 
     /// Node and size of every dead moment that acts.
-    pub fn moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
+    pub fn dead_moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
         let part = self.load_factor;
-        self.moments_of(self.loads)
+        self.dead_moments_under(self.loads)
             .map(move |(node, moment)| (node, part * moment))
             .filter(|(_, moment)| *moment != DVec3::ZERO)
     }
 
     /// The same under other loads.
-    pub fn moments_of(&self, loads: Loads) -> impl Iterator<Item = (usize, DVec3)> {
+    pub fn dead_moments_under(&self, loads: Loads) -> impl Iterator<Item = (usize, DVec3)> {
         let tip = (self.segments(), loads.tip_moment);
         let on_points = self.point_moments.iter();
-        let on_points = on_points.map(move |&(node, moment)| (node, loads.moments * moment));
+        let on_points =
+            on_points.map(move |&(node, moment)| (node, loads.dead_moment_factor * moment));
         // Joined tips pass on no moment.
         let single = self.rods() == 1;
         let tip = Some(tip).filter(|(_, moment)| single && *moment != DVec3::ZERO);
@@ -210,27 +211,28 @@ impl DiscreteLeaf {
     }
 
     /// The sum of the dead moments on node `i` of the rod.
-    pub(super) fn moment_on(&self, i: usize) -> DVec3 {
+    pub(super) fn node_dead_moment(&self, i: usize) -> DVec3 {
         if !self.loads.has_moments() {
             return DVec3::ZERO;
         }
-        let here = self.moments().filter(|(node, _)| *node == i);
+        let here = self.dead_moments().filter(|(node, _)| *node == i);
         here.map(|(_, moment)| moment).sum()
     }
 
     /// The sum of the dead moments at `sigma`, by which the moment of the rod jumps there.
-    pub fn moment_at(&self, sigma: f64) -> DVec3 {
+    pub fn dead_moment_at(&self, sigma: f64) -> DVec3 {
         if !self.loads.has_moments() {
             return DVec3::ZERO;
         }
-        let here = |node: usize| (self.grid.sigma()[node] - sigma).abs() < SAME_NODE;
-        let moments = self.moments().filter(|(node, _)| here(*node));
+        let here =
+            |node: usize| (self.grid.sigma()[node] - sigma).abs() < NODE_COINCIDENCE_TOLERANCE;
+        let moments = self.dead_moments().filter(|(node, _)| here(*node));
         moments.map(|(_, moment)| moment).sum()
     }
 
     /// The sum of the dead moments beyond segment `i`: what it carries of them if the tip is free.
-    pub fn moment_beyond(&self, i: usize) -> DVec3 {
-        let beyond = self.moments().filter(|(node, _)| *node > i);
+    pub fn dead_moment_beyond(&self, i: usize) -> DVec3 {
+        let beyond = self.dead_moments().filter(|(node, _)| *node > i);
         beyond.map(|(_, moment)| moment).sum()
     }
 
@@ -238,11 +240,12 @@ impl DiscreteLeaf {
     /// its solution.
     pub(super) fn add_moments(&self, system: &mut System) {
         let first = self.first_node();
-        system
-            .moments
-            .set(self.moments().map(|(node, moment)| (node - first, moment)));
+        system.moments.replace_moments(
+            self.dead_moments()
+                .map(|(node, moment)| (node - first, moment)),
+        );
         let (group, lane) = group_and_lane(0);
-        for (i, moment) in system.moments.on_nodes() {
+        for (i, moment) in system.moments.nodal_moments() {
             let rhs = &mut system.groups[group].rhs[i];
             for c in 0..3 {
                 rhs[c].0[lane] += moment[c];
@@ -262,13 +265,13 @@ pub(crate) struct DeadMoments {
 
 impl DeadMoments {
     /// Replaces them.
-    pub fn set(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
+    pub fn replace_moments(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
         self.on_nodes.clear();
         self.on_nodes.extend(moments);
     }
 
     /// Nodes (from 1) and moments.
-    pub fn on_nodes(&self) -> impl Iterator<Item = (usize, DVec3)> {
+    pub fn nodal_moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
         self.on_nodes.iter().copied()
     }
 
@@ -278,10 +281,10 @@ impl DeadMoments {
     }
 
     /// Writes S times the rotations of the nodes to a column of the equations.
-    fn set_column(&mut self, column: usize, rotations: &[Increments]) {
+    fn set_column(&mut self, column: usize, rotations: &[GroupIncrements]) {
         let width = 3 * self.on_nodes.len() + 1;
         for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
-            let turn = rotation(&rotations[*node]);
+            let turn = node_rotation(&rotations[*node]);
             let by = turn.cross(0.5 * *moment);
             for c in 0..3 {
                 self.rows[(3 * a + c) * width + column] = by[c];
@@ -290,7 +293,7 @@ impl DeadMoments {
     }
 }
 
-fn rotation(increments: &Increments) -> DVec3 {
+fn node_rotation(increments: &GroupIncrements) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|c| increments[c].0[0]);
     DVec3::new(x, y, z)
 }
@@ -303,12 +306,12 @@ impl System {
         dead.rows.resize(size * (size + 1), 0.0);
         for column in 0..size {
             let (node, axis) = (dead.on_nodes[column / 3].0, DVec3::AXES[column % 3]);
-            group.respond(arch, [(node, axis)]);
+            group.set_moment_response(arch, [(node, axis)]);
             dead.set_column(column, &group.z);
             dead.rows[column * (size + 1) + column] += 1.0;
         }
         dead.set_column(size, &group.solution);
-        if !eliminate(&mut dead.rows, size) {
+        if !solve_by_elimination(&mut dead.rows, size) {
             return false;
         }
         let part = |k: usize| dead.rows[k * (size + 1) + size];
@@ -318,7 +321,7 @@ impl System {
                 DVec3::new(part(3 * a), part(3 * a + 1), part(3 * a + 2)),
             )
         };
-        group.respond(arch, dead.on_nodes.iter().enumerate().map(taken));
+        group.set_moment_response(arch, dead.on_nodes.iter().enumerate().map(taken));
         for (solution, z) in group.solution.iter_mut().zip(&group.z) {
             for c in 0..6 {
                 solution[c].0[0] -= z[c].0[0];
@@ -328,23 +331,28 @@ impl System {
     }
 }
 
-impl Group {
+impl RodGroup {
     /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
-    fn respond(&mut self, arch: Arch, moments: impl IntoIterator<Item = (usize, DVec3)>) {
-        self.residual.fill(Increments::default());
+    fn set_moment_response(
+        &mut self,
+        arch: Arch,
+        moments: impl IntoIterator<Item = (usize, DVec3)>,
+    ) {
+        self.residual.fill(GroupIncrements::default());
         for (node, moment) in moments {
             for c in 0..3 {
                 self.residual[node][c].0[0] += moment[c];
             }
         }
-        self.matrix.forward(arch, &self.residual, &mut self.z);
-        (self.matrix).backward(arch, &self.residual, &mut self.z);
+        self.matrix
+            .substitute_forward(arch, &self.residual, &mut self.z);
+        (self.matrix).substitute_backward(arch, &self.residual, &mut self.z);
     }
 }
 
 /// Solves `size` equations in place by Gaussian elimination with partial pivoting: the solution is
 /// left in the last column. False if they are singular, or not finite.
-fn eliminate(rows: &mut [f64], size: usize) -> bool {
+fn solve_by_elimination(rows: &mut [f64], size: usize) -> bool {
     let width = size + 1;
     for k in 0..size {
         let below = |i: &usize| rows[i * width + k].abs();

@@ -9,16 +9,16 @@
 use crate::leaf::Leaf;
 use crate::leaf::rod_ode::RodFields;
 use crate::leaf::state::State;
-use crate::scenario::{Hold, Profile, Rod, Scenario};
+use crate::scenario::{Profile, Rod, Scenario, SupportKind};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
 impl Leaf {
     /// Half of the leaf, if it is its own mirror image and its tip is not held.
-    pub fn half(&self) -> Option<Leaf> {
+    pub fn mirror_half(&self) -> Option<Leaf> {
         let mut half = self.clone();
         let several = self.rods() > 1;
-        half.mirrored = several && self.held.is_none() && is_mirrored(self.scenario());
+        half.mirrored = several && self.tip_support.is_none() && is_mirrored(self.scenario());
         half.mirrored.then_some(half)
     }
 }
@@ -42,7 +42,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
     let other = distributed.is_some()
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
-        || *base_held != Hold::Clamped;
+        || *base_held != SupportKind::Clamped;
     let weights = |(a, b): (usize, usize)| {
         let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);
         own == [image[0], -image[1], image[2]]
@@ -81,10 +81,12 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
 
 /// Whether these rods at rest are each other's mirror images, within a distance of their nodes and
 /// an angle, in radians, of their sections.
-pub fn are_mirrored(rods: &[RodShape], distance: f64, angle: f64) -> bool {
+pub fn are_mirror_symmetric(rods: &[RodShape], distance: f64, angle: f64) -> bool {
     let images = |(a, b): (&NodeState, &NodeState)| {
-        a.position.distance(reflect(b.position, true)) <= distance
-            && a.rotation.angle_between(turned(b.rotation, true)) <= angle
+        a.position.distance(reflect_vector(b.position, true)) <= distance
+            && a.rotation
+                .angle_between(mirrored_rotation(b.rotation, true))
+                <= angle
     };
     let pairs = rods.iter().zip(rods.iter().rev());
     pairs
@@ -94,7 +96,7 @@ pub fn are_mirrored(rods: &[RodShape], distance: f64, angle: f64) -> bool {
 
 /// The state of half of a leaf that is in the state `whole`. What the mirror's plane cuts is put
 /// into it: no force of the half leaf would bring it back.
-pub fn half_of(half: &Leaf, whole: &State) -> State {
+pub fn half_state(half: &Leaf, whole: &State) -> State {
     if !half.mirrored {
         return whole.clone();
     }
@@ -105,10 +107,10 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
         for k in j * n..(j + 1) * n {
             state.n[k] = half.share(j) * whole.n[k];
         }
-        if half.in_plane(j) {
+        if half.is_halved_midrib(j) {
             for k in state.base(j)..=state.base(j) + n {
                 state.x[k].y = 0.0;
-                state.q[k] = about_normal(state.q[k]);
+                state.q[k] = rotation_about_normal(state.q[k]);
             }
             for force in &mut state.n[j * n..(j + 1) * n] {
                 force.y = 0.0;
@@ -123,7 +125,7 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
 }
 
 /// The state of the whole leaf whose half is in the state `state`.
-pub fn whole_of(half: &Leaf, state: &State) -> State {
+pub fn whole_state(half: &Leaf, state: &State) -> State {
     if !half.mirrored {
         return state.clone();
     }
@@ -133,10 +135,18 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
         let own = j.min(rods - 1 - j);
         let image = own != j;
         let base = state.base(own);
-        x.extend(state.x[base..=base + n].iter().map(|&x| reflect(x, image)));
-        q.extend(state.q[base..=base + n].iter().map(|&q| turned(q, image)));
+        x.extend(
+            state.x[base..=base + n]
+                .iter()
+                .map(|&x| reflect_vector(x, image)),
+        );
+        q.extend(
+            state.q[base..=base + n]
+                .iter()
+                .map(|&q| mirrored_rotation(q, image)),
+        );
         let own_forces = state.n[own * n..(own + 1) * n].iter();
-        forces.extend(own_forces.map(|&f| reflect(f / half.share(own), image)));
+        forces.extend(own_forces.map(|&f| reflect_vector(f / half.share(own), image)));
     }
     let mut whole = State::new(n, x, q);
     whole.n = forces;
@@ -144,22 +154,22 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
 }
 
 /// The rods of the whole leaf whose half has the fields `rods`.
-pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields>> {
+pub fn whole_leaf_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields>> {
     whole_rods(half, rods, |node, image, share| RodFields {
-        x: reflect(node.x, image),
-        q: turned(node.q, image),
-        n: reflect(node.n / share, image),
+        x: reflect_vector(node.x, image),
+        q: mirrored_rotation(node.q, image),
+        n: reflect_vector(node.n / share, image),
         m: reflect_axial(node.m / share, image),
     })
 }
 
 /// Changes of position, rotation, force and moment of the rods of the whole leaf, from those of its half.
-pub fn whole_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
+pub fn whole_leaf_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
     whole_rods(half, rods, |&[x, turn, n, m], image, share| {
         [
-            reflect(x, image),
+            reflect_vector(x, image),
             reflect_axial(turn, image),
-            reflect(n / share, image),
+            reflect_vector(n / share, image),
             reflect_axial(m / share, image),
         ]
     })
@@ -181,7 +191,7 @@ fn whole_rods<T>(half: &Leaf, rods: Vec<Vec<T>>, node: impl Fn(&T, bool, f64) ->
 }
 
 /// A rotation axis changes sign in the mirror, except its normal component.
-fn turned(q: DQuat, image: bool) -> DQuat {
+fn mirrored_rotation(q: DQuat, image: bool) -> DQuat {
     match image {
         true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
         false => q,
@@ -189,17 +199,17 @@ fn turned(q: DQuat, image: bool) -> DQuat {
 }
 
 /// The part of a rotation about the plane's normal.
-fn about_normal(q: DQuat) -> DQuat {
+fn rotation_about_normal(q: DQuat) -> DQuat {
     DQuat::from_xyzw(0.0, q.y, 0.0, q.w).normalize()
 }
 
-fn reflect(v: DVec3, image: bool) -> DVec3 {
+fn reflect_vector(v: DVec3, image: bool) -> DVec3 {
     if image { DVec3::new(v.x, -v.y, v.z) } else { v }
 }
 
 /// The image of an axial vector, such as a moment.
 fn reflect_axial(v: DVec3, image: bool) -> DVec3 {
-    if image { -reflect(v, true) } else { v }
+    if image { -reflect_vector(v, true) } else { v }
 }
 
 #[cfg(test)]
@@ -219,10 +229,10 @@ mod tests {
     /// Whether this leaf has a half, and lies in a plane.
     fn symmetries(entries: &[&str]) -> (bool, bool) {
         let entries: Vec<_> = entries.iter().map(|&entry| entry.into()).collect();
-        let entries = Entries::of_text(LEAF, "leaf").unwrap().replaced(&entries);
+        let entries = Entries::from_text(LEAF, "leaf").unwrap().replaced(&entries);
         let scenario = entries.unwrap().check().unwrap();
         let leaf = Leaf::new(&scenario);
-        (leaf.half().is_some(), leaf.is_planar())
+        (leaf.mirror_half().is_some(), leaf.is_planar())
     }
 
     #[test]

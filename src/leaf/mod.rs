@@ -33,23 +33,30 @@ mod supports;
 mod system;
 mod tissue;
 
-pub use crate::leaf::assembly::{Jump, Tangent};
-pub use crate::leaf::derivative::{Forces, LeafRate, Response, at_constant_force};
-pub use crate::leaf::direct::{Bordered, DirectError, DirectSolver, Factors};
+pub use crate::leaf::assembly::{FieldJump, SegmentTangent};
+pub use crate::leaf::derivative::{
+    LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
+};
+pub use crate::leaf::direct::{BorderedSolution, DirectError, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid};
 pub use crate::leaf::mirror::{
-    are_mirrored, half_of, is_mirrored, whole_changes, whole_fields, whole_of,
+    are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
+    whole_state,
 };
-pub use crate::leaf::rod_ode::{Flow, RodFields, Slice};
-pub use crate::leaf::solve::Factorised;
-pub use crate::leaf::state::{Field, Increment, State, add, shift, turn};
-pub use crate::leaf::system::{Solved, Sums, System};
+pub use crate::leaf::rod_ode::{RodFields, RodIntegrator, StationFields};
+pub use crate::leaf::solve::DefiniteFactors;
+pub use crate::leaf::state::{
+    Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
+};
+pub use crate::leaf::system::{AssemblyTotals, LinearSolveOutcome, System};
 pub use crate::leaf::tissue::HalfTurn;
 use crate::natural::Natural;
 use crate::rod::Section;
 use crate::rotation;
 pub use crate::scenario::Scale;
-use crate::scenario::{Clamp, Dynamics, Hold, Profile, Rod, Scenario, Turning, ascending};
+use crate::scenario::{
+    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation, sorted_distinct,
+};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -72,26 +79,26 @@ pub struct Leaf {
     /// The loads at rest.
     pub loads: Loads,
     /// The tip, if it is held.
-    pub held: Option<Held>,
+    pub tip_support: Option<TipSupport>,
     /// Whether hinges hold the bases.
     hinged: bool,
     /// The veins that can turn without resistance.
-    pub(super) turnings: Vec<Turning>,
+    pub(super) turnings: Vec<ZeroEnergyRotation>,
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
-    softest: f64,
+    softest_couple_stiffness: f64,
 }
 
 /// A tip that is held.
 #[derive(Clone, Debug)]
-pub struct Held {
+pub struct TipSupport {
     /// The position.
     pub position: DVec3,
     /// If rotations are held too, the clamps, one per rod.
     pub clamps: Option<Vec<Clamp>>,
 }
 
-impl Held {
+impl TipSupport {
     /// The rotation in which the tip of rod `j` is held.
     pub fn rotation(&self, j: usize) -> Option<DQuat> {
         Some(self.clamps.as_ref()?[j].rotation())
@@ -100,7 +107,7 @@ impl Held {
 
 /// A node that a grip holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gripped {
+pub struct GrippedNode {
     /// Number of the grip.
     pub grip: usize,
     /// Rod and node.
@@ -122,9 +129,9 @@ pub struct Loads {
     /// Moment on the tip of a single rod.
     pub tip_moment: DVec3,
     /// Part of the loads that veins have of their own: zero without any.
-    pub own: f64,
+    pub rod_load_factor: f64,
     /// Part of the dead moments on points of a single rod: zero without any.
-    pub moments: f64,
+    pub dead_moment_factor: f64,
 }
 
 impl std::ops::Sub for Loads {
@@ -135,8 +142,8 @@ impl std::ops::Sub for Loads {
             gravity: self.gravity - other.gravity,
             tip_force: self.tip_force - other.tip_force,
             tip_moment: self.tip_moment - other.tip_moment,
-            own: self.own - other.own,
-            moments: self.moments - other.moments,
+            rod_load_factor: self.rod_load_factor - other.rod_load_factor,
+            dead_moment_factor: self.dead_moment_factor - other.dead_moment_factor,
         }
     }
 }
@@ -149,8 +156,8 @@ impl std::ops::Mul<f64> for Loads {
             gravity: self.gravity * factor,
             tip_force: self.tip_force * factor,
             tip_moment: self.tip_moment * factor,
-            own: self.own * factor,
-            moments: self.moments * factor,
+            rod_load_factor: self.rod_load_factor * factor,
+            dead_moment_factor: self.dead_moment_factor * factor,
         }
     }
 }
@@ -158,12 +165,12 @@ impl std::ops::Mul<f64> for Loads {
 impl Leaf {
     /// Scales a checked scenario.
     pub fn new(scenario: &Scenario) -> Self {
-        Leaf::in_units(Arc::new(scenario.clone()), scenario.scale())
+        Leaf::with_scale(Arc::new(scenario.clone()), scenario.scale())
     }
 
     /// A scenario in given units, so that leaves that differ in length or stiffness are
     /// comparable.
-    pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
+    pub fn with_scale(scenario: Arc<Scenario>, scale: Scale) -> Self {
         // The profiles of the masses matter for motions.
         let Dynamics {
             density,
@@ -172,7 +179,7 @@ impl Leaf {
         } = &scenario.dynamics;
         let masses = density.iter().chain(rotary_inertia);
         let masses = masses.flat_map(Profile::kinks).copied();
-        let kinks = ascending(scenario.kinks().into_iter().chain(masses));
+        let kinks = sorted_distinct(scenario.kinks().into_iter().chain(masses));
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
@@ -183,26 +190,26 @@ impl Leaf {
                 gravity: vector(scenario.gravity, scale.force() / scale.length),
                 tip_force: vector(scenario.tip_force, scale.force()),
                 tip_moment: vector(scenario.tip_moment, scale.moment()),
-                own: 0.0,
-                moments: 0.0,
+                rod_load_factor: 0.0,
+                dead_moment_factor: 0.0,
             },
-            held: scenario.held_tip.as_ref().map(|held| Held {
+            tip_support: scenario.held_tip.as_ref().map(|held| TipSupport {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
-            hinged: scenario.base_held == Hold::Pinned,
-            turnings: scenario.turnings(),
+            hinged: scenario.base_held == SupportKind::Pinned,
+            turnings: scenario.zero_energy_rotations(),
             kinks,
-            softest: softest / scale.stiffness,
+            softest_couple_stiffness: softest / scale.stiffness,
             scenario,
         };
-        leaf.loads.own = if leaf.scenario.has_own_loads() {
+        leaf.loads.rod_load_factor = if leaf.scenario.has_own_loads() {
             1.0
         } else {
             0.0
         };
-        if leaf.moments_on_points().any(|(_, it)| it != DVec3::ZERO) {
-            leaf.loads.moments = 1.0;
+        if leaf.point_dead_moments().any(|(_, it)| it != DVec3::ZERO) {
+            leaf.loads.dead_moment_factor = 1.0;
         }
         leaf
     }
@@ -226,7 +233,7 @@ impl Leaf {
     /// The leaf with its tips apart and without the coupling of its veins; each tip bears an equal
     /// part of the force on the joint one. Tissue, which has no force between veins in their rest
     /// shapes, still ties them.
-    pub fn apart(&self) -> Leaf {
+    pub fn decoupled_leaf(&self) -> Leaf {
         let mut apart = self.clone();
         if self.joined() {
             apart.loads.tip_force /= self.scenario.rods.len() as f64;
@@ -250,23 +257,23 @@ impl Leaf {
     }
 
     /// Whether it is half of a leaf that is its own mirror image.
-    pub fn in_half(&self) -> bool {
+    pub fn is_mirror_half(&self) -> bool {
         self.mirrored
     }
 
     /// Fraction of rod `j` that belongs to this leaf: one half for the midrib of half a leaf.
     pub fn share(&self, j: usize) -> f64 {
-        if self.in_plane(j) { 0.5 } else { 1.0 }
+        if self.is_halved_midrib(j) { 0.5 } else { 1.0 }
     }
 
     /// Whether rod `j` is the midrib of half a leaf.
-    pub fn in_plane(&self, j: usize) -> bool {
+    pub fn is_halved_midrib(&self, j: usize) -> bool {
         let count = self.scenario.rods.len();
         self.mirrored && count % 2 == 1 && 2 * j + 1 == count
     }
 
     /// Whether rod `j` of half a leaf is next to its own mirror image.
-    pub fn beside_image(&self, j: usize) -> bool {
+    pub fn borders_own_image(&self, j: usize) -> bool {
         self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
     }
 
@@ -275,7 +282,7 @@ impl Leaf {
         let s = self.scenario();
         let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
         s.is_loaded_in_plane()
-            && self.held.is_none()
+            && self.tip_support.is_none()
             && curvatures.into_iter().all(|of| of.max_abs() == 0.0)
     }
 
@@ -290,8 +297,8 @@ impl Leaf {
     }
 
     /// Puts the tips where they are held, if they are.
-    pub fn hold_tips(&self, state: &mut State) {
-        let Some(held) = &self.held else {
+    pub fn place_held_tips(&self, state: &mut State) {
+        let Some(held) = &self.tip_support else {
             return;
         };
         for j in 0..self.rods() {
@@ -309,7 +316,7 @@ impl Leaf {
     }
 
     /// Rest length of rod `j` from the base up to `sigma`, including growth.
-    pub fn grown(&self, j: usize, sigma: f64) -> f64 {
+    pub fn grown_length(&self, j: usize, sigma: f64) -> f64 {
         self.length(j) * self.rod(j).rest_stretch.integral(sigma)
     }
 
@@ -324,7 +331,7 @@ impl Leaf {
     }
 
     /// Whether sections are the same all along each rod.
-    pub fn uniform(&self) -> bool {
+    pub fn has_uniform_sections(&self) -> bool {
         let constant = |profile: &Profile| matches!(profile, Profile::Constant(_));
         self.scenario
             .rods
@@ -337,7 +344,7 @@ impl Leaf {
     /// `width` of the rod.
     pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
         let rod = self.rod(j);
-        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::all(p, sigma));
+        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p, sigma));
         let share = self.share(j);
         Section {
             ds: self.length(j) * width,
@@ -347,7 +354,9 @@ impl Leaf {
             compliance: (share * at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }
-        .condense(share * (CONDENSING_STIFFNESS * self.softest).max(LEAST_CONDENSING))
+        .limit_condensing_stiffness(
+            share * (CONDENSING_STIFFNESS * self.softest_couple_stiffness).max(LEAST_CONDENSING),
+        )
     }
 
     /// Coupling of gap `g` between rods g and g + 1: force per unit
@@ -359,8 +368,8 @@ impl Leaf {
     }
 
     /// Whether the tip, or a part of a rod, is held by something that is moved to its place.
-    pub fn is_held(&self) -> bool {
-        self.held.is_some() || !self.scenario.grips.is_empty()
+    pub fn has_placed_supports(&self) -> bool {
+        self.tip_support.is_some() || !self.scenario.grips.is_empty()
     }
 
     /// Whether hinges hold the bases: they stay in their places, and turn freely.
@@ -381,7 +390,7 @@ impl Leaf {
 
     /// Stiffness k of the tissue in gap `g` at `sigma` per displacement, and c_1 (in the first
     /// component) per radian, both per unit of sigma.
-    pub fn tissue(&self, g: usize, sigma: f64) -> [DVec3; 2] {
+    pub fn tissue_stiffness(&self, g: usize, sigma: f64) -> [DVec3; 2] {
         let Some(tissue) = &self.scenario.tissue else {
             return [DVec3::ZERO; 2];
         };
@@ -408,9 +417,9 @@ impl Leaf {
             if self.is_straight_at_rest(j) {
                 continue;
             }
-            let mut before = natural.at(j, 0.0);
+            let mut before = natural.vein_pose(j, 0.0);
             for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
-                let next = natural.at(j, *sigma);
+                let next = natural.vein_pose(j, *sigma);
                 let ((x0, q0), (x1, q1)) = (before, next);
                 let chord = (x1 - x0) / (self.scale.length * section.ds);
                 section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
@@ -430,11 +439,11 @@ impl Leaf {
 }
 
 /// Fractions of the length closer to each other than this are those of one node.
-pub(super) const SAME_NODE: f64 = 1e-11;
+pub(super) const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
 
 impl Leaf {
     /// Own load on rod `j` at `sigma`, per unit of sigma, without those on points.
-    pub fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+    pub fn own_load_density(&self, j: usize, sigma: f64) -> DVec3 {
         let s = self.scenario();
         let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
         let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
@@ -453,13 +462,13 @@ impl Leaf {
 
 impl DiscreteLeaf {
     /// The veins' own loads on all nodes, rod after rod; empty if there are none.
-    pub(super) fn own_loads_of(&self, leaf: &Leaf) -> Vec<DVec3> {
-        if leaf.loads.own == 0.0 {
+    pub(super) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
+        if leaf.loads.rod_load_factor == 0.0 {
             return Vec::new();
         }
         let (n, sigma) = (self.segments(), self.grid.sigma());
-        let node = |(j, i)| self.grid.weight(i) * leaf.own_load(j, sigma[i]);
-        let mut loads: Vec<DVec3> = self.each(0..n + 1).map(node).collect();
+        let node = |(j, i)| self.grid.node_weight(i) * leaf.own_load_density(j, sigma[i]);
+        let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
         for (j, at, force) in leaf.point_loads() {
             loads[j * (n + 1) + self.grid.nearest(at)] += force;
         }
@@ -467,39 +476,40 @@ impl DiscreteLeaf {
     }
 
     /// Part of the veins' own loads that acts.
-    pub(super) fn own_part(&self) -> f64 {
-        self.load_factor * self.loads.own
+    pub(super) fn rod_load_factor(&self) -> f64 {
+        self.load_factor * self.loads.rod_load_factor
     }
 
     /// Own load on node `i` of rod `j`.
-    pub fn own_load(&self, j: usize, i: usize) -> DVec3 {
+    pub fn own_load_on_node(&self, j: usize, i: usize) -> DVec3 {
         let load = self.own_loads.get(j * (self.segments() + 1) + i);
-        load.map_or(DVec3::ZERO, |load| self.own_part() * *load)
+        load.map_or(DVec3::ZERO, |load| self.rod_load_factor() * *load)
     }
 
     /// The forces on points of rod `j` at `sigma`, by which its force jumps there.
-    pub fn force_on_points(&self, j: usize, sigma: f64) -> DVec3 {
+    pub fn point_force_at(&self, j: usize, sigma: f64) -> DVec3 {
         if self.leaf.scenario().points.is_empty() {
             return DVec3::ZERO;
         }
         let points = self.leaf.point_loads();
-        let here = points.filter(|(rod, at, _)| *rod == j && (at - sigma).abs() < SAME_NODE);
-        self.own_part() * here.map(|(_, _, force)| force).sum::<DVec3>()
+        let here = points
+            .filter(|(rod, at, _)| *rod == j && (at - sigma).abs() < NODE_COINCIDENCE_TOLERANCE);
+        self.rod_load_factor() * here.map(|(_, _, force)| force).sum::<DVec3>()
     }
 
     /// Adds dead forces on all nodes to the veins' own loads.
-    pub fn load_nodes(&mut self, forces: &[DVec3]) {
+    pub fn add_nodal_loads(&mut self, forces: &[DVec3]) {
         self.own_loads.resize(forces.len(), DVec3::ZERO);
         for (own, force) in self.own_loads.iter_mut().zip(forces) {
             *own += *force;
         }
-        self.loads.own = 1.0;
+        self.loads.rod_load_factor = 1.0;
     }
 
     /// Adds the veins' own loads to the moments and forces on all nodes.
     pub fn add_own_forces(&self, nodes: &mut [[DVec3; 2]]) {
         for (node, own) in nodes.iter_mut().zip(&self.own_loads) {
-            node[1] += self.own_part() * *own;
+            node[1] += self.rod_load_factor() * *own;
         }
     }
 
@@ -510,8 +520,8 @@ impl DiscreteLeaf {
             return 0.0;
         }
         let mut energy = 0.0;
-        for (j, i) in self.each(1..self.segments() + 1) {
-            let force = self.own_load(j, i);
+        for (j, i) in self.rod_index_pairs(1..self.segments() + 1) {
+            let force = self.own_load_on_node(j, i);
             energy -= force.dot(state.x[state.base(j) + i]);
             system.add_load(j, i, [DVec3::ZERO, force]);
         }

@@ -11,34 +11,34 @@ const PAIR: &str = r#"
     coupling = { y = 1.0 }
 "#;
 
-fn on(segments: usize) -> (DiscreteLeaf, State) {
+fn discretize_pair(segments: usize) -> (DiscreteLeaf, State) {
     let leaf = Leaf::new(&Scenario::from_toml(PAIR).unwrap());
     let leaf = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
-    let state = crate::relax::start(&leaf);
+    let state = crate::relax::initial_state(&leaf);
     (leaf, state)
 }
 
 #[test]
 fn in_a_solution_it_is_the_largest() {
-    let (leaf, _) = on(4);
+    let (leaf, _) = discretize_pair(4);
     let mut system = System::new(&leaf);
     for (c, found) in [(1, [f64::INFINITY, 3.0]), (4, [2.0, f64::INFINITY])] {
-        let mut solution: Field = vec![vec![[2.0, 2.0, 2.0, 3.0, 3.0, 3.0]; 4]; 2];
+        let mut solution: NodalField = vec![vec![[2.0, 2.0, 2.0, 3.0, 3.0, 3.0]; 4]; 2];
         solution[1][2][c] = f64::NAN;
         system.set_solution(&solution);
-        assert_eq!(<[f64; 2]>::from(system.largest()), found);
+        assert_eq!(<[f64; 2]>::from(system.largest_increment()), found);
     }
 }
 
 #[test]
 fn in_a_state_it_is_no_balance_and_no_short_way() {
-    let (leaf, mut state) = on(4);
+    let (leaf, mut state) = discretize_pair(4);
     assert!(leaf.residual(&state).is_finite());
     let before = state.clone();
     let middle = state.base(1) + 2;
     state.x[middle].y = f64::NAN;
     assert_eq!(leaf.residual(&state), f64::INFINITY);
-    assert_eq!(before.shift_to(&state), f64::INFINITY);
+    assert_eq!(before.largest_displacement_to(&state), f64::INFINITY);
     let sums = leaf.assemble(&state, &mut System::new(&leaf));
     assert!(sums.energy.is_nan());
     state.clone_from(&before);
@@ -48,18 +48,24 @@ fn in_a_state_it_is_no_balance_and_no_short_way() {
     state.clone_from(&before);
     state.q[middle].x = f64::NAN;
     let sums = leaf.assemble(&state, &mut System::new(&leaf));
-    assert_eq!(sums.turn, f64::INFINITY);
+    assert_eq!(sums.largest_turn, f64::INFINITY);
 }
 
 #[test]
 fn in_a_matrix_it_makes_pivots_without_sign() {
-    let (leaf, state) = on(4);
+    let (leaf, state) = discretize_pair(4);
     let mut system = System::new(&leaf);
     leaf.assemble(&state, &mut system);
     let pattern = DirectSolver::new(&system).unwrap();
-    assert_eq!(pattern.factorize(&system, 0.0).unwrap().negative(), 0);
+    assert_eq!(
+        pattern
+            .factorize(&system, 0.0)
+            .unwrap()
+            .negative_eigenvalue_count(),
+        0
+    );
     let nothing = (DMat3::ZERO, f64::NAN);
-    system.add(1, 2, nothing, (DVec3::ZERO, DVec3::ZERO));
+    system.add_to_node(1, 2, nothing, (DVec3::ZERO, DVec3::ZERO));
     let failed = pattern.factorize(&system, 0.0).err();
     assert_eq!(failed, Some(DirectError::NotFinite));
 }
@@ -77,11 +83,13 @@ fn a_singular_matrix_under_a_dead_moment_is_not_solved() {
     let solved = |about_z: f64| {
         let mut system = System::new(&leaf);
         let less = DMat3::from_diagonal(DVec3::new(0.0, 0.0, about_z - 1.0));
-        system.add(0, 1, (less, 0.0), (DVec3::Y, DVec3::ZERO));
-        system.moments.set([(0, 2.0 * DVec3::X)].into_iter());
+        system.add_to_node(0, 1, (less, 0.0), (DVec3::Y, DVec3::ZERO));
+        system
+            .moments
+            .replace_moments([(0, 2.0 * DVec3::X)].into_iter());
         assert!(system.factorize_indefinite());
         system.solve(None, 0.0)
     };
-    assert_eq!(solved(1.0), Solved::Yes(1));
-    assert_eq!(solved(-1.0), Solved::Singular);
+    assert_eq!(solved(1.0), LinearSolveOutcome::Converged(1));
+    assert_eq!(solved(-1.0), LinearSolveOutcome::Singular);
 }

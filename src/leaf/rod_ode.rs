@@ -10,14 +10,14 @@
 //!
 //! E' = L/2 (n.c n + m.m/A) + potential of the loads.
 
-use crate::leaf::block_tridiagonal::lanes_of;
+use crate::leaf::block_tridiagonal::lane_rods;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
-use crate::natural::{A, B, C, Natural, STAGES};
+use crate::leaf::loads::{GroupLoads, LaneRodLoads, group_loads};
+use crate::natural::{Natural, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::rod::Section;
-use crate::rod::{Ends, Strip};
+use crate::rod::{NodePair, TissueStrip};
 use crate::rotation::{Quaternions, directors};
-use crate::simd::{Four, GROUP, Kernel, Lanes, Vectors, run, widest_arch};
+use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run, widest_arch};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
 
@@ -36,9 +36,9 @@ pub struct RodFields {
 
 /// The fields of all rods at one sigma, in groups of four.
 #[derive(Clone, Debug, Default)]
-pub struct Slice(Vec<GroupFields>);
+pub struct StationFields(Vec<GroupFields>);
 
-impl Slice {
+impl StationFields {
     /// Rod `j`.
     pub fn rod(&self, j: usize) -> RodFields {
         rod_of(&self.0, j)
@@ -58,12 +58,12 @@ fn rod_of(groups: &[GroupFields], j: usize) -> RodFields {
 }
 
 /// Integrates the equations of all rods of a leaf.
-pub struct Flow<'a> {
+pub struct RodIntegrator<'a> {
     leaf: &'a DiscreteLeaf,
     arch: Arch,
     loads: Vec<GroupLoads>,
     fields: Vec<GroupFields>,
-    stage: Stage,
+    stage: RungeKuttaStage,
     /// Slopes of each stage and group.
     slopes: Vec<Vec<GroupFields>>,
     /// Constitutive laws at the present stage; constant if the rods are uniform.
@@ -74,40 +74,40 @@ pub struct Flow<'a> {
 }
 
 /// The fields of a Runge-Kutta stage.
-struct Stage {
+struct RungeKuttaStage {
     fields: Vec<GroupFields>,
     /// Positions again, contiguous for each axis, with padding before the first rod and after
     /// the last, so that those of neighbours are adjacent.
     x: [Vec<f64>; 3],
 }
 
-impl<'a> Flow<'a> {
+impl<'a> RodIntegrator<'a> {
     /// For the rods of `leaf`, on any grid.
     pub fn new(leaf: &'a DiscreteLeaf) -> Self {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);
-            if leaf.leaf.in_plane(j) {
+            if leaf.leaf.is_halved_midrib(j) {
                 // The image of its neighbour pulls it back into the plane.
                 load.previous.y = 0.0;
             }
             load
         };
         let groups = leaf.rods().div_ceil(GROUP);
-        let fields = vec![[Four::default(); FIELDS]; groups];
-        let mut flow = Flow {
+        let fields = vec![[NumberGroup::default(); FIELDS_PER_ROD]; groups];
+        let mut flow = RodIntegrator {
             leaf,
             arch: widest_arch(),
             loads: (0..groups)
-                .map(|group| group_loads(lanes_of(group, leaf.rods()).map(load)))
+                .map(|group| group_loads(lane_rods(group, leaf.rods()).map(load)))
                 .collect(),
-            stage: Stage {
+            stage: RungeKuttaStage {
                 fields: fields.clone(),
                 x: std::array::from_fn(|_| vec![0.0; GROUP * groups + 2]),
             },
             slopes: vec![fields.clone(); STAGES],
             laws: Vec::with_capacity(groups),
-            uniform: leaf.leaf.uniform(),
-            natural: leaf.tied().then(|| {
+            uniform: leaf.leaf.has_uniform_sections(),
+            natural: leaf.has_tissue().then(|| {
                 let scenario = leaf.leaf.scenario();
                 Natural::new(scenario, scenario.tissue_grown)
             }),
@@ -124,11 +124,11 @@ impl<'a> Flow<'a> {
         &mut self,
         begin: impl Fn(usize) -> RodFields,
         [from, to]: [f64; 2],
-        after: &mut [Slice],
+        after: &mut [StationFields],
     ) {
         let rods = self.leaf.rods();
         for (g, group) in self.fields.iter_mut().enumerate() {
-            for (lane, j) in lanes_of(g, rods).into_iter().enumerate() {
+            for (lane, j) in lane_rods(g, rods).into_iter().enumerate() {
                 let RodFields { x, q, n, m } = begin(j);
                 let vectors = [(0, x), (3, DVec3::new(q.x, q.y, q.z)), (7, n), (10, m)];
                 for (first, vector) in vectors {
@@ -143,12 +143,12 @@ impl<'a> Flow<'a> {
         let (h, last) = ((to - from) / after.len() as f64, after.len() - 1);
         let points = !self.leaf.leaf.scenario().points.is_empty();
         if points && h > 0.0 {
-            self.jump(from, -1.0);
+            self.add_point_loads(from, -1.0);
         }
-        for (step, Slice(after)) in after.iter_mut().enumerate() {
+        for (step, StationFields(after)) in after.iter_mut().enumerate() {
             self.step(from + h * step as f64, h);
             if points && h < 0.0 && step == last {
-                self.jump(to, 1.0);
+                self.add_point_loads(to, 1.0);
             }
             after.clone_from(&self.fields);
         }
@@ -163,21 +163,21 @@ impl<'a> Flow<'a> {
 
     fn step(&mut self, sigma: f64, h: f64) {
         for i in 0..STAGES {
-            self.combine(h, A[i]);
+            self.set_stage(h, STAGE_WEIGHTS[i]);
             if !self.uniform {
-                self.look_up_laws(sigma + C[i] * h);
+                self.look_up_laws(sigma + STAGE_NODES[i] * h);
             }
-            let mut kernel = Slopes {
+            let mut kernel = SlopeKernel {
                 stage: &self.stage,
                 loads: &self.loads,
                 laws: &self.laws,
                 out: &mut self.slopes[i],
             };
             run(self.arch, &mut kernel);
-            self.add_tissue(sigma + C[i] * h, i);
-            self.add_own_loads(sigma + C[i] * h, i);
+            self.add_tissue(sigma + STAGE_NODES[i] * h, i);
+            self.add_own_loads(sigma + STAGE_NODES[i] * h, i);
         }
-        self.combine(h, &B);
+        self.set_stage(h, &RESULT_WEIGHTS);
         std::mem::swap(&mut self.fields, &mut self.stage.fields);
     }
 
@@ -188,27 +188,27 @@ impl<'a> Flow<'a> {
         };
         let (leaf, fields, slopes) = (&self.leaf.leaf, &self.stage.fields, &mut self.slopes[stage]);
         let at_rest = |j: usize| {
-            let (x, q) = natural.at(j, sigma);
+            let (x, q) = natural.vein_pose(j, sigma);
             (x / leaf.scale.length, q)
         };
         let here = |j: usize| {
             let RodFields { x, q, .. } = rod_of(fields, j);
             (x, q)
         };
-        let ends = |a: (DVec3, DQuat), b: (DVec3, DQuat)| Ends {
+        let ends = |a: (DVec3, DQuat), b: (DVec3, DQuat)| NodePair {
             x: [a.0, b.0],
             q: [a.1, b.1],
         };
         let mut left = (at_rest(0), here(0));
         for g in 0..leaf.rods() - 1 {
             let right = (at_rest(g + 1), here(g + 1));
-            let [stiffness, fold] = leaf.tissue(g, sigma);
-            let strip = Strip::natural(stiffness, fold.x, &ends(left.0, right.0));
+            let [stiffness, fold] = leaf.tissue_stiffness(g, sigma);
+            let strip = TissueStrip::stress_free_between(stiffness, fold.x, &ends(left.0, right.0));
             let ends = ends(left.1, right.1);
             let (energy, loads) = strip.energy_and_loads(&ends);
             slopes[g / GROUP][13].0[g % GROUP] += energy;
             for (j, [mut moment, mut force]) in [g, g + 1].into_iter().zip(loads) {
-                if leaf.in_plane(j) {
+                if leaf.is_halved_midrib(j) {
                     // The image of its neighbour pulls it back into the plane.
                     (moment.x, moment.z, force.y) = (0.0, 0.0, 0.0);
                 }
@@ -224,11 +224,11 @@ impl<'a> Flow<'a> {
 
     /// Adds the loads that veins have of their own to the slopes of a stage, at `sigma`.
     fn add_own_loads(&mut self, sigma: f64, stage: usize) {
-        if self.leaf.loads.own == 0.0 {
+        if self.leaf.loads.rod_load_factor == 0.0 {
             return;
         }
         for j in 0..self.leaf.rods() {
-            let force = self.leaf.own_part() * self.leaf.leaf.own_load(j, sigma);
+            let force = self.leaf.rod_load_factor() * self.leaf.leaf.own_load_density(j, sigma);
             let slopes = &mut self.slopes[stage][j / GROUP];
             for c in 0..3 {
                 slopes[7 + c].0[j % GROUP] -= force[c];
@@ -239,10 +239,10 @@ impl<'a> Flow<'a> {
     }
 
     /// Adds `sign` times the forces and moments on points at `sigma` to those of the fields.
-    fn jump(&mut self, sigma: f64, sign: f64) {
+    fn add_point_loads(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
-            let force = sign * self.leaf.force_on_points(j, sigma);
-            let moment = sign * self.leaf.moment_at(sigma);
+            let force = sign * self.leaf.point_force_at(j, sigma);
+            let moment = sign * self.leaf.dead_moment_at(sigma);
             let fields = &mut self.fields[j / GROUP];
             for c in 0..3 {
                 fields[7 + c].0[j % GROUP] += force[c];
@@ -252,8 +252,8 @@ impl<'a> Flow<'a> {
     }
 
     /// Sets the stage to the fields plus h times the weighted sum of slopes.
-    fn combine(&mut self, h: f64, weights: &[f64]) {
-        let mut kernel = Combine {
+    fn set_stage(&mut self, h: f64, weights: &[f64]) {
+        let mut kernel = StageKernel {
             fields: &self.fields,
             slopes: &self.slopes,
             weights: (h, weights),
@@ -266,7 +266,7 @@ impl<'a> Flow<'a> {
     fn look_up_laws(&mut self, sigma: f64) {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
-            let sections = lanes_of(g, rods).map(|j| leaf.section(j, sigma, 1.0));
+            let sections = lane_rods(g, rods).map(|j| leaf.section(j, sigma, 1.0));
             laws(sections.each_ref())
         };
         self.laws.clear();
@@ -274,54 +274,56 @@ impl<'a> Flow<'a> {
     }
 }
 
-struct Slopes<'a> {
-    stage: &'a Stage,
+struct SlopeKernel<'a> {
+    stage: &'a RungeKuttaStage,
     loads: &'a [GroupLoads],
     laws: &'a [GroupLaws],
     out: &'a mut [GroupFields],
 }
 
-impl Kernel for Slopes<'_> {
+impl GroupKernel for SlopeKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         for (g, out) in self.out.iter_mut().enumerate() {
-            let fields = Fields::of(simd, &self.stage.fields[g], part);
+            let fields = LaneFields::load_group(simd, &self.stage.fields[g], part);
             let first = GROUP * g + part;
             let [previous, next] =
                 [first, first + 2].map(|at| Vectors::load(simd, &self.stage.x, at));
-            let loads = RodLoads::of(simd, &self.loads[g], part);
-            let load = loads.at([previous, fields.x, next], [1.0; 2], false);
-            fields.slopes(&self.laws[g], load, part).put(out, part);
+            let loads = LaneRodLoads::load_group(simd, &self.loads[g], part);
+            let load = loads.node_forces([previous, fields.x, next], [1.0; 2], false);
+            fields
+                .slopes(&self.laws[g], load, part)
+                .store_group(out, part);
         }
     }
 }
 
-struct Combine<'a> {
+struct StageKernel<'a> {
     fields: &'a [GroupFields],
     slopes: &'a [Vec<GroupFields>],
     weights: (f64, &'a [f64]),
-    out: &'a mut Stage,
+    out: &'a mut RungeKuttaStage,
 }
 
-impl Kernel for Combine<'_> {
+impl GroupKernel for StageKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let (h, weights) = self.weights;
         let h = Lanes::splat(simd, h);
         for (g, out) in self.out.fields.iter_mut().enumerate() {
-            let mut sums = [Lanes::splat(simd, 0.0); FIELDS];
+            let mut sums = [Lanes::splat(simd, 0.0); FIELDS_PER_ROD];
             for (weight, slopes) in weights.iter().zip(self.slopes) {
                 if *weight != 0.0 {
                     let weight = Lanes::splat(simd, *weight);
                     for (sum, slope) in sums.iter_mut().zip(&slopes[g]) {
-                        *sum = Lanes::of(simd, slope, part).mul_add(weight, *sum);
+                        *sum = Lanes::load_group(simd, slope, part).mul_add(weight, *sum);
                     }
                 }
             }
             for ((out, sum), field) in out.iter_mut().zip(&mut sums).zip(&self.fields[g]) {
-                let field = Lanes::of(simd, field, part);
+                let field = Lanes::load_group(simd, field, part);
                 *sum = sum.mul_add(h, field);
-                sum.put(out, part);
+                sum.store_group(out, part);
             }
             for (x, sum) in self.out.x.iter_mut().zip(sums) {
                 sum.store(x, GROUP * g + part + 1);
@@ -331,15 +333,15 @@ impl Kernel for Combine<'_> {
 }
 
 /// Number of fields of a rod at one sigma.
-pub const FIELDS: usize = 14;
+pub const FIELDS_PER_ROD: usize = 14;
 
 /// The fields of the rods of a group at one sigma: positions, quaternions, forces and moments
 /// along the lab axes, energies.
-pub type GroupFields = [Four; FIELDS];
+pub type GroupFields = [NumberGroup; FIELDS_PER_ROD];
 
 /// The fields of several rods at one sigma, as vectors.
 #[derive(Clone, Copy)]
-pub struct Fields<S: Simd> {
+pub struct LaneFields<S: Simd> {
     /// Positions.
     pub x: Vectors<S>,
     /// Rotations; quaternions of any length.
@@ -353,7 +355,7 @@ pub struct Fields<S: Simd> {
 }
 
 /// The coefficients of the equations for a group of rods: lengths, v0, u0, c, 1/A.
-pub type GroupLaws = [Four; 13];
+pub type GroupLaws = [NumberGroup; 13];
 
 /// The coefficients from sections whose `ds` is the length of the rod.
 pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
@@ -365,18 +367,18 @@ pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
             7..10 => section.compliance[k - 7],
             _ => 1.0 / section.couple_stiffness[k - 10],
         };
-        Four(sections.map(of))
+        NumberGroup(sections.map(of))
     };
     std::array::from_fn(number)
 }
 
-impl<S: Simd> Fields<S> {
+impl<S: Simd> LaneFields<S> {
     /// The fields of the lanes from `part` on.
     #[inline(always)]
-    pub fn of(simd: S, group: &GroupFields, part: usize) -> Self {
-        let number = |k: usize| Lanes::of(simd, &group[k], part);
+    pub fn load_group(simd: S, group: &GroupFields, part: usize) -> Self {
+        let number = |k: usize| Lanes::load_group(simd, &group[k], part);
         let vector = |k: usize| Vectors::new(number(k), number(k + 1), number(k + 2));
-        Fields {
+        LaneFields {
             x: vector(0),
             q: (vector(3), number(6)),
             n: vector(7),
@@ -387,14 +389,14 @@ impl<S: Simd> Fields<S> {
 
     /// Writes them.
     #[inline(always)]
-    pub fn put(self, group: &mut GroupFields, part: usize) {
+    pub fn store_group(self, group: &mut GroupFields, part: usize) {
         for (first, vector) in [(0, self.x), (3, self.q.0), (7, self.n), (10, self.m)] {
             for (k, component) in vector.array().into_iter().enumerate() {
-                component.put(&mut group[first + k], part);
+                component.store_group(&mut group[first + k], part);
             }
         }
-        self.q.1.put(&mut group[6], part);
-        self.energy.put(&mut group[13], part);
+        self.q.1.store_group(&mut group[6], part);
+        self.energy.store_group(&mut group[13], part);
     }
 
     /// Their derivatives with respect to sigma under a force with its potential, of the lanes
@@ -407,16 +409,19 @@ impl<S: Simd> Fields<S> {
         part: usize,
     ) -> Self {
         let (q, w) = self.q;
-        let law = |k: usize| Lanes::of(w.simd, &laws[k], part);
+        let law = |k: usize| Lanes::load_group(w.simd, &laws[k], part);
         let laws = |k: usize| Vectors::new(law(k), law(k + 1), law(k + 2));
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
-        let (n, m) = (self.n.onto(frame), self.m.onto(frame));
+        let (n, m) = (
+            self.n.director_components(frame),
+            self.m.director_components(frame),
+        );
         let (length, strain, bend) = (law(0), laws(7) * n, laws(10) * m);
         let (v, u) = (laws(1) + strain, laws(4) + bend);
-        let tangent = v.along(frame).scale(length);
-        let turn = u.along(frame).scale(length * half);
-        Fields {
+        let tangent = v.from_director_components(frame).scale(length);
+        let turn = u.from_director_components(frame).scale(length * half);
+        LaneFields {
             x: tangent,
             q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
             n: -force,
@@ -450,9 +455,9 @@ mod tests {
             n: DVec3::ZERO,
             m: CURVATURE * DVec3::Z,
         };
-        let mut after = vec![Slice::default(); steps];
-        Flow::new(&leaf).integrate(begin, [0.0, 1.0], &mut after);
-        let off = |(k, slice): (usize, &Slice)| {
+        let mut after = vec![StationFields::default(); steps];
+        RodIntegrator::new(&leaf).integrate(begin, [0.0, 1.0], &mut after);
+        let off = |(k, slice): (usize, &StationFields)| {
             let angle = CURVATURE * (k + 1) as f64 / steps as f64;
             let circle = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / CURVATURE;
             (slice.rod(0).x - circle).length()

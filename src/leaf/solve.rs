@@ -6,11 +6,14 @@
 //! A positive definite matrix that is factorised once and solved with several right-hand sides: rod
 //! by rod with conjugate gradients or, where tissue ties the rods, as a whole.
 
-use crate::leaf::block_tridiagonal::{Increments, Masses, TipFactor};
-use crate::leaf::direct::{DirectSolver, Factors};
+use crate::leaf::block_tridiagonal::{GroupIncrements, ShiftedMasses, TipFactor};
+use crate::leaf::direct::{DirectSolver, MatrixFactors};
 use crate::leaf::state::Increment;
-use crate::leaf::system::{Advance, Coupled, Direction, Product, System, each_group, rods_of};
-use crate::simd::{Four, run};
+use crate::leaf::system::{
+    CouplingOperator, CurvatureKernel, DirectionUpdateKernel, SolutionUpdateKernel, System,
+    each_group, group_rods,
+};
+use crate::simd::{NumberGroup, run};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -19,9 +22,9 @@ const MAX_ITERATIONS: usize = 200;
 
 /// The outcome of a linear solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Solved {
+pub enum LinearSolveOutcome {
     /// Converged to the tolerance, with the number of iterations.
-    Yes(usize),
+    Converged(usize),
     /// The matrix is not positive definite; detected after this number of iterations.
     Indefinite(usize),
     /// The iteration limit was reached.
@@ -30,12 +33,14 @@ pub enum Solved {
     Singular,
 }
 
-impl Solved {
+impl LinearSolveOutcome {
     /// The number of iterations.
     pub fn iterations(self) -> usize {
         match self {
-            Solved::Yes(count) | Solved::Indefinite(count) | Solved::TooSlow(count) => count,
-            Solved::Singular => 1,
+            LinearSolveOutcome::Converged(count)
+            | LinearSolveOutcome::Indefinite(count)
+            | LinearSolveOutcome::TooSlow(count) => count,
+            LinearSolveOutcome::Singular => 1,
         }
     }
 }
@@ -44,7 +49,7 @@ impl System {
     /// Factorises B + shift M; false if it is not positive definite, or tissue ties the rods.
     pub fn factorize(&mut self, shift: f64) -> bool {
         // Without the tissue, which is not in B + E.
-        if self.tied() {
+        if self.has_tissue() {
             return false;
         }
         self.factorize_signed(shift, false)
@@ -60,7 +65,7 @@ impl System {
     fn factorize_signed(&mut self, shift: f64, any_sign: bool) -> bool {
         let (arch, weights) = (self.arch, &self.weights);
         each_group(self.parallel, &mut self.groups, |_, group| {
-            let masses = Masses {
+            let masses = ShiftedMasses {
                 shift,
                 per_weight: group.masses,
                 weights,
@@ -75,7 +80,7 @@ impl System {
         }
         let mut sum = [[0.0; 3]; 3];
         for (g, group) in self.groups.iter().enumerate() {
-            for lane in 0..rods_of(g, self.rods).len() {
+            for lane in 0..group_rods(g, self.rods).len() {
                 for (sum, row) in sum.iter_mut().zip(group.matrix.tip(lane)) {
                     for c in 0..3 {
                         sum[c] += row[c];
@@ -90,7 +95,11 @@ impl System {
     /// Solves with the factorised matrix for the assembled right-hand side
     /// plus `inertia` (mass times velocity over time step), to the relative
     /// accuracy `tolerance` in the energy norm.
-    pub fn solve(&mut self, inertia: Option<(&[Vec<Increment>], f64)>, tolerance: f64) -> Solved {
+    pub fn solve(
+        &mut self,
+        inertia: Option<(&[Vec<Increment>], f64)>,
+        tolerance: f64,
+    ) -> LinearSolveOutcome {
         let mut tip_residual = self.set_residual(inertia);
         let (mut tip_z, mut rz) = self.precondition(tip_residual);
         if !self.coupled {
@@ -98,8 +107,8 @@ impl System {
                 group.solution.copy_from_slice(&group.z);
             }
             return match self.moments.is_empty() || self.correct_for_moments() {
-                true => Solved::Yes(1),
-                false => Solved::Singular,
+                true => LinearSolveOutcome::Converged(1),
+                false => LinearSolveOutcome::Singular,
             };
         }
 
@@ -107,19 +116,19 @@ impl System {
         let mut tip_b_p = tip_residual;
         let mut tip_solution = DVec3::ZERO;
         for (group, p) in self.groups.iter_mut().zip(&mut self.p) {
-            group.solution.fill(Increments::default());
+            group.solution.fill(GroupIncrements::default());
             p.copy_from_slice(&group.z);
             group.b_p.copy_from_slice(&group.residual);
         }
         let target = tolerance * tolerance * rz;
         let mut iterations = 1;
         loop {
-            let p_k_p = self.multiply() + tip_p.dot(tip_b_p);
+            let p_k_p = self.direction_curvature() + tip_p.dot(tip_b_p);
             if p_k_p.is_nan() || p_k_p <= 0.0 {
                 return if rz == 0.0 {
-                    Solved::Yes(iterations)
+                    LinearSolveOutcome::Converged(iterations)
                 } else {
-                    Solved::Indefinite(iterations)
+                    LinearSolveOutcome::Indefinite(iterations)
                 };
             }
             let alpha = rz / p_k_p;
@@ -132,7 +141,7 @@ impl System {
                 break;
             }
             if iterations >= MAX_ITERATIONS {
-                return Solved::TooSlow(iterations);
+                return LinearSolveOutcome::TooSlow(iterations);
             }
             iterations += 1;
             let beta = rz_next / rz;
@@ -144,10 +153,10 @@ impl System {
         if self.joined {
             for group in &mut self.groups {
                 let last = group.solution.last_mut().expect("a rod has a segment");
-                set_tip(last, tip_solution, &group.active);
+                set_tip(last, tip_solution, &group.active_lanes);
             }
         }
-        Solved::Yes(iterations)
+        LinearSolveOutcome::Converged(iterations)
     }
 
     /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
@@ -158,7 +167,7 @@ impl System {
             let Some((velocity, per_step)) = inertia else {
                 return;
             };
-            for (lane, j) in rods_of(g, rods).enumerate() {
+            for (lane, j) in group_rods(g, rods).enumerate() {
                 let [rotary, mass] = group.masses.map(|mass| mass.0[lane] * per_step);
                 for ((r, v), weight) in group.residual.iter_mut().zip(&velocity[j]).zip(weights) {
                     for c in 0..3 {
@@ -174,7 +183,7 @@ impl System {
                 let last = group.residual.last_mut().expect("a rod has a segment");
                 for c in 0..3 {
                     tip_residual[c] += last[3 + c].sum();
-                    last[3 + c] = Four::default();
+                    last[3 + c] = NumberGroup::default();
                 }
             }
         }
@@ -186,7 +195,9 @@ impl System {
     fn precondition(&mut self, tip_residual: DVec3) -> (DVec3, f64) {
         let (last, arch) = (self.nodes() - 1, self.arch);
         each_group(self.parallel, &mut self.groups, |_, group| {
-            group.matrix.forward(arch, &group.residual, &mut group.z);
+            group
+                .matrix
+                .substitute_forward(arch, &group.residual, &mut group.z);
         });
         let mut tip = None;
         if let Some(factor) = self.tip.as_ref().filter(|_| self.joined) {
@@ -200,33 +211,38 @@ impl System {
         }
         each_group(self.parallel, &mut self.groups, |_, group| {
             if let Some(tip) = tip {
-                set_tip(&mut group.z[last], tip, &group.active);
+                set_tip(&mut group.z[last], tip, &group.active_lanes);
             }
             // A joint tip's slots hold no residual, only its displacement.
-            group.partial = (group.matrix).backward(arch, &group.residual, &mut group.z);
+            group.partial_product =
+                (group.matrix).substitute_backward(arch, &group.residual, &mut group.z);
         });
         let tip = tip.unwrap_or_default();
-        let product = self.groups.iter().map(|group| group.partial).sum::<f64>();
+        let product = self
+            .groups
+            .iter()
+            .map(|group| group.partial_product)
+            .sum::<f64>();
         (tip, product + tip_residual.dot(tip))
     }
 
     /// p . (B + E) p without the contribution of the tip.
-    fn multiply(&mut self) -> f64 {
+    fn direction_curvature(&mut self) -> f64 {
         let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
         each_group(self.parallel, &mut self.groups, |g, group| {
-            let mut kernel = Product {
+            let mut kernel = CurvatureKernel {
                 group,
-                coupled: Coupled {
+                coupled: CouplingOperator {
                     p,
                     group: g,
                     weights,
                 },
-                product: Four::default(),
+                product: NumberGroup::default(),
             };
             run(arch, &mut kernel);
-            group.partial = kernel.product.sum();
+            group.partial_product = kernel.product.sum();
         });
-        self.groups.iter().map(|group| group.partial).sum()
+        self.groups.iter().map(|group| group.partial_product).sum()
     }
 
     /// Adds `alpha` p to the solution and updates the residual, which stays zero in the slots
@@ -234,14 +250,14 @@ impl System {
     fn advance(&mut self, alpha: f64) {
         let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
         each_group(self.parallel, &mut self.groups, |g, group| {
-            let coupled = Coupled {
+            let coupled = CouplingOperator {
                 p,
                 group: g,
                 weights,
             };
             run(
                 arch,
-                &mut Advance {
+                &mut SolutionUpdateKernel {
                     group,
                     coupled,
                     alpha,
@@ -253,8 +269,8 @@ impl System {
     /// The next direction: z plus `beta` times the last.
     fn update_direction(&mut self, beta: f64) {
         let arch = self.arch;
-        let turn = |(group, p): (&mut _, &mut Vec<Increments>)| {
-            run(arch, &mut Direction { group, p, beta });
+        let turn = |(group, p): (&mut _, &mut Vec<GroupIncrements>)| {
+            run(arch, &mut DirectionUpdateKernel { group, p, beta });
         };
         match self.parallel {
             true => (self.groups.par_iter_mut()).zip(&mut self.p).for_each(turn),
@@ -264,40 +280,42 @@ impl System {
 }
 
 /// Writes the displacement of a joint tip.
-fn set_tip(last: &mut Increments, tip: DVec3, active: &Four) {
+fn set_tip(last: &mut GroupIncrements, tip: DVec3, active: &NumberGroup) {
     for c in 0..3 {
-        last[3 + c] = Four(active.0.map(|active| active * tip[c]));
+        last[3 + c] = NumberGroup(active.0.map(|active| active * tip[c]));
     }
 }
 
 /// The factors of the matrix assembled in a [`System`]; those of the rods are in the system itself.
-pub struct Factorised(Option<Factors>);
+pub struct DefiniteFactors(Option<MatrixFactors>);
 
-impl Factorised {
+impl DefiniteFactors {
     /// Factorises K + `shift` M; `None` if it is not positive definite, or does not fit into memory.
     pub fn new(system: &mut System, shift: f64) -> Option<Self> {
-        if !system.tied() {
-            return system.factorize(shift).then_some(Factorised(None));
+        if !system.has_tissue() {
+            return system.factorize(shift).then_some(DefiniteFactors(None));
         }
         let solver = DirectSolver::new(system).ok()?;
         let factors = solver.factorize_definite(system, shift).ok()??;
-        Some(Factorised(Some(factors)))
+        Some(DefiniteFactors(Some(factors)))
     }
 
     /// Factorises the matrix of a single rod whatever the signs of its pivots; `None` if one of them
     /// is zero.
-    pub fn of_single_rod(system: &mut System) -> Option<Self> {
-        system.factorize_indefinite().then_some(Factorised(None))
+    pub fn indefinite_single_rod(system: &mut System) -> Option<Self> {
+        system
+            .factorize_indefinite()
+            .then_some(DefiniteFactors(None))
     }
 
     /// Solves for the right-hand side in `system`, to the relative accuracy `tolerance` in the
     /// energy norm.
-    pub fn solve(&mut self, system: &mut System, tolerance: f64) -> Solved {
+    pub fn solve(&mut self, system: &mut System, tolerance: f64) -> LinearSolveOutcome {
         match &mut self.0 {
             None => system.solve(None, tolerance),
             Some(factors) => {
                 factors.solve(system, None);
-                Solved::Yes(1)
+                LinearSolveOutcome::Converged(1)
             }
         }
     }

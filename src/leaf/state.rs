@@ -12,10 +12,10 @@
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::system::System;
 use crate::numbers::{larger, largest};
-use crate::rod::Ends;
+use crate::rod::NodePair;
 use crate::rotation;
 use crate::rotation::outer;
-use crate::scenario::{Begin, Turning};
+use crate::scenario::{BaseRotations, ZeroEnergyRotation};
 use glam::{DQuat, DVec3};
 use std::borrow::Cow;
 
@@ -36,7 +36,7 @@ pub struct State {
 }
 
 /// Distance of tips, in lengths, that is rounding.
-const MEETING: f64 = 1e-9;
+const TIP_COINCIDENCE_TOLERANCE: f64 = 1e-9;
 
 /// Increments of one node in the order of elimination: spatial rotation, then
 /// displacement.
@@ -45,22 +45,22 @@ pub type Increment = [f64; 6];
 /// Increments, or the forces that are dual to them, of all nodes of a leaf with equations: rods,
 /// then nodes from [`first_node`](crate::leaf::DiscreteLeaf::first_node) on. With a joint tip the last displacement is the same in every rod,
 /// and the last force is each rod's share.
-pub type Field = Vec<Vec<Increment>>;
+pub type NodalField = Vec<Vec<Increment>>;
 
 /// The rotation part of an increment.
 #[inline]
-pub fn turn(increment: &Increment) -> DVec3 {
+pub fn rotation_part(increment: &Increment) -> DVec3 {
     DVec3::new(increment[0], increment[1], increment[2])
 }
 
 /// The displacement part of an increment.
 #[inline]
-pub fn shift(increment: &Increment) -> DVec3 {
+pub fn displacement_part(increment: &Increment) -> DVec3 {
     DVec3::new(increment[3], increment[4], increment[5])
 }
 
 /// Adds a rotation and a displacement to an increment, or a moment and a force.
-pub fn add(increment: &mut Increment, turn: DVec3, shift: DVec3) {
+pub fn add_to_increment(increment: &mut Increment, turn: DVec3, shift: DVec3) {
     for c in 0..3 {
         increment[c] += turn[c];
         increment[3 + c] += shift[c];
@@ -99,7 +99,7 @@ impl State {
     /// Whether the tips of all rods are one point, but for rounding.
     pub fn tips_meet(&self) -> bool {
         let apart = |j: usize| self.tip(j).distance(self.tip(0));
-        (1..self.rods()).all(|j| apart(j) <= MEETING)
+        (1..self.rods()).all(|j| apart(j) <= TIP_COINCIDENCE_TOLERANCE)
     }
 
     /// Moves the tips of all rods to their mean.
@@ -114,9 +114,9 @@ impl State {
     }
 
     /// The nodes of segment `i` of rod `j`.
-    pub fn ends(&self, j: usize, i: usize) -> Ends {
+    pub fn ends(&self, j: usize, i: usize) -> NodePair {
         let k = self.base(j) + i;
-        Ends {
+        NodePair {
             x: [self.x[k], self.x[k + 1]],
             q: [self.q[k], self.q[k + 1]],
         }
@@ -134,7 +134,7 @@ impl State {
 
     /// The largest displacement between this state and another at the nodes common to both
     /// grids, of which one is a repeated halving of the other (or the same).
-    pub fn shift_to(&self, other: &State) -> f64 {
+    pub fn largest_displacement_to(&self, other: &State) -> f64 {
         let n = self.segments.min(other.segments);
         let distance = |j: usize, i: usize| {
             let [a, b] = [self, other].map(|it| it.x[it.base(j) + i * (it.segments / n)]);
@@ -149,7 +149,7 @@ impl State {
     pub fn distance(&self, other: &State) -> f64 {
         let turns = self.q.iter().zip(&other.q);
         let turns = turns.map(|(a, b)| rotation::log(*b * a.conjugate()).length());
-        turns.fold(self.shift_to(other), larger)
+        turns.fold(self.largest_displacement_to(other), larger)
     }
 
     /// The largest change of a segment's force between this state and another on the
@@ -161,7 +161,7 @@ impl State {
 
     /// Writes the increments of all nodes from the `first` on that lead to another state on the same
     /// grid.
-    pub fn increments_to(&self, other: &State, first: usize, field: &mut Field) {
+    pub fn increments_to(&self, other: &State, first: usize, field: &mut NodalField) {
         let nodes = self.segments + 1 - first;
         field.resize_with(self.rods(), || vec![[0.0; 6]; nodes]);
         for (j, rod) in field.iter_mut().enumerate() {
@@ -176,21 +176,21 @@ impl State {
 
     /// Rotates and displaces node `k` by `step` times the increment.
     #[inline]
-    pub fn advance(&mut self, k: usize, increment: &Increment, step: f64) {
-        self.q[k] = (rotation::exp(step * turn(increment)) * self.q[k]).normalize();
-        self.x[k] += step * shift(increment);
+    pub fn advance_node(&mut self, k: usize, increment: &Increment, step: f64) {
+        self.q[k] = (rotation::exp(step * rotation_part(increment)) * self.q[k]).normalize();
+        self.x[k] += step * displacement_part(increment);
     }
 }
 
 /// Stiffness of the spring, A/L^3, or A/L against a rotation.
-const SPRING: f64 = 100.0;
+const PHASE_SPRING_STIFFNESS: f64 = 100.0;
 
 /// A node that turns slower than this (lengths per radian) is on the axis: straight veins do not move
 /// when they turn.
-const ON_AXIS: f64 = 1e-6;
+const AXIS_SPEED_TOLERANCE: f64 = 1e-6;
 
 /// The node at which a turn is held.
-struct HeldNode {
+struct PhaseConditionNode {
     rod: usize,
     node: usize,
     /// The direction in which it rotates, or else that in which it is displaced.
@@ -200,26 +200,35 @@ struct HeldNode {
 impl DiscreteLeaf {
     /// The veins that can turn, whatever their state: in half of a mirror-symmetric leaf those
     /// whose images turn the other way.
-    fn turnings(&self) -> impl Iterator<Item = &Turning> {
-        let moves = |j: usize| j < self.rods() && !self.leaf.in_plane(j);
-        let half = self.leaf.in_half();
+    fn zero_energy_rotations(&self) -> impl Iterator<Item = &ZeroEnergyRotation> {
+        let moves = |j: usize| j < self.rods() && !self.leaf.is_halved_midrib(j);
+        let half = self.leaf.is_mirror_half();
         (self.leaf.turnings.iter()).filter(move |it| !half || it.rods.clone().all(moves))
     }
 
     /// The rotation and the displacement of a node by a turn at unit rate.
-    fn turn_of(&self, turning: &Turning, state: &State, k: usize) -> [DVec3; 2] {
-        turning.rates(state.x[k], state.q[k], self.leaf.scale.length)
+    fn zero_energy_increment(
+        &self,
+        turning: &ZeroEnergyRotation,
+        state: &State,
+        k: usize,
+    ) -> [DVec3; 2] {
+        turning.node_velocity(state.x[k], state.q[k], self.leaf.scale.length)
     }
 
     /// The node to hold: the one that is displaced most or, where sections spin, the base. A joint tip,
     /// which all rods share, is none.
-    fn node_to_hold(&self, turning: &Turning, state: &State) -> Option<HeldNode> {
+    fn phase_condition_node(
+        &self,
+        turning: &ZeroEnergyRotation,
+        state: &State,
+    ) -> Option<PhaseConditionNode> {
         if turning.axis == DVec3::ZERO {
             let rod = turning.rods.start;
             let points = &state.x[state.base(rod)..][..=self.segments()];
-            let [spin, _] = self.turn_of(turning, state, state.base(rod));
-            let moves = turning.moves(points, DVec3::ZERO, ON_AXIS);
-            return moves.then_some(HeldNode {
+            let [spin, _] = self.zero_energy_increment(turning, state, state.base(rod));
+            let moves = turning.moves_something(points, DVec3::ZERO, AXIS_SPEED_TOLERANCE);
+            return moves.then_some(PhaseConditionNode {
                 rod,
                 node: 0,
                 direction: [spin, DVec3::ZERO],
@@ -227,12 +236,12 @@ impl DiscreteLeaf {
         }
         let last = self.segments() - usize::from(self.tips_move_together());
         let mut farthest = None;
-        let mut most = ON_AXIS;
-        for (rod, node) in nodes(turning, last) {
-            let [_, speed] = self.turn_of(turning, state, state.base(rod) + node);
+        let mut most = AXIS_SPEED_TOLERANCE;
+        for (rod, node) in rotating_nodes(turning, last) {
+            let [_, speed] = self.zero_energy_increment(turning, state, state.base(rod) + node);
             if speed.length() > most {
                 most = speed.length();
-                farthest = Some(HeldNode {
+                farthest = Some(PhaseConditionNode {
                     rod,
                     node,
                     direction: [DVec3::ZERO, speed / most],
@@ -243,12 +252,12 @@ impl DiscreteLeaf {
     }
 
     /// Adds the phase conditions of veins that can turn to an assembled matrix.
-    pub fn hold_turn(&self, state: &State, system: &mut System) {
-        for turning in self.turnings() {
-            if let Some(at) = self.node_to_hold(turning, state) {
-                let [turn, shift] = at.direction.map(|d| SPRING * outer(d, d));
-                system.hold(at.rod, at.node, shift);
-                system.hold_rotation(at.rod, at.node, turn);
+    pub fn add_phase_conditions(&self, state: &State, system: &mut System) {
+        for turning in self.zero_energy_rotations() {
+            if let Some(at) = self.phase_condition_node(turning, state) {
+                let [turn, shift] = at.direction.map(|d| PHASE_SPRING_STIFFNESS * outer(d, d));
+                system.add_displacement_spring(at.rod, at.node, shift);
+                system.add_rotation_spring(at.rod, at.node, turn);
             }
         }
     }
@@ -257,9 +266,9 @@ impl DiscreteLeaf {
     /// the same one, on all grids: clamped ones until their moment at the base bends them down
     /// (towards -e3); on hinges as near as possible to where they begin in the natural leaf, or down;
     /// and a vein that spins without a twist from there.
-    pub fn lean_down(&self, state: &mut State) {
-        for turning in self.turnings() {
-            if turning.axis == DVec3::ZERO && self.node_to_hold(turning, state).is_none() {
+    pub fn rotate_to_representative(&self, state: &mut State) {
+        for turning in self.zero_energy_rotations() {
+            if turning.axis == DVec3::ZERO && self.phase_condition_node(turning, state).is_none() {
                 continue;
             }
             let rods = &turning.rods;
@@ -268,20 +277,20 @@ impl DiscreteLeaf {
                 let segment = self.segment(state, j, 0, n);
                 -segment.gradient(self.section(j, 0)).1
             };
-            let begin = |j: usize| Begin {
-                natural: self.leaf.base(j).1,
+            let begin = |j: usize| BaseRotations {
+                stress_free: self.leaf.base(j).1,
                 now: state.q[state.base(j)],
             };
-            let begins: Vec<Begin> = rods.clone().map(begin).collect();
+            let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
             let moments = (!self.leaf.hinged()).then(|| rods.clone().map(moment).sum());
-            let angle = turning.angle_to_lean(&begins, moments);
+            let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.leaf.scale.length;
             let n = self.segments();
             for j in rods.clone() {
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
-                    let [turns, shifts] = self.moves(j, node);
+                    let [turns, shifts] = self.allows_rotation_and_displacement(j, node);
                     if shifts || node < n {
                         state.x[k] = point + turn * (state.x[k] - point);
                     }
@@ -295,34 +304,41 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::lean_down`].
-    pub fn leaning<'s>(&self, state: &'s State) -> Cow<'s, State> {
+    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::rotate_to_representative`].
+    pub fn circle_representative<'s>(&self, state: &'s State) -> Cow<'s, State> {
         let mut state = Cow::Borrowed(state);
-        if self.turnings().next().is_some() {
-            self.lean_down(state.to_mut());
+        if self.zero_energy_rotations().next().is_some() {
+            self.rotate_to_representative(state.to_mut());
         }
         state
     }
 
     /// The turns at unit rate of veins that can: increments of the nodes of all rods.
-    pub fn turns(&self, state: &State) -> Vec<Field> {
-        let moves = |turning: &&Turning| self.node_to_hold(turning, state).is_some();
-        let turn = |turning: &Turning| {
+    pub fn zero_energy_fields(&self, state: &State) -> Vec<NodalField> {
+        let moves =
+            |turning: &&ZeroEnergyRotation| self.phase_condition_node(turning, state).is_some();
+        let turn = |turning: &ZeroEnergyRotation| {
             let mut field = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
             for j in turning.rods.clone() {
                 for (node, increments) in field[j].iter_mut().enumerate() {
                     let k = state.base(j) + node + self.first_node();
-                    let [spin, velocity] = self.turn_of(turning, state, k);
+                    let [spin, velocity] = self.zero_energy_increment(turning, state, k);
                     *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
                 }
             }
             field
         };
-        self.turnings().filter(moves).map(turn).collect()
+        self.zero_energy_rotations()
+            .filter(moves)
+            .map(turn)
+            .collect()
     }
 }
 
 /// Rods and nodes of veins, to the node `last`.
-fn nodes(turning: &Turning, last: usize) -> impl Iterator<Item = (usize, usize)> {
+fn rotating_nodes(
+    turning: &ZeroEnergyRotation,
+    last: usize,
+) -> impl Iterator<Item = (usize, usize)> {
     (turning.rods.clone()).flat_map(move |rod| (1..=last).map(move |node| (rod, node)))
 }

@@ -3,22 +3,22 @@
 //! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
 //! at a pinned or clamped tip, at a hinged base, or by grips.
 
-use crate::leaf::Gripped;
+use crate::leaf::GrippedNode;
 use crate::leaf::assembly::component;
-use crate::leaf::block_tridiagonal::{Chain, Increments, group_and_lane};
+use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{Field, State};
+use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;
 use crate::rod::UNKNOWNS;
-use crate::scenario::{Grip, Hold};
-use crate::simd::Four;
+use crate::scenario::{Grip, SupportKind};
+use crate::simd::NumberGroup;
 use glam::DVec3;
 use std::ops::Range;
 
 impl DiscreteLeaf {
     /// The nodes that grips hold, where they are in the `natural` leaf and moved by their
     /// displacements.
-    pub(super) fn gripped(&self, natural: &State) -> Vec<Gripped> {
+    pub(super) fn find_gripped_nodes(&self, natural: &State) -> Vec<GrippedNode> {
         let length = self.leaf.scale.length;
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
@@ -27,12 +27,12 @@ impl DiscreteLeaf {
             let moved = DVec3::from_array(grip.displacement) / length;
             (from..=to).map(move |node| {
                 let k = natural.base(vein) + node;
-                Gripped {
+                GrippedNode {
                     grip: number,
                     rod: vein,
                     node,
                     position: natural.x[k] + moved,
-                    rotation: (grip.held == Hold::Clamped).then_some(natural.q[k]),
+                    rotation: (grip.held == SupportKind::Clamped).then_some(natural.q[k]),
                 }
             })
         });
@@ -45,16 +45,19 @@ impl DiscreteLeaf {
     }
 
     /// The nodes of rod `j` that grips hold.
-    pub fn grips_of(&self, j: usize) -> impl Iterator<Item = &Gripped> {
+    pub fn rod_grips(&self, j: usize) -> impl Iterator<Item = &GrippedNode> {
         self.grips.iter().filter(move |held| held.rod == j)
     }
 
     /// The nodes of rod `j` with equations that hinges or grips hold, and the components that are.
-    pub(super) fn held_inside(&self, j: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+    pub(super) fn held_inner_components(
+        &self,
+        j: usize,
+    ) -> impl Iterator<Item = (usize, Range<usize>)> {
         let hinge = (0..1)
             .filter(|_| self.leaf.hinged())
             .map(|base| (base, 3..6));
-        let grips = self.grips_of(j).map(|held| {
+        let grips = self.rod_grips(j).map(|held| {
             let first = if held.rotation.is_some() { 0 } else { 3 };
             (held.node, first..6)
         });
@@ -62,11 +65,11 @@ impl DiscreteLeaf {
     }
 
     /// Whether node `i` of rod `j` is held at its base or by a grip: its rotation, and its position.
-    pub(super) fn is_gripped(&self, j: usize, i: usize) -> [bool; 2] {
+    pub(super) fn holds_rotation_and_position(&self, j: usize, i: usize) -> [bool; 2] {
         if i == 0 {
             return [!self.leaf.hinged(), true];
         }
-        let here = |it: &&Gripped| (it.rod, it.node) == (j, i);
+        let here = |it: &&GrippedNode| (it.rod, it.node) == (j, i);
         match self.grips.iter().find(here) {
             Some(held) => [held.rotation.is_some(), true],
             None => [false; 2],
@@ -74,17 +77,17 @@ impl DiscreteLeaf {
     }
 
     /// Whether node `i` of rod `j` may rotate, and be displaced.
-    pub fn moves(&self, j: usize, i: usize) -> [bool; 2] {
-        match &self.leaf.held {
+    pub fn allows_rotation_and_displacement(&self, j: usize, i: usize) -> [bool; 2] {
+        match &self.leaf.tip_support {
             Some(held) if i == self.segments() => [held.clamps.is_none(), false],
             _ if i > 0 && self.grips.is_empty() => [true; 2],
-            _ => self.is_gripped(j, i).map(|held| !held),
+            _ => self.holds_rotation_and_position(j, i).map(|held| !held),
         }
     }
 
     /// Puts tips and nodes where they are held.
-    pub fn hold(&self, state: &mut State) {
-        self.leaf.hold_tips(state);
+    pub fn place_held_nodes(&self, state: &mut State) {
+        self.leaf.place_held_tips(state);
         for held in &self.grips {
             let k = state.base(held.rod) + held.node;
             state.x[k] = held.position;
@@ -107,7 +110,7 @@ impl DiscreteLeaf {
         let middles: Vec<DVec3> = (0..grips.len()).map(middle).collect();
         let mut reactions = vec![[DVec3::ZERO; 2]; grips.len()];
         for held in &self.grips {
-            let [moment, force] = self.unbalanced(state, held.rod, held.node);
+            let [moment, force] = self.unbalanced_node_load(state, held.rod, held.node);
             let [force_on, moment_on] = &mut reactions[held.grip];
             *force_on += force;
             if held.rotation.is_some() {
@@ -118,8 +121,12 @@ impl DiscreteLeaf {
     }
 
     /// The forces on all holders: on that of held tips, if they are, and on every grip.
-    pub fn forces_on_holders(&self, state: &State) -> Vec<DVec3> {
-        let tips = self.leaf.held.as_ref().map(|_| self.reaction(state).0);
+    pub fn support_forces(&self, state: &State) -> Vec<DVec3> {
+        let tips = self
+            .leaf
+            .tip_support
+            .as_ref()
+            .map(|_| self.reaction(state).0);
         let grips = match self.has_grips() {
             true => self.grip_reactions(state),
             false => Vec::new(),
@@ -129,14 +136,14 @@ impl DiscreteLeaf {
     }
 
     /// Moment and force on a node by its segments, loads and neighbours.
-    pub(super) fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+    pub(super) fn unbalanced_node_load(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
         let n = self.segments();
         let gradient = |i: usize| {
             let segment = self.segment(state, j, i, state.n[j * n + i]);
             segment.gradient(self.section(j, i))
         };
         let load = self.load(state, j, i);
-        let (mut moment, mut force) = (load.moment + self.moment_on(i), load.force);
+        let (mut moment, mut force) = (load.moment + self.node_dead_moment(i), load.force);
         if i > 0 {
             let (g_x, _, g_b) = gradient(i - 1);
             (moment, force) = (moment - g_b, force - g_x);
@@ -151,34 +158,39 @@ impl DiscreteLeaf {
 
 /// Components of a node's increment (rotation, displacement) that are zero for a node in the
 /// mirror plane: rotations about x and z, the displacement along y.
-const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
+const MIRROR_CONSTRAINED_COMPONENTS: [usize; 3] = [0, 2, 4];
 
 /// All components; displacements are the last three.
-const ALL: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
+const ALL_COMPONENTS: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
 
 /// The entry on the diagonal of held components: with the masses of nodes within a vein it is a
 /// frequency above all others.
-const HELD: f64 = 1e9;
+const HELD_DIAGONAL_ENTRY: f64 = 1e9;
 
 impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` of rod `j`.
     fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
         if i == 0 || !self.grips.is_empty() {
-            match self.is_gripped(j, i) {
-                [true, _] => return &ALL,
-                [false, true] => return &ALL[3..],
+            match self.holds_rotation_and_position(j, i) {
+                [true, _] => return &ALL_COMPONENTS,
+                [false, true] => return &ALL_COMPONENTS[3..],
                 [false, false] => {}
             }
         }
-        if let Some(held) = self.leaf.held.as_ref().filter(|_| i == self.segments()) {
+        if let Some(held) = self
+            .leaf
+            .tip_support
+            .as_ref()
+            .filter(|_| i == self.segments())
+        {
             match held.clamps {
-                Some(_) => &ALL,
-                None => &ALL[3..],
+                Some(_) => &ALL_COMPONENTS,
+                None => &ALL_COMPONENTS[3..],
             }
-        } else if self.leaf.in_plane(j) {
-            &ACROSS_THE_PLANE
+        } else if self.leaf.is_halved_midrib(j) {
+            &MIRROR_CONSTRAINED_COMPONENTS
         } else if self.leaf.mirrored && self.leaf.joined() && i == self.segments() {
-            &ACROSS_THE_PLANE[2..]
+            &MIRROR_CONSTRAINED_COMPONENTS[2..]
         } else {
             &[]
         }
@@ -186,7 +198,7 @@ impl DiscreteLeaf {
 
     /// The first node with equations that may be held.
     fn first_held(&self) -> usize {
-        match (self.leaf.mirrored, &self.leaf.held) {
+        match (self.leaf.mirrored, &self.leaf.tip_support) {
             _ if self.leaf.hinged() || !self.grips.is_empty() => self.first_node(),
             (true, _) => self.first_node(),
             (false, Some(_)) => self.segments(),
@@ -196,7 +208,7 @@ impl DiscreteLeaf {
 
     /// Sets the held components of rod `j` to zero in the right-hand side of its
     /// group.
-    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
+    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [GroupIncrements]) {
         for i in self.first_held()..self.segments() + 1 {
             let rhs = &mut rhs[i - self.first_node()];
             for &c in self.held_components(j, i) {
@@ -206,8 +218,8 @@ impl DiscreteLeaf {
     }
 
     /// Sets the held components of forces on the nodes to zero.
-    pub(super) fn clear_held_forces(&self, forces: &mut Field) {
-        for (j, i) in self.each(self.first_held()..self.segments() + 1) {
+    pub(super) fn clear_held_forces(&self, forces: &mut NodalField) {
+        for (j, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             for &c in self.held_components(j, i) {
                 forces[j][i - self.first_node()][c] = 0.0;
             }
@@ -216,29 +228,32 @@ impl DiscreteLeaf {
 
     /// Replaces rows and columns of the held components of rod `j` in the matrix by those of
     /// the identity, which makes them zero.
-    pub(super) fn hold_components(&self, j: usize, chain: &mut Chain) {
-        let set = |four: &mut Four, value: f64| four.0[group_and_lane(j).1] = value;
+    pub(super) fn hold_components(&self, j: usize, chain: &mut BlockTridiagonal) {
+        let set = |four: &mut NumberGroup, value: f64| four.0[group_and_lane(j).1] = value;
         for i in self.first_held()..self.segments() + 1 {
             let at = i - self.first_node();
             for &c in self.held_components(j, i) {
                 for k in 0..UNKNOWNS {
-                    set(chain.diagonal(at, c.min(k), c.max(k)), 0.0);
-                    set(chain.off(at, c, k), 0.0);
+                    set(chain.diagonal_entry_mut(at, c.min(k), c.max(k)), 0.0);
+                    set(chain.off_diagonal_entry_mut(at, c, k), 0.0);
                     if at > 0 {
-                        set(chain.off(at - 1, k, c), 0.0);
+                        set(chain.off_diagonal_entry_mut(at - 1, k, c), 0.0);
                     }
                 }
-                let gripped = self.is_gripped(j, i)[1];
-                set(chain.diagonal(at, c, c), if gripped { HELD } else { 1.0 });
+                let gripped = self.holds_rotation_and_position(j, i)[1];
+                set(
+                    chain.diagonal_entry_mut(at, c, c),
+                    if gripped { HELD_DIAGONAL_ENTRY } else { 1.0 },
+                );
             }
         }
     }
 
     /// Sets the entries of held components between neighbouring rods to zero.
-    pub(super) fn hold_across(&self, system: &mut System) {
-        for (g, i) in self.each(self.first_held()..self.segments() + 1) {
+    pub(super) fn clear_held_gap_blocks(&self, system: &mut System) {
+        for (g, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             if g + 1 < self.rods() {
-                let across = system.across_mut(g, i - self.first_node());
+                let across = system.gap_block_mut(g, i - self.first_node());
                 for &c in self.held_components(g, i) {
                     across[c] = [0.0; UNKNOWNS];
                 }
@@ -252,7 +267,7 @@ impl DiscreteLeaf {
     /// The largest components of an unbalanced force and moment on a node of
     /// rod `j`, without those that the mirror image balances.
     pub(super) fn unbalanced_residual(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
-        match self.leaf.in_plane(j) {
+        match self.leaf.is_halved_midrib(j) {
             true => (component(force.with_y(0.0)), moment.y.abs()),
             false => (component(force), component(moment)),
         }

@@ -12,15 +12,16 @@
 //! The vectors of the conjugate gradients.
 
 use crate::leaf::block_tridiagonal::{
-    Chain, Increments, TipFactor, group_and_lane, of_lane, set_lane,
+    BlockTridiagonal, GroupIncrements, TipFactor, group_and_lane, lane_increment,
+    set_lane_increment,
 };
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::DeadMoments;
-pub use crate::leaf::solve::Solved;
-use crate::leaf::state::{Field, Increment, shift, turn};
+pub use crate::leaf::solve::LinearSolveOutcome;
+use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
 use crate::rod::NodeBlock;
-use crate::simd::{Four, GROUP, Kernel, Lanes, widest_arch};
+use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
@@ -32,45 +33,45 @@ const PARALLEL_NODES: usize = 8192;
 
 /// Sums, and a maximum, over all rods from an assembly.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sums {
+pub struct AssemblyTotals {
     /// Potential energy: of the strains, the coupling and the loads.
     pub energy: f64,
     /// Largest rotation between the ends of a segment.
-    pub turn: f64,
+    pub largest_turn: f64,
 }
 
 /// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
 /// and forces are zero.
 #[derive(Clone, Debug)]
-pub(crate) struct Group {
-    pub matrix: Chain,
+pub(crate) struct RodGroup {
+    pub matrix: BlockTridiagonal,
     /// One in lanes with a rod, zero in others.
-    pub active: Four,
+    pub active_lanes: NumberGroup,
     /// Right-hand side; with a joint tip, the last displacement slots hold
     /// the rods' shares of the tip's.
-    pub rhs: Vec<Increments>,
+    pub rhs: Vec<GroupIncrements>,
     /// Solution, all nodes with equations, complete.
-    pub solution: Vec<Increments>,
-    pub sums: Sums,
+    pub solution: Vec<GroupIncrements>,
+    pub sums: AssemblyTotals,
     /// Nodal masses per weight: rotary, translational.
-    pub(super) masses: [Four; 2],
+    pub(super) masses: [NumberGroup; 2],
     /// E: coupling per weight with the previous rods, with the next.
-    pub(super) coupling: [[Four; 3]; 2],
-    pub(super) residual: Vec<Increments>,
-    pub(super) z: Vec<Increments>,
-    pub(super) b_p: Vec<Increments>,
+    pub(super) coupling: [[NumberGroup; 3]; 2],
+    pub(super) residual: Vec<GroupIncrements>,
+    pub(super) z: Vec<GroupIncrements>,
+    pub(super) b_p: Vec<GroupIncrements>,
     /// Whether the last factorisation succeeded.
     pub(super) definite: bool,
     /// Its part of a scalar product.
-    pub(super) partial: f64,
+    pub(super) partial_product: f64,
 }
 
 /// The linear system of a leaf, with workspace for its solution.
 #[derive(Clone, Debug)]
 pub struct System {
-    pub(crate) groups: Vec<Group>,
+    pub(crate) groups: Vec<RodGroup>,
     pub(super) rods: usize,
-    pub(super) p: Vec<Vec<Increments>>,
+    pub(super) p: Vec<Vec<GroupIncrements>>,
     pub(super) joined: bool,
     pub(super) coupled: bool,
     pub(super) parallel: bool,
@@ -86,9 +87,9 @@ pub struct System {
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
     pub(super) gaps: Vec<DVec3>,
     /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without tissue.
-    pub(super) across: Vec<NodeBlock>,
+    pub(super) gap_blocks: Vec<NodeBlock>,
     /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
-    pub(super) held: Vec<(usize, usize, Range<usize>)>,
+    pub(super) held_components: Vec<(usize, usize, Range<usize>)>,
     /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
     /// rigid ones; empty without any.
     pub(super) law_forces: Vec<DVec3>,
@@ -114,7 +115,7 @@ pub(super) fn each_group<T: Send>(
 }
 
 /// The numbers of the rods of a group.
-pub(super) fn rods_of(group: usize, rods: usize) -> Range<usize> {
+pub(super) fn group_rods(group: usize, rods: usize) -> Range<usize> {
     GROUP * group..rods.min(GROUP * (group + 1))
 }
 
@@ -124,32 +125,35 @@ impl System {
         let (rods, nodes) = (leaf.rods(), leaf.moving_nodes());
         let (first, n) = (nodes.start, nodes.len());
         let joined = leaf.tips_move_together();
-        let coupled = leaf.coupled() || leaf.tied();
+        let coupled = leaf.coupled() || leaf.has_tissue();
         let gaps = match leaf.coupled() {
-            true => of_gaps(leaf).collect(),
+            true => gap_couplings(leaf).collect(),
             false => Vec::new(),
         };
         let count = rods.div_ceil(GROUP);
         System {
-            groups: (0..count).map(|g| Group::new(leaf, g, &gaps)).collect(),
+            groups: (0..count).map(|g| RodGroup::new(leaf, g, &gaps)).collect(),
             rods,
-            p: vec![vec![Increments::default(); n]; count],
+            p: vec![vec![GroupIncrements::default(); n]; count],
             joined,
             coupled,
             parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
             segments: leaf.segments(),
             first,
-            weights: nodes.clone().map(|i| leaf.moving_weight(i)).collect(),
+            weights: nodes.clone().map(|i| leaf.mass_weight(i)).collect(),
             coupling_weights: nodes
                 .map(|i| if i == 0 { 0.0 } else { leaf.coupling_weight(i) })
                 .collect(),
             arch: widest_arch(),
             tip: None,
             gaps,
-            across: vec![Default::default(); if leaf.tied() { (rods - 1) * n } else { 0 }],
-            held: (0..rods)
+            gap_blocks: vec![
+                Default::default();
+                if leaf.has_tissue() { (rods - 1) * n } else { 0 }
+            ],
+            held_components: (0..rods)
                 .flat_map(|j| {
-                    leaf.held_inside(j)
+                    leaf.held_inner_components(j)
                         .map(move |(i, parts)| (j, i - first, parts))
                 })
                 .collect(),
@@ -163,16 +167,16 @@ impl System {
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
         if !self.gaps.is_empty() {
             self.gaps.clear();
-            self.gaps.extend(of_gaps(leaf));
+            self.gaps.extend(gap_couplings(leaf));
             for (g, group) in self.groups.iter_mut().enumerate() {
-                group.coupling = of_group(rods_of(g, self.rods), &self.gaps);
+                group.coupling = group_couplings(group_rods(g, self.rods), &self.gaps);
             }
         }
     }
 
     /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
     /// on a grid of as many segments.
-    pub fn reused(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
+    pub fn new_in_memory(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
         let fits = |spare: &System| {
             let same = (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
             same && spare.first == leaf.first_node()
@@ -206,7 +210,7 @@ impl System {
     }
 
     /// Coupling of gap `g` at node `i` (from the first with equations), if there is one.
-    pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
+    pub(super) fn node_coupling(&self, g: usize, i: usize) -> Option<DVec3> {
         Some(*self.gaps.get(g)? * self.coupling_weights[i])
     }
 
@@ -219,18 +223,18 @@ impl System {
 
     /// The right-hand side of node `i` of rod `j`: moment and force on it; at a joint
     /// tip the rod's share.
-    pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
+    pub fn unbalanced_node_load(&self, j: usize, i: usize) -> (DVec3, DVec3) {
         let (group, lane) = group_and_lane(j);
-        let rhs = of_lane(&self.groups[group].rhs[i - self.first], lane);
-        (turn(&rhs), shift(&rhs))
+        let rhs = lane_increment(&self.groups[group].rhs[i - self.first], lane);
+        (rotation_part(&rhs), displacement_part(&rhs))
     }
 
     /// Sets the right-hand side to the mass matrix times the last solution, scaled to a
     /// largest component of one: a step of inverse iteration.
-    pub fn iterate_mode(&mut self) {
-        let (turn, shift) = self.largest();
+    pub fn iterate_inverse(&mut self) {
+        let (turn, shift) = self.largest_increment();
         let scale = 1.0 / turn.max(shift);
-        let mut rhs = self.momentum(&self.solution());
+        let mut rhs = self.mass_product(&self.solution());
         for value in rhs.iter_mut().flatten().flatten() {
             *value *= scale;
         }
@@ -239,7 +243,7 @@ impl System {
 
     /// Sets a right-hand side without symmetry, the same on all grids, as the start of inverse
     /// iteration.
-    pub fn seed_mode(&mut self) {
+    pub fn seed_inverse_iteration(&mut self) {
         // Multiples of the golden ratio are equidistributed: no symmetry, and deterministic.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let segments = self.segments as f64;
@@ -248,20 +252,20 @@ impl System {
             std::array::from_fn(|c| golden(12 * j + c + 1) + along * golden(12 * j + c + 7))
         };
         let rod = |j: usize| (0..self.nodes()).map(|i| node(j, i)).collect();
-        let seed: Field = (0..self.rods).map(rod).collect();
-        self.set_rhs(&self.momentum(&seed));
+        let seed: NodalField = (0..self.rods).map(rod).collect();
+        self.set_rhs(&self.mass_product(&seed));
     }
 
     /// Whether K + shift M is positive definite even without the coupling, which is positive
     /// semidefinite: then no eigenvalue is negative. Not known with tissue. Overwrites the matrix.
-    pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
-        if self.tied() {
+    pub fn is_definite_without_coupling(&mut self, shift: f64) -> bool {
+        if self.has_tissue() {
             return false;
         }
         for group in &mut self.groups {
             for (i, weight) in self.coupling_weights.iter().enumerate() {
                 for c in 0..3 {
-                    let block = group.matrix.diagonal(i, 3 + c, 3 + c);
+                    let block = group.matrix.diagonal_entry_mut(i, 3 + c, 3 + c);
                     for (lane, value) in block.0.iter_mut().enumerate() {
                         let [previous, next] = group.coupling.map(|side| side[c].0[lane]);
                         *value -= (previous + next) * weight;
@@ -273,61 +277,65 @@ impl System {
     }
 
     /// The right-hand side as of the last assembly.
-    pub fn rhs(&self) -> Field {
+    pub fn rhs(&self) -> NodalField {
         self.gather(|group| &group.rhs)
     }
 
     /// Replaces the right-hand side.
-    pub fn set_rhs(&mut self, rhs: &Field) {
+    pub fn set_rhs(&mut self, rhs: &NodalField) {
         self.scatter(rhs, |group| &mut group.rhs);
     }
 
     /// The last solution.
-    pub fn solution(&self) -> Field {
+    pub fn solution(&self) -> NodalField {
         self.gather(|group| &group.solution)
     }
 
     /// The last solution at node `i` of rod `j`.
-    pub fn increment(&self, j: usize, i: usize) -> Increment {
+    pub fn node_solution(&self, j: usize, i: usize) -> Increment {
         let (group, lane) = group_and_lane(j);
-        of_lane(&self.groups[group].solution[i - self.first], lane)
+        lane_increment(&self.groups[group].solution[i - self.first], lane)
     }
 
     /// Replaces the last solution.
-    pub fn set_solution(&mut self, increments: &Field) {
+    pub fn set_solution(&mut self, increments: &NodalField) {
         self.law_forces.clear();
         self.scatter(increments, |group| &mut group.solution);
     }
 
-    fn gather(&self, of: impl Fn(&Group) -> &Vec<Increments>) -> Field {
+    fn gather(&self, of: impl Fn(&RodGroup) -> &Vec<GroupIncrements>) -> NodalField {
         let rod = |j: usize| {
             let (group, lane) = group_and_lane(j);
             let nodes = of(&self.groups[group]).iter();
-            nodes.map(|node| of_lane(node, lane)).collect()
+            nodes.map(|node| lane_increment(node, lane)).collect()
         };
         (0..self.rods).map(rod).collect()
     }
 
-    fn scatter(&mut self, field: &Field, of: impl Fn(&mut Group) -> &mut Vec<Increments>) {
+    fn scatter(
+        &mut self,
+        field: &NodalField,
+        of: impl Fn(&mut RodGroup) -> &mut Vec<GroupIncrements>,
+    ) {
         for (j, rod) in field.iter().enumerate() {
             let (group, lane) = group_and_lane(j);
             for (node, of_rod) in of(&mut self.groups[group]).iter_mut().zip(rod) {
-                set_lane(node, lane, of_rod);
+                set_lane_increment(node, lane, of_rod);
             }
         }
     }
 
     /// The mass matrix times increments.
-    pub fn momentum(&self, increments: &Field) -> Field {
+    pub fn mass_product(&self, increments: &NodalField) -> NodalField {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
             std::array::from_fn(|c| mass[c / 3] * v[c])
         };
         let rods = increments.iter().enumerate();
-        let mut momentum: Field = rods
+        let mut momentum: NodalField = rods
             .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
             .collect();
-        for (j, i, held) in &self.held {
+        for (j, i, held) in &self.held_components {
             momentum[*j][*i][held.clone()].fill(0.0);
         }
         momentum
@@ -335,8 +343,8 @@ impl System {
 
     /// Largest rotation and largest displacement of the last solution; infinite if one is not a
     /// number.
-    pub fn largest(&self) -> (f64, f64) {
-        let mut largest = [Four::default(); 2];
+    pub fn largest_increment(&self) -> (f64, f64) {
+        let mut largest = [NumberGroup::default(); 2];
         for increment in self.groups.iter().flat_map(|group| &group.solution) {
             for c in 0..6 {
                 for (most, value) in largest[c / 3].0.iter_mut().zip(&increment[c].0) {
@@ -352,7 +360,8 @@ impl System {
     pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
-            0.5 * (mass[0] * turn(v).length_squared() + mass[1] * shift(v).length_squared())
+            0.5 * (mass[0] * rotation_part(v).length_squared()
+                + mass[1] * displacement_part(v).length_squared())
         };
         let rods = velocity.iter().enumerate();
         rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
@@ -361,41 +370,41 @@ impl System {
 
     /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
     /// time `dt`.
-    pub fn velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+    pub fn write_velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
         for (j, rod) in velocity.iter_mut().enumerate() {
             let (group, lane) = group_and_lane(j);
             for (v, d) in rod.iter_mut().zip(&self.groups[group].solution) {
-                *v = of_lane(d, lane).map(|d| part * d / dt);
+                *v = lane_increment(d, lane).map(|d| part * d / dt);
             }
         }
     }
 }
 
-impl Group {
+impl RodGroup {
     /// Allocates the equations of a group of the rods of `leaf`.
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
         let n = leaf.moving_nodes().len();
-        let zeros = vec![Increments::default(); n];
-        let (mut active, mut masses) = (Four::default(), [Four::default(); 2]);
-        for (lane, j) in rods_of(group, leaf.rods()).enumerate() {
+        let zeros = vec![GroupIncrements::default(); n];
+        let (mut active, mut masses) = (NumberGroup::default(), [NumberGroup::default(); 2]);
+        for (lane, j) in group_rods(group, leaf.rods()).enumerate() {
             active.0[lane] = 1.0;
             for (four, mass) in masses.iter_mut().zip(leaf.mass_per_weight(j)) {
                 four.0[lane] = mass;
             }
         }
-        Group {
-            matrix: Chain::new(n, leaf.tips_move_together()),
-            active,
+        RodGroup {
+            matrix: BlockTridiagonal::new(n, leaf.tips_move_together()),
+            active_lanes: active,
             rhs: zeros.clone(),
             solution: zeros.clone(),
-            sums: Sums::default(),
+            sums: AssemblyTotals::default(),
             masses,
-            coupling: of_group(rods_of(group, leaf.rods()), gaps),
+            coupling: group_couplings(group_rods(group, leaf.rods()), gaps),
             residual: zeros.clone(),
             z: zeros.clone(),
             b_p: zeros,
             definite: false,
-            partial: 0.0,
+            partial_product: 0.0,
         }
     }
 }
@@ -403,16 +412,16 @@ impl Group {
 impl System {
     /// Adds to the equations of node `i` of rod `j`: to the matrix a rotary and a
     /// translational part on its diagonal, to the right-hand side a moment and a force.
-    pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
+    pub fn add_to_node(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let (group, lane) = group_and_lane(j);
         let (at, group) = (i - self.first, &mut self.groups[group]);
         let chain = &mut group.matrix;
         let increment = &mut group.rhs[at];
         for c in 0..3 {
             for r in 0..=c {
-                chain.diagonal(at, r, c).0[lane] += matrix.0.col(c)[r];
+                chain.diagonal_entry_mut(at, r, c).0[lane] += matrix.0.col(c)[r];
             }
-            chain.diagonal(at, 3 + c, 3 + c).0[lane] += matrix.1;
+            chain.diagonal_entry_mut(at, 3 + c, 3 + c).0[lane] += matrix.1;
             increment[c].0[lane] += rhs.0[c];
             increment[3 + c].0[lane] += rhs.1[c];
         }
@@ -420,40 +429,40 @@ impl System {
 
     /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its
     /// displacement.
-    pub fn hold(&mut self, j: usize, i: usize, stiffness: DMat3) {
+    pub fn add_displacement_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
         let (group, lane) = group_and_lane(j);
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..=c {
-                chain.diagonal(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+                chain.diagonal_entry_mut(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
             }
         }
     }
 
     /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its rotation.
-    pub fn hold_rotation(&mut self, j: usize, i: usize, stiffness: DMat3) {
+    pub fn add_rotation_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
         let none = (DVec3::ZERO, DVec3::ZERO);
-        self.add(j, i, (stiffness, 0.0), none);
+        self.add_to_node(j, i, (stiffness, 0.0), none);
     }
 
     /// Adds `stiffness` to the matrix between the displacements of nodes `i` and `i` + 1 of
     /// rod `j`.
-    pub fn hold_together(&mut self, j: usize, i: usize, stiffness: DMat3) {
+    pub fn add_adjacent_node_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
         let (group, lane) = group_and_lane(j);
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..3 {
-                chain.off(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+                chain.off_diagonal_entry_mut(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
             }
         }
     }
 }
 
 /// Coupling of every gap per weight.
-pub(super) fn of_gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
+pub(super) fn gap_couplings(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
     let gap = move |g: usize| {
         // A node in the mirror plane is not displaced across it.
-        let free = match leaf.leaf.in_plane(g) {
+        let free = match leaf.leaf.is_halved_midrib(g) {
             true => DVec3::new(1.0, 0.0, 1.0),
             false => DVec3::ONE,
         };
@@ -463,8 +472,8 @@ pub(super) fn of_gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
 }
 
 /// Coupling of the rods of a group with the previous and the next rods.
-pub(super) fn of_group(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
-    let mut coupling = [[Four::default(); 3]; 2];
+pub(super) fn group_couplings(rods: Range<usize>, gaps: &[DVec3]) -> [[NumberGroup; 3]; 2] {
+    let mut coupling = [[NumberGroup::default(); 3]; 2];
     for (lane, j) in rods.enumerate() {
         for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
             for c in 0..3 {
@@ -477,22 +486,22 @@ pub(super) fn of_group(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
 
 /// The operands of E p.
 #[derive(Clone, Copy)]
-pub struct Coupled<'a> {
+pub struct CouplingOperator<'a> {
     /// The p of all groups, and the index of this group.
-    pub p: &'a [Vec<Increments>],
+    pub p: &'a [Vec<GroupIncrements>],
     pub group: usize,
     pub weights: &'a [f64],
 }
 
-impl Coupled<'_> {
+impl CouplingOperator<'_> {
     /// Component `c` of the displacement part of E p at node `i`.
     #[inline(always)]
-    fn pull<S: Simd>(
+    fn coupling_product<S: Simd>(
         self,
         simd: S,
         i: usize,
         c: usize,
-        coupling: &[[Four; 3]; 2],
+        coupling: &[[NumberGroup; 3]; 2],
         part: usize,
     ) -> Lanes<S> {
         let at = |group: usize, lane: usize| match self.p.get(group) {
@@ -502,86 +511,94 @@ impl Coupled<'_> {
         let own = self.p[self.group][i][3 + c].0;
         let first = at(self.group.wrapping_sub(1), GROUP - 1);
         let last = at(self.group + 1, 0);
-        let previous = Four([first, own[0], own[1], own[2]]);
-        let next = Four([own[1], own[2], own[3], last]);
-        let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &previous, part);
-        let next = Lanes::of(simd, &next, part);
-        let pull = next.mul_add(Lanes::of(simd, &coupling[1][c], part), pull);
+        let previous = NumberGroup([first, own[0], own[1], own[2]]);
+        let next = NumberGroup([own[1], own[2], own[3], last]);
+        let pull = Lanes::load_group(simd, &coupling[0][c], part)
+            * Lanes::load_group(simd, &previous, part);
+        let next = Lanes::load_group(simd, &next, part);
+        let pull = next.mul_add(Lanes::load_group(simd, &coupling[1][c], part), pull);
         Lanes::splat(simd, -self.weights[i]) * pull
     }
 
     /// Component `c` of (B + E) p at node `i` of its group.
     #[inline(always)]
-    fn product<S: Simd>(self, simd: S, of: &Group, i: usize, c: usize, part: usize) -> Lanes<S> {
-        let b_p = Lanes::of(simd, &of.b_p[i][c], part);
+    fn matrix_product<S: Simd>(
+        self,
+        simd: S,
+        of: &RodGroup,
+        i: usize,
+        c: usize,
+        part: usize,
+    ) -> Lanes<S> {
+        let b_p = Lanes::load_group(simd, &of.b_p[i][c], part);
         match c.checked_sub(3) {
-            Some(c) => b_p + self.pull(simd, i, c, &of.coupling, part),
+            Some(c) => b_p + self.coupling_product(simd, i, c, &of.coupling, part),
             None => b_p,
         }
     }
 }
 
 /// p . (B + E) p.
-pub struct Product<'a> {
-    pub group: &'a Group,
-    pub coupled: Coupled<'a>,
-    pub product: Four,
+pub struct CurvatureKernel<'a> {
+    pub group: &'a RodGroup,
+    pub coupled: CouplingOperator<'a>,
+    pub product: NumberGroup,
 }
 
-impl Kernel for Product<'_> {
+impl GroupKernel for CurvatureKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let mut sum = Lanes::splat(simd, 0.0);
         let p = &self.coupled.p[self.coupled.group];
         for (i, p) in p.iter().enumerate() {
             for c in 0..6 {
-                let k_p = self.coupled.product(simd, self.group, i, c, part);
-                sum = k_p.mul_add(Lanes::of(simd, &p[c], part), sum);
+                let k_p = self.coupled.matrix_product(simd, self.group, i, c, part);
+                sum = k_p.mul_add(Lanes::load_group(simd, &p[c], part), sum);
             }
         }
-        sum.put(&mut self.product, part);
+        sum.store_group(&mut self.product, part);
     }
 }
 
 /// solution += alpha p, residual -= alpha (B + E) p.
-pub struct Advance<'a> {
-    pub group: &'a mut Group,
-    pub coupled: Coupled<'a>,
+pub struct SolutionUpdateKernel<'a> {
+    pub group: &'a mut RodGroup,
+    pub coupled: CouplingOperator<'a>,
     pub alpha: f64,
 }
 
-impl Kernel for Advance<'_> {
+impl GroupKernel for SolutionUpdateKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let alpha = Lanes::splat(simd, self.alpha);
         let p = &self.coupled.p[self.coupled.group];
         for i in 0..p.len() {
             for c in 0..6 {
-                let k_p = self.coupled.product(simd, self.group, i, c, part);
+                let k_p = self.coupled.matrix_product(simd, self.group, i, c, part);
                 let solution = &mut self.group.solution[i][c];
                 let residual = &mut self.group.residual[i][c];
-                let p = Lanes::of(simd, &p[i][c], part);
-                p.mul_add(alpha, Lanes::of(simd, solution, part))
-                    .put(solution, part);
-                k_p.neg_mul_add(alpha, Lanes::of(simd, residual, part))
-                    .put(residual, part);
+                let p = Lanes::load_group(simd, &p[i][c], part);
+                p.mul_add(alpha, Lanes::load_group(simd, solution, part))
+                    .store_group(solution, part);
+                k_p.neg_mul_add(alpha, Lanes::load_group(simd, residual, part))
+                    .store_group(residual, part);
             }
         }
     }
 }
 
 /// p = z + beta p, B p = residual + beta B p.
-pub struct Direction<'a> {
-    pub group: &'a mut Group,
-    pub p: &'a mut [Increments],
+pub struct DirectionUpdateKernel<'a> {
+    pub group: &'a mut RodGroup,
+    pub p: &'a mut [GroupIncrements],
     pub beta: f64,
 }
 
-impl Kernel for Direction<'_> {
+impl GroupKernel for DirectionUpdateKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let beta = Lanes::splat(simd, self.beta);
-        let Group {
+        let RodGroup {
             z, residual, b_p, ..
         } = &mut *self.group;
         for i in 0..z.len() {
@@ -590,8 +607,10 @@ impl Kernel for Direction<'_> {
                     (&mut self.p[i][c], &z[i][c]),
                     (&mut b_p[i][c], &residual[i][c]),
                 ] {
-                    let new = Lanes::of(simd, new, part);
-                    Lanes::of(simd, old, part).mul_add(beta, new).put(old, part);
+                    let new = Lanes::load_group(simd, new, part);
+                    Lanes::load_group(simd, old, part)
+                        .mul_add(beta, new)
+                        .store_group(old, part);
                 }
             }
         }

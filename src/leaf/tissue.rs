@@ -1,4 +1,4 @@
-//! Tissue between neighbouring veins: the law of a strip ([`Strip`]) at every node of every gap, in
+//! Tissue between neighbouring veins: the law of a strip ([`TissueStrip`]) at every node of every gap, in
 //! the sums over the leaf.
 //!
 //! What ties neighbouring rods also by moments: the blocks between their nodes.
@@ -6,10 +6,10 @@
 use crate::leaf::block_tridiagonal::group_and_lane;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::NodeLoad;
-use crate::leaf::state::{Increment, State, shift, turn};
+use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
-use crate::numbers::{largest, two_digits};
-use crate::rod::{Ends, NodeBlock, Strip};
+use crate::numbers::{format_two_digits, largest};
+use crate::rod::{NodeBlock, NodePair, TissueStrip};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
@@ -31,7 +31,7 @@ impl HalfTurn {
              where the law of the tissue between them jumps from one sense of rotation to the other",
             self.gap + 1,
             self.gap + 2,
-            two_digits(self.sigma)
+            format_two_digits(self.sigma)
         )
     }
 }
@@ -39,12 +39,12 @@ impl HalfTurn {
 /// Angle between two sections, in radians, by which half a turn exceeds theirs at most where an
 /// iteration that ended is taken to have ended at half a turn: such iterations go back and forth
 /// between both sides of the jump.
-const AT_HALF_TURN: f64 = 0.01;
+const HALF_TURN_TOLERANCE: f64 = 0.01;
 
 impl DiscreteLeaf {
     /// For every strip, whether the quaternions of its nodes are on the same side: in a continuous
     /// motion this changes only where their rotation against each other passes half a turn.
-    pub fn alignments(&self, state: &State) -> Vec<bool> {
+    pub fn strip_alignments(&self, state: &State) -> Vec<bool> {
         let strips = self.each_strip();
         strips
             .map(|(g, i, _)| cosine_of_half(state, g, i) >= 0.0)
@@ -56,17 +56,19 @@ impl DiscreteLeaf {
     pub fn half_turn_since(&self, alignments: &[bool], state: &State) -> Option<HalfTurn> {
         let mut strips = self.each_strip().zip(alignments);
         let passed = strips.find(|((g, i, strip), aligned)| {
-            (cosine_of_half(state, *g, *i) >= 0.0) != **aligned && strip.acts()
+            (cosine_of_half(state, *g, *i) >= 0.0) != **aligned && strip.has_stiffness()
         });
         passed.map(|((g, i, _), _)| self.half_turn(g, i))
     }
 
     /// The place where sections are turned against each other by half a turn, nearly.
     pub fn half_turn_near(&self, state: &State) -> Option<HalfTurn> {
-        let acting = self.each_strip().filter(|(.., strip)| strip.acts());
+        let acting = self
+            .each_strip()
+            .filter(|(.., strip)| strip.has_stiffness());
         let cosines = acting.map(|(g, i, _)| (cosine_of_half(state, g, i).abs(), g, i));
         let (cosine, g, i) = cosines.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (cosine < (0.5 * AT_HALF_TURN).sin()).then(|| self.half_turn(g, i))
+        (cosine < (0.5 * HALF_TURN_TOLERANCE).sin()).then(|| self.half_turn(g, i))
     }
 
     fn half_turn(&self, gap: usize, node: usize) -> HalfTurn {
@@ -77,26 +79,30 @@ impl DiscreteLeaf {
     /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
     /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
     /// joint tip, where they resist rotations.
-    pub(super) fn strips(&self, natural: &State) -> Vec<Strip> {
+    pub(super) fn strips(&self, natural: &State) -> Vec<TissueStrip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
-            let [stiffness, fold] = self.leaf.tissue(g, self.grid.sigma()[i]);
-            let weight = self.grid.weight(i);
-            Strip::natural(weight * stiffness, weight * fold.x, &across(natural, g, i))
+            let [stiffness, fold] = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);
+            let weight = self.grid.node_weight(i);
+            TissueStrip::stress_free_between(
+                weight * stiffness,
+                weight * fold.x,
+                &strip_ends(natural, g, i),
+            )
         };
         gaps.flat_map(|g| (0..=self.segments()).map(move |i| strip(g, i)))
             .collect()
     }
 
     /// Whether tissue ties neighbouring rods.
-    pub fn tied(&self) -> bool {
+    pub fn has_tissue(&self) -> bool {
         !self.strips.is_empty()
     }
 
     /// The exponent by which perturbations of one vein grow over a part `width` of its length where
     /// the tissue on both sides resists them, in its middle: it bends, as on a foundation, or stretches.
-    pub fn growth(&self, width: f64) -> f64 {
-        if !self.tied() {
+    pub fn tissue_growth_exponent(&self, width: f64) -> f64 {
+        if !self.has_tissue() {
             return 0.0;
         }
         let rate = |j: usize| {
@@ -104,7 +110,7 @@ impl DiscreteLeaf {
             let gaps = gaps.into_iter().flatten();
             let k = 2.0
                 * gaps
-                    .map(|g| self.leaf.tissue(g, 0.5)[0].max_element())
+                    .map(|g| self.leaf.tissue_stiffness(g, 0.5)[0].max_element())
                     .sum::<f64>();
             let section = self.leaf.section(j, 0.5, 1.0);
             let (length, softest) = (section.ds, section.couple_stiffness.min_element());
@@ -116,14 +122,14 @@ impl DiscreteLeaf {
     }
 
     /// The strip of node `i` in gap `g`.
-    fn strip(&self, g: usize, i: usize) -> &Strip {
+    fn strip(&self, g: usize, i: usize) -> &TissueStrip {
         &self.strips[g * (self.segments() + 1) + i]
     }
 
     /// What the tissue on either side exerts on node `i` of rod `j`.
     pub(super) fn tissue_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
         let mut load = NodeLoad::default();
-        if !self.tied() {
+        if !self.has_tissue() {
             return load;
         }
         let gaps = [
@@ -132,7 +138,7 @@ impl DiscreteLeaf {
         ];
         for (gap, end) in gaps {
             let Some(g) = gap else { continue };
-            let (strip, ends) = (self.strip(g, i), across(state, g, i));
+            let (strip, ends) = (self.strip(g, i), strip_ends(state, g, i));
             let (energy, loads) = strip.energy_and_loads(&ends);
             let [moment, force] = loads[end];
             load.moment += moment;
@@ -144,7 +150,7 @@ impl DiscreteLeaf {
         load
     }
 
-    fn each_strip(&self) -> impl Iterator<Item = (usize, usize, &Strip)> {
+    fn each_strip(&self) -> impl Iterator<Item = (usize, usize, &TissueStrip)> {
         let nodes = self.segments() + 1;
         let strips = self.strips.iter().enumerate();
         strips.map(move |(k, strip)| (k / nodes, k % nodes, strip))
@@ -155,7 +161,7 @@ impl DiscreteLeaf {
     pub(super) fn add_tissue(&self, state: &State, system: &mut System, matrix: bool) -> f64 {
         let mut energy = 0.0;
         for (g, i, strip) in self.each_strip() {
-            let ends = across(state, g, i);
+            let ends = strip_ends(state, g, i);
             let (own, mut loads) = strip.energy_and_loads(&ends);
             energy += own;
             if i < self.first_node() {
@@ -170,10 +176,10 @@ impl DiscreteLeaf {
             }
             if matrix {
                 let hessian = strip.condensed_hessian(&ends, force);
-                for (rod, own) in [g, g + 1].into_iter().zip(&hessian.own) {
+                for (rod, own) in [g, g + 1].into_iter().zip(&hessian.diagonal_blocks) {
                     system.add_block(rod, i, own);
                 }
-                *system.across_mut(g, i - self.first_node()) = hessian.across;
+                *system.gap_block_mut(g, i - self.first_node()) = hessian.off_diagonal_block;
             }
         }
         energy
@@ -184,11 +190,11 @@ impl DiscreteLeaf {
         &self,
         state: &State,
         (g, i): (usize, usize),
-        strip: &Strip,
-        ends: &Ends,
+        strip: &TissueStrip,
+        ends: &NodePair,
     ) -> DVec3 {
         match state.tissue.get(g * (self.segments() + 1) + i) {
-            Some(force) => self.grid.weight(i) * *force,
+            Some(force) => self.grid.node_weight(i) * *force,
             None => strip.force(ends),
         }
     }
@@ -203,24 +209,24 @@ impl DiscreteLeaf {
     ) {
         next.tissue.resize(self.strips.len(), DVec3::ZERO);
         for (k, (g, i, strip)) in self.each_strip().enumerate() {
-            let ends = across(state, g, i);
+            let ends = strip_ends(state, g, i);
             let force = self.tissue_force(state, (g, i), strip, &ends);
             let change = match i < self.first_node() {
                 true => DVec3::ZERO,
                 false => {
-                    let [a, b] = [g, g + 1].map(|rod| solution.increment(rod, i));
-                    let dx = shift(&b) - shift(&a);
-                    strip.force_increment(&ends, force, dx, [turn(&a), turn(&b)])
+                    let [a, b] = [g, g + 1].map(|rod| solution.node_solution(rod, i));
+                    let dx = displacement_part(&b) - displacement_part(&a);
+                    strip.force_increment(&ends, force, dx, [rotation_part(&a), rotation_part(&b)])
                 }
             };
-            next.tissue[k] = (force + step * change) / self.grid.weight(i);
+            next.tissue[k] = (force + step * change) / self.grid.node_weight(i);
         }
     }
 
     /// Adds the moments and forces of all tissue on all nodes, rod after rod.
     pub fn add_tissue_loads(&self, state: &State, loads: &mut [[DVec3; 2]]) {
         for (g, i, strip) in self.each_strip() {
-            let (_, [a, b]) = strip.energy_and_loads(&across(state, g, i));
+            let (_, [a, b]) = strip.energy_and_loads(&strip_ends(state, g, i));
             for (rod, [moment, force]) in [(g, a), (g + 1, b)] {
                 let load = &mut loads[state.base(rod) + i];
                 load[0] += moment;
@@ -236,7 +242,7 @@ impl DiscreteLeaf {
         state: &State,
     ) -> impl Iterator<Item = (usize, usize, SMatrix<f64, 12, 12>)> {
         self.each_strip()
-            .map(|(g, i, strip)| (g, i, stiffness(strip, &across(state, g, i))))
+            .map(|(g, i, strip)| (g, i, stiffness(strip, &strip_ends(state, g, i))))
     }
 
     /// The changes of moment and force of the strip of node `i` in gap `g` on its two nodes, by
@@ -248,34 +254,39 @@ impl DiscreteLeaf {
         increments: &[Increment; 2],
     ) -> [[DVec3; 2]; 2] {
         let both = SVector::<f64, 12>::from_fn(|k, _| increments[k / 6][k % 6]);
-        let change = stiffness(self.strip(g, i), &across(state, g, i)) * both;
+        let change = stiffness(self.strip(g, i), &strip_ends(state, g, i)) * both;
         let vector = |first: usize| DVec3::from_slice(&change.as_slice()[first..first + 3]);
         [0, 6].map(|node| [-vector(node), -vector(node + 3)])
     }
 
     /// The largest stiffness against displacements, that against a fold, and the natural width of
     /// the strips on either side of node `i` of rod `j`.
-    pub fn tissue_at(&self, j: usize, i: usize) -> impl Iterator<Item = (f64, f64, f64)> {
+    pub fn adjacent_tissue_stiffness(
+        &self,
+        j: usize,
+        i: usize,
+    ) -> impl Iterator<Item = (f64, f64, f64)> {
         let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
-        let gaps = gaps.filter(|g| self.tied() && g + 1 < self.rods());
+        let gaps = gaps.filter(|g| self.has_tissue() && g + 1 < self.rods());
         gaps.map(move |g| {
             let strip = self.strip(g, i);
             (
                 strip.stiffness.max_element(),
-                strip.fold,
-                strip.width.length(),
+                strip.fold_stiffness,
+                strip.stress_free_gap.length(),
             )
         })
     }
 
     /// The changes of energy and loads of the strip of node `i` in gap `g` by a change of it.
-    pub(super) fn tissue_rates(
+    pub(super) fn strip_derivatives(
         &self,
         state: &State,
         (g, i): (usize, usize),
-        change: &Strip,
+        change: &TissueStrip,
     ) -> (f64, [[DVec3; 2]; 2]) {
-        self.strip(g, i).rates(&across(state, g, i), change)
+        self.strip(g, i)
+            .parameter_derivative(&strip_ends(state, g, i), change)
     }
 
     /// Second derivatives of the energy of the tissue along a shape, at all nodes but clamped bases.
@@ -293,12 +304,12 @@ impl DiscreteLeaf {
 }
 
 /// The second derivatives of the energy of a strip by the unknowns of both nodes.
-fn stiffness(strip: &Strip, ends: &Ends) -> SMatrix<f64, 12, 12> {
+fn stiffness(strip: &TissueStrip, ends: &NodePair) -> SMatrix<f64, 12, 12> {
     let hessian = strip.hessian(ends);
     SMatrix::from_fn(|r, c| match (r / 6, c / 6) {
-        (0, 1) => hessian.across[r][c - 6],
-        (1, 0) => hessian.across[c][r - 6],
-        (a, _) => hessian.own[a][r.min(c) % 6][r.max(c) % 6],
+        (0, 1) => hessian.off_diagonal_block[r][c - 6],
+        (1, 0) => hessian.off_diagonal_block[c][r - 6],
+        (a, _) => hessian.diagonal_blocks[a][r.min(c) % 6][r.max(c) % 6],
     })
 }
 
@@ -309,9 +320,9 @@ fn cosine_of_half(state: &State, g: usize, i: usize) -> f64 {
 }
 
 /// The two nodes of a strip.
-fn across(state: &State, g: usize, i: usize) -> Ends {
+fn strip_ends(state: &State, g: usize, i: usize) -> NodePair {
     let nodes = [g, g + 1].map(|rod| state.base(rod) + i);
-    Ends {
+    NodePair {
         x: nodes.map(|k| state.x[k]),
         q: nodes.map(|k| state.q[k]),
     }
@@ -320,28 +331,28 @@ fn across(state: &State, g: usize, i: usize) -> Ends {
 impl System {
     /// Whether tissue ties neighbours, also by moments: then the matrix must be factorised as a
     /// whole, as rod by rod conjugate gradients take too many iterations.
-    pub fn tied(&self) -> bool {
-        !self.across.is_empty()
+    pub fn has_tissue(&self) -> bool {
+        !self.gap_blocks.is_empty()
     }
 
     /// The unknowns of a node (rotation, displacement) that are coupled with those of neighbours.
     pub(super) fn coupled_unknowns(&self) -> [bool; 6] {
         let along = |c: usize| self.gaps.iter().any(|gap| gap[c] != 0.0);
-        std::array::from_fn(|c| self.tied() || c >= 3 && along(c - 3))
+        std::array::from_fn(|c| self.has_tissue() || c >= 3 && along(c - 3))
     }
 
     /// The block between node `i` (from the first with equations) of rod `g` and that of the next, if there is tissue.
-    pub(super) fn across(&self, g: usize, i: usize) -> Option<&NodeBlock> {
-        match self.tied() && g + 1 < self.rods {
-            true => Some(&self.across[g * self.nodes() + i]),
+    pub(super) fn gap_block(&self, g: usize, i: usize) -> Option<&NodeBlock> {
+        match self.has_tissue() && g + 1 < self.rods {
+            true => Some(&self.gap_blocks[g * self.nodes() + i]),
             false => None,
         }
     }
 
     /// The same, to be changed.
-    pub(super) fn across_mut(&mut self, g: usize, i: usize) -> &mut NodeBlock {
+    pub(super) fn gap_block_mut(&mut self, g: usize, i: usize) -> &mut NodeBlock {
         let nodes = self.nodes();
-        &mut self.across[g * nodes + i]
+        &mut self.gap_blocks[g * nodes + i]
     }
 
     /// Adds the upper triangle of a block to the matrix at node `i` of rod `j`.
@@ -350,7 +361,7 @@ impl System {
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for (r, row) in block.iter().enumerate() {
             for c in r..row.len() {
-                chain.diagonal(at, r, c).0[lane] += row[c];
+                chain.diagonal_entry_mut(at, r, c).0[lane] += row[c];
             }
         }
     }

@@ -4,7 +4,7 @@
 //!
 //! Loads with which searches for modes begin.
 
-use crate::modes::{Masses, Vibration};
+use crate::modes::{MassMatrix, Vibration};
 use crate::run::Limit;
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -12,38 +12,38 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const LEAST_ACCURACY: f64 = 1e-13;
 
 /// Largest dimension of the Krylov space, and its increase for every pair wanted.
-const MOST: usize = 40;
+const MAX_KRYLOV_DIMENSION: usize = 40;
 
-const MOST_A_PAIR: usize = 4;
+const KRYLOV_DIMENSION_PER_PAIR: usize = 4;
 
 /// If some pairs have converged and the next one would take more checks than this, a
 /// closer shift is cheaper.
-const MORE_CHECKS: f64 = 3.0;
+const MAX_FURTHER_CHECKS: f64 = 3.0;
 
 /// A direction reduced by orthogonalisation below this part of its length is rounding: the
 /// Krylov space of the start is exhausted.
-const EXHAUSTED: f64 = 1e-13;
+const KRYLOV_EXHAUSTION_RATIO: f64 = 1e-13;
 
 /// An eigenvector of unit mass.
-pub struct Mode {
+pub struct NormalizedEigenvector {
     pub eigenvalue: f64,
     pub vector: Vec<f64>,
 }
 
 /// A Ritz value that eigenvalues do not exceed, and its relative error as seen from the shift.
-pub struct Bound {
+pub struct RitzBound {
     pub eigenvalue: f64,
     pub error: f64,
 }
 
 pub struct Lanczos<'a> {
-    pub masses: &'a Masses,
+    pub masses: &'a MassMatrix,
     /// Sigma.
     pub shift: f64,
     /// Solves (K - sigma M) x = b in place.
     pub solve: &'a mut dyn FnMut(&mut [f64]),
     /// Eigenvectors found before, to be excluded.
-    pub known: &'a [Mode],
+    pub known_modes: &'a [NormalizedEigenvector],
     /// Relative accuracy of an eigenvector; that of the eigenvalue is its square.
     pub accuracy: f64,
     /// Directions between convergence checks.
@@ -78,10 +78,11 @@ impl Lanczos<'_> {
         start: Vec<f64>,
         wanted: usize,
         limit: f64,
-    ) -> (Vec<Mode>, Option<Bound>) {
+    ) -> (Vec<NormalizedEigenvector>, Option<RitzBound>) {
         let mut next = start;
         (self.solve)(&mut next);
-        let most = (MOST + MOST_A_PAIR * wanted).min(next.len() - self.known.len());
+        let most = (MAX_KRYLOV_DIMENSION + KRYLOV_DIMENSION_PER_PAIR * wanted)
+            .min(next.len() - self.known_modes.len());
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut length = self.orthogonal(&mut next, &basis);
@@ -96,7 +97,7 @@ impl Lanczos<'_> {
             basis.push(next);
             let before = dot(&image, &self.masses.times(&image)).max(0.0).sqrt();
             length = self.orthogonal(&mut image, &basis);
-            if length <= EXHAUSTED * before {
+            if length <= KRYLOV_EXHAUSTION_RATIO * before {
                 length = 0.0;
             }
             let size = basis.len();
@@ -114,13 +115,13 @@ impl Lanczos<'_> {
                 };
                 let slow = limit.is_infinite() && last_check.0 == done && done > 0 && {
                     let gained = (last_check.1 / next_error).ln().max(0.0);
-                    (next_error / self.accuracy).ln() > MORE_CHECKS * gained
+                    (next_error / self.accuracy).ln() > MAX_FURTHER_CHECKS * gained
                 };
                 last_check = (done, next_error);
                 let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
                 let beyond = done > 0 && eigenvalue(done - 1) > limit;
                 if done >= wanted || beyond || slow || size == most || length == 0.0 {
-                    let pair = |k: usize| Mode {
+                    let pair = |k: usize| NormalizedEigenvector {
                         eigenvalue: eigenvalue(k),
                         vector: self.combined(&basis, &vectors, k),
                     };
@@ -128,7 +129,7 @@ impl Lanczos<'_> {
                     let positive = values.iter().take_while(|&&value| value > 0.0).count();
                     let found = (0..done.min(positive)).map(pair).collect();
                     let short = done < wanted && wanted <= positive;
-                    let bound = |k: usize| Bound {
+                    let bound = |k: usize| RitzBound {
                         eigenvalue: eigenvalue(k),
                         error: error(k) / values[k],
                     };
@@ -146,7 +147,7 @@ impl Lanczos<'_> {
     fn orthogonal(&self, vector: &mut [f64], basis: &[Vec<f64>]) -> f64 {
         for _ in 0..2 {
             let loaded = self.masses.times(vector);
-            let known = self.known.iter().map(|found| &found.vector);
+            let known = self.known_modes.iter().map(|found| &found.vector);
             for direction in known.chain(basis) {
                 subtract(vector, dot(direction, &loaded), direction);
             }
@@ -187,23 +188,23 @@ fn ritz(diagonal: &[f64], off: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
 
 impl Vibration<'_> {
     /// A load that excites all approximate modes not found yet.
-    pub(super) fn near_start(&self, found: usize) -> Vec<f64> {
-        let mut load = vec![0.0; self.pattern.size()];
-        for near in &self.near[found..] {
+    pub(super) fn start_from_modes(&self, found: usize) -> Vec<f64> {
+        let mut load = vec![0.0; self.direct_solver.size()];
+        for near in &self.approximate_modes[found..] {
             (load.iter_mut().zip(near)).for_each(|(load, near)| *load += near);
         }
         self.masses.times(&load)
     }
 
     /// A load without any symmetry, different in every search.
-    pub(super) fn start(&self, search: usize) -> Vec<f64> {
+    pub(super) fn asymmetric_start(&self, search: usize) -> Vec<f64> {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
-        let mut load = vec![0.0; self.pattern.size()];
-        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
+        let mut load = vec![0.0; self.direct_solver.size()];
+        for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
             let sigma = self.leaf.grid.sigma()[i];
             let wave = (7.0 * search as f64 * sigma).sin();
-            for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+            for (c, at) in self.direct_solver.unknowns(j, i).into_iter().enumerate() {
                 let k = 18 * (j + 97 * search) + c;
                 load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
             }

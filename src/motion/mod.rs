@@ -12,10 +12,10 @@ mod physics;
 mod semi_implicit;
 
 use crate::leaf::{DiscreteLeaf, HalfTurn, State};
-pub use crate::motion::constraint_projection::unstrained;
-pub use crate::motion::explicit::{Explicit, Rigid, StableStep};
-pub use crate::motion::physics::{Drag, Inertia, Physics, Wind};
-pub use crate::motion::semi_implicit::{SemiImplicit, Steps};
+pub use crate::motion::constraint_projection::project_constraints;
+pub use crate::motion::explicit::{Explicit, RigidRodError, StableStep};
+pub use crate::motion::physics::{Inertia, Physics, SegmentDrag, WindDrag};
+pub use crate::motion::semi_implicit::{SemiImplicit, StepControl};
 use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;
 use crate::run::Limit;
@@ -56,7 +56,7 @@ impl Energy {
 
     /// The energy that has moved, present, dissipated or put in by loads, in a motion that began
     /// with this `potential`.
-    pub(crate) fn moved(&self, potential: f64) -> f64 {
+    pub(crate) fn exchanged_energy(&self, potential: f64) -> f64 {
         let there = self.kinetic + self.elastic + self.coupling + self.dissipated;
         there.max((self.potential - potential - self.work).abs())
     }
@@ -201,7 +201,7 @@ pub trait TimeIntegrator {
 const LARGEST_IMBALANCE: f64 = 0.5;
 
 /// Energy, in units of A/L, that may be due to rounding.
-const ROUNDING: f64 = 1e-12;
+const ENERGY_ROUNDING: f64 = 1e-12;
 
 /// Energies at an instant, without what was dissipated and put in before. Sets the loads and
 /// the rest shape of `leaf` to those of that time.
@@ -213,16 +213,16 @@ pub fn measure(
     velocity: &[Velocity],
 ) -> Energy {
     leaf.loads = physics.loads(time);
-    if physics.rest_differs() {
-        leaf.set_rest(physics.rest(time));
+    if physics.rest_curvature_differs() {
+        leaf.scale_rest_curvatures(physics.rest_curvature_factor(time));
     }
     let n = leaf.segments();
     let mut energy = Energy::default();
-    for (j, i) in leaf.each(0..=n) {
+    for (j, i) in leaf.rod_index_pairs(0..=n) {
         let (k, inertia) = (state.base(j) + i, physics.inertia(leaf, j, i));
         let Velocity { angular, linear } = velocity[k];
         let spin = angular.dot(state.q[k] * DVec3::X);
-        let turning = angular.length_squared() + inertia.excess * spin * spin;
+        let turning = angular.length_squared() + inertia.polar_excess * spin * spin;
         energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
         energy.kinetic += 0.5 * inertia.transverse * turning;
         let potential = leaf.load(state, j, i).energy;
@@ -245,22 +245,22 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
     let loads = physics.loads(time);
     let n = leaf.segments();
     let mut energy = 0.0;
-    for (j, i) in leaf.each(0..=n) {
+    for (j, i) in leaf.rod_index_pairs(0..=n) {
         let inertia = physics.inertia(leaf, j, i);
-        let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
+        let weight = leaf.grid.node_weight(i) * leaf.leaf.length(j);
         energy += (weight * loads.gravity).length_squared() / inertia.mass;
         if i == n {
             energy += loads.tip_force.length_squared() / inertia.mass;
         }
     }
-    for (node, moment) in leaf.moments_of(loads) {
+    for (node, moment) in leaf.dead_moments_under(loads) {
         energy += moment.length_squared() / physics.inertia(leaf, 0, node).transverse;
     }
     0.5 * h * h * energy
 }
 
 /// Fails if the grid cannot resolve a segment bent by `turn`.
-pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
+pub fn check_resolution(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
     match turn <= RESOLVED_TURN {
         true => Ok(()),
         false => Err(Stopped::Unresolved {
@@ -292,14 +292,14 @@ pub struct EnergyBalance {
     balance: f64,
     potential: f64,
     /// The largest energy that moved so far.
-    largest: f64,
+    largest_exchanged_energy: f64,
 }
 
 impl EnergyBalance {
     pub fn begin(&mut self, start: &Snapshot) {
         self.balance = start.energy.balance();
         self.potential = start.energy.potential;
-        self.largest = start.energy.moved(self.potential);
+        self.largest_exchanged_energy = start.energy.exchanged_energy(self.potential);
     }
 
     pub fn add(&mut self, exchange: Exchange) {
@@ -307,7 +307,7 @@ impl EnergyBalance {
     }
 
     /// The present energy, with what was exchanged so far and `since`.
-    pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
+    pub fn present_energy(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
             dissipated: self.exchanged.dissipated + since.dissipated,
             work: self.exchanged.work + since.work,
@@ -317,7 +317,7 @@ impl EnergyBalance {
 
     /// Checks that the motion of the leaf, in steps of `h`, is reliable; if it is not,
     /// `otherwise` is advice besides a shorter step.
-    pub fn judge(
+    pub fn check_reliability(
         &mut self,
         leaf: &DiscreteLeaf,
         physics: &Physics,
@@ -326,11 +326,13 @@ impl EnergyBalance {
         otherwise: &'static str,
     ) -> Result<(), Stopped> {
         let time = now.time;
-        self.largest = self.largest.max(now.energy.moved(self.potential));
+        self.largest_exchanged_energy = self
+            .largest_exchanged_energy
+            .max(now.energy.exchanged_energy(self.potential));
         // The method's own damping may reduce energy, but nothing may increase it.
         let gain = now.energy.balance() - self.balance;
         let unresolved = unresolved_energy(leaf, physics, time, h);
-        let imbalance = gain / (self.largest + unresolved + ROUNDING);
+        let imbalance = gain / (self.largest_exchanged_energy + unresolved + ENERGY_ROUNDING);
         if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
             return Err(Stopped::Diverged {
                 time,
@@ -338,24 +340,24 @@ impl EnergyBalance {
                 otherwise,
             });
         }
-        let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn();
-        let turns = leaf.each(0..leaf.segments()).map(turn);
-        resolved(leaf, time, largest(turns))
+        let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).end_rotation();
+        let turns = leaf.rod_index_pairs(0..leaf.segments()).map(turn);
+        check_resolution(leaf, time, largest(turns))
     }
 }
 
 /// A step shorter than this part of the next one makes the rate inaccurate.
-const SHORTEST_PART: f64 = 0.25;
+const MIN_STEP_RATIO: f64 = 0.25;
 
 /// Weights of a value and the two before it for its present rate of change, the
 /// last step being `last` long and the one before `before`: the backward
 /// difference of second order; of first order if that step was too short
 /// or missing (zero); all zero if there was no step.
-pub fn rates(last: f64, before: f64) -> [f64; 3] {
+pub fn rate_weights(last: f64, before: f64) -> [f64; 3] {
     if last == 0.0 {
         return [0.0; 3];
     }
-    if before < SHORTEST_PART * last {
+    if before < MIN_STEP_RATIO * last {
         return [1.0 / last, -1.0 / last, 0.0];
     }
     let r = last / before;
@@ -373,7 +375,7 @@ mod tests {
         for (last, before) in [(0.1, 0.1), (0.1, 0.3), (0.3, 0.1), (1e-3, 1.0)] {
             let t = 0.7;
             let values = [value(t), value(t - last), value(t - last - before)];
-            let weights = rates(last, before);
+            let weights = rate_weights(last, before);
             let found: f64 = values.iter().zip(weights).map(|(v, w)| v * w).sum();
             assert!((found - rate(t)).abs() < 1e-11, "{last}, {before}: {found}");
         }
@@ -382,8 +384,8 @@ mod tests {
     #[test]
     fn straight_lines_where_less_is_known() {
         for before in [0.0, 1e-9, 0.024] {
-            assert_eq!(rates(0.1, before), [10.0, -10.0, 0.0]);
+            assert_eq!(rate_weights(0.1, before), [10.0, -10.0, 0.0]);
         }
-        assert_eq!(rates(0.0, 0.0), [0.0; 3]);
+        assert_eq!(rate_weights(0.0, 0.0), [0.0; 3]);
     }
 }

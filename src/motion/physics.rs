@@ -23,19 +23,19 @@ pub struct Inertia {
     /// Moment of inertia about d2 and d3.
     pub transverse: f64,
     /// Relative excess of that about d1.
-    pub excess: f64,
+    pub polar_excess: f64,
 }
 
 impl Inertia {
     /// Moment of inertia about d1.
     pub fn polar(&self) -> f64 {
-        self.transverse * (1.0 + self.excess)
+        self.transverse * (1.0 + self.polar_excess)
     }
 
     /// Inertia tensor of the node rotated by `rotation`, along the lab axes.
     pub fn tensor(&self, rotation: DQuat) -> DMat3 {
         let d1 = rotation * DVec3::X;
-        let excess = self.excess * self.transverse;
+        let excess = self.polar_excess * self.transverse;
         DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess
     }
 }
@@ -46,16 +46,16 @@ pub struct Physics {
     dynamics: Dynamics,
     scale: Scale,
     /// Unit of time, in that of the scenario.
-    pub time: f64,
+    pub time_unit: f64,
     /// Unit of mass per length, in that of the scenario: the mean density.
-    density: f64,
+    density_unit: f64,
     /// External damping: every velocity decays at this rate.
     pub damping: f64,
     /// Internal damping: retardation time.
     pub retardation: f64,
     /// Part of the loads of single veins, and of the dead moments on points.
-    own_loads: f64,
-    moments: f64,
+    rod_load_factor: f64,
+    dead_moment_factor: f64,
     /// Vein, fraction of its length and mass of what is on points.
     point_masses: Vec<(usize, f64, f64)>,
     /// Velocity of the air, if there is wind, in the scenario's units.
@@ -63,7 +63,7 @@ pub struct Physics {
     /// The loads, if they are constant.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
-    pub constant_rest: Option<f64>,
+    pub constant_rest_factor: Option<f64>,
     /// Times at which a load, the air's velocity or the factor may change its slope, in increasing
     /// order.
     knots: Vec<f64>,
@@ -72,8 +72,8 @@ pub struct Physics {
 impl Physics {
     /// Inertia, damping and loads of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
-        let mut physics = Physics::of(leaf, leaf.scenario().dynamics.clone());
-        let unit = physics.density * physics.scale.length;
+        let mut physics = Physics::from_dynamics(leaf, leaf.scenario().dynamics.clone());
+        let unit = physics.density_unit * physics.scale.length;
         let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
         let masses = points.map(|it| (it.vein, it.at, it.mass / unit));
         physics.point_masses = masses.collect();
@@ -82,35 +82,37 @@ impl Physics {
 
     /// The defaults for scenarios without dynamics, under the loads at
     /// rest: the damped motion of a relaxation, in which masses on points are weights alone.
-    pub fn at_rest(leaf: &Leaf) -> Self {
+    pub fn for_relaxation(leaf: &Leaf) -> Self {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
         let loaded = dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment);
-        Physics::of(leaf, loaded)
+        Physics::from_dynamics(leaf, loaded)
     }
 
-    fn of(leaf: &Leaf, dynamics: Dynamics) -> Self {
+    fn from_dynamics(leaf: &Leaf, dynamics: Dynamics) -> Self {
         let scale = leaf.scale;
         let densities = dynamics.density.iter().map(|density| density.at(0.5));
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
-        let still = schedules(&dynamics).iter().all(|load| load.is_constant());
+        let still = load_schedules(&dynamics)
+            .iter()
+            .all(|load| load.is_constant());
         let air = leaf
             .scenario()
             .wind
             .as_ref()
             .map(|wind| wind.velocity.clone());
         let mut physics = Physics {
-            own_loads: leaf.loads.own,
-            moments: leaf.loads.moments,
+            rod_load_factor: leaf.loads.rod_load_factor,
+            dead_moment_factor: leaf.loads.dead_moment_factor,
             constant_loads: None,
             point_masses: Vec::new(),
-            knots: knots(&dynamics, air.as_ref(), time),
+            knots: schedule_knots(&dynamics, air.as_ref(), time),
             air,
-            constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
+            constant_rest_factor: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
-            time,
-            density,
+            time_unit: time,
+            density_unit: density,
             damping: dynamics.external_damping / density * time,
             retardation: dynamics.internal_damping / time,
             dynamics,
@@ -127,12 +129,12 @@ impl Physics {
     /// Inertia of node `i` of rod `j`.
     pub fn inertia(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Inertia {
         let sigma = leaf.grid.sigma()[i];
-        let length = leaf.grid.weight(i) * leaf.leaf.length(j) * leaf.leaf.share(j);
-        let rotary = self.density * self.scale.length * self.scale.length;
+        let length = leaf.grid.node_weight(i) * leaf.leaf.length(j) * leaf.leaf.share(j);
+        let rotary = self.density_unit * self.scale.length * self.scale.length;
         // Where a blade ends in a point its last node has the inertia of the stretch around it.
         let around = |of: &Profile| match of.at(sigma) > 0.0 {
             true => of.at(sigma),
-            false => of.at((0.5 * leaf.grid.weight(i) - sigma).abs()),
+            false => of.at((0.5 * leaf.grid.node_weight(i) - sigma).abs()),
         };
         let here = |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest(*at) == i;
         let on_points = self
@@ -142,43 +144,43 @@ impl Physics {
             .map(|(_, _, mass)| mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         Inertia {
-            mass: length * around(&self.dynamics.density[j]) / self.density + on_points,
+            mass: length * around(&self.dynamics.density[j]) / self.density_unit + on_points,
             transverse: length * around(&self.dynamics.rotary_inertia[j]) / rotary,
-            excess: self.dynamics.polar_excess,
+            polar_excess: self.dynamics.polar_excess,
         }
     }
 
     /// Duration of the motion and output interval.
-    pub fn duration(&self) -> (f64, f64) {
+    pub fn duration_and_interval(&self) -> (f64, f64) {
         let (duration, interval) = (self.dynamics.duration, self.dynamics.output_interval);
-        (duration / self.time, interval / self.time)
+        (duration / self.time_unit, interval / self.time_unit)
     }
 
     /// The loads at a time.
     pub fn loads(&self, time: f64) -> Loads {
-        let at = time * self.time;
-        self.loads_by(|load| load.at(at))
+        let at = time * self.time_unit;
+        self.evaluate_loads(|load| load.at(at))
     }
 
     /// The means of the loads over an interval.
     pub fn mean_loads(&self, interval: [f64; 2]) -> Loads {
-        let [from, to] = interval.map(|time| time * self.time);
-        self.loads_by(|load| load.mean(from, to))
+        let [from, to] = interval.map(|time| time * self.time_unit);
+        self.evaluate_loads(|load| load.mean(from, to))
     }
 
     /// The loads with these values, without dimensions.
-    fn loads_by(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> Loads {
+    fn evaluate_loads(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> Loads {
         if let Some(loads) = self.constant_loads {
             return loads;
         }
-        let loads = schedules(&self.dynamics).map(|load| DVec3::from_array(value(load)));
+        let loads = load_schedules(&self.dynamics).map(|load| DVec3::from_array(value(load)));
         let ([gravity, tip_force, tip_moment], force) = (loads, self.scale.force());
         Loads {
             gravity: gravity * (self.scale.length / force),
             tip_force: tip_force / force,
             tip_moment: tip_moment / self.scale.moment(),
-            own: self.own_loads,
-            moments: self.moments,
+            rod_load_factor: self.rod_load_factor,
+            dead_moment_factor: self.dead_moment_factor,
         }
     }
 
@@ -189,35 +191,35 @@ impl Physics {
 
     /// The velocity of the air at a time.
     pub fn air(&self, time: f64) -> DVec3 {
-        self.air_by(|velocity| velocity.at(time * self.time))
+        self.evaluate_air_velocity(|velocity| velocity.at(time * self.time_unit))
     }
 
     /// The mean of that velocity over an interval.
     pub fn mean_air(&self, interval: [f64; 2]) -> DVec3 {
-        let [from, to] = interval.map(|time| time * self.time);
-        self.air_by(|velocity| velocity.mean(from, to))
+        let [from, to] = interval.map(|time| time * self.time_unit);
+        self.evaluate_air_velocity(|velocity| velocity.mean(from, to))
     }
 
     /// The largest speed of the air.
     pub fn strongest_wind(&self) -> f64 {
         let speeds = self.air.iter().flat_map(|velocity| &velocity.value);
         let speeds = speeds.map(|value| DVec3::from_array(*value).length());
-        speeds.fold(0.0, f64::max) * self.time / self.scale.length
+        speeds.fold(0.0, f64::max) * self.time_unit / self.scale.length
     }
 
-    fn air_by(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> DVec3 {
+    fn evaluate_air_velocity(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> DVec3 {
         let velocity = self.air.as_ref().map_or([0.0; 3], value);
-        DVec3::from_array(velocity) * (self.time / self.scale.length)
+        DVec3::from_array(velocity) * (self.time_unit / self.scale.length)
     }
 
     /// The factor of |u_n| u_n in the drag on segment `i` of rod `j`: rho_a C_D w L/(2 rho) times
     /// its length; zero without wind.
     pub fn drag(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> f64 {
-        let length = leaf.grid.width(i) * leaf.leaf.length(j);
+        let length = leaf.grid.segment_width(i) * leaf.leaf.length(j);
         leaf.leaf.scenario().wind.as_ref().map_or(0.0, |wind| {
-            let width = wind.width[j].at(leaf.grid.middle(i));
+            let width = wind.width[j].at(leaf.grid.segment_midpoint(i));
             let pressed = 0.5 * wind.density * wind.drag * width * self.scale.length;
-            pressed / self.density * length
+            pressed / self.density_unit * length
         })
     }
 
@@ -227,58 +229,58 @@ impl Physics {
     pub fn next_knot(&self, time: f64) -> f64 {
         let next = self.knots.partition_point(|&knot| knot <= time);
         let knot = self.knots.get(next).copied().unwrap_or(f64::INFINITY);
-        knot.max(time + SHORTEST)
+        knot.max(time + MIN_KNOT_STEP)
     }
 
     /// A time at which one of them has a pulse too short for steps that end at its
     /// knots, in the scenario's unit.
-    pub fn too_short_a_pulse(&self) -> Option<f64> {
-        let (d, shortest) = (&self.dynamics, SHORTEST * self.time);
-        let mut loads = schedules(d).into_iter().chain(&self.air);
+    pub fn unresolved_pulse_time(&self) -> Option<f64> {
+        let (d, shortest) = (&self.dynamics, MIN_KNOT_STEP * self.time_unit);
+        let mut loads = load_schedules(d).into_iter().chain(&self.air);
         let of_loads = loads.find_map(|load| load.pulse_within(shortest));
         of_loads.or_else(|| d.rest.pulse_within(shortest))
     }
 
     /// The factor of all rest curvatures at a time.
-    pub fn rest(&self, time: f64) -> f64 {
-        let changing = || self.dynamics.rest.at(time * self.time);
-        self.constant_rest.unwrap_or_else(changing)
+    pub fn rest_curvature_factor(&self, time: f64) -> f64 {
+        let changing = || self.dynamics.rest.at(time * self.time_unit);
+        self.constant_rest_factor.unwrap_or_else(changing)
     }
 
     /// The mean of that factor over an interval.
-    pub fn mean_rest(&self, interval: [f64; 2]) -> f64 {
-        let [from, to] = interval.map(|time| time * self.time);
+    pub fn mean_rest_curvature_factor(&self, interval: [f64; 2]) -> f64 {
+        let [from, to] = interval.map(|time| time * self.time_unit);
         let changing = || self.dynamics.rest.mean(from, to);
-        self.constant_rest.unwrap_or_else(changing)
+        self.constant_rest_factor.unwrap_or_else(changing)
     }
 
     /// Whether loads vary in time.
-    pub fn loads_change(&self) -> bool {
+    pub fn loads_vary(&self) -> bool {
         self.constant_loads.is_none()
     }
 
     /// Whether rest curvatures vary in time.
-    pub fn rest_changes(&self) -> bool {
-        self.constant_rest.is_none()
+    pub fn rest_curvature_varies(&self) -> bool {
+        self.constant_rest_factor.is_none()
     }
 
     /// Whether rest curvatures ever differ from the leaf's own.
-    pub fn rest_differs(&self) -> bool {
-        self.constant_rest != Some(1.0)
+    pub fn rest_curvature_differs(&self) -> bool {
+        self.constant_rest_factor != Some(1.0)
     }
 }
 
 /// Shortest step to a knot, in units of time: the accelerations of shorter ones are rounding.
-const SHORTEST: f64 = 1e-6;
+const MIN_KNOT_STEP: f64 = 1e-6;
 
 /// Gravity, and the force and the moment on a tip.
-fn schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
+fn load_schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
     [&dynamics.gravity, &dynamics.tip_force, &dynamics.tip_moment]
 }
 
 /// The knots of everything that varies in time, over the unit of time.
-fn knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Vec<f64> {
-    let loads = schedules(dynamics).into_iter().chain(air);
+fn schedule_knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Vec<f64> {
+    let loads = load_schedules(dynamics).into_iter().chain(air);
     let loads = loads.filter(|load| !load.is_constant());
     let rest = Some(&dynamics.rest).filter(|rest| !rest.is_constant());
     let knots = loads.flat_map(|load| &load.at);
@@ -290,11 +292,11 @@ fn knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Ve
 
 /// Ratio of the speed of the air relative to a leaf to that of the wind, for stable steps: a leaf may
 /// move against the wind as fast as that blows.
-const RELATIVE: f64 = 2.0;
+const RELATIVE_WIND_RATIO: f64 = 2.0;
 
 /// Wind on a leaf of a grid. Dimensionless.
 #[derive(Clone, Debug)]
-pub struct Wind {
+pub struct WindDrag {
     /// c times the length, of all segments, rod after rod.
     factors: Vec<f64>,
     segments: usize,
@@ -302,60 +304,61 @@ pub struct Wind {
 
 /// The drag on a segment.
 #[derive(Clone, Copy, Debug)]
-pub struct Drag {
+pub struct SegmentDrag {
     factor: f64,
     /// Length and unit tangent t of the chord.
     chord: f64,
     tangent: DVec3,
     /// t . u, u_n and |u_n|.
-    along: f64,
-    normal: DVec3,
-    speed: f64,
+    tangential_velocity: f64,
+    normal_velocity: DVec3,
+    normal_speed: f64,
 }
 
-impl Drag {
+impl SegmentDrag {
     fn new(factor: f64, chord: DVec3, u: DVec3) -> Self {
         let tangent = chord.normalize_or_zero();
         let along = tangent.dot(u);
         let normal = u - along * tangent;
-        Drag {
+        SegmentDrag {
             factor,
             chord: chord.length(),
             tangent,
-            along,
-            normal,
-            speed: normal.length(),
+            tangential_velocity: along,
+            normal_velocity: normal,
+            normal_speed: normal.length(),
         }
     }
 
     /// The force.
     pub fn force(&self) -> DVec3 {
-        self.factor * self.speed * self.normal
+        self.factor * self.normal_speed * self.normal_velocity
     }
 
     /// The derivative of the force with respect to the air's velocity: c (|u_n| P + u_n u_n/|u_n|),
     /// P being the projection normal to the tangent.
-    pub fn by_velocity(&self) -> DMat3 {
+    pub fn velocity_derivative(&self) -> DMat3 {
         let normal = DMat3::IDENTITY - outer(self.tangent, self.tangent);
-        let direction = self.normal.normalize_or_zero();
-        self.factor * self.speed * (normal + outer(direction, direction))
+        let direction = self.normal_velocity.normalize_or_zero();
+        self.factor * self.normal_speed * (normal + outer(direction, direction))
     }
 
     /// The derivative of the force with respect to the vector from one end to the other, as the
     /// tangent turns with it.
-    pub fn by_chord(&self) -> DMat3 {
-        let turned = self.factor * self.speed * outer(self.tangent, self.normal);
-        (self.along * self.by_velocity() + turned) * (-self.chord.max(f64::MIN_POSITIVE).recip())
+    pub fn chord_derivative(&self) -> DMat3 {
+        let turned = self.factor * self.normal_speed * outer(self.tangent, self.normal_velocity);
+        (self.tangential_velocity * self.velocity_derivative() + turned)
+            * (-self.chord.max(f64::MIN_POSITIVE).recip())
     }
 }
 
-impl Wind {
+impl WindDrag {
     /// On this leaf; `None` if its scenario has no wind.
     pub fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
         let drag = |(j, i)| physics.drag(leaf, j, i);
-        physics.is_windy().then(|| Wind {
-            factors: leaf.each(0..segments).map(drag).collect(),
+        physics.is_windy().then(|| WindDrag {
+            factors: leaf.rod_index_pairs(0..segments).map(drag).collect(),
             segments,
         })
     }
@@ -367,14 +370,14 @@ impl Wind {
         state: &'a State,
         air: DVec3,
         velocity: impl Fn(usize) -> DVec3 + 'a,
-    ) -> impl Iterator<Item = ((usize, usize), Drag)> + 'a {
+    ) -> impl Iterator<Item = ((usize, usize), SegmentDrag)> + 'a {
         let segments = self.factors.iter().enumerate();
         segments.map(move |(k, &factor)| {
             let (j, i) = (k / self.segments, k % self.segments);
             let node = state.base(j) + i;
             let moving = 0.5 * (velocity(node) + velocity(node + 1));
             let chord = state.x[node + 1] - state.x[node];
-            ((j, i), Drag::new(factor, chord, air - moving))
+            ((j, i), SegmentDrag::new(factor, chord, air - moving))
         })
     }
 
@@ -404,7 +407,7 @@ impl Wind {
             nodes[node][0] += factor;
             nodes[node + 1][0] += factor;
         }
-        for (j, i) in leaf.each(0..=n) {
+        for (j, i) in leaf.rod_index_pairs(0..=n) {
             nodes[j * (n + 1) + i][1] = physics.inertia(leaf, j, i).mass;
         }
         if leaf.tips_move_together() {
@@ -413,7 +416,7 @@ impl Wind {
             (0..leaf.rods()).for_each(|j| nodes[j * (n + 1) + n] = tip);
         }
         let rates = nodes.into_iter().map(|[factor, mass]| factor / mass);
-        RELATIVE * physics.strongest_wind() * rates.fold(0.0, f64::max)
+        RELATIVE_WIND_RATIO * physics.strongest_wind() * rates.fold(0.0, f64::max)
     }
 }
 
@@ -424,14 +427,14 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_the_force() {
         let (chord, u) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.1, 0.7, -0.4));
-        let drag = |chord, u| Drag::new(0.7, chord, u);
+        let drag = |chord, u| SegmentDrag::new(0.7, chord, u);
         let (here, h) = (drag(chord, u), 1e-6);
         for axis in DVec3::AXES {
             let of = |to: f64, air: f64| drag(chord + to * axis, u + air * axis).force();
             let by_chord = (of(h, 0.0) - of(-h, 0.0)) / (2.0 * h);
             let by_velocity = (of(0.0, h) - of(0.0, -h)) / (2.0 * h);
-            assert!((here.by_chord() * axis).distance(by_chord) < 1e-8);
-            assert!((here.by_velocity() * axis).distance(by_velocity) < 1e-8);
+            assert!((here.chord_derivative() * axis).distance(by_chord) < 1e-8);
+            assert!((here.velocity_derivative() * axis).distance(by_velocity) < 1e-8);
         }
     }
 }

@@ -26,12 +26,12 @@
 //! segments are strained, as those of arcs with different chords, positions without such strains.
 
 use crate::leaf::{DiscreteLeaf, Loads, State, System};
-use crate::motion::constraint_projection::unstrained;
-use crate::motion::physics::{Inertia, Physics, Wind};
+use crate::motion::constraint_projection::project_constraints;
+use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, measure, rates,
+    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, measure, rate_weights,
 };
-use crate::newton::{Definite, Work};
+use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
 use crate::rod::Section;
 use crate::rotation;
@@ -40,24 +40,24 @@ use glam::{DMat3, DVec3};
 
 /// Spectral radius rho_inf at infinite frequency: the part of unresolved motion that
 /// remains after a step. Smaller values also damp more of what is resolved.
-const RHO_INF: f64 = 0.8;
+const SPECTRAL_RADIUS: f64 = 0.8;
 
 /// Weights of the method.
 #[derive(Clone, Copy, Debug)]
-struct Weights {
+struct GeneralizedAlphaWeights {
     alpha_m: f64,
     alpha_f: f64,
     gamma: f64,
     beta: f64,
 }
 
-impl Weights {
+impl GeneralizedAlphaWeights {
     /// For a spectral radius `rho_inf` at infinite frequency.
-    fn of(rho_inf: f64) -> Self {
+    fn from_spectral_radius(rho_inf: f64) -> Self {
         let alpha_m = (2.0 * rho_inf - 1.0) / (rho_inf + 1.0);
         let alpha_f = rho_inf / (rho_inf + 1.0);
         let gamma = 0.5 + alpha_f - alpha_m;
-        Weights {
+        GeneralizedAlphaWeights {
             alpha_m,
             alpha_f,
             gamma,
@@ -69,45 +69,45 @@ impl Weights {
 /// Shortest step, and the part of a step below which differences of time are rounding.
 const SHORTEST_STEP: f64 = 1e-10;
 
-const NO_TIME: f64 = 1e-9;
+const TIME_ROUNDING_FRACTION: f64 = 1e-9;
 
 /// Bounds on the ratio of successive steps.
-const GROWTH: (f64, f64) = (0.2, 2.0);
+const STEP_RATIO_BOUNDS: (f64, f64) = (0.2, 2.0);
 
 /// Advice if energy grows, besides a shorter step, and if steps are too short.
-const OTHERWISE: &str = "dynamics.start = \"at-rest\"";
+const ENERGY_GROWTH_ADVICE: &str = "dynamics.start = \"at-rest\"";
 
-const TOO_SHORT: &str = "use more segments a rod, or slower changes of the loads";
+const SHORT_STEP_ADVICE: &str = "use more segments a rod, or slower changes of the loads";
 
-const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
+const SHORT_FIRST_STEP_ADVICE: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
     use dynamics.start = \"at-rest\", or a lower stiffness";
 
 /// Control of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Steps {
+pub enum StepControl {
     /// All of this length, except those that end at the times asked for.
     Fixed(f64),
     /// Such that the local error of positions (lengths) and rotations (radians)
     /// stays below this.
-    Error(f64),
-    /// Bounded like [`Steps::Error`], if only their number matters: equations are solved with
+    LocalError(f64),
+    /// Bounded like [`StepControl::LocalError`], if only their number matters: equations are solved with
     /// just the accuracy that the local error is estimated with, and no energy balance is kept.
-    ToCount(f64),
+    CountOnly(f64),
 }
 
-impl Steps {
+impl StepControl {
     /// The permitted local error, if it determines the step.
     fn error(self) -> Option<f64> {
         match self {
-            Steps::Fixed(_) => None,
-            Steps::Error(error) | Steps::ToCount(error) => Some(error),
+            StepControl::Fixed(_) => None,
+            StepControl::LocalError(error) | StepControl::CountOnly(error) => Some(error),
         }
     }
 }
 
 /// Motion of a node: pairs of an angular and a linear vector.
 #[derive(Clone, Copy, Debug, Default)]
-struct Moving {
+struct NodeMotion {
     /// Velocity.
     v: [DVec3; 2],
     /// Auxiliary acceleration.
@@ -116,11 +116,11 @@ struct Moving {
     w: [DVec3; 2],
 }
 
-impl Moving {
+impl NodeMotion {
     /// An acceleration without velocity.
     fn at_rest(w: [DVec3; 2]) -> Self {
         let v = [DVec3::ZERO; 2];
-        Moving { v, a: w, w }
+        NodeMotion { v, a: w, w }
     }
 }
 
@@ -129,35 +129,35 @@ pub struct SemiImplicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     inertia: Vec<Inertia>,
-    wind: Option<Wind>,
+    wind: Option<WindDrag>,
     /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
     /// Strains (v, u) of all segments at the last step and the one before.
-    past: [Vec<[DVec3; 2]>; 2],
+    strain_history: [Vec<[DVec3; 2]>; 2],
     /// Length of the last step; zero if there was none.
     past_step: f64,
     /// Power of internal friction at the last step.
     friction_power: f64,
     system: System,
-    solver: Definite,
+    solver: DefiniteSolver,
     state: State,
     trial: State,
     next: State,
-    moving: Vec<Moving>,
-    next_moving: Vec<Moving>,
-    weights: Weights,
-    steps: Steps,
+    node_motions: Vec<NodeMotion>,
+    next_node_motions: Vec<NodeMotion>,
+    weights: GeneralizedAlphaWeights,
+    steps: StepControl,
     step: f64,
     /// A bound on the steps, and the longest since this was asked last.
-    longest: f64,
-    longest_made: f64,
+    step_bound: f64,
+    longest_taken: f64,
     time: f64,
     count: usize,
     /// Number of factorisations.
     pub factorizations: usize,
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
-    corrected: Loads,
+    corrected_loads: Loads,
     /// Those of the tissue's strips at the start.
     alignments: Vec<bool>,
     limit: Limit,
@@ -165,42 +165,44 @@ pub struct SemiImplicit {
 
 impl SemiImplicit {
     /// A leaf at rest in `state`.
-    pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, steps: Steps) -> Self {
-        let nodes = leaf.each(0..=leaf.segments());
+    pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, steps: StepControl) -> Self {
+        let nodes = leaf.rod_index_pairs(0..=leaf.segments());
         let mut motion = SemiImplicit {
             inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
-            wind: Wind::new(&leaf, &physics),
+            wind: WindDrag::new(&leaf, &physics),
             sections: leaf.sections.clone(),
-            past: [Vec::new(), Vec::new()],
+            strain_history: [Vec::new(), Vec::new()],
             past_step: 0.0,
             friction_power: 0.0,
             system: System::new(&leaf),
-            solver: Definite::default(),
+            solver: DefiniteSolver::default(),
             state: state.clone(),
             trial: state.clone(),
             next: state.clone(),
-            moving: vec![Moving::default(); state.x.len()],
-            next_moving: vec![Moving::default(); state.x.len()],
+            node_motions: vec![NodeMotion::default(); state.x.len()],
+            next_node_motions: vec![NodeMotion::default(); state.x.len()],
             step: match steps {
-                Steps::Fixed(h) => h,
-                Steps::Error(error) | Steps::ToCount(error) => 0.1 * error.cbrt(),
+                StepControl::Fixed(h) => h,
+                StepControl::LocalError(error) | StepControl::CountOnly(error) => {
+                    0.1 * error.cbrt()
+                }
             },
-            longest: f64::INFINITY,
-            longest_made: 0.0,
-            weights: Weights::of(RHO_INF),
+            step_bound: f64::INFINITY,
+            longest_taken: 0.0,
+            weights: GeneralizedAlphaWeights::from_spectral_radius(SPECTRAL_RADIUS),
             steps,
             time: 0.0,
             count: 0,
             factorizations: 0,
             balance: EnergyBalance::default(),
-            corrected: Loads::default(),
-            alignments: leaf.alignments(state),
+            corrected_loads: Loads::default(),
+            alignments: leaf.strip_alignments(state),
             limit: Limit::default(),
             leaf,
             physics,
         };
         motion.initialise();
-        motion.past = [motion.strains(), motion.strains()];
+        motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
         motion
@@ -212,23 +214,23 @@ impl SemiImplicit {
     /// If it would be too short, or sections passed half a turn against each other.
     pub fn step_towards(&mut self, until: f64) -> Result<(), Stopped> {
         let left = until - self.time;
-        if left < NO_TIME * self.step {
+        if left < TIME_ROUNDING_FRACTION * self.step {
             self.time = until;
             return Ok(());
         }
-        let step = self.step.min(self.longest);
+        let step = self.step.min(self.step_bound);
         let count = (left / step * (1.0 - 1e-12)).ceil().max(1.0);
         // The last two steps divide the remaining time equally.
         let last = count == 1.0;
         let h = match self.steps {
-            Steps::Fixed(_) => left / count,
+            StepControl::Fixed(_) => left / count,
             _ if count <= 2.0 => left / count,
             _ => step,
         };
         let error = self.attempt(h);
         if let (Some(allowed), Some(error)) = (self.steps.error(), error) {
             let factor = 0.9 * (allowed / error.max(1e-300)).cbrt();
-            let next = h * factor.clamp(GROWTH.0, GROWTH.1);
+            let next = h * factor.clamp(STEP_RATIO_BOUNDS.0, STEP_RATIO_BOUNDS.1);
             if error > allowed {
                 self.step = next;
                 return Ok(());
@@ -240,8 +242,8 @@ impl SemiImplicit {
             Some(_) => self.accept(h),
             None => self.step = 0.25 * h,
         }
-        if let (Steps::Fixed(longest), Some(_)) = (self.steps, error) {
-            self.step = longest.min(GROWTH.1 * self.step);
+        if let (StepControl::Fixed(longest), Some(_)) = (self.steps, error) {
+            self.step = longest.min(STEP_RATIO_BOUNDS.1 * self.step);
         }
         let time = self.time;
         // Beyond the jump of the law no step may converge.
@@ -255,9 +257,9 @@ impl SemiImplicit {
         if self.step < SHORTEST_STEP {
             let started = time > 0.0;
             let advice = if started {
-                TOO_SHORT
+                SHORT_STEP_ADVICE
             } else {
-                TOO_SHORT_AT_THE_START
+                SHORT_FIRST_STEP_ADVICE
             };
             return Err(Stopped::StepTooShort { time, advice });
         }
@@ -278,11 +280,11 @@ impl TimeIntegrator for SemiImplicit {
     }
 
     fn limit_steps(&mut self, longest: f64) {
-        self.longest = longest;
+        self.step_bound = longest;
     }
 
     fn take_longest_step(&mut self) -> f64 {
-        std::mem::take(&mut self.longest_made)
+        std::mem::take(&mut self.longest_taken)
     }
 
     fn set_limit(&mut self, limit: Limit) {
@@ -299,12 +301,18 @@ impl TimeIntegrator for SemiImplicit {
             self.step_towards(until.min(knot))?;
         }
         let now = self.snapshot();
-        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
+        (self.balance).check_reliability(
+            &self.leaf,
+            &self.physics,
+            &now,
+            self.step,
+            ENERGY_GROWTH_ADVICE,
+        )?;
         Ok(now)
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        let velocity = self.moving.iter().map(|m| {
+        let velocity = self.node_motions.iter().map(|m| {
             let [angular, linear] = m.v;
             Velocity { angular, linear }
         });
@@ -313,7 +321,7 @@ impl TimeIntegrator for SemiImplicit {
         let energy = measure(&mut self.leaf, &self.physics, time, &state, &velocity);
         Snapshot {
             time,
-            energy: self.balance.complete(energy, Exchange::default()),
+            energy: self.balance.present_energy(energy, Exchange::default()),
             state,
             velocity,
         }
@@ -322,38 +330,38 @@ impl TimeIntegrator for SemiImplicit {
 
 /// Newton iterations in a step, and the size of the last (radians, lengths),
 /// as a part of the permitted error and as an upper limit; for steps of given length.
-const ITERATIONS: usize = 12;
+const MAX_NEWTON_ITERATIONS: usize = 12;
 
-const LAST_ITERATION: f64 = 1e-3;
+const ITERATION_ERROR_FRACTION: f64 = 1e-3;
 
-const LARGEST_LAST: f64 = 1e-9;
+const MAX_ITERATION_ERROR: f64 = 1e-9;
 
-const FIXED_LAST: f64 = 1e-12;
+const FIXED_STEP_ITERATION_ERROR: f64 = 1e-12;
 
 /// Iteration error if steps are only counted, as a part of the permitted error.
-const LAST_TO_COUNT: f64 = 1e-2;
+const COUNT_ONLY_ITERATION_ERROR: f64 = 1e-2;
 
 /// Relative accuracy of the conjugate gradients, and, if steps are only counted, as a part of the
 /// permitted error: increments are less than one, so that this is noise far below it.
 const CG_TOLERANCE: f64 = 1e-10;
 
-const CG_TO_COUNT: f64 = 1e-2;
+const COUNT_ONLY_CG_TOLERANCE: f64 = 1e-2;
 
 /// Largest rotation of a node in a step, radians.
-const LARGEST_TURN: f64 = 0.5;
+const MAX_NODE_ROTATION: f64 = 0.5;
 
 /// The stiffness with which the forces of rigid segments are condensed out is
 /// at least this multiple of the resistance of inertia: iterations then converge
 /// equally fast for all steps.
-const STIFFER: f64 = 1e3;
+const CONDENSING_INERTIA_RATIO: f64 = 1e3;
 
 impl SemiImplicit {
     /// Factorises and solves; false if the matrix is not positive definite.
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;
-        let mut uncounted = Work::default();
+        let mut uncounted = SolverCounts::default();
         let accuracy = match self.steps {
-            Steps::ToCount(error) => CG_TO_COUNT * error,
+            StepControl::CountOnly(error) => COUNT_ONLY_CG_TOLERANCE * error,
             _ => CG_TOLERANCE,
         };
         self.solver
@@ -372,7 +380,9 @@ impl SemiImplicit {
     /// base or tip.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
         let nodes = self.leaf.segments() + 1;
-        let [turns, shifts] = self.leaf.moves(k / nodes, k % nodes);
+        let [turns, shifts] = self
+            .leaf
+            .allows_rotation_and_displacement(k / nodes, k % nodes);
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
         let shift = || self.trial.x[k] - self.state.x[k];
         [
@@ -389,8 +399,8 @@ impl SemiImplicit {
         let of_before = (0.5 - w.beta) / w.beta;
         let first = self.leaf.first_node();
         for k in (0..self.state.x.len()).filter(|k| k % nodes >= first) {
-            let (m, d) = (self.moving[k], self.increment(k));
-            let next = &mut self.next_moving[k];
+            let (m, d) = (self.node_motions[k], self.increment(k));
+            let next = &mut self.next_node_motions[k];
             for c in 0..2 {
                 let a1 = of_increment * (d[c] - h * m.v[c]) - of_before * m.a[c];
                 let mean = (1.0 - w.alpha_m) * a1 + w.alpha_m * m.a[c];
@@ -408,19 +418,21 @@ impl SemiImplicit {
         let of_acceleration = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * h * h);
         let per_mass = of_acceleration + damping * w.gamma / (w.beta * h);
         self.apply_loads_and_damping(self.time + h, h, per_mass);
-        self.correct_lag(h);
+        self.correct_load_lag(h);
         self.predict(h);
         let last = match self.steps {
-            Steps::Fixed(_) => FIXED_LAST,
-            Steps::ToCount(error) => LAST_TO_COUNT * error,
-            Steps::Error(allowed) => (LAST_ITERATION * allowed).min(LARGEST_LAST),
+            StepControl::Fixed(_) => FIXED_STEP_ITERATION_ERROR,
+            StepControl::CountOnly(error) => COUNT_ONLY_ITERATION_ERROR * error,
+            StepControl::LocalError(allowed) => {
+                (ITERATION_ERROR_FRACTION * allowed).min(MAX_ITERATION_ERROR)
+            }
         };
         let mut before = f64::INFINITY;
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_NEWTON_ITERATIONS {
             self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(self.time + h, w.gamma / (w.beta * h));
-            let (moving, inertia) = (&self.next_moving, &self.inertia);
+            let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
@@ -431,15 +443,15 @@ impl SemiImplicit {
             if !self.solve() {
                 return None;
             }
-            let (turn, shift) = self.system.largest();
+            let (turn, shift) = self.system.largest_increment();
             let size = larger(turn, shift);
-            if !size.is_finite() || size > before.max(LARGEST_TURN) {
+            if !size.is_finite() || size > before.max(MAX_NODE_ROTATION) {
                 return None;
             }
             self.advance_trial();
             let remaining = match self.steps {
                 // Two iterations show how fast they converge: the size of the next one.
-                Steps::ToCount(_) if before.is_finite() => size * size / before,
+                StepControl::CountOnly(_) if before.is_finite() => size * size / before,
                 _ => size,
             };
             if remaining <= last || (size < 1e-11 && size > 0.3 * before) {
@@ -453,7 +465,7 @@ impl SemiImplicit {
 
     fn local_error(&self, h: f64) -> f64 {
         let mut error: f64 = 0.0;
-        for (next, now) in self.next_moving.iter().zip(&self.moving) {
+        for (next, now) in self.next_node_motions.iter().zip(&self.node_motions) {
             for c in 0..2 {
                 error = larger(error, (next.a[c] - now.a[c]).length());
             }
@@ -465,11 +477,11 @@ impl SemiImplicit {
     /// Predicts the trial with constant accelerations.
     fn predict(&mut self, h: f64) {
         self.trial.clone_from(&self.state);
-        for (k, m) in self.moving.iter().enumerate() {
+        for (k, m) in self.node_motions.iter().enumerate() {
             let d = |c: usize| h * m.v[c] + 0.5 * h * h * m.a[c];
             // If the prediction is far away, the present state is better.
             let turn = d(0);
-            if turn.length() < LARGEST_TURN {
+            if turn.length() < MAX_NODE_ROTATION {
                 self.trial.q[k] = (rotation::exp(turn) * self.trial.q[k]).normalize();
                 self.trial.x[k] += d(1);
             }
@@ -481,26 +493,26 @@ impl SemiImplicit {
     /// then the method has the exact impulse of the load. Where the load changes its slope, or
     /// steps change their length, the lag is another one: without a correction a pulse of few
     /// steps would have another impulse, and go on acting in the longer steps after it.
-    fn correct_lag(&mut self, h: f64) {
-        if !self.physics.loads_change() {
+    fn correct_load_lag(&mut self, h: f64) {
+        if !self.physics.loads_vary() {
             return;
         }
         let (now, w) = (self.time, self.weights);
         let [before, now, after] =
             [now - self.past_step, now, now + h].map(|t| self.physics.loads(t));
         let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
-        let change = lag - self.corrected;
-        self.corrected = lag;
+        let change = lag - self.corrected_loads;
+        self.corrected_loads = lag;
         if change != Loads::default() {
-            self.accelerate(change);
+            self.add_load_accelerations(change);
         }
     }
 
     /// Adds the accelerations of free nodes under these loads.
-    fn accelerate(&mut self, loads: Loads) {
+    fn add_load_accelerations(&mut self, loads: Loads) {
         let n = self.leaf.segments();
         let force = |j: usize, i: usize| {
-            let weight = self.leaf.grid.weight(i) * self.leaf.leaf.length(j);
+            let weight = self.leaf.grid.node_weight(i) * self.leaf.leaf.length(j);
             weight * self.leaf.leaf.share(j) * loads.gravity
         };
         let rods = 0..self.leaf.rods();
@@ -511,9 +523,9 @@ impl SemiImplicit {
             tip.1 += self.inertia[self.state.base(j) + n].mass;
         }
         let together = self.leaf.tips_move_together();
-        for (j, i) in self.leaf.each(1..=n) {
+        for (j, i) in self.leaf.rod_index_pairs(1..=n) {
             let k = self.state.base(j) + i;
-            let [_, shifts] = self.leaf.moves(j, i);
+            let [_, shifts] = self.leaf.allows_rotation_and_displacement(j, i);
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,
@@ -521,13 +533,13 @@ impl SemiImplicit {
                 false => force(j, i) / mass,
             };
             if shifts {
-                self.moving[k].a[1] += linear;
+                self.node_motions[k].a[1] += linear;
             }
         }
-        for (node, moment) in self.leaf.moments_of(loads) {
-            if self.leaf.moves(0, node)[0] {
+        for (node, moment) in self.leaf.dead_moments_under(loads) {
+            if self.leaf.allows_rotation_and_displacement(0, node)[0] {
                 let tensor = self.inertia[node].tensor(self.state.q[node]);
-                self.moving[node].a[0] += tensor.inverse() * moment;
+                self.node_motions[node].a[0] += tensor.inverse() * moment;
             }
         }
     }
@@ -539,8 +551,11 @@ impl SemiImplicit {
     /// `per_mass` times the masses.
     pub(super) fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
         self.leaf.loads = self.physics.loads(time);
-        let (rest, eta) = (self.physics.rest(time), self.physics.retardation);
-        let [c0, c1, c2] = rates(h, self.past_step).map(|c| eta * c);
+        let (rest, eta) = (
+            self.physics.rest_curvature_factor(time),
+            self.physics.retardation,
+        );
+        let [c0, c1, c2] = rate_weights(h, self.past_step).map(|c| eta * c);
         let n = self.leaf.segments();
         let both = self.leaf.sections.iter_mut().zip(&self.sections);
         for (i, (section, own)) in both.enumerate() {
@@ -548,7 +563,9 @@ impl SemiImplicit {
             section.rest_curvature *= rest;
             let stiffer = 1.0 + c0;
             if c0 > 0.0 {
-                let before = |kind: usize| c1 * self.past[0][i][kind] + c2 * self.past[1][i][kind];
+                let before = |kind: usize| {
+                    c1 * self.strain_history[0][i][kind] + c2 * self.strain_history[1][i][kind]
+                };
                 section.rest_strain = (section.rest_strain - before(0)) / stiffer;
                 section.rest_curvature = (section.rest_curvature - before(1)) / stiffer;
                 section.compliance /= stiffer;
@@ -556,7 +573,7 @@ impl SemiImplicit {
             }
             let node = i / n * (n + 1) + i % n;
             let mass = 0.5 * (self.inertia[node].mass + self.inertia[node + 1].mass);
-            let inertial = DVec3::splat(STIFFER * per_mass * mass * section.ds);
+            let inertial = DVec3::splat(CONDENSING_INERTIA_RATIO * per_mass * mass * section.ds);
             let condensing = (stiffer * own.condensing).max(inertial);
             section.condensing = condensing.min(section.compliance.recip());
         }
@@ -578,7 +595,7 @@ pub(super) fn add_inertia(
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
             let matrix = (tensor * per_mass, inertia[k].mass * per_mass);
-            system.add(j, i, matrix, load(k, &tensor));
+            system.add_to_node(j, i, matrix, load(k, &tensor));
         }
     }
 }
@@ -591,34 +608,34 @@ impl SemiImplicit {
             let segment = leaf.segment(state, j, i, state.n[j * n + i]);
             [segment.v(leaf.section(j, i)), segment.u]
         };
-        leaf.each(0..n).map(strains).collect()
+        leaf.rod_index_pairs(0..n).map(strains).collect()
     }
 
     /// Accepts the attempted step of `h` and updates the energy balance, unless steps are only
     /// counted.
     pub(super) fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
-        std::mem::swap(&mut self.moving, &mut self.next_moving);
-        if !matches!(self.steps, Steps::ToCount(_)) {
-            let exchange = self.exchange(h);
+        std::mem::swap(&mut self.node_motions, &mut self.next_node_motions);
+        if !matches!(self.steps, StepControl::CountOnly(_)) {
+            let exchange = self.step_energy_exchange(h);
             self.balance.add(exchange);
         }
         if self.physics.retardation > 0.0 {
-            self.past.swap(0, 1);
-            self.past[0] = self.strains();
+            self.strain_history.swap(0, 1);
+            self.strain_history[0] = self.strains();
         }
-        self.corrected = Loads::default();
+        self.corrected_loads = Loads::default();
         self.past_step = h;
-        self.longest_made = self.longest_made.max(h);
+        self.longest_taken = self.longest_taken.max(h);
         self.time += h;
         self.count += 1;
     }
 
     /// What the accepted step of `h` exchanged.
-    fn exchange(&mut self, h: f64) -> Exchange {
+    fn step_energy_exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
-            work: self.work_of_changes(h) + self.work_of_wind(h),
+            work: self.varying_load_work(h) + self.work_of_wind(h),
         };
         if self.physics.retardation > 0.0 {
             let power = self.power_of_friction(h);
@@ -630,10 +647,10 @@ impl SemiImplicit {
 
     /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of
     /// the states before (the trial) and after.
-    fn work_of_changes(&mut self, h: f64) -> f64 {
+    fn varying_load_work(&mut self, h: f64) -> f64 {
         let (from, to) = (self.time, self.time + h);
         let mut work = 0.0;
-        if self.physics.loads_change() {
+        if self.physics.loads_vary() {
             let mut potential = |loads: Loads| {
                 self.leaf.loads = loads;
                 self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
@@ -641,13 +658,15 @@ impl SemiImplicit {
             let before = potential(self.physics.loads(from));
             work += 0.5 * (potential(self.physics.loads(to)) - before);
         }
-        if self.physics.rest_changes() {
+        if self.physics.rest_curvature_varies() {
             let bending =
                 |rest: f64| self.bending(&self.trial, rest) + self.bending(&self.state, rest);
-            work += 0.5 * (bending(self.physics.rest(to)) - bending(self.physics.rest(from)));
+            work += 0.5
+                * (bending(self.physics.rest_curvature_factor(to))
+                    - bending(self.physics.rest_curvature_factor(from)));
         }
         for time in [from, to] {
-            for (node, moment) in self.leaf.moments_of(self.physics.loads(time)) {
+            for (node, moment) in self.leaf.dead_moments_under(self.physics.loads(time)) {
                 let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
                 work += 0.5 * moment.dot(turn);
             }
@@ -657,7 +676,7 @@ impl SemiImplicit {
 
     /// Energy of bending in a state with the rest curvatures times `rest`.
     fn bending(&self, state: &State, rest: f64) -> f64 {
-        let segments = self.leaf.each(0..self.leaf.segments());
+        let segments = self.leaf.rod_index_pairs(0..self.leaf.segments());
         let energy = |((j, i), own): (_, &Section)| {
             let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
             let bent = u - rest * own.rest_curvature;
@@ -668,12 +687,14 @@ impl SemiImplicit {
 
     /// Power of internal friction at the end of a step of `h`.
     fn power_of_friction(&self, h: f64) -> f64 {
-        let [c0, c1, c2] = rates(h, self.past_step);
+        let [c0, c1, c2] = rate_weights(h, self.past_step);
         let mut power = 0.0;
         for (i, now) in self.strains().iter().enumerate() {
             let section = &self.sections[i];
             let rate = |kind: usize| {
-                c0 * now[kind] + c1 * self.past[0][i][kind] + c2 * self.past[1][i][kind]
+                c0 * now[kind]
+                    + c1 * self.strain_history[0][i][kind]
+                    + c2 * self.strain_history[1][i][kind]
             };
             let (v, u) = (rate(0), rate(1));
             for c in 0..3 {
@@ -692,7 +713,7 @@ impl SemiImplicit {
     fn momentum_times_displacement(&self) -> f64 {
         let mut sum = 0.0;
         for (k, inertia) in self.inertia.iter().enumerate() {
-            let (before, after) = (&self.next_moving[k], &self.moving[k]);
+            let (before, after) = (&self.next_node_motions[k], &self.node_motions[k]);
             let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
@@ -710,20 +731,20 @@ impl SemiImplicit {
     /// small beside that of inertia in steps that resolve the motion.
     pub(super) fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
-        let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_moving);
-        let moves = |j: usize, i: usize| leaf.moves(j, i)[1];
+        let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
+        let moves = |j: usize, i: usize| leaf.allows_rotation_and_displacement(j, i)[1];
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let (half, stiffness) = (0.5 * drag.force(), 0.25 * rate * drag.by_velocity());
+            let (half, stiffness) = (0.5 * drag.force(), 0.25 * rate * drag.velocity_derivative());
             let free = [moves(j, i), moves(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {
                 if free {
                     system.add_load(j, node, [DVec3::ZERO, half]);
-                    system.hold(j, node, stiffness);
+                    system.add_displacement_spring(j, node, stiffness);
                 }
             }
             if free == [true; 2] {
-                system.hold_together(j, i, stiffness);
+                system.add_adjacent_node_spring(j, i, stiffness);
             }
         }
     }
@@ -733,8 +754,8 @@ impl SemiImplicit {
     pub(super) fn work_of_wind(&self, h: f64) -> f64 {
         let Some(wind) = &self.wind else { return 0.0 };
         let [from, to] = [self.time, self.time + h].map(|time| self.physics.air(time));
-        let before = wind.drags(&self.trial, from, |k| self.next_moving[k].v[1]);
-        let after = wind.drags(&self.state, to, |k| self.moving[k].v[1]);
+        let before = wind.drags(&self.trial, from, |k| self.next_node_motions[k].v[1]);
+        let after = wind.drags(&self.state, to, |k| self.node_motions[k].v[1]);
         let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
             let node = self.state.base(j) + i;
             let moved = |k: usize| self.state.x[k] - self.trial.x[k];
@@ -748,34 +769,34 @@ impl SemiImplicit {
 /// Inverse square of the length of a first step from rest, of implicit Euler, so short that the
 /// leaf hardly moves. It determines the forces in rigid segments, which do not follow from
 /// strains.
-const INVERSE_STEP_SQUARED: f64 = 1e6;
+const FIRST_STEP_INVERSE_SQUARE: f64 = 1e6;
 
 /// Iterations of that step, and the size of the last.
 const INITIAL_ITERATIONS: usize = 30;
 
-const LAST: f64 = 1e-15;
+const INITIAL_ITERATION_ERROR: f64 = 1e-15;
 
 /// Strain of a rigid segment, as a length, that may be due to rounding.
-const VIOLATION: f64 = 1e-12;
+const RIGID_STRAIN_ROUNDING: f64 = 1e-12;
 
 /// Strain of a rigid segment, as a length, above which positions are not consistent.
-const STRAINED: f64 = 1e-8;
+const INCONSISTENT_RIGID_STRAIN: f64 = 1e-8;
 
 impl SemiImplicit {
     /// Initialises the forces of the segments and the accelerations of the nodes.
     pub(super) fn initialise(&mut self) {
-        self.apply_loads_and_damping(0.0, 0.0, INVERSE_STEP_SQUARED);
+        self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP_INVERSE_SQUARE);
         let violation = self.leaf.strain_forces(&mut self.state);
         if self.leaf.least_compliance() > 0.0 {
             return self.set_accelerations();
         }
-        if violation > VIOLATION {
+        if violation > RIGID_STRAIN_ROUNDING {
             let strained = self.state.clone();
             if self.first_step() {
                 std::mem::swap(&mut self.state, &mut self.trial);
             }
             let forces = self.state.n.clone();
-            if self.leaf.strain_forces(&mut self.state) < STRAINED {
+            if self.leaf.strain_forces(&mut self.state) < INCONSISTENT_RIGID_STRAIN {
                 self.state.n = forces;
             } else {
                 self.state = strained;
@@ -787,8 +808,8 @@ impl SemiImplicit {
             true => {
                 std::mem::swap(&mut self.state.n, &mut self.trial.n);
                 for k in 0..self.state.x.len() {
-                    let w = self.increment(k).map(|d| INVERSE_STEP_SQUARED * d);
-                    self.moving[k] = Moving::at_rest(w);
+                    let w = self.increment(k).map(|d| FIRST_STEP_INVERSE_SQUARE * d);
+                    self.node_motions[k] = NodeMotion::at_rest(w);
                 }
             }
             false => self.set_accelerations(),
@@ -799,7 +820,7 @@ impl SemiImplicit {
     fn make_consistent(&mut self) {
         let mut leaf = self.leaf.clone();
         leaf.sections.clone_from(&self.sections);
-        if let Some(state) = unstrained(&leaf, &self.state) {
+        if let Some(state) = project_constraints(&leaf, &self.state) {
             self.state = state;
         }
     }
@@ -811,7 +832,7 @@ impl SemiImplicit {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(0.0, 0.0);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
-            let (inertia, per_mass) = (&self.inertia, INVERSE_STEP_SQUARED);
+            let (inertia, per_mass) = (&self.inertia, FIRST_STEP_INVERSE_SQUARE);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
@@ -822,8 +843,8 @@ impl SemiImplicit {
                 return false;
             }
             self.advance_trial();
-            let (turn, shift) = self.system.largest();
-            if larger(turn, shift) < LAST {
+            let (turn, shift) = self.system.largest_increment();
+            if larger(turn, shift) < INITIAL_ITERATION_ERROR {
                 break;
             }
         }
@@ -837,22 +858,22 @@ impl SemiImplicit {
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
-        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
+        for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
             let k = self.state.base(j) + i;
-            let (moment, force) = self.system.unbalanced(j, i);
+            let (moment, force) = self.system.unbalanced_node_load(j, i);
             let Inertia { mass, .. } = self.inertia[k];
             let tensor = self.inertia[k].tensor(self.state.q[k]);
             if i == n {
                 tip_force += force;
                 tip_mass += mass;
             }
-            self.moving[k] = Moving::at_rest([tensor.inverse() * moment, force / mass]);
+            self.node_motions[k] = NodeMotion::at_rest([tensor.inverse() * moment, force / mass]);
         }
         if joined {
             for j in 0..self.leaf.rods() {
                 let k = self.state.base(j) + n;
-                self.moving[k].w[1] = tip_force / tip_mass;
-                self.moving[k].a[1] = tip_force / tip_mass;
+                self.node_motions[k].w[1] = tip_force / tip_mass;
+                self.node_motions[k].a[1] = tip_force / tip_mass;
             }
         }
     }

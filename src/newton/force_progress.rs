@@ -6,57 +6,57 @@
 //! the constitutive law of nearly rigid segments is completed in every step.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::newton::converged;
+use crate::newton::remaining_error;
 use crate::numbers::{larger, largest};
 
 /// The law lags behind where a step misses more than this part of the strain that the step before
 /// missed; below the second number the strain is rounding.
-const LAGGING: f64 = 0.03;
+const LAW_LAG_FRACTION: f64 = 0.03;
 
-const ROUNDED_STRAIN: f64 = 1e-14;
+const STRAIN_NOISE: f64 = 1e-14;
 
 /// Rounding error of a strain, per segment of a rod.
 const STRAIN_ROUNDING: f64 = 10.0 * f64::EPSILON;
 
 /// Changes of forces below this part of the largest that do not decrease are due to rounding.
-const ROUNDED_FORCE: f64 = 1e-9;
+const FORCE_NOISE_FRACTION: f64 = 1e-9;
 
 /// On the way to a leaf at rest, to more than this accuracy, its forces are not asked for.
-const ROUGH: f64 = 1e-3;
+const ROUGH_ACCURACY: f64 = 1e-3;
 
 /// Safety factor on the error of forces after a first increment.
 const FIRST_SAFETY: f64 = 10.0;
 
 /// The forces of a leaf in an iteration.
-pub struct ForceProgress {
+pub struct ForceConvergence {
     nearly_rigid: bool,
     /// Whether strains determine the forces of some rods.
-    redundant: bool,
+    is_indeterminate: bool,
     /// The strain that the last step missed.
-    missing: f64,
+    missed_strain: f64,
     /// The largest stiffness in stretch and shear, and the rounding error of forces.
     stiffness: f64,
     rounding: f64,
     /// The largest force, its last change, and the one before.
-    largest: f64,
+    largest_force: f64,
     change: f64,
     previous: f64,
     /// Size of the last increment of the nodes.
     increment: f64,
 }
 
-impl ForceProgress {
+impl ForceConvergence {
     /// Before the first step.
     pub fn new(leaf: &DiscreteLeaf) -> Self {
         let stiffness = leaf.largest_force_stiffness();
         let rounding = STRAIN_ROUNDING * leaf.segments() as f64 * stiffness;
-        ForceProgress {
+        ForceConvergence {
             nearly_rigid: leaf.is_nearly_rigid(),
-            redundant: leaf.leaf.is_held(),
-            missing: f64::INFINITY,
+            is_indeterminate: leaf.leaf.has_placed_supports(),
+            missed_strain: f64::INFINITY,
             stiffness,
             rounding,
-            largest: 0.0,
+            largest_force: 0.0,
             change: f64::INFINITY,
             previous: f64::INFINITY,
             increment: f64::INFINITY,
@@ -70,32 +70,34 @@ impl ForceProgress {
             return false;
         }
         let missing = leaf.missing_strain(before, after);
-        self.redundant |= missing > LAGGING * self.missing && missing > ROUNDED_STRAIN;
-        self.missing = missing;
-        self.redundant
+        self.is_indeterminate |=
+            missing > LAW_LAG_FRACTION * self.missed_strain && missing > STRAIN_NOISE;
+        self.missed_strain = missing;
+        self.is_indeterminate
     }
 
     /// After a step of this size between two states.
-    pub fn observe(&mut self, size: f64, before: &State, after: &State) {
-        if self.redundant {
+    pub fn record_step(&mut self, size: f64, before: &State, after: &State) {
+        if self.is_indeterminate {
             self.previous = self.change;
             self.change = after.force_change(before);
-            self.largest = largest(after.n.iter().map(|n| n.length()));
+            self.largest_force = largest(after.n.iter().map(|n| n.length()));
             self.increment = size;
         }
     }
 
     /// Whether the error that remains in the forces is at most this part of the largest, or
     /// rounding.
-    pub fn at_rest(&self, accuracy: f64) -> bool {
-        if !self.redundant || accuracy > ROUGH {
+    pub fn has_converged(&self, accuracy: f64) -> bool {
+        if !self.is_indeterminate || accuracy > ROUGH_ACCURACY {
             return true;
         }
-        let scale = self.largest.max(1.0);
-        let rounding = larger(ROUNDED_FORCE, self.rounding / scale);
+        let scale = self.largest_force.max(1.0);
+        let rounding = larger(FORCE_NOISE_FRACTION, self.rounding / scale);
         // Rotations of the size of the increment shorten a segment by their square.
         let first = FIRST_SAFETY * self.stiffness * self.increment * self.increment / scale;
         let (size, previous) = (self.change / scale, self.previous / scale);
-        size == 0.0 || converged(size, previous, [0.0; 2], (accuracy, rounding), first).is_some()
+        size == 0.0
+            || remaining_error(size, previous, [0.0; 2], (accuracy, rounding), first).is_some()
     }
 }

@@ -5,17 +5,17 @@
 //!
 //! Eigenvalues on nested grids, and what their extrapolation tells.
 
-use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, shift, turn};
+use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
-use crate::modes::{Eigenpair, Wanted};
+use crate::modes::{Eigenpair, ModeRequest};
 use crate::motion::Physics;
 use crate::numbers::larger;
-use crate::relax::accuracy::richardson::{Best, Richardson};
+use crate::relax::accuracy::richardson::{BestColumn, Richardson};
 use crate::relax::accuracy::transfer::Stencil;
-use crate::relax::accuracy::{Level, NestedEquilibrium};
+use crate::relax::accuracy::{GridLevel, NestedEquilibrium};
 use crate::relax::loading::arrival::on_next_grid;
 use crate::relax::request::Options;
-use crate::relax::rest::Problem;
+use crate::relax::rest::RelaxationProblem;
 use crate::relax::result::Mode;
 use glam::DVec3;
 use std::borrow::Cow;
@@ -29,13 +29,13 @@ const FEW_UNKNOWNS: usize = 20_000;
 const QUICK_UNKNOWNS: usize = 4_000;
 
 /// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
-const MANY_MORE_UNKNOWNS: usize = 200_000;
+const MAX_ADDED_GRID_UNKNOWNS: usize = 200_000;
 
 /// Largest number of grids finer than those of the relaxation.
 const MORE_GRIDS: usize = 6;
 
 /// Growth of the rounding error of an eigenvalue from grid to grid.
-const FINER_NOISE: f64 = 4.0;
+const EIGENVALUE_ROUNDING_GROWTH: f64 = 4.0;
 
 /// The tolerance if only the signs of the eigenvalues are needed.
 const SIGN_TOLERANCE: f64 = 1e-2;
@@ -44,11 +44,11 @@ const SIGN_TOLERANCE: f64 = 1e-2;
 /// square), and its limits: with less of it close eigenvalues are not told apart.
 const ACCURACY: f64 = 5e-3;
 
-const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
+const EIGENVECTOR_ACCURACY_BOUNDS: (f64, f64) = (1e-7, 1.6e-4);
 
 /// Two grids do not tell how eigenvalues converge, and one may be equal on both by chance: of
 /// requested ones so many are compared.
-const COMPARED: usize = 3;
+const MIN_COMPARED_GRIDS: usize = 3;
 
 /// Largest relative error of frequencies that are listed without their shapes, over the tolerance
 /// and in itself, but never asked to be less than the tolerance: by default eigenvalues have four
@@ -58,12 +58,12 @@ const LISTED_OVER_TOLERANCE: f64 = 40.0;
 const LARGEST_LISTED: f64 = 4e-5;
 
 /// The lowest modes of a settled leaf.
-pub struct Lowest {
+pub struct LowestModes {
     pub modes: Vec<Mode>,
     /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
     /// An eigenvalue that is zero to the accuracy required does not count, nor one within rounding of
     /// zero if the leaf can turn.
-    pub undecided: Option<f64>,
+    pub undecided_size: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
     /// So many eigenvalues are below those of the list.
@@ -72,10 +72,10 @@ pub struct Lowest {
     pub signs: Vec<Option<bool>>,
     /// The ratio of the softest eigenvalue and that on the grid whose linear equations tell the
     /// error, at least one: beside a bifurcation their response is wrong by so much.
-    pub softening: f64,
+    pub bifurcation_error_factor: f64,
 }
 
-impl Lowest {
+impl LowestModes {
     /// How many eigenvalues are negative for certain, whatever is known of the others.
     pub fn certainly_negative(&self) -> usize {
         let negative = self.signs.iter().filter(|sign| **sign == Some(true));
@@ -92,25 +92,25 @@ impl Lowest {
 
 /// A list of eigenvalues.
 #[derive(Clone, Copy)]
-pub struct List {
+pub struct EigenvalueRequest {
     pub count: usize,
     /// So many lower ones are left out, and the shift by which they are found to be lower: see
-    /// [`Wanted::above`].
-    pub above: Option<(usize, f64)>,
+    /// [`ModeRequest::above`].
+    pub omitted_lower: Option<(usize, f64)>,
     /// Whether the stability of the leaf depends on them: then its size does not matter.
-    pub decides: bool,
+    pub decides_stability: bool,
     /// Whether more than their signs is needed: they are as accurate as requested ones.
-    pub exact: bool,
+    pub needs_values: bool,
 }
 
-impl List {
+impl EigenvalueRequest {
     /// The modes that are requested.
-    pub fn requested(problem: &Problem) -> Self {
-        List {
+    pub fn requested(problem: &RelaxationProblem) -> Self {
+        EigenvalueRequest {
             count: problem.options.modes,
-            above: None,
-            decides: false,
-            exact: false,
+            omitted_lower: None,
+            decides_stability: false,
+            needs_values: false,
         }
     }
 }
@@ -118,63 +118,73 @@ impl List {
 /// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
 /// large, or there are several equal ones that cannot be told apart.
 /// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
-pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Option<Lowest> {
-    let List { count, above, .. } = list;
+pub fn lowest(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    list: EigenvalueRequest,
+) -> Option<LowestModes> {
+    let EigenvalueRequest {
+        count,
+        omitted_lower: above,
+        ..
+    } = list;
     let options = problem.options;
     let finest = found.levels.last()?;
-    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides;
+    let large =
+        unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides_stability;
     if count == 0 || !finest.leaf.leaf.has_potential() || large {
         return None;
     }
     let physics = Physics::new(problem.leaf);
     let requested = count <= options.modes && above.is_none();
-    let tolerance = if requested || list.exact {
+    let tolerance = if requested || list.needs_values {
         problem.tolerance
     } else {
         SIGN_TOLERANCE
     };
-    let on = |level: &Level, near: &[Vec<Increment>]| {
-        let wanted = Wanted {
+    let on = |level: &GridLevel, near: &[Vec<Increment>]| {
+        let wanted = ModeRequest {
             count,
-            above,
-            accuracy: (ACCURACY * tolerance.sqrt()).clamp(ACCURACIES.0, ACCURACIES.1),
-            near,
+            modes_below: above,
+            accuracy: (ACCURACY * tolerance.sqrt())
+                .clamp(EIGENVECTOR_ACCURACY_BOUNDS.0, EIGENVECTOR_ACCURACY_BOUNDS.1),
+            approximate_modes: near,
             time: &options.limit,
         };
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
     let left_out = above.map_or(0, |(others, _)| others);
-    let (wanted, most_unknowns) = match options.mode_shapes || list.exact {
-        true => (tolerance, MANY_MORE_UNKNOWNS),
+    let (wanted, most_unknowns) = match options.mode_shapes || list.needs_values {
+        true => (tolerance, MAX_ADDED_GRID_UNKNOWNS),
         false => {
             let listed = (LISTED_OVER_TOLERANCE * tolerance).min(LARGEST_LISTED);
             (tolerance.max(listed), FEW_UNKNOWNS)
         }
     };
-    let mut nested = Nested {
-        series: Series {
+    let mut nested = NestedEigenvalues {
+        series: EigenvalueSeries {
             index: found.index.unwrap_or(0).saturating_sub(left_out),
-            single: found.clearly_stable || problem.segments().is_some(),
+            trusts_single_grid: found.clearly_stable || problem.segments().is_some(),
             grids: Vec::new(),
             tolerance,
-            wanted,
+            wanted_relative_error: wanted,
             rounding: 0.0,
-            turns: !finest.leaf.turns(&finest.state).is_empty(),
+            turns: !finest.leaf.zero_energy_fields(&finest.state).is_empty(),
         },
         finest: None,
         coarser: None,
         segments: Vec::new(),
     };
-    let sharp = requested || list.exact;
+    let sharp = requested || list.needs_values;
     let compares = requested && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
-    let enough = |series: &Series| {
-        (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
+    let enough = |series: &EigenvalueSeries| {
+        (!sharp || series.accurate()) && (!compares || series.grids.len() >= MIN_COMPARED_GRIDS)
     };
     let sufficient_grids = sufficient_grids(options, found);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
     for (k, level) in found.levels.iter().enumerate().skip(skipped) {
         let series = &nested.series;
-        let decided = !series.grids.is_empty() && series.undecided().is_none();
+        let decided = !series.grids.is_empty() && series.undecided_size().is_none();
         if k >= sufficient_grids && decided && enough(series) {
             break;
         }
@@ -188,21 +198,21 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
     }
     nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        refine(problem, &mut nested, most_unknowns, (on, enough));
+        refine_eigenvalues(problem, &mut nested, most_unknowns, (on, enough));
     }
     let on = found.segments_of_estimate();
     let softening = (nested
         .segments
         .iter()
         .position(|segments| Some(*segments) == on))
-    .map_or(1.0, |grid| nested.series.softening(grid));
-    let Nested { series, finest, .. } = nested;
+    .map_or(1.0, |grid| nested.series.bifurcation_error_factor(grid));
+    let NestedEigenvalues { series, finest, .. } = nested;
     let shapes = match options.mode_shapes {
         true => finest?.shapes(&found.levels.last()?.leaf),
         false => Vec::new(),
     };
-    let unit = physics.time.powi(-2);
-    let mode = |it: Extrapolated| {
+    let unit = physics.time_unit.powi(-2);
+    let mode = |it: ExtrapolatedEigenvalue| {
         let (displacement, rotation) = shapes.get(it.number).cloned().unwrap_or_default();
         Mode {
             eigenvalue: it.value * unit,
@@ -211,38 +221,38 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
             rotation,
         }
     };
-    Some(Lowest {
+    Some(LowestModes {
         modes: series.values().into_iter().map(mode).collect(),
-        undecided: series.undecided(),
-        negative: series.negative().map(|negative| left_out + negative),
+        undecided_size: series.undecided_size(),
+        negative: series.negative_count().map(|negative| left_out + negative),
         left_out,
         signs: series.signs(),
-        softening,
+        bifurcation_error_factor: softening,
     })
 }
 
 /// Eigenvalues on nested grids, and the modes on the finest of these.
-struct Nested<'a> {
-    series: Series,
-    finest: Option<OnGrid<'a>>,
+struct NestedEigenvalues<'a> {
+    series: EigenvalueSeries,
+    finest: Option<GridModes<'a>>,
     /// The grid before that.
-    coarser: Option<Cow<'a, Level>>,
+    coarser: Option<Cow<'a, GridLevel>>,
     /// Segments of each grid of the series.
     segments: Vec<usize>,
 }
 
 /// The lowest modes on one grid: their number and their nodes are those of this grid alone.
-struct OnGrid<'a> {
-    level: Cow<'a, Level>,
+struct GridModes<'a> {
+    level: Cow<'a, GridLevel>,
     pairs: Vec<Eigenpair>,
 }
 
-impl<'a> Nested<'a> {
+impl<'a> NestedEigenvalues<'a> {
     /// Adds the modes on the next finer grid; false if they are not found.
     fn add(
         &mut self,
-        level: Cow<'a, Level>,
-        on: impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+        level: Cow<'a, GridLevel>,
+        on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
     ) -> bool {
         let coarser = self.finest.as_ref();
         let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
@@ -251,8 +261,8 @@ impl<'a> Nested<'a> {
         };
         self.series.push(&pairs);
         self.segments.push(level.leaf.segments());
-        self.series.rounding = modes::rounding(&level.leaf);
-        let before = self.finest.replace(OnGrid { level, pairs });
+        self.series.rounding = modes::quotient_rounding(&level.leaf);
+        let before = self.finest.replace(GridModes { level, pairs });
         self.coarser = before.map(|before| before.level);
         true
     }
@@ -269,28 +279,35 @@ fn sufficient_grids(options: &Options, found: &NestedEquilibrium) -> usize {
     if options.mode_shapes || found.index != Some(0) {
         return found.levels.len();
     }
-    let few = |level: &&Level| unknowns(&level.leaf) < QUICK_UNKNOWNS;
+    let few = |level: &&GridLevel| unknowns(&level.leaf) < QUICK_UNKNOWNS;
     let few = found.levels.iter().take_while(few).count();
     few.max(2).min(found.levels.len())
 }
 
 /// Whether the cost of modes on this grid is acceptable.
 fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
-    6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
+    6 * leaf.rods() * grid.segments() <= MAX_ADDED_GRID_UNKNOWNS
 }
 
 /// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
 /// small enough for an undecided one of this `size`.
-pub fn deciding_grid(problem: &Problem, found: &NestedEquilibrium, size: f64) -> Option<Grid> {
+pub fn deciding_grid(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    size: f64,
+) -> Option<Grid> {
     let noise = found.levels.last()?.leaf.neutral_shift();
-    let finer = (found.finer()).filter(|grid| is_affordable(problem.leaf, grid))?;
-    (size > FINER_NOISE * noise && !problem.out_of_time()).then_some(finer)
+    let finer = (found.next_finer_grid()).filter(|grid| is_affordable(problem.leaf, grid))?;
+    (size > EIGENVALUE_ROUNDING_GROWTH * noise && !problem.out_of_time()).then_some(finer)
 }
 
 /// The next grid, if it has few unknowns.
-pub fn small_grid(problem: &Problem, found: &NestedEquilibrium) -> Option<Grid> {
+pub fn affordable_next_grid(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+) -> Option<Grid> {
     let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
-    (found.finer()).filter(|grid| few(grid) && !problem.out_of_time())
+    (found.next_finer_grid()).filter(|grid| few(grid) && !problem.out_of_time())
 }
 
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
@@ -299,13 +316,13 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
 
 /// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, or
 /// the limits are reached.
-fn refine(
-    problem: &Problem,
-    nested: &mut Nested,
+fn refine_eigenvalues(
+    problem: &RelaxationProblem,
+    nested: &mut NestedEigenvalues,
     most_unknowns: usize,
     (on, enough): (
-        impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
-        impl Fn(&Series) -> bool,
+        impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+        impl Fn(&EigenvalueSeries) -> bool,
     ),
 ) -> Option<()> {
     for _ in 0..MORE_GRIDS {
@@ -324,16 +341,19 @@ fn refine(
     Some(())
 }
 
-impl OnGrid<'_> {
+impl GridModes<'_> {
     /// The shapes interpolated to a finer grid.
     fn interpolated(&self, fine: &DiscreteLeaf) -> Vec<Vec<Increment>> {
         let coarse = &self.level.leaf;
         let nodes = fine.grid.sigma().iter();
-        let stencils: Vec<_> = nodes.map(|&sigma| <Stencil>::at(coarse, sigma)).collect();
+        let stencils: Vec<_> = nodes
+            .map(|&sigma| <Stencil>::value_and_derivative_stencils(coarse, sigma))
+            .collect();
         let on_grid = |pair: &Eigenpair| {
             let rods = pair.shape.chunks(coarse.segments() + 1);
             let node = |(rod, [stencil, _]): (&[Increment], &[Stencil; 2])| -> Increment {
-                let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
+                let [turn, shift] =
+                    [rotation_part, displacement_part].map(|part| stencil.value(|i| part(&rod[i])));
                 let mut both = [0.0; 6];
                 turn.write_to_slice(&mut both[..3]);
                 shift.write_to_slice(&mut both[3..]);
@@ -347,14 +367,14 @@ impl OnGrid<'_> {
 
     /// Normalised shapes at the nodes of the same or a coarser grid: the largest displacement
     /// is the longest rod's length, and the last of the largest components is positive.
-    fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<Shape> {
+    fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<NodalModeShape> {
         let length = coarse.leaf.scale.length;
         let (nodes, segments) = (self.level.leaf.segments() + 1, coarse.segments());
         let stride = self.level.leaf.segments().div_ceil(segments);
         let shape = |pair: &Eigenpair| {
             let rods = pair.shape.chunks(nodes);
             let shape = rods.map(|rod| rod.iter().step_by(stride).copied().collect());
-            normalized(&shape.collect::<Vec<Vec<Increment>>>(), length)
+            normalize_mode_shape(&shape.collect::<Vec<Vec<Increment>>>(), length)
         };
         self.pairs.iter().map(shape).collect()
     }
@@ -362,21 +382,22 @@ impl OnGrid<'_> {
 
 /// A mode with smaller displacements than this, in lengths per radian of its rotation, is one
 /// of rotation alone.
-const NO_DISPLACEMENT: f64 = 1e-6;
+const PURE_ROTATION_DISPLACEMENT: f64 = 1e-6;
 
 /// Displacements and rotations of all nodes, rod by rod.
-pub(super) type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
+pub(super) type NodalModeShape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
 /// A shape in the scenario's unit of length, normalised.
-pub(super) fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
+pub(super) fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape {
     let nodes = || shape.iter().flatten();
     let largest =
         |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
-    let (far, turned) = (largest(shift), largest(turn));
-    let (size, part): (f64, fn(&Increment) -> DVec3) = match far > NO_DISPLACEMENT * turned {
-        true => (far, shift),
-        false => (turned, turn),
-    };
+    let (far, turned) = (largest(displacement_part), largest(rotation_part));
+    let (size, part): (f64, fn(&Increment) -> DVec3) =
+        match far > PURE_ROTATION_DISPLACEMENT * turned {
+            true => (far, displacement_part),
+            false => (turned, rotation_part),
+        };
     let components: Vec<f64> = nodes().flat_map(|node| part(node).to_array()).collect();
     let most = components.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     // The last of those that are equal up to rounding: a tip's.
@@ -389,14 +410,17 @@ pub(super) fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
         shape.iter().map(rod).collect()
     };
     let unit = sign / size;
-    (rods(shift, unit * length), rods(turn, unit))
+    (
+        rods(displacement_part, unit * length),
+        rods(rotation_part, unit),
+    )
 }
 
 /// Largest number of grids that are extrapolated.
 pub const GRIDS: usize = 4;
 
 /// Eigenvalues below this part of the largest have errors relative to that part.
-const SMALL: f64 = 1e-3;
+const SMALL_EIGENVALUE_FRACTION: f64 = 1e-3;
 
 /// Where all grids show the orders of their columns: the factor on the largest correction of an
 /// eigenvalue, and the part of each that those after it must reach, as that of a single number may be
@@ -416,16 +440,16 @@ const SAFETY: f64 = 2.0;
 
 const LEAST_CHANGE: f64 = 0.1;
 
-const OF_TWO_GRIDS: f64 = 1.0;
+const TWO_GRID_ERROR_FACTOR: f64 = 1.0;
 
 /// An error of up to this many times that of rounding does not decrease on finer grids.
-const NOISE: f64 = 4.0;
+const ROUNDING_ERROR_MULTIPLE: f64 = 4.0;
 
 /// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
-const UNFINISHED: f64 = 2e-3;
+const ITERATION_ERROR_FRACTION: f64 = 2e-3;
 
 /// An extrapolated eigenvalue.
-pub struct Extrapolated {
+pub struct ExtrapolatedEigenvalue {
     pub value: f64,
     /// If there are at least two grids.
     pub error: Option<f64>,
@@ -434,15 +458,15 @@ pub struct Extrapolated {
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
-pub struct Series {
+pub struct EigenvalueSeries {
     /// Number of the listed eigenvalues that are negative on the finest grid.
     pub index: usize,
     /// Whether their signs on a single grid are enough.
-    pub single: bool,
+    pub trusts_single_grid: bool,
     pub grids: Vec<Vec<f64>>,
     pub tolerance: f64,
     /// Relative error of frequencies that is small enough.
-    pub wanted: f64,
+    pub wanted_relative_error: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     pub rounding: f64,
     /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
@@ -450,7 +474,7 @@ pub struct Series {
     pub turns: bool,
 }
 
-impl Series {
+impl EigenvalueSeries {
     /// Adds the eigenvalues on a grid twice as fine as the last.
     pub fn push(&mut self, pairs: &[Eigenpair]) {
         let values = pairs.iter().map(|pair| pair.eigenvalue);
@@ -461,13 +485,13 @@ impl Series {
     fn unit(&self, k: usize) -> f64 {
         let finest = &self.grids[self.grids.len() - 1];
         let largest = finest.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
-        let unit = finest[k].abs().max(SMALL * largest);
+        let unit = finest[k].abs().max(SMALL_EIGENVALUE_FRACTION * largest);
         if unit > 0.0 { unit } else { 1.0 }
     }
 
     /// The extrapolated value of the eigenvalue with this number, and a bound on its error by its own
     /// changes if there are at least two grids, in its unit.
-    fn judge(&self, k: usize) -> (f64, Option<f64>) {
+    fn extrapolate_eigenvalue(&self, k: usize) -> (f64, Option<f64>) {
         // A coarse grid may have fewer modes.
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
         let all = values.clone().count();
@@ -475,7 +499,7 @@ impl Series {
         let table: Richardson = values
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
-        let error = |best: Best| {
+        let error = |best: BestColumn| {
             if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
                 let (factor, part) = CORRECTIONS;
                 // Where signs alone are needed, grids go on until they are certain.
@@ -487,7 +511,7 @@ impl Series {
                 return factor * table.largest_correction(best.columns, part);
             }
             let least = match (all, best.columns) {
-                (2, _) => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
+                (2, _) => TWO_GRID_ERROR_FACTOR * (table.column(0)[0] - self.coarser(k)).abs(),
                 (_, 0) => LEAST_CHANGE * table.change_before(),
                 _ => 0.0,
             };
@@ -503,16 +527,17 @@ impl Series {
 
     /// Extrapolated values, ascending, and their errors if there are at least two grids: the
     /// geometric mean of its own bound, which may be small by chance, and the largest of all.
-    pub fn values(&self) -> Vec<Extrapolated> {
+    pub fn values(&self) -> Vec<ExtrapolatedEigenvalue> {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
-            .map(|k| self.judge(k))
+            .map(|k| self.extrapolate_eigenvalue(k))
             .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
-        let bound = |error: f64| (error * largest).sqrt() + UNFINISHED * self.tolerance;
+        let bound =
+            |error: f64| (error * largest).sqrt() + ITERATION_ERROR_FRACTION * self.tolerance;
         let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
             let unit = self.unit(number);
-            Extrapolated {
+            ExtrapolatedEigenvalue {
                 value: value * unit,
                 // Zero on all grids is that of a turn without resistance, and exact.
                 error: error.map(|error| match *value == 0.0 {
@@ -523,14 +548,14 @@ impl Series {
             }
         };
         let mut values: Vec<_> = found.iter().enumerate().map(in_units).collect();
-        ascending(&mut values);
+        sort_extrapolated(&mut values);
         values
     }
 
     /// Whether the relative error of all frequencies is as small as wanted.
     pub fn accurate(&self) -> bool {
-        let known = |(k, it): (usize, Extrapolated)| {
-            let wanted = 2.0 * self.wanted * self.unit(k);
+        let known = |(k, it): (usize, ExtrapolatedEigenvalue)| {
+            let wanted = 2.0 * self.wanted_relative_error * self.unit(k);
             it.error
                 .is_some_and(|error| error <= wanted + self.rounding)
         };
@@ -539,7 +564,7 @@ impl Series {
 
     /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
     /// grid.
-    pub fn negative(&self) -> Option<usize> {
+    pub fn negative_count(&self) -> Option<usize> {
         let negative = |sum, sign: Option<bool>| Some(sum + usize::from(sign?));
         self.signs().into_iter().try_fold(0, negative)
     }
@@ -547,19 +572,23 @@ impl Series {
     /// Whether each eigenvalue, ascending, is negative, if that is certain; on a single grid
     /// whether it is there.
     pub fn signs(&self) -> Vec<Option<bool>> {
-        let alone = |k: usize| NOISE * self.rounding + UNFINISHED * self.tolerance * self.unit(k);
-        let certain = |(k, it): (usize, &Extrapolated)| match it.error {
-            Some(error) => it.value.abs() > error || error == 0.0,
-            None => self.single && it.value.abs() > alone(k),
+        let alone = |k: usize| {
+            ROUNDING_ERROR_MULTIPLE * self.rounding
+                + ITERATION_ERROR_FRACTION * self.tolerance * self.unit(k)
         };
-        let sign = |(k, it): (usize, Extrapolated)| certain((k, &it)).then_some(it.value < 0.0);
+        let certain = |(k, it): (usize, &ExtrapolatedEigenvalue)| match it.error {
+            Some(error) => it.value.abs() > error || error == 0.0,
+            None => self.trusts_single_grid && it.value.abs() > alone(k),
+        };
+        let sign =
+            |(k, it): (usize, ExtrapolatedEigenvalue)| certain((k, &it)).then_some(it.value < 0.0);
         self.values().into_iter().enumerate().map(sign).collect()
     }
 
     /// The largest ratio of a positive eigenvalue on a grid and what it is at least without errors
     /// of grids, either way, of those that are larger than their errors; at least one.
-    pub fn softening(&self, grid: usize) -> f64 {
-        let ratio = |it: Extrapolated| {
+    pub fn bifurcation_error_factor(&self, grid: usize) -> f64 {
+        let ratio = |it: ExtrapolatedEigenvalue| {
             let on_grid = *self.grids[grid].get(it.number)?;
             let least = it.value - it.error?;
             let smallest = least.min(on_grid.abs());
@@ -574,19 +603,19 @@ impl Series {
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
     /// finest grid. One that is zero to the tolerance may have either sign, and of a leaf that
     /// can turn one that is zero to rounding.
-    pub fn undecided(&self) -> Option<f64> {
-        let unknown = |(k, it): (usize, Extrapolated)| {
+    pub fn undecided_size(&self) -> Option<f64> {
+        let unknown = |(k, it): (usize, ExtrapolatedEigenvalue)| {
             let size = it.value.abs();
             let Some(error) = it.error else {
                 // There is no other grid to compare with.
-                return (!self.single).then_some(size.max(self.unit(k)));
+                return (!self.trusts_single_grid).then_some(size.max(self.unit(k)));
             };
             let noise = if self.turns {
-                NOISE * self.rounding
+                ROUNDING_ERROR_MULTIPLE * self.rounding
             } else {
                 0.0
             };
-            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + noise;
+            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL_EIGENVALUE_FRACTION) + noise;
             let decided = match size > error {
                 true => (it.value < 0.0) == (k < self.index),
                 false => error <= zero,
@@ -599,7 +628,7 @@ impl Series {
 }
 
 /// Sorts extrapolated values. The errors of those that change places cover the exchange.
-fn ascending(values: &mut [Extrapolated]) {
+fn sort_extrapolated(values: &mut [ExtrapolatedEigenvalue]) {
     let mut first = 0;
     for end in 1..=values.len() {
         let highest = values[first..end].iter().map(|it| it.value);
@@ -629,18 +658,18 @@ mod tests {
     #[test]
     fn negative_eigenvalues_are_counted_beside_one_that_may_have_either_sign() {
         let grids = [[-1.27e-3, 1e-6], [-1.278e-3, 2e-6], [-1.28e-3, 1e-6]];
-        let found = Series {
+        let found = EigenvalueSeries {
             index: 0,
-            single: false,
+            trusts_single_grid: false,
             grids: grids.map(Vec::from).into(),
             tolerance: 1e-6,
-            wanted: 1e-6,
+            wanted_relative_error: 1e-6,
             rounding: 8e-6,
             turns: false,
         };
-        assert_eq!(found.negative(), None);
+        assert_eq!(found.negative_count(), None);
         assert_eq!(found.signs(), [Some(true), None]);
-        assert!(found.undecided().is_some());
+        assert!(found.undecided_size().is_some());
     }
 
     /// Three grids that all show their order are enough for four digits, as of the leaf of Fig. 4; and
@@ -662,12 +691,12 @@ mod tests {
             [82.184376, 314.139966, 512.585365],
         ];
         for (grids, exact) in [clean, by_chance].into_iter().zip(exact) {
-            let found = Series {
+            let found = EigenvalueSeries {
                 index: 0,
-                single: false,
+                trusts_single_grid: false,
                 grids: grids.map(Vec::from).into(),
                 tolerance: 1e-6,
-                wanted: 4e-5,
+                wanted_relative_error: 4e-5,
                 rounding: 0.0,
                 turns: false,
             };

@@ -5,18 +5,18 @@
 //! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
 
 use crate::homotopy::Homotopy;
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafRate, Response, State};
-use crate::newton::Stop;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
+use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::transfer::transfer;
-use crate::relax::accuracy::{Level, NestedEquilibrium};
+use crate::relax::accuracy::{GridLevel, NestedEquilibrium};
 use crate::relax::loading::arrival;
-use crate::relax::loading::arrival::{follow, follow_on_these};
-use crate::relax::request::{Options, Progress, RelaxError, rests_in_wind};
-use crate::relax::rest::{Effort, Problem, decided, relax_on_grids};
+use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
+use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
+use crate::relax::rest::{RelaxationProblem, WorkLog, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
 use crate::relax::sensitivity::Linearized;
-use crate::relax::stability::project;
+use crate::relax::stability::state_from_rod_shapes;
 use crate::run::Instant;
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
@@ -25,13 +25,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
 /// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
-const DRIFT: f64 = 0.5;
+const LARGEST_PREDICTION_ERROR: f64 = 0.5;
 
 const DRIFT_LENGTH: f64 = 0.02;
 
 /// The grids on which an equilibrium is continued.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Grids {
+pub(crate) enum GridPolicy {
     /// The present ones, and finer ones where the tolerance requires them.
     AsNeeded,
     /// The present ones only.
@@ -40,20 +40,20 @@ pub(crate) enum Grids {
 
 /// Why a continuation ended without an equilibrium.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Lost {
+pub(crate) enum ContinuationFailure {
     /// The leaf does not come to rest, with the reason.
     NotAtRest(String),
     /// The equilibrium found is not the continuation of this one: the leaf would have to jump.
-    Elsewhere,
+    OtherEquilibrium,
 }
 
 impl NestedEquilibrium {
     /// The stable equilibrium to which relaxation leads from the start of the scenario.
-    pub fn find(
+    pub fn relax_to_stable(
         scenario: &Scenario,
         options: &Options,
-    ) -> Result<Result<NestedEquilibrium, Lost>, RelaxError> {
-        observed(scenario, options, &mut |_| {})
+    ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
+        relax_with_progress(scenario, options, &mut |_| {})
     }
 
     /// The same in no more than so many steps; a leaf that needs more does not come to rest.
@@ -61,7 +61,7 @@ impl NestedEquilibrium {
         scenario: &Scenario,
         options: &Options,
         most_steps: usize,
-    ) -> Result<Result<NestedEquilibrium, Lost>, RelaxError> {
+    ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
         let cancel = Arc::new(AtomicBool::new(false));
         let mut limited = options.clone();
         limited.limit.cancel = Some(cancel.clone());
@@ -72,71 +72,77 @@ impl NestedEquilibrium {
                 cancel.store(true, Ordering::Relaxed);
             }
         };
-        observed(scenario, &limited, &mut count)
+        relax_with_progress(scenario, &limited, &mut count)
     }
 
     /// The equilibrium of a slightly different scenario, starting on each grid from this one
     /// plus its linear response to the difference.
-    pub fn follow(
+    pub fn continue_to_scenario(
         &self,
         scenario: Arc<Scenario>,
-        response: &[Response],
-        (options, grids): (&Options, Grids),
-    ) -> Result<NestedEquilibrium, Lost> {
+        response: &[LinearResponse],
+        (options, grids): (&Options, GridPolicy),
+    ) -> Result<NestedEquilibrium, ContinuationFailure> {
         let scale = scenario.scale();
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let leaf = Leaf::in_units(scenario, scale);
+        let leaf = Leaf::with_scale(scenario, scale);
         let guesses: Vec<_> = (self.levels.iter().enumerate())
             .map(|(k, level)| {
-                let mut state = moved(level, &leaf, &response[k]);
-                leaf.hold_tips(&mut state);
+                let mut state = displaced_state(level, &leaf, &response[k]);
+                leaf.place_held_tips(&mut state);
                 (level.leaf.grid.clone(), state)
             })
             .collect();
         let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
-        let problem = Problem {
+        let problem = RelaxationProblem {
             // As for a reduced leaf: it fails if the leaf would have to move far.
-            whole: Some(&leaf),
-            ..Problem::new(&leaf, options, tolerance)
+            whole_leaf: Some(&leaf),
+            ..RelaxationProblem::new(&leaf, options, tolerance)
         };
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-        let (begun, mut effort) = (NestedEquilibrium::begun(&problem), Effort::new(ignored));
+        let (begun, mut effort) = (
+            NestedEquilibrium::without_grids(&problem),
+            WorkLog::new(ignored),
+        );
         let followed = match grids {
-            Grids::AsNeeded => follow(&problem, begun, guesses, &mut effort),
-            Grids::These => follow_on_these(&problem, begun, guesses, &mut effort),
+            GridPolicy::AsNeeded => solve_from_guesses(&problem, begun, guesses, &mut effort),
+            GridPolicy::These => solve_on_given_grids(&problem, begun, guesses, &mut effort),
         };
         let found = followed.map_err(|failure| match failure.stop {
-            Stop::StepLimit if problem.out_of_time() => {
-                Lost::NotAtRest("the time allowed was over".into())
+            EquilibriumFailure::StepLimit if problem.out_of_time() => {
+                ContinuationFailure::NotAtRest("the time allowed was over".into())
             }
-            _ => Lost::Elsewhere,
+            _ => ContinuationFailure::OtherEquilibrium,
         })?;
         for ((level, expected), before) in found.levels.iter().zip(&expected).zip(&self.levels) {
-            let predicted = rescaled(before, before.state.clone(), &leaf).shift_to(expected);
-            if level.state.shift_to(expected) > DRIFT * predicted + DRIFT_LENGTH {
-                return Err(Lost::Elsewhere);
+            let predicted = rescale_state(before, before.state.clone(), &leaf)
+                .largest_displacement_to(expected);
+            if level.state.largest_displacement_to(expected)
+                > LARGEST_PREDICTION_ERROR * predicted + DRIFT_LENGTH
+            {
+                return Err(ContinuationFailure::OtherEquilibrium);
             }
         }
-        Ok(found.after(effort.work))
+        Ok(found.with_work(effort.work))
     }
 }
 
-fn observed(
+fn relax_with_progress(
     scenario: &Scenario,
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
-) -> Result<Result<NestedEquilibrium, Lost>, RelaxError> {
+) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
     let (leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
         let remark = leaf.remark.clone();
         let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
-        return Ok(Err(Lost::NotAtRest(why)));
+        return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
     Ok(Ok(found))
 }
 
 /// A state of a level in the units of another leaf, with the base rotations of that leaf.
-pub(super) fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
+pub(super) fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);
@@ -149,20 +155,20 @@ pub(super) fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
 }
 
 /// A state displaced by a linear response, in the units of another leaf.
-fn moved(level: &Level, leaf: &Leaf, response: &Response) -> State {
+fn displaced_state(level: &GridLevel, leaf: &Leaf, response: &LinearResponse) -> State {
     let mut state = level.state.clone();
     response.advance(&mut state, 1.0);
-    rescaled(level, state, leaf)
+    rescale_state(level, state, leaf)
 }
 
 /// The shortest step of the way, as a part of it.
 const SHORTEST: f64 = 1.0 / 4096.0;
 
 /// How much shorter a step is made that fails.
-const SHORTENED: f64 = 0.25;
+const FAILED_STEP_FACTOR: f64 = 0.25;
 
 /// Grids on which the next equilibrium is predicted.
-const PREDICTING: usize = 2;
+const MAX_PREDICTED_GRIDS: usize = 2;
 
 /// The finest of the grids that are tried where coarser ones have no equilibrium any more: folds lie
 /// elsewhere on each of them.
@@ -170,7 +176,7 @@ const FINEST: usize = 128;
 
 /// Equilibria on two grids that are no farther apart, in lengths, are one: beside a fold, which lies
 /// elsewhere on each, that is far.
-const SAME: f64 = 0.1;
+const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.1;
 
 /// A leaf at rest, which can follow.
 ///
@@ -193,32 +199,32 @@ const SAME: f64 = 0.1;
 /// assert_eq!(heavy.stable(), Some(true));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Follower {
+pub struct EquilibriumTracker {
     scenario: Arc<Scenario>,
     options: Options,
     at: NestedEquilibrium,
     /// Segments of the coarsest grid away from folds.
-    usual: usize,
+    usual_coarsest_segments: usize,
     /// Those that are tried instead, once, where it takes more than [`ENOUGH`] grids.
-    other: Option<usize>,
+    alternative_segments: Option<usize>,
 }
 
 /// Grids that a leaf needs on the right coarsest one: the next would cost more than all of these.
-const ENOUGH: usize = 3;
+const MAX_ECONOMICAL_GRIDS: usize = 3;
 
 /// Where a leaf is that was to follow.
-pub enum Followed {
+pub enum TrackOutcome {
     /// In the equilibrium into which the one before has changed.
-    There(Box<Equilibrium>),
+    Arrived(Box<Equilibrium>),
     /// Its stable equilibria end at this part of the way, where it stays: from there it has to move
     /// on, to another one.
-    Left {
+    BranchEnded {
         /// From 0, where it began, to 1.
         part: f64,
     },
 }
 
-impl Follower {
+impl EquilibriumTracker {
     /// Brings a leaf to rest as [`relax`](crate::relax::relax) does; none can follow if it is not, or at
     /// a saddle.
     ///
@@ -227,21 +233,25 @@ impl Follower {
     pub fn begin(
         scenario: &Scenario,
         options: &Options,
-    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+    ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
         let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
         let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
-        let follower = Follower::new(Arc::new(scenario.clone()), options, at);
+        let follower = EquilibriumTracker::new(Arc::new(scenario.clone()), options, at);
         Ok((leaf, rests.then_some(follower)))
     }
 
-    fn new(scenario: Arc<Scenario>, options: &Options, at: NestedEquilibrium) -> Follower {
+    fn new(
+        scenario: Arc<Scenario>,
+        options: &Options,
+        at: NestedEquilibrium,
+    ) -> EquilibriumTracker {
         let usual = (at.levels.first()).map_or(0, |level| level.leaf.segments());
-        Follower {
+        EquilibriumTracker {
             scenario,
             options: options.clone(),
             at,
-            usual,
-            other: Some(usual + usual / 4),
+            usual_coarsest_segments: usual,
+            alternative_segments: Some(usual + usual / 4),
         }
     }
 
@@ -254,23 +264,23 @@ impl Follower {
         scenario: &Scenario,
         options: &Options,
         (stations, rods): (&[f64], &[RodShape]),
-    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
-        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+    ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
+        let leaf = Leaf::with_scale(Arc::new(scenario.clone()), scenario.scale());
         let alike = rods.len() == leaf.rods()
             && (stations.first(), stations.last()) == (Some(&0.0), Some(&1.0))
             && stations.is_sorted_by(|a, b| a < b)
             && rods.iter().all(|rod| rod.nodes.len() == stations.len());
         if !alike {
-            return Follower::begin(scenario, options);
+            return EquilibriumTracker::begin(scenario, options);
         }
-        let grid = Grid::through(stations, leaf.kinks());
-        let mut state = project(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
+        let grid = Grid::from_stations(stations, leaf.kinks());
+        let mut state = state_from_rod_shapes(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
         for j in 0..leaf.rods() {
             let base = state.base(j);
             (state.x[base], state.q[base]) = leaf.base(j);
         }
-        leaf.hold_tips(&mut state);
-        Follower::begin_from(scenario, options, (grid, state))
+        leaf.place_held_tips(&mut state);
+        EquilibriumTracker::begin_from(scenario, options, (grid, state))
     }
 
     /// The same from this state on a grid.
@@ -278,23 +288,23 @@ impl Follower {
         scenario: &Scenario,
         options: &Options,
         (grid, state): (Grid, State),
-    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
-        rests_in_wind(scenario, options)?;
+    ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
+        check_wind_options(scenario, options)?;
         let clock = Instant::now();
         let scenario = Arc::new(scenario.clone());
-        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let leaf = Leaf::with_scale(Arc::clone(&scenario), scenario.scale());
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let problem = Problem::new(&leaf, options, tolerance);
+        let problem = RelaxationProblem::new(&leaf, options, tolerance);
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-        let mut effort = Effort::new(ignored);
-        let begun = NestedEquilibrium::begun(&problem);
-        match arrival::follow(&problem, begun, vec![(grid, state)], &mut effort) {
+        let mut effort = WorkLog::new(ignored);
+        let begun = NestedEquilibrium::without_grids(&problem);
+        match arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort) {
             Ok(found) if found.is_stable() => {
                 let (at, result) = decide(&problem, found, clock, &mut effort);
-                let follower = Follower::new(Arc::clone(&scenario), options, at);
+                let follower = EquilibriumTracker::new(Arc::clone(&scenario), options, at);
                 Ok((result, Some(follower)))
             }
-            _ => Follower::begin(&scenario, options),
+            _ => EquilibriumTracker::begin(&scenario, options),
         }
     }
 
@@ -304,7 +314,7 @@ impl Follower {
     }
 
     /// The leaf on its grids.
-    pub(crate) fn levels(&self) -> &[Level] {
+    pub(crate) fn levels(&self) -> &[GridLevel] {
         &self.at.levels
     }
 
@@ -315,26 +325,26 @@ impl Follower {
     pub fn follow<E: From<RelaxError>>(
         &mut self,
         along: &dyn Fn(f64) -> Result<Scenario, E>,
-    ) -> Result<Followed, E> {
+    ) -> Result<TrackOutcome, E> {
         let clock = Instant::now();
         let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
         loop {
-            let scenario = Arc::new(along(way.next())?);
-            rests_in_wind(&scenario, &self.options)?;
-            let last = way.next() == 1.0;
+            let scenario = Arc::new(along(way.next_lambda())?);
+            check_wind_options(&scenario, &self.options)?;
+            let last = way.next_lambda() == 1.0;
             match self.step(Arc::clone(&scenario), last) {
                 Ok(found) => {
                     (self.at, self.scenario) = (found, scenario);
                     if last {
                         self.coarsen();
-                        self.economise();
-                        return Ok(Followed::There(Box::new(self.equilibrium(clock))));
+                        self.choose_cheaper_grid();
+                        return Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))));
                     }
-                    way.advance(2.0 * way.length());
+                    way.advance(2.0 * way.next_step_length());
                 }
-                Err(_) if way.shorten(SHORTENED) => {}
+                Err(_) if way.shorten(FAILED_STEP_FACTOR) => {}
                 Err(_) if self.refine() => {}
-                Err(_) => return Ok(Followed::Left { part: way.part }),
+                Err(_) => return Ok(TrackOutcome::BranchEnded { part: way.lambda }),
             }
         }
     }
@@ -346,24 +356,25 @@ impl Follower {
             let fine = finer.leaf.segments() <= FINEST;
             if fine {
                 let levels = self.at.levels[1..].to_vec();
-                self.at = self.at.grids().on(levels);
+                self.at = self.at.without_estimates().with_levels(levels);
             }
             return fine;
         }
         let only = &self.at.levels[0].leaf;
-        only.segments() < FINEST && self.goes_on(only.leaf.clone(), only.grid.refined())
+        only.segments() < FINEST && self.continue_on_grid(only.leaf.clone(), only.grid.refined())
     }
 
     /// Whether it is in the same equilibrium on another grid, on which it then goes on.
-    fn goes_on(&mut self, leaf: Leaf, grid: Grid) -> bool {
-        let Ok(found) = self.near(&leaf, grid) else {
+    fn continue_on_grid(&mut self, leaf: Leaf, grid: Grid) -> bool {
+        let Ok(found) = self.equilibrium_on_grid(&leaf, grid) else {
             return false;
         };
         let (Some(own), Some(other)) = (self.at.levels.last(), found.levels.last()) else {
             return false;
         };
         let there = transfer(&own.leaf, &own.state, &other.leaf.grid);
-        let same = there.shift_to(&other.state) < SAME && found.is_stable();
+        let same = there.largest_displacement_to(&other.state) < SAME_EQUILIBRIUM_DISTANCE
+            && found.is_stable();
         if same {
             self.at = found;
         }
@@ -373,21 +384,23 @@ impl Follower {
     /// Goes back to the usual grids, if the equilibrium exists on these.
     fn coarsen(&mut self) {
         let coarsest = &self.at.levels[0].leaf;
-        if coarsest.segments() > self.usual {
-            let grid = Grid::new(self.usual, coarsest.leaf.kinks());
-            self.goes_on(coarsest.leaf.clone(), grid);
+        if coarsest.segments() > self.usual_coarsest_segments {
+            let grid = Grid::new(self.usual_coarsest_segments, coarsest.leaf.kinks());
+            self.continue_on_grid(coarsest.leaf.clone(), grid);
         }
     }
 
     /// Goes on from a coarsest grid that is a little finer, if that saves the finest of too many.
-    fn economise(&mut self) {
+    fn choose_cheaper_grid(&mut self) {
         let first = &self.at.levels[0].leaf;
-        let too_many = self.at.levels.len() > ENOUGH && first.segments() == self.usual;
-        if let Some(segments) = self.other.take_if(|_| too_many) {
-            let (leaf, before) = (first.leaf.clone(), self.at.grids());
+        let too_many = self.at.levels.len() > MAX_ECONOMICAL_GRIDS
+            && first.segments() == self.usual_coarsest_segments;
+        if let Some(segments) = self.alternative_segments.take_if(|_| too_many) {
+            let (leaf, before) = (first.leaf.clone(), self.at.without_estimates());
             let grid = Grid::new(segments, leaf.kinks());
-            match self.goes_on(leaf, grid) && self.at.levels.len() <= ENOUGH {
-                true => self.usual = segments,
+            match self.continue_on_grid(leaf, grid) && self.at.levels.len() <= MAX_ECONOMICAL_GRIDS
+            {
+                true => self.usual_coarsest_segments = segments,
                 false => self.at = before,
             }
         }
@@ -398,36 +411,40 @@ impl Follower {
     /// # Errors
     /// Requests that cannot be met.
     pub fn settle(&mut self, scenario: &Scenario) -> Result<Equilibrium, RelaxError> {
-        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+        let leaf = Leaf::with_scale(Arc::new(scenario.clone()), scenario.scale());
         let grid = self.grid(&leaf);
         let state = self.state_on(&leaf, &grid);
-        self.settle_from(scenario, (grid, state))
+        self.relax_from_state(scenario, (grid, state))
     }
 
     /// The same from this state on a grid; where that leads nowhere, as a relaxation begins.
-    pub(crate) fn settle_from(
+    pub(crate) fn relax_from_state(
         &mut self,
         scenario: &Scenario,
         guess: (Grid, State),
     ) -> Result<Equilibrium, RelaxError> {
-        let (result, follower) = Follower::begin_from(scenario, &self.options, guess)?;
+        let (result, follower) = EquilibriumTracker::begin_from(scenario, &self.options, guess)?;
         if let Some(follower) = follower {
             // What it is brought to on a finer grid need not stay there.
-            let (usual, other) = (self.usual.min(follower.usual), self.other);
+            let (usual, other) = (
+                self.usual_coarsest_segments
+                    .min(follower.usual_coarsest_segments),
+                self.alternative_segments,
+            );
             *self = follower;
-            (self.usual, self.other) = (usual, other);
+            (self.usual_coarsest_segments, self.alternative_segments) = (usual, other);
         }
         Ok(result)
     }
 
     /// The present equilibrium as a result.
     fn equilibrium(&mut self, clock: Instant) -> Equilibrium {
-        let leaf = Leaf::in_units(Arc::clone(&self.scenario), self.scenario.scale());
-        let problem = Problem::new(&leaf, &self.options, self.tolerance(&self.scenario));
+        let leaf = Leaf::with_scale(Arc::clone(&self.scenario), self.scenario.scale());
+        let problem = RelaxationProblem::new(&leaf, &self.options, self.tolerance(&self.scenario));
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-        let mut effort = Effort::new(ignored);
+        let mut effort = WorkLog::new(ignored);
         effort.work = self.at.work;
-        let found = std::mem::replace(&mut self.at, NestedEquilibrium::begun(&problem));
+        let found = std::mem::replace(&mut self.at, NestedEquilibrium::without_grids(&problem));
         let (at, result) = decide(&problem, found, clock, &mut effort);
         self.at = at;
         result
@@ -438,54 +455,66 @@ impl Follower {
     }
 
     /// The equilibrium of a scenario nearby, if it is the continuation of the present one and stable.
-    fn step(&self, scenario: Arc<Scenario>, last: bool) -> Result<NestedEquilibrium, Lost> {
-        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
-        let near = self.at.coarsest(PREDICTING.min(self.at.levels.len()));
-        let near = near.unwrap_or_else(|| self.at.grids());
-        let found = match self.is_like(&leaf) {
+    fn step(
+        &self,
+        scenario: Arc<Scenario>,
+        last: bool,
+    ) -> Result<NestedEquilibrium, ContinuationFailure> {
+        let leaf = Leaf::with_scale(Arc::clone(&scenario), scenario.scale());
+        let near = self
+            .at
+            .on_coarsest_grids(MAX_PREDICTED_GRIDS.min(self.at.levels.len()));
+        let near = near.unwrap_or_else(|| self.at.without_estimates());
+        let found = match self.has_same_structure(&leaf) {
             true => {
                 let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
-                let rate = LeafRate::new(&near.levels[0].leaf.leaf, &terms);
+                let rate = LeafParameterDerivative::new(&near.levels[0].leaf.leaf, &terms);
                 let mut responses = Vec::new();
                 for level in &near.levels {
                     let mut linear = Linearized::new(level, self.tolerance(&scenario));
                     let forces = linear.forces(level, std::slice::from_ref(&rate));
                     let response = linear.responses(level, &forces);
                     let response = response.and_then(|all| all.into_iter().next());
-                    responses.push(response.ok_or(Lost::Elsewhere)?);
+                    responses.push(response.ok_or(ContinuationFailure::OtherEquilibrium)?);
                 }
                 let grids = match last {
-                    true => Grids::AsNeeded,
-                    false => Grids::These,
+                    true => GridPolicy::AsNeeded,
+                    false => GridPolicy::These,
                 };
-                near.follow(scenario, &responses, (&self.options, grids))?
+                near.continue_to_scenario(scenario, &responses, (&self.options, grids))?
             }
-            false => self.near(&leaf, self.grid(&leaf))?,
+            false => self.equilibrium_on_grid(&leaf, self.grid(&leaf))?,
         };
         match last && !found.is_stable() {
-            true => Err(Lost::Elsewhere),
+            true => Err(ContinuationFailure::OtherEquilibrium),
             false => Ok(found),
         }
     }
 
     /// The equilibrium of a leaf whose nodes lie elsewhere: from where this one is, on a grid, without
     /// leaving its valley.
-    fn near(&self, leaf: &Leaf, grid: Grid) -> Result<NestedEquilibrium, Lost> {
-        let problem = Problem {
-            whole: Some(leaf),
-            ..Problem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
+    fn equilibrium_on_grid(
+        &self,
+        leaf: &Leaf,
+        grid: Grid,
+    ) -> Result<NestedEquilibrium, ContinuationFailure> {
+        let problem = RelaxationProblem {
+            whole_leaf: Some(leaf),
+            ..RelaxationProblem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
         };
         let guess = self.state_on(leaf, &grid);
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-        let mut effort = Effort::new(ignored);
-        let begun = NestedEquilibrium::begun(&problem);
-        let found = arrival::follow(&problem, begun, vec![(grid, guess)], &mut effort);
-        Ok(found.map_err(|_| Lost::Elsewhere)?.after(effort.work))
+        let mut effort = WorkLog::new(ignored);
+        let begun = NestedEquilibrium::without_grids(&problem);
+        let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, guess)], &mut effort);
+        Ok(found
+            .map_err(|_| ContinuationFailure::OtherEquilibrium)?
+            .with_work(effort.work))
     }
 
     /// Whether the scenario of a leaf differs from the present one in numbers alone that leave the
     /// nodes, and what is held and tied, where they are.
-    fn is_like(&self, leaf: &Leaf) -> bool {
+    fn has_same_structure(&self, leaf: &Leaf) -> bool {
         let (own, other) = (&*self.scenario, leaf.scenario());
         let held = |of: &Scenario| of.held_tip.as_ref().map(|tip| tip.clamps.is_some());
         let grips = own.grips.iter().zip(&other.grips);
@@ -516,20 +545,20 @@ impl Follower {
     /// Its state on a grid of a leaf with as many rods, in the units of that leaf.
     pub(crate) fn state_on(&self, leaf: &Leaf, grid: &Grid) -> State {
         let level = &self.at.levels[0];
-        let mut state = rescaled(level, level.state.clone(), leaf);
+        let mut state = rescale_state(level, level.state.clone(), leaf);
         state = transfer(&level.leaf, &state, grid);
-        leaf.hold_tips(&mut state);
+        leaf.place_held_tips(&mut state);
         state
     }
 }
 
 /// The result of an equilibrium, and the grids on which its stability is known.
 fn decide(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     found: NestedEquilibrium,
     clock: Instant,
-    effort: &mut Effort,
+    effort: &mut WorkLog,
 ) -> (NestedEquilibrium, Equilibrium) {
-    let (result, at) = decided(problem, Ok(found), clock, effort);
+    let (result, at) = equilibrium_with_stability(problem, Ok(found), clock, effort);
     (at, result)
 }

@@ -20,38 +20,41 @@ pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
 use crate::memory;
-pub use crate::newton::Work;
-pub(crate) use crate::relax::accuracy::transfer::{Stencil, rods as shape_of};
-pub(crate) use crate::relax::accuracy::{Level, NestedEquilibrium};
-pub use crate::relax::follow::{Followed, Follower};
-pub(crate) use crate::relax::follow::{Grids, Lost};
-pub use crate::relax::path::{Event, Happening, Path, Route, Stage};
+pub use crate::newton::SolverCounts;
+pub(crate) use crate::relax::accuracy::transfer::{Stencil, rod_shapes};
+pub(crate) use crate::relax::accuracy::{GridLevel, NestedEquilibrium};
+pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
+pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
+pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
-    SMALLEST_TOLERANCE, SemiImplicit, Settings, Unfit, check_tolerance, without_wind,
+    SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,
 };
 pub(crate) use crate::relax::rest::relax_on_grids;
 pub use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 pub(crate) use crate::relax::result::serialize_index;
 pub use crate::relax::result::{
-    Accuracy, Barrier, BladeReport, Direction, Equilibrium, Fate, FewerVeins, Loss, Margin, Mode,
-    Model, Neighbour, Outcome, Push, Sensitivity, Shape, Stability,
+    Accuracy, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, FewerVeins,
+    InstabilityKind, Margin, Mode, Model, Neighbour, Outcome, PostcriticalBehavior, Sensitivity,
+    Shape, Stability,
 };
 pub use crate::relax::saddle::Saddle;
-pub(crate) use crate::relax::saddle::{ANY_SIGN, NOISY, polish};
-pub(crate) use crate::relax::sensitivity::{
-    Linearized, Nearby, Parameter, sensitivities, unit_forces,
+pub(crate) use crate::relax::saddle::{
+    INDEFINITE_NEWTON_EQUATIONS, NOISY_EIGENVALUE_THRESHOLD, converge_saddle,
 };
-pub(crate) use crate::relax::shooting::{START as SHOOTING_START, check_intervals};
+pub(crate) use crate::relax::sensitivity::{
+    Linearized, NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
+};
+pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
 pub(crate) use crate::relax::solve_on_grid::check_segments;
+pub(crate) use crate::relax::solve_on_grid::start::initial_state;
 pub use crate::relax::solve_on_grid::start::relax_from;
-pub(crate) use crate::relax::solve_on_grid::start::start;
-pub(crate) use crate::relax::stability::{index_near, project};
+pub(crate) use crate::relax::stability::{index_near, state_from_rod_shapes};
 use crate::run::Instant;
-pub use crate::run::{Limit, RefusedOption, UnknownWord as UnknownMethod, Unmodelled};
+pub use crate::run::{Limit, RefusedOption, UnknownWord as UnknownMethod, UnmodelledFeature};
 use crate::scenario::Scenario;
 pub use crate::shape::{NodeState, RodShape};
-pub use crate::shooting::Correction;
+pub use crate::shooting::CorrectionProgress;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -70,7 +73,7 @@ impl Scenario {
     ///
     /// # Errors
     /// Requests that cannot be met; the end of the run itself is the result's
-    /// [`Outcome`](crate::relax::Outcome).
+    /// [`Outcome`].
     pub fn relax(&self) -> Result<Equilibrium, RelaxError> {
         self.relaxation().run()
     }
@@ -163,20 +166,20 @@ impl<'a> Relaxation<'a> {
 
 /// Factor on the tolerance of a leaf that does not keep it between the stations of its
 /// solution, in layers thinner than the distance of these.
-const FOR_STATIONS: f64 = 1e-2;
+const STATION_TOLERANCE_FACTOR: f64 = 1e-2;
 
 /// Brings a scenario's leaf to rest.
 ///
 /// # Errors
 /// Requests that cannot be met; everything that happens while solving is an
-/// [`Outcome`](crate::relax::Outcome) instead.
+/// [`Outcome`] instead.
 pub fn relax(
     scenario: &Scenario,
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     if let Some(stations) = options.stations {
-        memory::stations(scenario.rods.len(), stations)?;
+        memory::check_station_memory(scenario.rods.len(), stations)?;
     }
     let found = relax_once(scenario, options, progress)?;
     let Some(parts) = options.stations else {
@@ -187,7 +190,7 @@ pub fn relax(
     }
     let tolerance = found.accuracy.tolerance;
     let sharper = Options {
-        tolerance: Some((FOR_STATIONS * tolerance).max(SMALLEST_TOLERANCE)),
+        tolerance: Some((STATION_TOLERANCE_FACTOR * tolerance).max(SMALLEST_TOLERANCE)),
         ..options.clone()
     };
     let mut sharp = relax_once(scenario, &sharper, progress)?;
@@ -230,6 +233,20 @@ fn relax_once(
     }
     let shape_alone = options.modes == 0;
     relax_on_grids(scenario, options, shape_alone, progress).map(|(found, _)| found)
+}
+
+crate::renamed! {
+    Correction => CorrectionProgress,
+    Direction => AxisDirection,
+    Fate => PostcriticalBehavior,
+    Followed => TrackOutcome,
+    Follower => EquilibriumTracker,
+    Happening => StabilityLoss,
+    Loss => InstabilityKind,
+    Push => CriticalTipForce,
+    Unfit => UnsupportedSetting,
+    Unmodelled => UnmodelledFeature,
+    Work => SolverCounts,
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ words! {
     pub enum Route {
         /// That of a leaf which is loaded slowly: see [`Path`].
         #[default]
-        Loading = "loading",
+        LoadedLeaf = "loading",
         /// That in which a leaf comes to rest which is released under all of its loads, with
         /// its tips together and its veins bent to circular arcs.
         Release = "release",
@@ -35,7 +35,7 @@ words! {
     /// A stage of the path.
     pub enum Stage {
         /// The loads are put on the veins apart.
-        Loading = "loading",
+        LoadedLeaf = "loading",
         /// The tips are moved together, and the coupling is put on.
         Joining = "joining",
         /// What is held is moved to its place.
@@ -52,13 +52,13 @@ pub struct Event {
     pub part: f64,
     /// What happened.
     #[serde(flatten)]
-    pub happening: Happening,
+    pub happening: StabilityLoss,
 }
 
 /// How the stability of a path was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Happening {
+pub enum StabilityLoss {
     /// The equilibrium ended at a fold: the leaf moved to another one.
     Snapped,
     /// The equilibrium became unstable: the leaf turned aside.
@@ -107,15 +107,15 @@ impl Path {
         match self {
             Path::Loaded {
                 confirmed: false, ..
-            } => Some(UNCONFIRMED.into()),
-            Path::Released if meant == Route::Loading => Some(INSTEAD.into()),
+            } => Some(UNCONFIRMED_PATH_REMARK.into()),
+            Path::Released if meant == Route::LoadedLeaf => Some(RELEASED_INSTEAD_REMARK.into()),
             _ => None,
         }
     }
 
     /// The word for it in files.
     pub fn word(&self) -> &'static str {
-        let snapped = |event: &Event| event.happening == Happening::Snapped;
+        let snapped = |event: &Event| event.happening == StabilityLoss::Snapped;
         match self.events() {
             _ if *self == Path::Released => "released",
             [] => "stable-throughout",
@@ -126,20 +126,20 @@ impl Path {
 }
 
 /// Remark on a path whose events lead elsewhere on another grid.
-const UNCONFIRMED: &str = "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
+const UNCONFIRMED_PATH_REMARK: &str = "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
      different grids: this is one in which it can rest; relax with --all looks for the others";
 
 /// Remark on a leaf whose path could not be followed.
-const INSTEAD: &str = "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
+const RELEASED_INSTEAD_REMARK: &str = "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
      loads instead, and may rest elsewhere than slow loading leads";
 
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let percent = 100.0 * self.part;
         let what = match self.happening {
-            Happening::Snapped => "snapped",
-            Happening::Branched { equally_open: true } => "turned to one of two equal sides",
-            Happening::Branched { .. } => "turned aside",
+            StabilityLoss::Snapped => "snapped",
+            StabilityLoss::Branched { equally_open: true } => "turned to one of two equal sides",
+            StabilityLoss::Branched { .. } => "turned aside",
         };
         write!(f, "{what} at {percent:.0} % of {}", self.stage)
     }

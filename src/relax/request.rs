@@ -6,7 +6,7 @@
 
 use crate::memory::TooMuch;
 use crate::relax::path::Route;
-use crate::run::{Limit, RefusedOption, Unmodelled};
+use crate::run::{Limit, RefusedOption, UnmodelledFeature};
 use crate::scenario::{Scenario, UnbalancedMoment};
 use crate::{read_and_write, shooting};
 use glam::DVec3;
@@ -113,7 +113,7 @@ impl Method {
     }
 
     /// The same method with the given settings.
-    pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
+    pub fn with(self, settings: Settings) -> Result<Method, UnsupportedSetting> {
         let Settings {
             segments,
             intervals,
@@ -125,7 +125,7 @@ impl Method {
             self,
             Method::Shooting { .. } | Method::ShootingFromRest { .. }
         );
-        let unfit = |setting, value, why| Unfit {
+        let unfit = |setting, value, why| UnsupportedSetting {
             setting,
             value,
             why,
@@ -192,7 +192,7 @@ pub struct Settings {
 
 /// A setting that a method does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unfit {
+pub struct UnsupportedSetting {
     /// The setting's name among [`Settings`].
     pub setting: &'static str,
     /// Its value, if it is a number.
@@ -210,7 +210,7 @@ pub struct Options {
     pub route: Route,
     /// A force along the lab axes, of any size, that decides to which side a slowly loaded leaf
     /// turns where both are equally open; zero: down, then to the left, then forward.
-    pub leaning: DVec3,
+    pub bias_direction: DVec3,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
     /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];
@@ -244,7 +244,7 @@ pub enum Progress {
         residual: f64,
     },
     /// Of a shooting.
-    Shooting(shooting::Correction),
+    Shooting(shooting::CorrectionProgress),
 }
 
 impl fmt::Display for Progress {
@@ -258,10 +258,10 @@ impl fmt::Display for Progress {
                 f,
                 "{grid} segments a vein, step {step}, residual {residual:.1e}"
             ),
-            Progress::Shooting(now) if now.way < 1.0 => write!(
+            Progress::Shooting(now) if now.lambda < 1.0 => write!(
                 f,
                 "shooting, {:.0} % of the way, correction {:.1e}",
-                100.0 * now.way,
+                100.0 * now.lambda,
                 now.size
             ),
             Progress::Shooting(now) if now.linearized < 1.0 => write!(
@@ -286,7 +286,7 @@ pub const SMALLEST_TOLERANCE: f64 = 1e-12;
 pub const LARGEST_TOLERANCE: f64 = 0.1;
 
 /// What a tolerance must be.
-const TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the largest rod length; double \
+const ALLOWED_TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the largest rod length; double \
      precision does not carry more)";
 
 /// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
@@ -302,7 +302,11 @@ pub const MAX_INTERVALS: usize = 4096;
 pub fn check_tolerance(tolerance: f64) -> Result<(), RefusedOption> {
     match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         true => Ok(()),
-        false => Err(RefusedOption::new("tolerance", tolerance, TOLERANCES)),
+        false => Err(RefusedOption::new(
+            "tolerance",
+            tolerance,
+            ALLOWED_TOLERANCES,
+        )),
     }
 }
 
@@ -329,7 +333,7 @@ pub enum RelaxError {
     Memory(#[from] TooMuch),
     /// The scenario has what this method or question does not take into account.
     #[error("{0}")]
-    Unmodelled(#[from] Unmodelled),
+    Unmodelled(#[from] UnmodelledFeature),
     /// Wind that changes, in which nothing rests.
     #[error(
         "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
@@ -357,13 +361,16 @@ pub enum RelaxError {
 pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
     match scenario.wind {
         None => Ok(()),
-        Some(_) => Err(Unmodelled::Wind { what }.into()),
+        Some(_) => Err(UnmodelledFeature::Wind { what }.into()),
     }
 }
 
 /// Refuses a leaf on hinges that may point anywhere, or that nothing keeps from turning for ever.
-pub fn points_somewhere(scenario: &Scenario) -> Result<(), RelaxError> {
-    match (scenario.turns_freely(), scenario.unbalanced_moment()) {
+pub fn check_hinge_equilibrium(scenario: &Scenario) -> Result<(), RelaxError> {
+    match (
+        scenario.has_undetermined_orientation(),
+        scenario.unbalanced_moment(),
+    ) {
         (true, _) => Err(RelaxError::TurnsFreely),
         (false, Some(UnbalancedMoment { line, moment })) => {
             Err(RelaxError::UnbalancedMoment { line, moment })
@@ -373,7 +380,7 @@ pub fn points_somewhere(scenario: &Scenario) -> Result<(), RelaxError> {
 }
 
 /// Refuses a leaf in wind unless it is released, to move to rest by the semi-implicit method.
-pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), RelaxError> {
+pub fn check_wind_options(scenario: &Scenario, options: &Options) -> Result<(), RelaxError> {
     let Some(wind) = &scenario.wind else {
         return Ok(());
     };
@@ -382,7 +389,7 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
             "the search for an equilibrium of any index"
         }
         Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
-        Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
+        Method::SemiImplicit(_) if options.route == Route::LoadedLeaf => "slow loading",
         Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
         Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
             return Err(RelaxError::ChangingWind);
@@ -394,7 +401,7 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
         Method::Explicit { .. } => "explicit relaxation",
         _ => "shooting",
     };
-    Err(Unmodelled::Wind { what }.into())
+    Err(UnmodelledFeature::Wind { what }.into())
 }
 
 #[cfg(test)]

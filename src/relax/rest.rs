@@ -6,20 +6,22 @@
 //! What the way to rest has cost so far, and what it leaves for reuse.
 
 use crate::leaf::{Grid, Leaf, Loads, System};
-use crate::newton::Work;
-use crate::relax::accuracy::{Found, History, NestedEquilibrium, along};
+use crate::newton::SolverCounts;
+use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
 use crate::relax::eigenvalues;
-use crate::relax::eigenvalues::List;
+use crate::relax::eigenvalues::EigenvalueRequest;
 use crate::relax::loading::arrival::{
-    arrive, follow, guess, load_slowly, solve, takes_loads_stably,
+    follow_load_path, guess, load_slowly, solve_from_guesses, solve_from_start, takes_loads_stably,
 };
 use crate::relax::path::{Path, Route, Stage};
 use crate::relax::request::{
-    Method, Options, Progress, RelaxError, SemiImplicit, check_tolerance, points_somewhere,
-    rests_in_wind,
+    Method, Options, Progress, RelaxError, SemiImplicit, check_hinge_equilibrium, check_tolerance,
+    check_wind_options,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
-use crate::relax::solve_on_grid::{check_segments, explicit, least, reducible, softens};
+use crate::relax::solve_on_grid::{
+    check_segments, explicit, least_segments, may_solve_half, softens,
+};
 use crate::relax::stability::{Decision, Verdict, decide};
 use crate::run::Instant;
 use crate::scenario::Scenario;
@@ -28,7 +30,7 @@ use crate::scenario::Scenario;
 /// steps of Newton's method without softened rods, rests where slow loading leads, stably if its veins
 /// take their loads stably: so did all of 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
 /// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
-const FIRST_VALLEY: (f64, usize) = (2.0, 8);
+const FIRST_VALLEY_BOUNDS: (f64, usize) = (2.0, 8);
 
 /// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
 /// also returns the leaf on these grids.
@@ -40,8 +42,8 @@ pub(crate) fn relax_on_grids(
 ) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    rests_in_wind(scenario, options)?;
-    points_somewhere(scenario)?;
+    check_wind_options(scenario, options)?;
+    check_hinge_equilibrium(scenario)?;
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {
@@ -51,30 +53,35 @@ pub(crate) fn relax_on_grids(
     // Four segments are too few to be divided among panels, and for the layers of tissue.
     let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
     // What a held leaf comes to depends on the way of its holders, which few segments would change.
-    let least = match leaf.is_held() {
+    let least = match leaf.has_placed_supports() {
         true => COARSEST,
-        false => least(method, tolerance, few),
+        false => least_segments(method, tolerance, few),
     };
     let first = check_segments(&leaf, method.segments(), least)?;
-    let half = reducible(method).then(|| leaf.half()).flatten();
-    let problem = Problem {
-        planar: reducible(method) && leaf.is_planar(),
+    let half = may_solve_half(method).then(|| leaf.mirror_half()).flatten();
+    let problem = RelaxationProblem {
+        planar: may_solve_half(method) && leaf.is_planar(),
         shape_alone,
-        ..Problem::new(&leaf, options, tolerance)
+        ..RelaxationProblem::new(&leaf, options, tolerance)
     };
-    let mut effort = Effort::new(progress);
+    let mut effort = WorkLog::new(progress);
     let grid = Grid::new(first, leaf.kinks());
-    let found = rest(&problem, half.as_ref(), grid, &mut effort);
-    Ok(decided(&problem, found, clock, &mut effort))
+    let found = find_rest(&problem, half.as_ref(), grid, &mut effort);
+    Ok(equilibrium_with_stability(
+        &problem,
+        found,
+        clock,
+        &mut effort,
+    ))
 }
 
 /// Brings the leaf to rest, its `half` where that is enough.
-fn rest<'a>(
-    problem: &Problem<'a>,
+fn find_rest<'a>(
+    problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
     grid: Grid,
-    effort: &mut Effort,
-) -> Found {
+    effort: &mut WorkLog,
+) -> RelaxationResult {
     let slowly = problem.loads_slowly();
     // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
     // the path need not be walked.
@@ -82,11 +89,11 @@ fn rest<'a>(
         && matches!(problem.options.method, Method::SemiImplicit(_))
         && !softens(problem.leaf);
     if in_valley || !slowly && half.is_some() {
-        let reduced = Problem {
+        let reduced = RelaxationProblem {
             stays_in_valley: in_valley,
-            ..problem.reduced(half)
+            ..problem.reduced_to_half(half)
         };
-        let found = solve(&reduced, grid.clone(), effort);
+        let found = solve_from_start(&reduced, grid.clone(), effort);
         if half.is_some() {
             effort.spare_system = None;
         }
@@ -95,8 +102,8 @@ fn rest<'a>(
             && (!slowly || is_in_first_valley(&found.history))
             && (!slowly || takes_loads_stably(problem, &found, effort))
         {
-            let path = problem.path();
-            return Ok(found.completed(&reduced).along(path));
+            let path = problem.undisturbed_path();
+            return Ok(found.mirrored_to_whole(&reduced).with_path(path));
         }
         // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
         // solve the full leaf.
@@ -105,74 +112,79 @@ fn rest<'a>(
     if slowly {
         return load_slowly(problem, half, effort);
     }
-    match solve(problem, grid, effort) {
+    match solve_from_start(problem, grid, effort) {
         Err(_) if problem.may_be_loaded_instead() => {
             effort.spare_system = None;
             load_slowly(problem, None, effort)
         }
-        found => along(found, problem.path()),
+        found => result_with_path(found, problem.undisturbed_path()),
     }
 }
 
 /// Whether Newton's method alone came to rest from the start, so near that this is where
 /// slow loading leads.
 fn is_in_first_valley(history: &History) -> bool {
-    let near =
-        |(distance, steps): (f64, usize)| distance < FIRST_VALLEY.0 && steps <= FIRST_VALLEY.1;
+    let near = |(distance, steps): (f64, usize)| {
+        distance < FIRST_VALLEY_BOUNDS.0 && steps <= FIRST_VALLEY_BOUNDS.1
+    };
     history.from_start.is_some_and(near) && history.saddle.is_none()
 }
 
 /// Rest from the start, on this grid and finer ones.
-fn rest_again(problem: &Problem, grid: Grid, effort: &mut Effort) -> Option<NestedEquilibrium> {
+fn find_rest_on_grid(
+    problem: &RelaxationProblem,
+    grid: Grid,
+    effort: &mut WorkLog,
+) -> Option<NestedEquilibrium> {
     if !problem.loads_slowly() {
-        let found = solve(problem, grid.clone(), effort);
+        let found = solve_from_start(problem, grid.clone(), effort);
         if found.is_ok() || !problem.may_be_loaded_instead() {
             return found.ok();
         }
     }
-    let arrived = arrive(problem, grid, effort).ok()?;
-    let mut begun = NestedEquilibrium::begun(problem).along(Some(arrived.path));
+    let arrived = follow_load_path(problem, grid, effort).ok()?;
+    let mut begun = NestedEquilibrium::without_grids(problem).with_path(Some(arrived.path));
     let guess = guess(problem, &mut begun.history, arrived.level, effort);
-    follow(problem, begun, vec![guess], effort).ok()
+    solve_from_guesses(problem, begun, vec![guess], effort).ok()
 }
 
 /// The result, with the stability of a leaf at rest decided and its modes: requested modes are
 /// not counted in the time of the solution, unless stability depends on them.
-pub(super) fn decided(
-    problem: &Problem,
-    found: Found,
+pub(super) fn equilibrium_with_stability(
+    problem: &RelaxationProblem,
+    found: RelaxationResult,
     clock: Instant,
-    effort: &mut Effort,
+    effort: &mut WorkLog,
 ) -> (Equilibrium, NestedEquilibrium) {
     let requested = problem.options.modes;
     let before = clock.elapsed().as_secs_f64();
     let (decision, stopped) = match found {
         Ok(found) => {
-            let again = |grid, effort: &mut Effort| rest_again(problem, grid, effort);
+            let again = |grid, effort: &mut WorkLog| find_rest_on_grid(problem, grid, effort);
             (decide(problem, found, effort, &again), None)
         }
-        Err(failure) => (Decision::none(failure.at), Some(failure.stop)),
+        Err(failure) => (Decision::without_decision(failure.at), Some(failure.stop)),
     };
     let wall = match decision.needed || requested == 0 {
         true => clock.elapsed().as_secs_f64(),
         false => before,
     };
-    let found = decision.found.after(effort.work);
-    let outcome = report::outcome(problem, &found, stopped, effort.reached);
+    let found = decision.found.with_work(effort.work);
+    let outcome = report::outcome(problem, &found, stopped, effort.farthest_stage);
     let mut leaf = report::equilibrium(problem, &found, outcome, wall);
     if matches!(leaf.path, Some(Path::Held { .. })) && !leaf.outcome.is_at_rest() {
         // What the way was like, it did not end where the leaf is held.
         leaf.path = None;
     }
-    leaf.doubts = report::doubts(problem.leaf.scenario(), &leaf);
+    leaf.doubts = report::implausible_properties(problem.leaf.scenario(), &leaf);
     let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
     leaf.doubts.extend(doubt);
     leaf.doubts
-        .extend(unconfirmed.then(|| UNCONFIRMED.to_owned()));
-    leaf.decide(decision.verdict);
+        .extend(unconfirmed.then(|| UNCONFIRMED_EQUILIBRIUM_REMARK.to_owned()));
+    leaf.apply_stability_verdict(decision.verdict);
     let modes = decision.modes.or_else(|| {
-        let list = List::requested(problem);
+        let list = EigenvalueRequest::requested(problem);
         (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
     leaf.stability.modes = modes.map(|it| it.modes);
@@ -182,21 +194,21 @@ pub(super) fn decided(
 impl Equilibrium {
     /// Takes the Morse index by extrapolated eigenvalues, if it is known, where those of single
     /// grids may have other signs.
-    fn decide(&mut self, verdict: Verdict) {
+    fn apply_stability_verdict(&mut self, verdict: Verdict) {
         let index = match verdict {
             Verdict::AsCounted => return,
             Verdict::Undecided(certain)
                 if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
             {
-                self.doubts.push(AT_LEAST.to_owned());
+                self.doubts.push(MINIMUM_INDEX_REMARK.to_owned());
                 certain
             }
             Verdict::Undecided(_) => {
-                self.doubts.push(UNDECIDED.to_owned());
+                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
                 return;
             }
             Verdict::Unknown => {
-                self.doubts.push(UNDECIDED.to_owned());
+                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
                 self.stability.negative_eigenvalues = None;
                 return;
             }
@@ -208,7 +220,7 @@ impl Equilibrium {
         }
         if index > 0 {
             self.outcome = Outcome::Saddle;
-            self.remark = Some(BESIDE_BIFURCATION.to_owned());
+            self.remark = Some(BESIDE_BIFURCATION_REMARK.to_owned());
         } else if unknown {
             // It said so.
             self.remark = None;
@@ -217,19 +229,19 @@ impl Equilibrium {
 }
 
 /// Remark on a leaf that two grids never bring to the same equilibrium.
-const UNCONFIRMED: &str = "from its start the leaf moves to different equilibria on different grids: \
+const UNCONFIRMED_EQUILIBRIUM_REMARK: &str = "from its start the leaf moves to different equilibria on different grids: \
      this is one in which it can rest; relax with --all looks for the others";
 
 /// Remark on a leaf with an eigenvalue that may have either sign.
-const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+const UNDECIDED_SIGN_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
      whether the leaf is stable is not certain";
 
 /// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
-const AT_LEAST: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+const MINIMUM_INDEX_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
      the index is the number of those that are certainly negative, or larger";
 
 /// Remark on a leaf at rest on all grids that is at a saddle.
-const BESIDE_BIFURCATION: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
+const BESIDE_BIFURCATION_REMARK: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
      still stable; a load that is a little larger, or a small disturbance, shows where it goes";
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
@@ -237,17 +249,17 @@ pub const COARSEST: usize = 8;
 
 /// The smallest tolerance for which the first grid is tried alone: below it nodes would be too
 /// few for stations between them.
-const LEAST_ALONE: f64 = 5e-7;
+const SMALLEST_SINGLE_GRID_TOLERANCE: f64 = 5e-7;
 
 /// Largest number of corrections by the estimated error.
 const CORRECTIONS: usize = 4;
 
 /// The leaf that is to come to rest, and how.
 #[derive(Clone, Copy)]
-pub struct Problem<'a> {
+pub struct RelaxationProblem<'a> {
     pub leaf: &'a Leaf,
     /// The full leaf, if `leaf` is half of it.
-    pub whole: Option<&'a Leaf>,
+    pub whole_leaf: Option<&'a Leaf>,
     pub options: &'a Options,
     pub tolerance: f64,
     /// Whether only the shape and its stability are requested, without forces on the grids,
@@ -259,12 +271,12 @@ pub struct Problem<'a> {
     pub stays_in_valley: bool,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> RelaxationProblem<'a> {
     /// The leaf with forces and eigenvalues, wherever it comes to rest.
     pub fn new(leaf: &'a Leaf, options: &'a Options, tolerance: f64) -> Self {
-        Problem {
+        RelaxationProblem {
             leaf,
-            whole: None,
+            whole_leaf: None,
             options,
             tolerance,
             shape_alone: false,
@@ -274,12 +286,12 @@ impl<'a> Problem<'a> {
     }
 
     /// The same for the half of the leaf, if there is one.
-    pub fn reduced(self, half: Option<&'a Leaf>) -> Self {
+    pub fn reduced_to_half(self, half: Option<&'a Leaf>) -> Self {
         match half {
             None => self,
-            Some(half) => Problem {
+            Some(half) => RelaxationProblem {
                 leaf: half,
-                whole: Some(self.leaf),
+                whole_leaf: Some(self.leaf),
                 ..self
             },
         }
@@ -314,9 +326,9 @@ impl<'a> Problem<'a> {
             _ => false,
         };
         // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
-        self.options.route == Route::Loading
+        self.options.route == Route::LoadedLeaf
             && !released
-            && !self.leaf.is_held()
+            && !self.leaf.has_placed_supports()
             && !self.leaf.hinged()
             && self.leaf.loads != Loads::default()
             && !self.leaf.loads.has_moments()
@@ -329,27 +341,27 @@ impl<'a> Problem<'a> {
             Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none()
         );
         settles
-            && self.options.route == Route::Loading
-            && !self.leaf.is_held()
+            && self.options.route == Route::LoadedLeaf
+            && !self.leaf.has_placed_supports()
             && !self.leaf.hinged()
             && !self.leaf.loads.has_moments()
             && !self.out_of_time()
     }
 
     /// The path of the leaf as far as nothing happens on it, if it has one.
-    pub fn path(&self) -> Option<Path> {
+    pub fn undisturbed_path(&self) -> Option<Path> {
         if self.loads_slowly() {
             return Some(Path::STABLE);
         }
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let moved = self.leaf.is_held() || self.leaf.loads.has_moments();
+        let moved = self.leaf.has_placed_supports() || self.leaf.loads.has_moments();
         (released && !moved).then_some(Path::Released)
     }
 
     /// The largest number of corrections.
     pub fn corrections(&self) -> usize {
         let grids = matches!(self.options.method, Method::SemiImplicit(_));
-        let free = !self.leaf.is_held() && self.segments().is_none();
+        let free = !self.leaf.has_placed_supports() && self.segments().is_none();
         match grids && free && self.shape_alone {
             true => CORRECTIONS,
             false => 0,
@@ -357,8 +369,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Whether the first grid may be enough.
-    pub fn may_be_alone(&self) -> bool {
-        self.corrections() > 0 && self.tolerance >= LEAST_ALONE
+    pub fn may_use_single_grid(&self) -> bool {
+        self.corrections() > 0 && self.tolerance >= SMALLEST_SINGLE_GRID_TOLERANCE
     }
 }
 
@@ -366,28 +378,28 @@ impl<'a> Problem<'a> {
 pub const BUDGET: usize = 10_000_000;
 
 /// Counts of the work on all grids, whatever becomes of them, and its progress.
-pub struct Effort<'o> {
+pub struct WorkLog<'o> {
     pub progress: &'o mut dyn FnMut(&Progress),
-    pub work: Work,
+    pub work: SolverCounts,
     /// Nodes times force evaluations so far.
-    pub spent: usize,
+    pub node_evaluations: usize,
     /// Nodes times force evaluations of all walks.
-    pub walked: usize,
+    pub loading_node_evaluations: usize,
     /// How far the leaf came on its path before it failed.
-    pub reached: Option<(Stage, f64)>,
+    pub farthest_stage: Option<(Stage, f64)>,
     /// The linear system of the last grid, for reuse.
     pub spare_system: Option<System>,
 }
 
-impl<'o> Effort<'o> {
+impl<'o> WorkLog<'o> {
     /// None so far.
     pub fn new(progress: &'o mut dyn FnMut(&Progress)) -> Self {
-        Effort {
+        WorkLog {
             progress,
-            work: Work::default(),
-            spent: 0,
-            walked: 0,
-            reached: None,
+            work: SolverCounts::default(),
+            node_evaluations: 0,
+            loading_node_evaluations: 0,
+            farthest_stage: None,
             spare_system: None,
         }
     }

@@ -9,18 +9,20 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
-use crate::leaf::{DirectSolver, DiscreteLeaf, Factorised, Solved, State, System};
-use crate::newton::{Equations, Newton, Stop, Work, at_saddle};
+use crate::leaf::{DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, State, System};
+use crate::newton::{
+    EquilibriumFailure, NewtonEquations, NewtonIteration, SolverCounts, is_at_saddle,
+};
 use crate::numbers::larger;
-use crate::relax::loading::Walk;
-use crate::relax::path::Happening;
-use crate::relax::solve_on_grid::start::preference;
+use crate::relax::loading::LoadPath;
+use crate::relax::path::StabilityLoss;
+use crate::relax::solve_on_grid::start::symmetry_breaking_field;
 use glam::DVec3;
 use serde::Serialize;
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
 /// (lengths) along the unstable mode.
-const PUSH: f64 = 0.03;
+const SADDLE_ESCAPE_DISTANCE: f64 = 0.03;
 
 /// Steps of inverse iteration; the mode must be unstable, not accurate.
 const MODE_ITERATIONS: usize = 6;
@@ -33,7 +35,7 @@ const MAX_STEP: f64 = 0.5;
 const CLEARLY_POSITIVE: f64 = 0.1;
 
 /// Noise of eigenvalues by rounding from which on their signs are not taken for granted.
-pub const NOISY: f64 = 0.01;
+pub const NOISY_EIGENVALUE_THRESHOLD: f64 = 0.01;
 
 /// Safety factor on the excess stiffness of the elements, which is computed with the forces on
 /// the grid.
@@ -59,7 +61,7 @@ pub fn index(
     state: &State,
     system: &mut System,
     shift: f64,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Option<usize> {
     count(leaf, state, system, (0.0, shift), work)
 }
@@ -72,14 +74,14 @@ fn count(
     state: &State,
     system: &mut System,
     (excess, shift): (f64, f64),
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Option<usize> {
-    if system.tied() {
+    if system.has_tissue() {
         return count_coupled(leaf, state, system, (excess, shift), work);
     }
-    assemble(leaf, state, system, excess, work);
+    assemble_minus_excess(leaf, state, system, excess, work);
     // For most stable leaves one linear-time factorisation is enough.
-    if system.stable_without_coupling(shift) {
+    if system.is_definite_without_coupling(shift) {
         return Some(0);
     }
     if excess > 0.0 && !system.coupled() {
@@ -89,9 +91,15 @@ fn count(
 }
 
 /// The matrix, minus `excess` times the excess stiffness of the elements.
-fn assemble(leaf: &DiscreteLeaf, state: &State, system: &mut System, excess: f64, work: &mut Work) {
+fn assemble_minus_excess(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    excess: f64,
+    work: &mut SolverCounts,
+) {
     leaf.assemble(state, system);
-    leaf.hold_turn(state, system);
+    leaf.add_phase_conditions(state, system);
     if excess > 0.0 {
         leaf.subtract_excess_stiffness(state, system, excess);
     }
@@ -105,17 +113,17 @@ fn count_coupled(
     state: &State,
     system: &mut System,
     (excess, shift): (f64, f64),
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Option<usize> {
-    assemble(leaf, state, system, excess, work);
-    let pattern = DirectSolver::of_coupling(system).ok()?;
+    assemble_minus_excess(leaf, state, system, excess, work);
+    let pattern = DirectSolver::for_coupling_pattern(system).ok()?;
     pattern.count_negative(system, shift).ok()
 }
 
 /// How many eigenvalues of an equilibrium are negative beyond doubt, how many may be on this
 /// grid, being close to zero, and how many on finer ones: those of the Hessian less what
 /// [`clearly_stable`] subtracts. Also how close to zero is close.
-pub struct Bounds {
+pub struct IndexBounds {
     pub least: usize,
     pub here: usize,
     pub finer: usize,
@@ -128,14 +136,14 @@ pub fn bounds(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    work: &mut Work,
-) -> Option<Bounds> {
+    work: &mut SolverCounts,
+) -> Option<IndexBounds> {
     let close = CLEARLY_POSITIVE.max(leaf.neutral_shift());
     let mut of = |excess, shift| count_coupled(leaf, state, system, (excess, shift), work);
     let least = of(0.0, close)?;
     let here = of(0.0, -close)?;
     let finer = of(EXCESS_SAFETY, -close)?;
-    Some(Bounds {
+    Some(IndexBounds {
         least,
         here,
         finer: finer.max(here),
@@ -149,7 +157,7 @@ pub fn index_within_rounding(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Option<[usize; 2]> {
     let noise = leaf.neutral_shift();
     let least = index(leaf, state, system, noise, work)?;
@@ -164,14 +172,15 @@ pub fn clearly_stable(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> bool {
     let least = CLEARLY_POSITIVE.max(leaf.neutral_shift());
     count(leaf, state, system, (EXCESS_SAFETY, -least), work) == Some(0)
 }
 
 /// Newton's equations with pivots of any sign, and steps of bounded size.
-pub const ANY_SIGN: Equations = Equations::AnySign { largest: MAX_STEP };
+pub const INDEFINITE_NEWTON_EQUATIONS: NewtonEquations =
+    NewtonEquations::Indefinite { largest: MAX_STEP };
 
 /// Newton iterations to converge at a saddle.
 const POLISH_ITERATIONS: usize = 20;
@@ -185,21 +194,21 @@ const POLISH_DISTANCE: f64 = 0.1;
 /// Converges a state near a saddle to rounding by Newton's method and counts its Morse index,
 /// a neutral mode not counting as negative. `None` if Newton's method leads elsewhere, with
 /// the state unchanged, or if the index is not known.
-pub fn polish(
+pub fn converge_saddle(
     leaf: &DiscreteLeaf,
     state: &mut State,
     system: &mut System,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Option<usize> {
     let mut exact = state.clone();
-    let iteration = Newton {
+    let iteration = NewtonIteration {
         accuracy: POLISH_ACCURACY,
         iterations: POLISH_ITERATIONS,
         work,
         progress: &mut |_, _| {},
     };
-    let found = iteration.solve(leaf, &mut exact, system, ANY_SIGN);
-    if found.is_err() || state.shift_to(&exact) >= POLISH_DISTANCE {
+    let found = iteration.solve(leaf, &mut exact, system, INDEFINITE_NEWTON_EQUATIONS);
+    if found.is_err() || state.largest_displacement_to(&exact) >= POLISH_DISTANCE {
         return None;
     }
     *state = exact;
@@ -207,25 +216,28 @@ pub fn polish(
 }
 
 /// Finds the most unstable mode at a saddle, by inverse iteration with the first shift, doubled
-/// from 1e-4, that makes the matrix positive definite, from the [`preference`]. It is the solution
+/// from 1e-4, that makes the matrix positive definite, from the [`symmetry_breaking_field`]. It is the solution
 /// of the system; false if there is none.
 pub fn find_unstable_mode(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
     leaning: DVec3,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> bool {
     leaf.assemble(state, system);
-    leaf.hold_turn(state, system);
+    leaf.add_phase_conditions(state, system);
     work.force_evaluations += 1;
-    let momentum = system.momentum(&preference(leaf, state, leaning));
+    let momentum = system.mass_product(&symmetry_breaking_field(leaf, state, leaning));
     system.set_rhs(&momentum);
     let mut shift = 1e-4;
     let mut factors = loop {
         work.factorizations += 1;
-        if let Some(mut factors) = Factorised::new(system, shift)
-            && matches!(factors.solve(system, 1e-3), Solved::Yes(_))
+        if let Some(mut factors) = DefiniteFactors::new(system, shift)
+            && matches!(
+                factors.solve(system, 1e-3),
+                LinearSolveOutcome::Converged(_)
+            )
         {
             break factors;
         }
@@ -235,8 +247,11 @@ pub fn find_unstable_mode(
         }
     };
     for _ in 0..MODE_ITERATIONS {
-        system.iterate_mode();
-        if !matches!(factors.solve(system, 1e-3), Solved::Yes(_)) {
+        system.iterate_inverse();
+        if !matches!(
+            factors.solve(system, 1e-3),
+            LinearSolveOutcome::Converged(_)
+        ) {
             break;
         }
     }
@@ -245,20 +260,20 @@ pub fn find_unstable_mode(
 
 /// Displaces a state along the mode that was found, to the side of this sign.
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
-    let (turn, displacement) = system.largest();
+    let (turn, displacement) = system.largest_increment();
     let mut pushed = state.clone();
-    let step = sign * PUSH / larger(turn, displacement);
+    let step = sign * SADDLE_ESCAPE_DISTANCE / larger(turn, displacement);
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }
 
-/// Displaces a state at a saddle along its most unstable mode, to the [`preference`].
-pub fn push_off(
+/// Displaces a state at a saddle along its most unstable mode, to the [`symmetry_breaking_field`].
+pub fn escape_saddle(
     leaf: &DiscreteLeaf,
     state: &mut State,
     system: &mut System,
     leaning: DVec3,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) {
     if find_unstable_mode(leaf, state, system, leaning, work) {
         displace(leaf, state, system, 1.0);
@@ -273,7 +288,7 @@ const IMAGES_APART: f64 = 0.05;
 
 /// Of the sides of a saddle to which a leaf turned, with their energies: that of less energy, or the
 /// first of two that are equal, and whether there is another one as good.
-pub fn lower_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
+pub fn lower_energy_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
     match sides {
         [Some((e1, one)), Some((e2, other))] => {
             let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
@@ -289,7 +304,7 @@ pub fn lower_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
 }
 
 /// The saddle at a state, in the units of the scenario.
-pub fn saddle_of(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
+pub fn saddle_at_state(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
     let scale = leaf.leaf.scale;
     Saddle {
         energy: leaf.energy(state) * scale.moment(),
@@ -307,7 +322,7 @@ const LEAST_RATE: f64 = 0.02;
 
 const LARGEST_RATE: f64 = 1e12;
 
-const LARGEST_UNRESOLVED: f64 = 1e6;
+const LARGEST_UNRESOLVED_RATE: f64 = 1e6;
 
 /// Factors by which the rate falls after the first of several successful steps and rises after
 /// the first of several failed ones, each time squared, and their limits.
@@ -330,72 +345,72 @@ const LARGEST_INCREMENT: f64 = 0.5;
 const LARGEST_CHANGE: f64 = 0.5;
 
 /// Accuracy of the equilibrium at the end of a motion.
-const AT_REST: f64 = 1e-3;
+const REST_ACCURACY: f64 = 1e-3;
 
 /// Saddles that are left in one motion.
-const SADDLES: usize = 6;
+const MAX_SADDLE_ESCAPES: usize = 6;
 
 /// A leaf that moves no farther (lengths, radians) has not snapped.
-const NEARBY: f64 = 0.05;
+const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
 
-impl Walk<'_> {
+impl LoadPath<'_> {
     /// From the unstable equilibrium in which Newton's method has put the next state the leaf
     /// turns to one of its sides.
-    pub fn turn_aside(&mut self, part: f64) -> Result<(), Stop> {
+    pub fn branch_aside(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
         let saddle = self.next.clone();
         let leaf = &self.loading.leaf;
         let system = &mut self.system;
-        if !find_unstable_mode(leaf, &saddle, system, self.leaning, self.work) {
-            return Err(Stop::Stuck);
+        if !find_unstable_mode(leaf, &saddle, system, self.bias_direction, self.work) {
+            return Err(EquilibriumFailure::NoDescent);
         }
         let mode = self.system.solution();
         let mut found: [Option<(f64, State)>; 2] = [None, None];
-        let mut stopped = Stop::Stuck;
+        let mut stopped = EquilibriumFailure::NoDescent;
         for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
             self.next.clone_from(&saddle);
             self.system.set_solution(&mode);
             displace(&self.loading.leaf, &mut self.next, &self.system, sign);
-            match self.move_to_rest() {
+            match self.relax_next_state() {
                 Ok(()) => *found = Some((self.loading.leaf.energy(&self.next), self.next.clone())),
                 Err(stop) => stopped = stop,
             }
         }
-        let (state, equally_open) = lower_side(found).ok_or(stopped)?;
+        let (state, equally_open) = lower_energy_side(found).ok_or(stopped)?;
         self.next = state;
-        self.note(part, Happening::Branched { equally_open });
+        self.record_event(part, StabilityLoss::Branched { equally_open });
         Ok(())
     }
 
     /// From the last equilibrium before the end of the path the leaf snaps.
-    pub fn snap(&mut self, part: f64) -> Result<(), Stop> {
+    pub fn snap_through(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
         self.carry_last(part);
         let before = self.next.clone();
-        self.move_to_rest()?;
-        if before.distance(&self.next) > NEARBY {
-            self.note(part, Happening::Snapped);
+        self.relax_next_state()?;
+        if before.distance(&self.next) > LARGEST_CONTINUOUS_MOTION {
+            self.record_event(part, StabilityLoss::Snapped);
         }
         Ok(())
     }
 
     /// Moves the next state to rest, leaving saddles.
-    fn move_to_rest(&mut self) -> Result<(), Stop> {
+    fn relax_next_state(&mut self) -> Result<(), EquilibriumFailure> {
         let leaf = &self.loading.leaf;
         leaf.strain_forces(&mut self.next);
-        let mut rate = Rate::new();
+        let mut rate = SpringRate::new();
         let mut saddles = 0;
         while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
             let from = self.next.clone();
-            let step = Newton {
+            let step = NewtonIteration {
                 accuracy: if rate.now > 0.0 {
                     STEP_ACCURACY
                 } else {
-                    AT_REST
+                    REST_ACCURACY
                 },
                 iterations: ITERATIONS,
                 work: self.work,
                 progress: self.progress,
             };
-            let proximal = Equations::Proximal {
+            let proximal = NewtonEquations::Proximal {
                 solver: &mut self.solver,
                 at: &from,
                 rate: rate.now,
@@ -403,67 +418,74 @@ impl Walk<'_> {
             };
             let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
             if moved.is_ok() && from.distance(&self.next) > LARGEST_CHANGE {
-                moved = Err(Stop::Stuck);
+                moved = Err(EquilibriumFailure::NoDescent);
             }
             match moved {
                 Ok(size)
                     if rate.now == 0.0
-                        || at_saddle(leaf, &self.next, self.next.shift_to(&from).max(size)) =>
+                        || is_at_saddle(
+                            leaf,
+                            &self.next,
+                            self.next.largest_displacement_to(&from).max(size),
+                        ) =>
                 {
                     let shift = leaf.neutral_shift();
                     let (state, system) = (&mut self.next, &mut self.system);
                     let index = index(leaf, state, system, shift, self.work);
                     // Converged to rounding a neutral mode is not unstable.
-                    if index == Some(0) || polish(leaf, state, system, self.work) == Some(0) {
+                    if index == Some(0)
+                        || converge_saddle(leaf, state, system, self.work) == Some(0)
+                    {
                         return Ok(());
                     }
-                    moved = Err(Stop::Saddle);
+                    moved = Err(EquilibriumFailure::Saddle);
                 }
                 _ => {}
             }
             match moved {
-                Err(Stop::Saddle) => {
+                Err(EquilibriumFailure::Saddle) => {
                     saddles += 1;
-                    if saddles > SADDLES {
-                        return Err(Stop::Saddle);
+                    if saddles > MAX_SADDLE_ESCAPES {
+                        return Err(EquilibriumFailure::Saddle);
                     }
                     let (state, system) = (&mut self.next, &mut self.system);
-                    push_off(leaf, state, system, self.leaning, self.work);
+                    escape_saddle(leaf, state, system, self.bias_direction, self.work);
                     leaf.strain_forces(&mut self.next);
-                    rate = Rate::new();
+                    rate = SpringRate::new();
                 }
-                Ok(_) => rate.fall(),
+                Ok(_) => rate.decrease_after_success(),
                 Err(stop) => {
                     self.next = from;
-                    rate.rise();
-                    let unresolved = stop == Stop::Unresolved && rate.now > LARGEST_UNRESOLVED;
+                    rate.increase_after_failure();
+                    let unresolved = stop == EquilibriumFailure::Unresolved
+                        && rate.now > LARGEST_UNRESOLVED_RATE;
                     if rate.now > LARGEST_RATE || unresolved {
                         return Err(stop);
                     }
                 }
             }
         }
-        Err(Stop::StepLimit)
+        Err(EquilibriumFailure::StepLimit)
     }
 }
 
 /// The spring rate of the steps.
-struct Rate {
+struct SpringRate {
     now: f64,
     /// The factor of its last change.
     factor: f64,
 }
 
-impl Rate {
+impl SpringRate {
     fn new() -> Self {
-        Rate {
+        SpringRate {
             now: FIRST_RATE,
             factor: 1.0,
         }
     }
 
     /// After a step that succeeded.
-    fn fall(&mut self) {
+    fn decrease_after_success(&mut self) {
         self.factor = match self.factor {
             fell if fell < 1.0 => (fell * fell).max(LARGEST_DECREASE),
             _ => FIRST_DECREASE,
@@ -475,7 +497,7 @@ impl Rate {
     }
 
     /// After a step that failed.
-    fn rise(&mut self) {
+    fn increase_after_failure(&mut self) {
         self.factor = match self.factor {
             rose if rose > 1.0 => (rose * rose).min(LARGEST_INCREASE),
             _ => FIRST_INCREASE,

@@ -12,24 +12,24 @@
 //! Derivatives on successively refined grids.
 
 use crate::leaf::{
-    DirectSolver, DiscreteLeaf, Factors, Field, Forces, Leaf, LeafRate, Response, Solved, State,
-    System, shift, turn,
+    DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative, LinearResponse, LinearSolveOutcome,
+    MatrixFactors, NodalField, ParameterForces, State, System, displacement_part, rotation_part,
 };
 use crate::modes::Eigenpair;
 use crate::motion::Physics;
-use crate::relax::accuracy::Level;
-use crate::relax::accuracy::richardson::{Best, Richardson};
+use crate::relax::accuracy::GridLevel;
+use crate::relax::accuracy::richardson::{BestColumn, Richardson};
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
 use crate::rod::Segment;
-use crate::scenario::{Grip, Hold, Scenario};
+use crate::scenario::{Grip, Scenario, SupportKind};
 use crate::{modes, rotation};
 use glam::DVec3;
 use std::sync::Arc;
 
 /// Up to this many numbers the equations are solved for each, which gives all derivatives; for
 /// more of them adjoint solutions give those of tips and energy alone.
-const MOST_DIRECT: usize = 100;
+const MAX_DIRECT_PARAMETERS: usize = 100;
 
 /// Grids with fewer unknowns than this have their eigenvalues differentiated, and the coarsest
 /// in any case.
@@ -37,7 +37,7 @@ const FEW_UNKNOWNS: usize = 4_000;
 
 /// A number with its name, the derivative of the scenario, and neighbouring scenarios if they
 /// are needed.
-type Known<'n, 'a> = (
+type ParameterRates<'n, 'a> = (
     &'n String,
     &'n Parameter<'a>,
     Vec<(f64, Scenario)>,
@@ -47,13 +47,13 @@ type Known<'n, 'a> = (
 /// Derivatives on one grid, in the leaf's units: of the tips, the energy, the eigenvalues (numbers
 /// as x), the reaction (force, then moments), the positions, and the grips' reactions (of each the
 /// force and the moment).
-type Changes = [Vec<DVec3>; 6];
+type ResultDerivatives = [Vec<DVec3>; 6];
 
 /// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
 /// are its grids from coarse to fine. Left out are numbers for which the scenario has no
 /// admissible differences, and all numbers if the leaf is at a singular point.
 pub(crate) fn sensitivities(
-    levels: &[Level],
+    levels: &[GridLevel],
     numbers: &[(String, Parameter)],
     tolerance: f64,
     modes: usize,
@@ -62,28 +62,32 @@ pub(crate) fn sensitivities(
         return Vec::new();
     };
     let leaf = &finest.leaf.leaf;
-    let differences = modes > 0 || is_clamped(leaf) || has_clamped_grips(leaf);
-    let known: Vec<Known> = (numbers.iter())
+    let differences = modes > 0 || has_clamped_tip(leaf) || has_clamped_grips(leaf);
+    let known: Vec<ParameterRates> = (numbers.iter())
         .filter_map(|(key, number)| {
-            let near = if differences { number.nearby() } else { None };
+            let near = if differences {
+                number.neighbouring_scenarios()
+            } else {
+                None
+            };
             Some((key, number, number.rate()?, near.unwrap_or_default()))
         })
         .collect();
-    let rates: Vec<LeafRate> = (known.iter())
-        .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
+    let rates: Vec<LeafParameterDerivative> = (known.iter())
+        .map(|(_, _, terms, _)| LeafParameterDerivative::new(leaf, terms))
         .collect();
-    let mut found: Vec<[Series; 6]> = rates.iter().map(|_| Default::default()).collect();
-    let mut eigenvalues = Series::default();
+    let mut found: Vec<[VectorSeries; 6]> = rates.iter().map(|_| Default::default()).collect();
+    let mut eigenvalues = VectorSeries::default();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
         let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
-        let grid = Grid {
+        let grid = SensitivityGrid {
             level,
             tolerance,
             modes: if with_modes { modes } else { 0 },
             stride: level.leaf.segments() / coarsest.leaf.segments(),
         };
-        let Some((squared, changes)) = grid.changes(&known, &rates) else {
+        let Some((squared, changes)) = grid.result_derivatives(&known, &rates) else {
             return Vec::new();
         };
         let segments = level.leaf.segments();
@@ -127,13 +131,13 @@ fn sensitivity(
     let places = positions.0.chunks(stations.len());
     let held = reaction.0.split_first().map(|(force, moments)| Reaction {
         force: *force * scale.force(),
-        moments: is_clamped(leaf).then(|| of(moments, scale.moment())),
+        moments: has_clamped_tip(leaf).then(|| of(moments, scale.moment())),
         error: None,
         moments_error: None,
     });
     let grip = |(change, grip): (&[DVec3], &Grip)| GripReaction {
         force: change[0] * scale.force(),
-        moment: (grip.held == Hold::Clamped).then(|| change[1] * scale.moment()),
+        moment: (grip.held == SupportKind::Clamped).then(|| change[1] * scale.moment()),
         error: None,
         moment_error: None,
     };
@@ -162,42 +166,50 @@ fn sensitivity(
     }
 }
 
-fn is_clamped(leaf: &Leaf) -> bool {
-    (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some())
+fn has_clamped_tip(leaf: &Leaf) -> bool {
+    (leaf.tip_support.as_ref()).is_some_and(|held| held.clamps.is_some())
 }
 
 fn has_clamped_grips(leaf: &Leaf) -> bool {
     let mut grips = leaf.scenario().grips.iter();
-    grips.any(|grip| grip.held == Hold::Clamped)
+    grips.any(|grip| grip.held == SupportKind::Clamped)
 }
 
 /// A grid on which derivatives are computed.
-struct Grid<'l> {
-    level: &'l Level,
+struct SensitivityGrid<'l> {
+    level: &'l GridLevel,
     tolerance: f64,
     modes: usize,
     /// Segments between neighbouring nodes of the coarsest grid.
     stride: usize,
 }
 
-impl Grid<'_> {
+impl SensitivityGrid<'_> {
     /// The squared frequencies, and the derivatives with respect to each number.
-    fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
+    fn result_derivatives(
+        &self,
+        known: &[ParameterRates],
+        rates: &[LeafParameterDerivative],
+    ) -> Option<(Vec<f64>, Vec<ResultDerivatives>)> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
         let mut linear = Linearized::new(self.level, self.tolerance);
         let forces = linear.forces(self.level, rates);
         // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
         let physics = Physics::new(&leaf.leaf);
         let modes = match self.modes > 0 && !leaf.has_moments() {
-            true => modes::loaded(leaf, state, self.modes),
+            true => modes::unsoftened_modes(leaf, state, self.modes),
             false => None,
         };
         let modes = modes.unwrap_or_default();
         // In the scenario's unit of time, as their derivatives are.
-        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
+        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time_unit.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
-        let (tip_held, held) = (leaf.leaf.held.is_some(), leaf.leaf.is_held());
-        if forces.len() > MOST_DIRECT && modes.is_empty() && !leaf.has_moments() && !held {
+        let (tip_held, held) = (
+            leaf.leaf.tip_support.is_some(),
+            leaf.leaf.has_placed_supports(),
+        );
+        if forces.len() > MAX_DIRECT_PARAMETERS && modes.is_empty() && !leaf.has_moments() && !held
+        {
             return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
         }
         let responses = linear.responses(self.level, &forces)?;
@@ -205,16 +217,16 @@ impl Grid<'_> {
         let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
             let change = (rate, response);
             let differences = !near.is_empty() && (held || !modes.is_empty());
-            let near = differences.then(|| Nearby::new(self.level, near, change));
+            let near = differences.then(|| NeighbouringEquilibria::new(self.level, near, change));
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moments())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
             let n = leaf.segments();
-            let tip = |j: usize| shift(&response.of_node(leaf, j, n));
+            let tip = |j: usize| displacement_part(&response.node_increment(leaf, j, n));
             // The work of dead moments is not part of the energy.
-            let works = leaf
-                .moments()
-                .map(|(node, moment)| moment.dot(turn(&response.of_node(leaf, 0, node))));
+            let works = leaf.dead_moments().map(|(node, moment)| {
+                moment.dot(rotation_part(&response.node_increment(leaf, 0, node)))
+            });
             let work: f64 = works.sum();
             [
                 self.tips().map(tip).collect(),
@@ -225,7 +237,7 @@ impl Grid<'_> {
                     false => Vec::new(),
                 },
                 self.positions(rate, response),
-                self.on_grips(near.as_ref(), change),
+                self.grip_derivatives(near.as_ref(), change),
             ]
         });
         Some((eigenvalues, changes.collect()))
@@ -236,10 +248,14 @@ impl Grid<'_> {
         0..if leaf.leaf.joined() { 1 } else { leaf.rods() }
     }
 
-    fn reaction(&self, near: Option<&Nearby>, change: (&LeafRate, &Response)) -> Vec<DVec3> {
+    fn reaction(
+        &self,
+        near: Option<&NeighbouringEquilibria>,
+        change: (&LeafParameterDerivative, &LinearResponse),
+    ) -> Vec<DVec3> {
         let leaf = &self.level.leaf;
         let mut all = vec![leaf.reaction_rate(change.0, change.1)];
-        if is_clamped(&leaf.leaf) {
+        if has_clamped_tip(&leaf.leaf) {
             all.extend(
                 near.iter()
                     .flat_map(|near| near.clamp_moment_rates(self.level)),
@@ -249,12 +265,12 @@ impl Grid<'_> {
     }
 
     /// The changes of force and moment on every grip.
-    fn on_grips(
+    fn grip_derivatives(
         &self,
-        near: Option<&Nearby>,
-        (rate, response): (&LeafRate, &Response),
+        near: Option<&NeighbouringEquilibria>,
+        (rate, response): (&LeafParameterDerivative, &LinearResponse),
     ) -> Vec<DVec3> {
-        let Level { leaf, state } = self.level;
+        let GridLevel { leaf, state } = self.level;
         if !leaf.has_grips() {
             return Vec::new();
         }
@@ -271,29 +287,39 @@ impl Grid<'_> {
     }
 
     /// Displacements of the nodes that all grids have, rod after rod.
-    fn positions(&self, rate: &LeafRate, response: &Response) -> Vec<DVec3> {
+    fn positions(&self, rate: &LeafParameterDerivative, response: &LinearResponse) -> Vec<DVec3> {
         let rods = response.nodes.iter().enumerate();
         let of = |(j, rod): (usize, &Vec<[f64; 6]>)| -> Vec<DVec3> {
             // A clamped base has no equations; a hinged one moves with its hinge.
             let (bases, nodes) = rod.split_at(1 - self.level.leaf.first_node());
-            let base = bases.first().map_or(rate.of_base(j)[0], shift);
+            let base = bases
+                .first()
+                .map_or(rate.base_motion_rates(j)[0], displacement_part);
             let nodes = nodes.iter().skip(self.stride - 1).step_by(self.stride);
-            [base].into_iter().chain(nodes.map(shift)).collect()
+            [base]
+                .into_iter()
+                .chain(nodes.map(displacement_part))
+                .collect()
         };
         rods.flat_map(of).collect()
     }
 
     /// Derivatives of the tips and of the energy alone, by one adjoint solution for each
     /// component of a tip.
-    fn tips_by_adjoint(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
+    fn tips_by_adjoint(
+        &self,
+        linear: &mut Linearized,
+        forces: &[ParameterForces],
+    ) -> Option<Vec<ResultDerivatives>> {
         let units = unit_forces(&self.level.leaf, self.tips().len());
         let adjoint = linear.responses(self.level, &units)?;
         let linear = &*linear;
-        let component = |forces: &Forces, k: usize| linear.work(self.level, forces, &adjoint[k]);
-        let tip = |forces: &Forces, tip: usize| {
+        let component =
+            |forces: &ParameterForces, k: usize| linear.work(self.level, forces, &adjoint[k]);
+        let tip = |forces: &ParameterForces, tip: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
         };
-        let changes = |forces: &Forces| -> Changes {
+        let changes = |forces: &ParameterForces| -> ResultDerivatives {
             let tips = self.tips().map(|k| tip(forces, k)).collect();
             let energy = vec![DVec3::X * forces.energy];
             [tips, energy, Vec::new(), Vec::new(), Vec::new(), Vec::new()]
@@ -303,11 +329,11 @@ impl Grid<'_> {
 }
 
 /// A unit force on every tip along every axis.
-pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
+pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<ParameterForces> {
     let n = leaf.moving_nodes().len();
     let force = |(tip, axis): (usize, usize)| {
-        let mut unit = Forces::zeros(leaf.rods());
-        unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;
+        let mut unit = ParameterForces::zeros(leaf.rods());
+        unit.node_forces_mut(tip, n)[n - 1][3 + axis] = 1.0;
         unit
     };
     let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));
@@ -316,9 +342,9 @@ pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
 
 /// The leaf for neighbouring values of a number, at rest to first order, with
 /// finite-difference weights.
-pub(crate) struct Nearby(Vec<Near>);
+pub(crate) struct NeighbouringEquilibria(Vec<NeighbouringEquilibrium>);
 
-struct Near {
+struct NeighbouringEquilibrium {
     offset: f64,
     weight: f64,
     leaf: DiscreteLeaf,
@@ -327,37 +353,39 @@ struct Near {
 
 /// Relative differences below which two eigenvalues, and their derivatives, count as equal;
 /// the third number bounds the error of eigenvalues by rounding, as a part of the first.
-const EQUAL: f64 = 1e-6;
+const EQUAL_EIGENVALUE_TOLERANCE: f64 = 1e-6;
 
-const SAME: f64 = 1e-3;
+const EQUAL_DERIVATIVE_TOLERANCE: f64 = 1e-3;
 
-const NOISE: f64 = 1e-3;
+const EIGENVALUE_ROUNDING_LIMIT: f64 = 1e-3;
 
-impl Nearby {
+impl NeighbouringEquilibria {
     /// From scenarios nearby, with their offsets and weights.
     pub fn new(
-        level: &Level,
+        level: &GridLevel,
         scenarios: &[(f64, f64, Arc<Scenario>)],
-        (rate, response): (&LeafRate, &Response),
-    ) -> Nearby {
+        (rate, response): (&LeafParameterDerivative, &LinearResponse),
+    ) -> NeighbouringEquilibria {
         let leaf = &level.leaf;
         let near = |(offset, weight, scenario): &(f64, f64, Arc<Scenario>)| {
-            let near = Leaf::in_units(Arc::clone(scenario), leaf.leaf.scale);
+            let near = Leaf::with_scale(Arc::clone(scenario), leaf.leaf.scale);
             let near = DiscreteLeaf::new(&near, leaf.grid.clone());
-            Near {
+            NeighbouringEquilibrium {
                 offset: *offset,
                 weight: *weight,
                 leaf: near,
-                state: moved(level, rate, response, *offset),
+                state: displace_along_response(level, rate, response, *offset),
             }
         };
-        Nearby(scenarios.iter().map(near).collect())
+        NeighbouringEquilibria(scenarios.iter().map(near).collect())
     }
 
     /// The derivative of the eigenvalue of a mode: that of its Rayleigh quotient between
     /// neighbouring equilibria, as changes of its shape enter in second order only.
     pub fn eigenvalue_rate(&self, mode: &Eigenpair) -> f64 {
-        let term = |near: &Near| near.weight * modes::eigenvalue(&near.leaf, &near.state, mode);
+        let term = |near: &NeighbouringEquilibrium| {
+            near.weight * modes::eigenvalue(&near.leaf, &near.state, mode)
+        };
         self.0.iter().map(term).sum()
     }
 
@@ -373,13 +401,15 @@ impl Nearby {
         let pairs = modes.windows(2).enumerate();
         let equal = |pair: &[Eigenpair]| {
             let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
-            (a - b).abs() <= EQUAL * a.abs().max(b.abs())
+            (a - b).abs() <= EQUAL_EIGENVALUE_TOLERANCE * a.abs().max(b.abs())
         };
         for (k, pair) in pairs.filter(|(_, pair)| equal(pair)) {
             let [a, b] = [rates[k], rates[k + 1]];
             let mixed = self.eigenvalue_rate(&pair[0].plus(&pair[1])) - 0.5 * (a + b);
-            let rounding = EQUAL * NOISE * pair[0].eigenvalue.abs() / farthest;
-            let same = SAME * a.abs().max(b.abs()) + rounding;
+            let rounding =
+                EQUAL_EIGENVALUE_TOLERANCE * EIGENVALUE_ROUNDING_LIMIT * pair[0].eigenvalue.abs()
+                    / farthest;
+            let same = EQUAL_DERIVATIVE_TOLERANCE * a.abs().max(b.abs()) + rounding;
             if !(mixed.abs() <= same && (a - b).abs() <= same) {
                 rates[k..k + 2].fill(f64::NAN);
             }
@@ -388,21 +418,21 @@ impl Nearby {
     }
 
     /// The derivatives of the moments of the rods on a clamp.
-    pub fn clamp_moment_rates(&self, level: &Level) -> Vec<DVec3> {
-        self.rates_of(level, |leaf, state| leaf.reaction(state).1)
+    pub fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+        self.vector_derivatives(level, |leaf, state| leaf.reaction(state).1)
     }
 
     /// The derivatives of the moments on grips about their middles.
-    pub fn grip_moment_rates(&self, level: &Level) -> Vec<DVec3> {
-        self.rates_of(level, |leaf, state| {
+    pub fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+        self.vector_derivatives(level, |leaf, state| {
             let reactions = leaf.grip_reactions(state).into_iter();
             reactions.map(|[_, moment]| moment).collect()
         })
     }
 
-    fn rates_of(
+    fn vector_derivatives(
         &self,
-        level: &Level,
+        level: &GridLevel,
         vectors: impl Fn(&DiscreteLeaf, &State) -> Vec<DVec3>,
     ) -> Vec<DVec3> {
         let first = vectors(&level.leaf, &level.state);
@@ -419,24 +449,24 @@ impl Nearby {
 
 /// Relative step of finite differences with respect to a parameter on which the scenario
 /// depends linearly: large, since rounding is the only error.
-const LINEAR: f64 = 0.125;
+const LINEAR_PARAMETER_STEP: f64 = 0.125;
 
 /// Relative step for other parameters, with differences of fourth order.
-const NONLINEAR: f64 = 1e-3;
+const NONLINEAR_PARAMETER_STEP: f64 = 1e-3;
 
 /// Relative step of differences of eigenvalues, whose modes may be close together, and of
 /// clamp moments.
-const NEIGHBOURING: f64 = 3e-4;
+const EIGENVALUE_DIFFERENCE_STEP: f64 = 3e-4;
 
 /// Offsets (in steps) and weights of the central and the one-sided fourth-order differences.
-const CENTRAL: [(f64, f64); 4] = [
+const CENTRAL_DIFFERENCE_RULE: [(f64, f64); 4] = [
     (-2.0, 1.0 / 12.0),
     (-1.0, -2.0 / 3.0),
     (1.0, 2.0 / 3.0),
     (2.0, -1.0 / 12.0),
 ];
 
-const ONE_SIDED: [(f64, f64); 5] = [
+const ONE_SIDED_DIFFERENCE_RULE: [(f64, f64); 5] = [
     (0.0, -25.0 / 12.0),
     (1.0, 4.0),
     (2.0, -3.0),
@@ -457,7 +487,7 @@ pub(crate) struct Parameter<'a> {
 }
 
 impl Parameter<'_> {
-    fn size(&self) -> f64 {
+    fn step_unit(&self) -> f64 {
         match self.value.abs() {
             size if size > 0.0 => size,
             _ => self.unit,
@@ -483,8 +513,14 @@ impl Parameter<'_> {
     /// The derivative of the scenario as a weighted sum of scenarios.
     pub fn rate(&self) -> Option<Vec<(f64, Scenario)>> {
         let found = match self.linear {
-            true => self.differences(LINEAR * self.size(), &[&[(0.0, -1.0), (1.0, 1.0)]]),
-            false => self.differences(NONLINEAR * self.size(), &[&CENTRAL, &ONE_SIDED]),
+            true => self.differences(
+                LINEAR_PARAMETER_STEP * self.step_unit(),
+                &[&[(0.0, -1.0), (1.0, 1.0)]],
+            ),
+            false => self.differences(
+                NONLINEAR_PARAMETER_STEP * self.step_unit(),
+                &[&CENTRAL_DIFFERENCE_RULE, &ONE_SIDED_DIFFERENCE_RULE],
+            ),
         };
         let terms = found?.into_iter();
         Some(
@@ -496,8 +532,11 @@ impl Parameter<'_> {
 
     /// Neighbouring scenarios with their offsets and the finite-difference weights for a
     /// function of the scenario.
-    pub fn nearby(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
-        let found = self.differences(NEIGHBOURING * self.size(), &[&CENTRAL, &ONE_SIDED])?;
+    pub fn neighbouring_scenarios(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
+        let found = self.differences(
+            EIGENVALUE_DIFFERENCE_STEP * self.step_unit(),
+            &[&CENTRAL_DIFFERENCE_RULE, &ONE_SIDED_DIFFERENCE_RULE],
+        )?;
         let shared = |(offset, weight, scenario)| (offset, weight, Arc::new(scenario));
         Some(found.into_iter().map(shared).collect())
     }
@@ -505,9 +544,9 @@ impl Parameter<'_> {
 
 /// Relative accuracy of the conjugate gradients, as a part of the tolerance, and its lower
 /// limit.
-const SOLUTION: f64 = 3e-3;
+const CONJUGATE_GRADIENT_ACCURACY: f64 = 3e-3;
 
-const BEST_SOLUTION: f64 = 1e-11;
+const BEST_CONJUGATE_GRADIENT_ACCURACY: f64 = 1e-11;
 
 /// A settled leaf (all rods, in space) with its equations linearised and factorised once for
 /// all right-hand sides.
@@ -527,11 +566,11 @@ pub(crate) struct Linearized {
 
 impl Linearized {
     /// Linearises about the state of a level.
-    pub fn new(level: &Level, tolerance: f64) -> Linearized {
+    pub fn new(level: &GridLevel, tolerance: f64) -> Linearized {
         let (leaf, state) = (&level.leaf, &level.state);
         let mut system = System::new(leaf);
         leaf.assemble(state, &mut system);
-        leaf.hold_turn(state, &mut system);
+        leaf.add_phase_conditions(state, &mut system);
         let factorized = match leaf.has_moments() {
             false => system.factorize(0.0),
             true => system.factorize_indefinite(),
@@ -539,7 +578,8 @@ impl Linearized {
         Linearized {
             system,
             segments: leaf.all_segments(state),
-            accuracy: (SOLUTION * tolerance).clamp(BEST_SOLUTION, 1e-4),
+            accuracy: (CONJUGATE_GRADIENT_ACCURACY * tolerance)
+                .clamp(BEST_CONJUGATE_GRADIENT_ACCURACY, 1e-4),
             factorized,
             solves: 0,
             factorizations: 1,
@@ -547,31 +587,43 @@ impl Linearized {
     }
 
     /// The forces by which parameter changes of the leaf unbalance that state.
-    pub fn forces(&self, level: &Level, rates: &[LeafRate]) -> Vec<Forces> {
-        let force = |rate| level.leaf.rate(&level.state, &self.segments, rate);
+    pub fn forces(
+        &self,
+        level: &GridLevel,
+        rates: &[LeafParameterDerivative],
+    ) -> Vec<ParameterForces> {
+        let force = |rate| {
+            level
+                .leaf
+                .parameter_forces(&level.state, &self.segments, rate)
+        };
         rates.iter().map(force).collect()
     }
 
     /// The responses to forces. `None` if the matrix is singular.
-    pub fn responses(&mut self, level: &Level, loads: &[Forces]) -> Option<Vec<Response>> {
+    pub fn responses(
+        &mut self,
+        level: &GridLevel,
+        loads: &[ParameterForces],
+    ) -> Option<Vec<LinearResponse>> {
         self.responses_to(level, loads, self.accuracy)
     }
 
     /// The same to another relative accuracy.
     pub fn responses_to(
         &mut self,
-        level: &Level,
-        loads: &[Forces],
+        level: &GridLevel,
+        loads: &[ParameterForces],
         accuracy: f64,
-    ) -> Option<Vec<Response>> {
+    ) -> Option<Vec<LinearResponse>> {
         let (leaf, segments, solves) = (&level.leaf, &self.segments, &mut self.solves);
         if self.factorized {
             let system = &mut self.system;
-            let mut by_rods = |rhs: &Field| {
+            let mut by_rods = |rhs: &NodalField| {
                 *solves += 1;
                 system.set_rhs(rhs);
                 match system.solve(None, accuracy) {
-                    Solved::Yes(_) => Some(system.solution()),
+                    LinearSolveOutcome::Converged(_) => Some(system.solution()),
                     _ => None,
                 }
             };
@@ -584,11 +636,11 @@ impl Linearized {
             self.factorized = false;
         }
         leaf.assemble(&level.state, &mut self.system);
-        leaf.hold_turn(&level.state, &mut self.system);
+        leaf.add_phase_conditions(&level.state, &mut self.system);
         self.factorizations += 1;
         let pattern = DirectSolver::new(&self.system).ok()?;
-        let mut factor: Factors = pattern.factorize(&self.system, 0.0).ok()?;
-        let mut direct = |rhs: &Field| {
+        let mut factor: MatrixFactors = pattern.factorize(&self.system, 0.0).ok()?;
+        let mut direct = |rhs: &NodalField| {
             *solves += 1;
             Some(factor.solve_bordered(rhs, &[]).increments)
         };
@@ -599,28 +651,38 @@ impl Linearized {
 
     /// The work of forces on the response to others: by symmetry also that of the others on
     /// the response to these.
-    pub fn work(&self, level: &Level, forces: &Forces, response: &Response) -> f64 {
-        level.leaf.work(&self.segments, forces, response)
+    pub fn work(
+        &self,
+        level: &GridLevel,
+        forces: &ParameterForces,
+        response: &LinearResponse,
+    ) -> f64 {
+        level.leaf.mutual_work(&self.segments, forces, response)
     }
 }
 
 fn response(
     leaf: &DiscreteLeaf,
     segments: &[Segment],
-    load: &Forces,
-    solve: &mut dyn FnMut(&Field) -> Option<Field>,
-) -> Option<Response> {
+    load: &ParameterForces,
+    solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
+) -> Option<LinearResponse> {
     let (mut rhs, mut gaps) = load.dense(leaf);
-    let mut response = Response {
-        nodes: Field::new(),
-        carried: vec![DVec3::ZERO; gaps.len()],
+    let mut response = LinearResponse {
+        nodes: NodalField::new(),
+        force_changes: vec![DVec3::ZERO; gaps.len()],
     };
     leaf.condense_gaps(segments, &gaps, &mut rhs);
     response.nodes = solve(&rhs)?;
-    leaf.carried(segments, &response.nodes, &mut gaps, &mut response.carried);
+    leaf.carried_force_changes(
+        segments,
+        &response.nodes,
+        &mut gaps,
+        &mut response.force_changes,
+    );
     leaf.complete_law(segments, &mut response, &mut gaps, true, solve);
     // Held nodes move with their holders.
-    for (rod, moved) in response.nodes.iter_mut().zip(&load.moved) {
+    for (rod, moved) in response.nodes.iter_mut().zip(&load.support_increments) {
         let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());
         nodes.for_each(|(sum, value)| *sum += value);
     }
@@ -630,11 +692,16 @@ fn response(
 }
 
 /// The state, moved along a response.
-pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f64) -> State {
+pub(crate) fn displace_along_response(
+    level: &GridLevel,
+    rate: &LeafParameterDerivative,
+    response: &LinearResponse,
+    step: f64,
+) -> State {
     let mut state = level.state.clone();
     for j in 0..state.rods() {
         let base = state.base(j);
-        let [shift, turn] = rate.of_base(j);
+        let [shift, turn] = rate.base_motion_rates(j);
         state.x[base] += step * shift;
         state.q[base] = (rotation::exp(step * turn) * state.q[base]).normalize();
     }
@@ -649,13 +716,13 @@ const SAFETY: f64 = 3.0;
 /// Relative errors by rounding, and by unfinished iterations as a part of the tolerance.
 const ROUNDING: f64 = 1e-10;
 
-const UNFINISHED: f64 = 0.1;
+const ITERATION_ERROR_FRACTION: f64 = 0.1;
 
 /// Values on successively refined grids, extrapolated together.
 #[derive(Default)]
-pub(super) struct Series(Vec<(usize, Vec<DVec3>)>);
+pub(super) struct VectorSeries(Vec<(usize, Vec<DVec3>)>);
 
-impl Series {
+impl VectorSeries {
     /// Adds the values on a grid of so many segments, if there are as many as before: not all
     /// are known on every grid.
     pub fn push(&mut self, segments: usize, values: Vec<DVec3>) {
@@ -681,7 +748,9 @@ impl Series {
         };
         let table: Richardson = self.0.iter().map(on).collect();
         let values = table.extrapolated().chunks(3);
-        let error = |best: Best| (SAFETY * best.error + ROUNDING + UNFINISHED * tolerance) * unit;
+        let error = |best: BestColumn| {
+            (SAFETY * best.error + ROUNDING + ITERATION_ERROR_FRACTION * tolerance) * unit
+        };
         (
             values.map(|v| DVec3::from_slice(v) * unit).collect(),
             table.best().map(error),
@@ -705,7 +774,7 @@ mod tests {
         for level in &found.levels {
             let mut linear = Linearized::new(level, 1e-6);
             let units = super::unit_forces(&level.leaf, 1);
-            let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();
+            let loads: Vec<ParameterForces> = units.iter().cycle().take(10).cloned().collect();
             assert_eq!(linear.responses(level, &loads).unwrap().len(), 10);
             assert_eq!((linear.solves, linear.factorizations), (10, 1));
         }

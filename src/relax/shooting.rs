@@ -1,7 +1,7 @@
 //! Shooting: a boundary-value solution as a result of the same type as a relaxation's.
 
 use crate::leaf::{Grid, Leaf};
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::relax::request::{MAX_INTERVALS, Method, Options, Progress, RelaxError};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::forces::{Reaction, Stresses};
@@ -11,10 +11,10 @@ use crate::relax::result::{
 };
 use crate::relax::solve_on_grid::coarsest;
 use crate::relax::stability::index_near;
-use crate::run::{Instant, RefusedOption, Unmodelled};
+use crate::run::{Instant, RefusedOption, UnmodelledFeature};
 use crate::scenario::{Scenario, longest};
-use crate::shape::{RodShape, SAME_STATION, Undulation, equally_spaced};
-use crate::shooting::{Reason, Solution, Start};
+use crate::shape::{RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
+use crate::shooting::{ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::{memory, shooting};
 use glam::DVec3;
 
@@ -23,7 +23,7 @@ const SEGMENTS: usize = 32;
 
 /// Tolerance of the relaxation that shooting starts from: the coarsest grids are enough, as
 /// Newton's method converges from there faster than finer grids.
-pub const START: f64 = 1e-3;
+pub const START_TOLERANCE: f64 = 1e-3;
 
 /// The grid whose nodes are the stations of a boundary-value solution.
 fn station_grid(scenario: &Scenario) -> Grid {
@@ -34,13 +34,13 @@ fn station_grid(scenario: &Scenario) -> Grid {
 
 /// The stations `own` and those that divide a vein into `parts` equal parts: the solution is
 /// integrated to all of them, so that none is interpolated.
-fn with_requested(own: &[f64], parts: Option<usize>) -> Vec<f64> {
+fn merge_requested_stations(own: &[f64], parts: Option<usize>) -> Vec<f64> {
     let requested = parts.map(equally_spaced).unwrap_or_default();
     let mut all = own.to_vec();
     let is_own = |at: &f64| {
-        let next = own.partition_point(|station| at - station >= SAME_STATION);
+        let next = own.partition_point(|station| at - station >= STATION_TOLERANCE);
         own.get(next)
-            .is_some_and(|station| station - at < SAME_STATION)
+            .is_some_and(|station| station - at < STATION_TOLERANCE)
     };
     all.extend(requested.iter().filter(|at| !is_own(at)));
     all.sort_by(f64::total_cmp);
@@ -48,7 +48,7 @@ fn with_requested(own: &[f64], parts: Option<usize>) -> Vec<f64> {
 }
 
 /// The rods at those of their `stations` that are in `own`, too.
-fn at_own(own: &[f64], stations: &[f64], rods: &[RodShape]) -> Vec<RodShape> {
+fn rods_at_stations(own: &[f64], stations: &[f64], rods: &[RodShape]) -> Vec<RodShape> {
     let at_own = |rod: &RodShape| {
         let nodes = rod.nodes.iter().zip(stations);
         let nodes = nodes.filter(|(_, at)| own.binary_search_by(|o| o.total_cmp(at)).is_ok());
@@ -72,7 +72,7 @@ pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), Rela
         return Err(RefusedOption::new("intervals", found, allowed).into());
     }
     let intervals = intervals.unwrap_or(1);
-    Ok(memory::shooting(rods, intervals)?)
+    Ok(memory::check_shooting_memory(rods, intervals)?)
 }
 
 /// Brings a leaf to rest by shooting: from arcs, or from a relaxed leaf.
@@ -95,7 +95,7 @@ pub fn relax(
         return Err(RefusedOption::new("method", options.method.word(), why).into());
     }
     shooting::check_models(scenario, from_rest).map_err(|missing| match missing {
-        Unmodelled::FromArcs { .. } => {
+        UnmodelledFeature::FromArcs { .. } => {
             RefusedOption::new("method", options.method.word(), missing.to_string()).into()
         }
         other => RelaxError::from(other),
@@ -103,9 +103,9 @@ pub fn relax(
     let how = (intervals, tolerance);
     let mut found = match from_rest {
         true => relax_from_rest(scenario, options, how, progress)?,
-        false => shoot(scenario, options, how, Start::Arcs, progress),
+        false => shoot(scenario, options, how, ShootingStart::Arcs, progress),
     };
-    found.doubts = report::doubts(scenario, &found);
+    found.doubts = report::implausible_properties(scenario, &found);
     Ok(found)
 }
 
@@ -119,7 +119,7 @@ fn relax_from_rest(
 ) -> Result<Equilibrium, RelaxError> {
     let relaxation = Options {
         method: Method::default(),
-        tolerance: Some(START),
+        tolerance: Some(START_TOLERANCE),
         modes: 0,
         stations: None,
         ..options.clone()
@@ -131,7 +131,7 @@ fn relax_from_rest(
             ..rest
         });
     }
-    let start = Start::Leaf {
+    let start = ShootingStart::Leaf {
         stations: &rest.shape.stations,
         rods: &rest.shape.rods,
     };
@@ -144,9 +144,9 @@ fn relax_from_rest(
 
 /// The work of shooting in terms of a relaxation: Newton corrections count as steps,
 /// linearisations as factorisations, evaluations of all slopes as force evaluations.
-impl From<shooting::Work> for Work {
-    fn from(work: shooting::Work) -> Self {
-        Work {
+impl From<shooting::ShootingCounts> for SolverCounts {
+    fn from(work: shooting::ShootingCounts) -> Self {
+        SolverCounts {
             steps: work.iterations,
             factorizations: work.linearizations,
             force_evaluations: work.slopes,
@@ -160,17 +160,21 @@ fn shoot(
     scenario: &Scenario,
     options: &Options,
     (intervals, tolerance): (Option<usize>, f64),
-    start: Start,
+    start: ShootingStart,
     progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
     let own = grid.sigma().to_vec();
-    let stations = with_requested(&own, options.stations);
-    let shooting_options = shooting::Options {
+    let stations = merge_requested_stations(&own, options.stations);
+    let shooting_options = shooting::ShootingOptions {
         intervals,
         limit: options.limit.clone(),
-        ..shooting::Options::new(start, &stations, shooting::Precision::Error(tolerance))
+        ..shooting::ShootingOptions::new(
+            start,
+            &stations,
+            shooting::RequiredPrecision::EstimatedError(tolerance),
+        )
     };
     let found = shooting::solve(scenario, &shooting_options, &mut |step| {
         progress(&Progress::Shooting(*step))
@@ -191,7 +195,7 @@ fn shoot(
             accuracy.error_estimate = Some(solution.error.position);
             energy = Some(solution.energy);
             errors = Some(solution.error);
-            let rods = at_own(&own, &stations, &solution.rods);
+            let rods = rods_at_stations(&own, &stations, &solution.rods);
             index = index_near(scenario, grid, &rods, solution.error.position);
             let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
             (outcome, solution.work, solution.rods)
@@ -201,7 +205,7 @@ fn shoot(
     let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
     let tip_force_sum = tips.iter().map(|node| node.rotation * node.n).sum();
-    let rods_at_own = at_own(&own, &stations, &rods);
+    let rods_at_own = rods_at_stations(&own, &stations, &rods);
     Equilibrium {
         scenario: scenario.name.clone(),
         method: options.method,
@@ -233,8 +237,9 @@ fn shoot(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
-        stress: Stresses::of(scenario, &stations, &rods)
-            .map(|it| it.within(scenario, errors.map(|error| [error.force, error.moment]))),
+        stress: Stresses::of(scenario, &stations, &rods).map(|it| {
+            it.with_field_errors(scenario, errors.map(|error| [error.force, error.moment]))
+        }),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
@@ -253,7 +258,7 @@ fn shoot(
 /// The outcome of a solution.
 fn outcome_of_solution(
     scenario: &Scenario,
-    solution: &Solution,
+    solution: &ShootingSolution,
     index: Option<usize>,
     tolerance: f64,
 ) -> (Outcome, Option<String>) {
@@ -280,13 +285,13 @@ fn outcome_of_solution(
 }
 
 /// The outcome of a failure: how far the continuation came, and why it ended.
-fn outcome_of_failure(failure: &shooting::Failure) -> (Outcome, Option<String>) {
-    let way = match failure.part {
+fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<String>) {
+    let way = match failure.lambda {
         part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
         _ => String::new(),
     };
     let outcome = match failure.reason {
-        Reason::Singular(_) => Outcome::Singular,
+        ShootingFailureReason::Singular(_) => Outcome::Singular,
         _ => Outcome::NotAtRest,
     };
     (outcome, Some(format!("{}{way}", failure.reason)))

@@ -6,14 +6,16 @@
 //! The Morse index of an equilibrium that was not found by relaxation.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::accuracy::transfer::prolong;
-use crate::relax::accuracy::{Level, NestedEquilibrium, positions};
-use crate::relax::eigenvalues::{List, Lowest, deciding_grid, small_grid};
-use crate::relax::loading::arrival::{continue_on, refine};
+use crate::relax::accuracy::{GridLevel, NestedEquilibrium, positions};
+use crate::relax::eigenvalues::{
+    EigenvalueRequest, LowestModes, affordable_next_grid, deciding_grid,
+};
+use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::request::{MOST_MODES, Method, Options, Progress, SemiImplicit};
-use crate::relax::rest::{Effort, Problem};
+use crate::relax::rest::{RelaxationProblem, WorkLog};
 use crate::relax::saddle::bounds;
 use crate::relax::{eigenvalues, saddle};
 use crate::scenario::Scenario;
@@ -38,14 +40,14 @@ pub struct Decision {
     pub found: NestedEquilibrium,
     pub verdict: Verdict,
     /// The requested modes, if they were computed for it.
-    pub modes: Option<Lowest>,
+    pub modes: Option<LowestModes>,
     /// Whether stability was not clear without eigenvalues, or not on the grids before.
     pub needed: bool,
 }
 
 impl Decision {
     /// Nothing is decided on a leaf that is not at rest.
-    pub fn none(found: NestedEquilibrium) -> Self {
+    pub fn without_decision(found: NestedEquilibrium) -> Self {
         Decision {
             found,
             verdict: Verdict::AsCounted,
@@ -56,71 +58,78 @@ impl Decision {
 }
 
 /// Brings the leaf to rest on this grid, and on finer ones, if it can.
-pub type Again<'a> = dyn Fn(Grid, &mut Effort) -> Option<NestedEquilibrium> + 'a;
+pub type RelaxOnGrid<'a> = dyn Fn(Grid, &mut WorkLog) -> Option<NestedEquilibrium> + 'a;
 
 /// What to do on the grids so far.
-enum Next {
+enum NextStabilityCheck {
     /// The count is certain.
-    Nothing,
+    CountIsCertain,
     /// A finer grid.
     Finer(Grid),
     /// Compute these eigenvalues.
-    Compute(List),
+    Compute(EigenvalueRequest),
     /// The matrix does not fit into memory.
-    Impossible,
+    OutOfMemory,
 }
 
 /// Decides, on further grids where necessary; `again` brings the leaf to rest on a grid whose
 /// equilibrium is not near those of the grids before.
 pub fn decide(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     mut found: NestedEquilibrium,
-    effort: &mut Effort,
-    again: &Again,
+    effort: &mut WorkLog,
+    again: &RelaxOnGrid,
 ) -> Decision {
     let (mut needed, mut may_refine) = (false, true);
     loop {
-        let next = next(problem, &found, may_refine, &mut effort.work);
+        let next = next_stability_check(problem, &found, may_refine, &mut effort.work);
         let list = match &next {
-            Next::Nothing => {
+            NextStabilityCheck::CountIsCertain => {
                 return Decision {
                     needed,
-                    ..Decision::none(found)
+                    ..Decision::without_decision(found)
                 };
             }
-            Next::Finer(_) => None,
+            NextStabilityCheck::Finer(_) => None,
             // More than one attempt: the leaf may be large.
-            Next::Compute(list) => Some(List {
-                decides: list.decides || needed,
+            NextStabilityCheck::Compute(list) => Some(EigenvalueRequest {
+                decides_stability: list.decides_stability || needed,
                 ..*list
             }),
-            Next::Impossible => {
+            NextStabilityCheck::OutOfMemory => {
                 return Decision {
                     verdict: Verdict::Unknown,
                     needed: true,
-                    ..Decision::none(found)
+                    ..Decision::without_decision(found)
                 };
             }
         };
         let lowest = list.and_then(|list| eigenvalues::lowest(problem, &found, list));
-        needed |= list.is_none_or(|list| list.decides);
-        found = found.softened(lowest.as_ref().map_or(1.0, |lowest| lowest.softening));
+        needed |= list.is_none_or(|list| list.decides_stability);
+        found = found.with_bifurcation_factor(
+            lowest
+                .as_ref()
+                .map_or(1.0, |lowest| lowest.bifurcation_error_factor),
+        );
         let inaccurate = found.keeps_tolerance && !found.is_accurate();
         let finer = match (next, &lowest) {
-            (Next::Finer(grid), _) => Some(grid),
-            (_, Some(_)) if inaccurate && may_refine => found.finer(),
+            (NextStabilityCheck::Finer(grid), _) => Some(grid),
+            (_, Some(_)) if inaccurate && may_refine => found.next_finer_grid(),
             (_, Some(lowest)) => {
-                (lowest.undecided).and_then(|size| deciding_grid(problem, &found, size))
+                (lowest.undecided_size).and_then(|size| deciding_grid(problem, &found, size))
             }
-            _ => needed.then(|| small_grid(problem, &found)).flatten(),
+            _ => needed
+                .then(|| affordable_next_grid(problem, &found))
+                .flatten(),
         };
-        if let Some(further) = finer.and_then(|finer| go_on(problem, &found, finer, effort, again))
+        if let Some(further) =
+            finer.and_then(|finer| continue_on_finer_grid(problem, &found, finer, effort, again))
         {
             (found, needed) = (further, true);
             continue;
         }
         let keeps_tolerance = found.keeps_tolerance && !inaccurate;
-        found = found.ended(keeps_tolerance);
+        found = found.with_tolerance_kept(keeps_tolerance);
         let Some(list) = list else {
             // The grids so far have to do.
             may_refine = false;
@@ -131,7 +140,7 @@ pub fn decide(
             None => Verdict::AsCounted,
             Some(lowest) => verdict(problem, &found, list, lowest),
         };
-        let requested = list.above.is_none() && list.count == problem.options.modes;
+        let requested = list.omitted_lower.is_none() && list.count == problem.options.modes;
         return Decision {
             found,
             verdict,
@@ -143,112 +152,124 @@ pub fn decide(
 
 /// Comes to rest on a finer grid. The grids before found rest; without this one the sign remains
 /// undecided.
-fn go_on(
-    problem: &Problem,
+fn continue_on_finer_grid(
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     finer: Grid,
-    effort: &mut Effort,
-    again: &Again,
+    effort: &mut WorkLog,
+    again: &RelaxOnGrid,
 ) -> Option<NestedEquilibrium> {
     // A saddle of the finer grid may be none of the coarser, and what it leads to not near them.
-    match continue_on(problem, found.grids(), finer.clone(), effort) {
+    match continue_on(problem, found.without_estimates(), finer.clone(), effort) {
         Ok(further) => Some(further),
         Err(_) => {
             let further = again(finer, effort)?;
             let path = further.path.clone().or_else(|| found.path.clone());
-            Some(further.along(path))
+            Some(further.with_path(path))
         }
     }
 }
 
 /// What decides on the grids so far.
-fn next(problem: &Problem, found: &NestedEquilibrium, may_refine: bool, work: &mut Work) -> Next {
-    let requested = List::requested(problem);
+fn next_stability_check(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    may_refine: bool,
+    work: &mut SolverCounts,
+) -> NextStabilityCheck {
+    let requested = EigenvalueRequest::requested(problem);
     let Some(level) = found.levels.last() else {
-        return Next::Nothing;
+        return NextStabilityCheck::CountIsCertain;
     };
     // A single grid allows no comparison; without a potential there is nothing to compare.
     let comparable = problem.segments().is_none() && level.leaf.leaf.has_potential();
     match found.index {
-        Some(0) if comparable && !found.clearly_stable => Next::Compute(List {
-            count: requested.count.max(1),
-            decides: true,
-            ..requested
-        }),
-        Some(1..) if comparable => beside_zero(problem, found, may_refine, work),
-        _ if requested.count == 0 => Next::Nothing,
-        _ => Next::Compute(requested),
+        Some(0) if comparable && !found.clearly_stable => {
+            NextStabilityCheck::Compute(EigenvalueRequest {
+                count: requested.count.max(1),
+                decides_stability: true,
+                ..requested
+            })
+        }
+        Some(1..) if comparable => check_near_zero(problem, found, may_refine, work),
+        _ if requested.count == 0 => NextStabilityCheck::CountIsCertain,
+        _ => NextStabilityCheck::Compute(requested),
     }
 }
 
 /// What decides on a saddle: the counts of negative eigenvalues, or the few that are close to
 /// zero.
-fn beside_zero(
-    problem: &Problem,
+fn check_near_zero(
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     may_refine: bool,
-    work: &mut Work,
-) -> Next {
-    let Some(Level { leaf, state }) = found.levels.last() else {
-        return Next::Nothing;
+    work: &mut SolverCounts,
+) -> NextStabilityCheck {
+    let Some(GridLevel { leaf, state }) = found.levels.last() else {
+        return NextStabilityCheck::CountIsCertain;
     };
     let mut system = System::new(leaf);
     let Some(bounds) = bounds(leaf, state, &mut system, work) else {
-        return Next::Impossible;
+        return NextStabilityCheck::OutOfMemory;
     };
     if bounds.least == bounds.finer && found.index == Some(bounds.least) {
-        return Next::Nothing;
+        return NextStabilityCheck::CountIsCertain;
     }
     if may_refine
         && bounds.here < bounds.finer
-        && let Some(finer) = small_grid(problem, found)
+        && let Some(finer) = affordable_next_grid(problem, found)
     {
-        return Next::Finer(finer);
+        return NextStabilityCheck::Finer(finer);
     }
     let count = (bounds.finer - bounds.least).max(1);
     if count > MOST_MODES {
-        return Next::Impossible;
+        return NextStabilityCheck::OutOfMemory;
     }
-    Next::Compute(List {
+    NextStabilityCheck::Compute(EigenvalueRequest {
         count,
-        above: Some((bounds.least, -bounds.close)),
-        decides: true,
-        exact: false,
+        omitted_lower: Some((bounds.least, -bounds.close)),
+        decides_stability: true,
+        needs_values: false,
     })
 }
 
 /// What the signs of extrapolated eigenvalues tell.
-fn verdict(problem: &Problem, found: &NestedEquilibrium, list: List, lowest: &Lowest) -> Verdict {
+fn verdict(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    list: EigenvalueRequest,
+    lowest: &LowestModes,
+) -> Verdict {
     // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
     // coarser ones tell.
-    let as_counted = lowest.undecided.is_none() && lowest.negative <= found.index;
+    let as_counted = lowest.undecided_size.is_none() && lowest.negative <= found.index;
     if as_counted && lowest.certainly_negative() <= found.index.unwrap_or(0) {
         return Verdict::AsCounted;
     }
-    let (certain, negative) = match list.above {
+    let (certain, negative) = match list.omitted_lower {
         Some(_) => (lowest.certainly_negative(), lowest.negative),
-        None => by_more_eigenvalues(problem, found, list, lowest),
+        None => count_with_more_eigenvalues(problem, found, list, lowest),
     };
     negative.map_or(Verdict::Undecided(certain), Verdict::Index)
 }
 
 /// How many eigenvalues are negative for certain, and how many are, if that is known: of the list
 /// or, where its signs are not certain or all of them are negative, of a longer and exact one.
-fn by_more_eigenvalues(
-    problem: &Problem,
+fn count_with_more_eigenvalues(
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    list: List,
-    lowest: &Lowest,
+    list: EigenvalueRequest,
+    lowest: &LowestModes,
 ) -> (usize, Option<usize>) {
     let (mut certain, mut negative) = (lowest.certainly_negative(), lowest.negative);
-    let mut list = List {
-        decides: true,
+    let mut list = EigenvalueRequest {
+        decides_stability: true,
         ..list
     };
     while list.count < MOST_MODES
-        && (negative == Some(list.count) || negative.is_none() && !list.exact)
+        && (negative == Some(list.count) || negative.is_none() && !list.needs_values)
     {
-        list.exact = true;
+        list.needs_values = true;
         list.count = (2 * list.count).min(MOST_MODES);
         let more = eigenvalues::lowest(problem, found, list);
         negative = (more.as_ref()).and_then(|more| more.negative_beyond(certain));
@@ -269,9 +290,9 @@ const LEAST_TOLERANCE: f64 = 1e-5;
 
 /// Equilibria farther apart than this, in lengths, are different ones, and so are those that are
 /// farther apart than their errors times the second number.
-const SAME_PLACE: f64 = 0.02;
+const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.02;
 
-const SAFETY: f64 = 10.0;
+const SAME_EQUILIBRIUM_ERROR_MULTIPLE: f64 = 10.0;
 
 /// Number of negative eigenvalues of the energy's Hessian at the equilibrium with the shape `rods`,
 /// given at the nodes of `grid` in the scenario's units within `error`, decided as that of a
@@ -294,17 +315,17 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
     let mut ignored = |_: &Progress| {};
     let error = error / leaf.scale.length;
     let tolerance = error.clamp(LEAST_TOLERANCE, TOLERANCE);
-    let problem = Problem::new(&leaf, &options, tolerance);
-    let mut effort = Effort::new(&mut ignored);
+    let problem = RelaxationProblem::new(&leaf, &options, tolerance);
+    let mut effort = WorkLog::new(&mut ignored);
     let discrete = DiscreteLeaf::new(&leaf, grid);
-    let state = project(&leaf, &discrete, rods);
-    let given = Level {
+    let state = state_from_rod_shapes(&leaf, &discrete, rods);
+    let given = GridLevel {
         leaf: discrete,
         state,
     };
     let mut guess = given.clone();
     while guess.leaf.segments() <= FINEST {
-        let finer = Level {
+        let finer = GridLevel {
             leaf: DiscreteLeaf::new(&leaf, guess.leaf.grid.refined()),
             state: prolong(&guess.leaf, &guess.state),
         };
@@ -319,24 +340,26 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
 /// The index at the `given` equilibrium, known within `error`, counted on grids from that of the
 /// `guess` on; `None` if these lead to another one.
 fn index_from(
-    problem: &Problem,
-    mut guess: Level,
-    (given, error): (&Level, f64),
-    effort: &mut Effort,
+    problem: &RelaxationProblem,
+    mut guess: GridLevel,
+    (given, error): (&GridLevel, f64),
+    effort: &mut WorkLog,
 ) -> Option<Option<usize>> {
-    let Level { leaf, state } = &mut guess;
+    let GridLevel { leaf, state } = &mut guess;
     let mut system = System::new(leaf);
     let begun = state.clone();
-    let index = saddle::polish(leaf, state, &mut system, &mut effort.work)?;
+    let index = saddle::converge_saddle(leaf, state, &mut system, &mut effort.work)?;
     if saddle::clearly_stable(leaf, state, &mut system, &mut effort.work) {
-        return (state.shift_to(&begun) < SAME_PLACE).then_some(Some(0));
+        return (state.largest_displacement_to(&begun) < SAME_EQUILIBRIUM_DISTANCE)
+            .then_some(Some(0));
     }
-    let counted = NestedEquilibrium::begun(problem).counted(false, Some(index));
-    let refined = refine(problem, counted.with(guess), effort).ok()?;
+    let counted = NestedEquilibrium::without_grids(problem).with_index(false, Some(index));
+    let refined = refine_to_tolerance(problem, counted.with_finer_level(guess), effort).ok()?;
     // No other equilibrium is of interest.
     let Decision { found, verdict, .. } = decide(problem, refined, effort, &|_, _| None);
-    let allowed = SAME_PLACE.min(SAFETY * (error + found.error().unwrap_or(f64::INFINITY)));
-    (distance_from(&found, given) <= allowed).then_some(match verdict {
+    let allowed = SAME_EQUILIBRIUM_DISTANCE
+        .min(SAME_EQUILIBRIUM_ERROR_MULTIPLE * (error + found.error().unwrap_or(f64::INFINITY)));
+    (distance_from_given(&found, given) <= allowed).then_some(match verdict {
         Verdict::AsCounted => found.index,
         Verdict::Index(index) => Some(index),
         Verdict::Undecided(_) | Verdict::Unknown => None,
@@ -345,16 +368,19 @@ fn index_from(
 
 /// The largest distance of the extrapolated positions from those `given` on a grid whose repeated
 /// halving leads to the first of those where it was found.
-fn distance_from(found: &NestedEquilibrium, given: &Level) -> f64 {
+fn distance_from_given(found: &NestedEquilibrium, given: &GridLevel) -> f64 {
     let (first, own) = (found.levels[0].leaf.segments(), given.leaf.segments());
-    let rods = found.table.extrapolated().chunks(3 * (first + 1));
+    let rods = found
+        .convergence_table
+        .extrapolated()
+        .chunks(3 * (first + 1));
     let shared = rods.flat_map(|rod| rod.chunks(3).step_by(first / own).flatten());
     let shared: Vec<f64> = shared.copied().collect();
     distance(&shared, &positions(given, 1))
 }
 
 /// The state of the discrete leaf at the given nodes.
-pub fn project(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
+pub fn state_from_rod_shapes(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
     let scale = leaf.scale;
     let nodes = || rods.iter().flat_map(|rod| &rod.nodes);
     let x = nodes().map(|node| node.position / scale.length).collect();

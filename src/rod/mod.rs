@@ -28,9 +28,11 @@
 mod segment;
 mod strip;
 
-pub use crate::rod::segment::{Blocks, Ends, Section, SectionRate, Sections, Segment};
-pub use crate::rod::strip::{NodeBlock, Strip};
-use crate::rotation::{Quaternions, Relative};
+pub use crate::rod::segment::{
+    LaneSections, NodePair, Section, SectionParameterDerivative, Segment, SegmentHessian,
+};
+pub use crate::rod::strip::{NodeBlock, TissueStrip};
+use crate::rotation::{Quaternions, RelativeRotation};
 use crate::simd::{Lanes, Vectors};
 use pulp::Simd;
 
@@ -39,7 +41,7 @@ pub const RESOLVED_TURN: f64 = 1.6;
 
 /// The two nodes of several segments.
 #[derive(Clone, Copy)]
-pub struct Nodes<S: Simd> {
+pub struct LaneNodes<S: Simd> {
     /// Positions.
     pub x: [Vectors<S>; 2],
     /// Rotations.
@@ -55,18 +57,18 @@ pub struct Element<S: Simd> {
     pub(super) nu: Vectors<S>,
     pub(super) w: Vectors<S>,
     pub(super) gap: Vectors<S>,
-    pub(super) relative: Relative<S>,
+    pub(super) relative: RelativeRotation<S>,
 }
 
 impl<S: Simd> Element<S> {
     /// The segments between `nodes` that carry the spatial forces `n`.
     #[inline(always)]
-    pub fn new(sections: &Sections<S>, nodes: &Nodes<S>, n: Vectors<S>) -> Self {
-        let (relative, frame) = Relative::between(nodes.q);
+    pub fn new(sections: &LaneSections<S>, nodes: &LaneNodes<S>, n: Vectors<S>) -> Self {
+        let (relative, frame) = RelativeRotation::between(nodes.q);
         let u = relative.psi.scale(sections.per_ds);
-        let nu = n.onto(frame);
+        let nu = n.director_components(frame);
         let w = nu * sections.compliance + sections.rest_strain;
-        let dx = (nodes.x[1] - nodes.x[0]).onto(frame);
+        let dx = (nodes.x[1] - nodes.x[0]).director_components(frame);
         Element {
             frame,
             u,
@@ -81,10 +83,10 @@ impl<S: Simd> Element<S> {
     /// The segments between `nodes` that carry the forces of their strains, whose stiffness is the
     /// condensing one: zero is allowed.
     #[inline(always)]
-    pub fn strained(sections: &Sections<S>, nodes: &Nodes<S>) -> Self {
-        let (relative, frame) = Relative::between(nodes.q);
+    pub fn with_strain_forces(sections: &LaneSections<S>, nodes: &LaneNodes<S>) -> Self {
+        let (relative, frame) = RelativeRotation::between(nodes.q);
         let u = relative.psi.scale(sections.per_ds);
-        let dx = (nodes.x[1] - nodes.x[0]).onto(frame);
+        let dx = (nodes.x[1] - nodes.x[0]).director_components(frame);
         let w = dx.scale(sections.per_ds);
         Element {
             frame,
@@ -106,7 +108,7 @@ impl<S: Simd> Element<S> {
     /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - v0_k)^2 +
     /// A_k (u_k - u0_k)^2). Infinite for a strained rigid rod.
     #[inline(always)]
-    pub fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S> {
+    pub fn strain_energy(&self, sections: &LaneSections<S>) -> Lanes<S> {
         let strain = self.w - sections.rest_strain;
         let gamma = self.gap.mul_add(sections.per_ds, strain);
         let stretch = gamma * gamma / sections.compliance;
@@ -117,48 +119,57 @@ impl<S: Simd> Element<S> {
 
     /// First derivatives of Pi at fixed force.
     #[inline(always)]
-    pub fn gradient(&self, sections: &Sections<S>) -> First<S> {
-        self.pull_back(self.nu, self.nu.cross(self.w).scale(sections.ds), self.m)
+    pub fn gradient(&self, sections: &LaneSections<S>) -> FirstDerivatives<S> {
+        self.nodal_derivatives(self.nu, self.nu.cross(self.w).scale(sections.ds), self.m)
     }
 
     /// With the force condensed out: the right-hand side for [`Element::hessian`].
     #[inline(always)]
-    pub fn condensed(&self, sections: &Sections<S>) -> First<S> {
+    pub fn condensed(&self, sections: &LaneSections<S>) -> FirstDerivatives<S> {
         let correction = sections.condensing * self.gap;
         let g_mu = self.nu.cross(self.w).scale(sections.ds);
         let g_mu = g_mu - self.law_rate_transposed(sections, correction);
         let nu = correction.mul_add(sections.per_ds, self.nu);
-        self.pull_back(nu, g_mu, self.m)
+        self.nodal_derivatives(nu, g_mu, self.m)
     }
 
     /// The first-order change of the condensed gradient if the compliance of the components in
     /// `dropped` (ones and zeros) is removed.
     #[inline(always)]
-    pub fn stiffening(&self, sections: &Sections<S>, dropped: Vectors<S>) -> First<S> {
+    pub fn stiffening_gradient(
+        &self,
+        sections: &LaneSections<S>,
+        dropped: Vectors<S>,
+    ) -> FirstDerivatives<S> {
         let gap = (dropped * sections.compliance * self.nu).scale(sections.ds);
         let correction = sections.condensing * gap;
         let g_mu = -self.nu.cross(gap) - self.law_rate_transposed(sections, correction);
         let none = Vectors::splat(sections.ds.simd, [0.0; 3]);
-        self.pull_back(correction.scale(sections.per_ds), g_mu, none)
+        self.nodal_derivatives(correction.scale(sections.per_ds), g_mu, none)
     }
 
     /// Converts derivatives with respect to R^T dx and to the rotation mu of the midpoint to
     /// nodal derivatives, adding the bending moment `m`.
     #[inline(always)]
-    pub(super) fn pull_back(&self, nu: Vectors<S>, g_mu: Vectors<S>, m: Vectors<S>) -> First<S> {
+    pub(super) fn nodal_derivatives(
+        &self,
+        nu: Vectors<S>,
+        g_mu: Vectors<S>,
+        m: Vectors<S>,
+    ) -> FirstDerivatives<S> {
         let g_mu = g_mu.scale(Lanes::splat(nu.x.simd, 0.5));
-        let g_delta = self.relative.tau.cross(g_mu) + self.relative.derivative(m);
+        let g_delta = self.relative.tau.cross(g_mu) + self.relative.apply_derivative(m);
         [
-            nu.along(self.frame),
-            (g_mu - g_delta).along(self.frame),
-            (g_mu + g_delta).along(self.frame),
+            nu.from_director_components(self.frame),
+            (g_mu - g_delta).from_director_components(self.frame),
+            (g_mu + g_delta).from_director_components(self.frame),
         ]
     }
 
     /// D^T a, with d(R w) = R D mu at constant spatial force, D being
     /// diag(c) \[nu\] - \[w\].
     #[inline(always)]
-    fn law_rate_transposed(&self, sections: &Sections<S>, a: Vectors<S>) -> Vectors<S> {
+    fn law_rate_transposed(&self, sections: &LaneSections<S>, a: Vectors<S>) -> Vectors<S> {
         self.w.cross(a) - self.nu.cross(sections.compliance * a)
     }
 
@@ -166,7 +177,7 @@ impl<S: Simd> Element<S> {
     /// respect to the rotation of the midpoint, ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2
     /// + \[nu\] diag(c) \[nu\]).
     #[inline(always)]
-    fn midpoint(&self, sections: &Sections<S>) -> [Rows<S>; 2] {
+    fn midpoint_hessian(&self, sections: &LaneSections<S>) -> [Rows<S>; 2] {
         let (nu, w, c, k) = (self.nu, self.w, sections.compliance, sections.condensing);
         let zero = Lanes::splat(k.x.simd, 0.0);
         let half = Lanes::splat(k.x.simd, 0.5);
@@ -205,7 +216,7 @@ impl<S: Simd> Element<S> {
     /// diag(k) D = \[nu\] - diag(k) \[w\],
     /// -\[w\] diag(k) \[w\] + (w nu^T + nu w^T)/2 - w.nu.
     #[inline(always)]
-    fn midpoint_strained(&self, sections: &Sections<S>) -> [Rows<S>; 2] {
+    fn strained_midpoint_hessian(&self, sections: &LaneSections<S>) -> [Rows<S>; 2] {
         let (nu, w, k) = (self.nu, self.w, sections.condensing);
         let zero = Lanes::splat(k.x.simd, 0.0);
         let half = Lanes::splat(k.x.simd, 0.5);
@@ -238,8 +249,16 @@ impl<S: Simd> Element<S> {
     #[inline(always)]
     fn in_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
         let frame = self.frame;
-        let [a, b, c] = transposed([a.along(frame), b.along(frame), c.along(frame)]);
-        [a.along(frame), b.along(frame), c.along(frame)]
+        let [a, b, c] = transposed([
+            a.from_director_components(frame),
+            b.from_director_components(frame),
+            c.from_director_components(frame),
+        ]);
+        [
+            a.from_director_components(frame),
+            b.from_director_components(frame),
+            c.from_director_components(frame),
+        ]
     }
 
     /// F K F^T for a diagonal matrix K.
@@ -248,38 +267,42 @@ impl<S: Simd> Element<S> {
         let [d1, d2, d3] = self.frame;
         let [a, b, c] = transposed([d1.scale(k.x), d2.scale(k.y), d3.scale(k.z)]);
         [
-            a.along(self.frame),
-            b.along(self.frame),
-            c.along(self.frame),
+            a.from_director_components(self.frame),
+            b.from_director_components(self.frame),
+            c.from_director_components(self.frame),
         ]
     }
 
     /// Second derivatives, the force condensed out, in terms of
-    /// eta = (a + b)/2 and delta = b - a (see [`Relative`] for the expansions),
+    /// eta = (a + b)/2 and delta = b - a (see [`RelativeRotation`] for the expansions),
     /// then of the two nodes.
     #[inline(always)]
-    pub fn second(&self, sections: &Sections<S>) -> Second<S> {
-        self.second_of(sections, self.midpoint(sections))
+    pub fn second(&self, sections: &LaneSections<S>) -> SecondDerivatives<S> {
+        self.second_derivatives_from_midpoint(sections, self.midpoint_hessian(sections))
     }
 
     /// As [`Element::second`] for segments that carry the forces of their strains.
     #[inline(always)]
-    pub fn second_strained(&self, sections: &Sections<S>) -> Second<S> {
-        self.second_of(sections, self.midpoint_strained(sections))
+    pub fn second_strained(&self, sections: &LaneSections<S>) -> SecondDerivatives<S> {
+        self.second_derivatives_from_midpoint(sections, self.strained_midpoint_hessian(sections))
     }
 
     /// The second derivatives from those with respect to the rotation of the midpoint.
     #[inline(always)]
-    fn second_of(&self, sections: &Sections<S>, [stiff, midpoint]: [Rows<S>; 2]) -> Second<S> {
+    fn second_derivatives_from_midpoint(
+        &self,
+        sections: &LaneSections<S>,
+        [stiff, midpoint]: [Rows<S>; 2],
+    ) -> SecondDerivatives<S> {
         let simd = sections.ds.simd;
         let number = |value: f64| Lanes::splat(simd, value);
         let (half, quarter, eighth) = (number(0.5), number(0.25), number(0.125));
         let (stiff, p) = (self.in_lab(stiff), self.in_lab(midpoint));
         let xx = self.diagonal_to_lab(sections.condensing.scale(sections.per_ds));
-        let lab = |v: Vectors<S>| v.along(self.frame);
+        let lab = |v: Vectors<S>| v.from_director_components(self.frame);
         let tau = lab(self.relative.tau);
         let g = lab(self.nu.cross(self.w).scale(sections.ds));
-        let moment = lab(self.relative.derivative(self.m)).scale(half);
+        let moment = lab(self.relative.apply_derivative(self.m)).scale(half);
         let y = tau.cross(g).scale(eighth);
         let bending = sections.couple_stiffness.scale(sections.per_ds);
         let (diagonal, multiple, v) = self.relative.second_derivatives(bending, self.m);
@@ -326,7 +349,7 @@ impl<S: Simd> Element<S> {
             xa[r] = -(eta + delta);
             xb[r] = delta - eta;
         }
-        Second {
+        SecondDerivatives {
             xx,
             xa,
             xb,
@@ -338,8 +361,8 @@ impl<S: Simd> Element<S> {
 
     /// Second derivatives by nodes.
     #[inline(always)]
-    pub fn hessian(&self, sections: &Sections<S>) -> Hessian<S> {
-        self.second(sections).by_nodes()
+    pub fn hessian(&self, sections: &LaneSections<S>) -> NodalHessian<S> {
+        self.second(sections).nodal_hessian()
     }
 
     /// The change of the spatial force for the nodal increments `dx` = dx1 - dx0 and the
@@ -347,17 +370,20 @@ impl<S: Simd> Element<S> {
     #[inline(always)]
     pub fn force_increment(
         &self,
-        sections: &Sections<S>,
+        sections: &LaneSections<S>,
         dx: Vectors<S>,
         turns: [Vectors<S>; 2],
     ) -> Vectors<S> {
         let half = Lanes::splat(dx.x.simd, 0.5);
-        let [alpha, beta] = [turns[0].onto(self.frame), turns[1].onto(self.frame)];
+        let [alpha, beta] = [
+            turns[0].director_components(self.frame),
+            turns[1].director_components(self.frame),
+        ];
         let mu = (alpha + beta + (beta - alpha).cross(self.relative.tau)).scale(half);
         let d_mu = sections.compliance * self.nu.cross(mu) - self.w.cross(mu);
-        let gap = d_mu.neg_mul_add(sections.ds, dx.onto(self.frame) + self.gap);
+        let gap = d_mu.neg_mul_add(sections.ds, dx.director_components(self.frame) + self.gap);
         let change = sections.condensing * gap.scale(sections.per_ds);
-        change.along(self.frame)
+        change.from_director_components(self.frame)
     }
 }
 
@@ -366,11 +392,11 @@ pub type Rows<S> = [Vectors<S>; 3];
 
 /// First derivatives: with respect to x1 (that to x0 is its negative), and to
 /// the rotations of the two nodes.
-pub type First<S> = [Vectors<S>; 3];
+pub type FirstDerivatives<S> = [Vectors<S>; 3];
 
 /// Second derivatives with respect to (x1 - x0) and the spatial rotation
 /// increments a, b of the two nodes.
-pub struct Second<S: Simd> {
+pub struct SecondDerivatives<S: Simd> {
     pub xx: Rows<S>,
     pub xa: Rows<S>,
     pub xb: Rows<S>,
@@ -379,11 +405,11 @@ pub struct Second<S: Simd> {
     pub bb: Rows<S>,
 }
 
-impl<S: Simd> Second<S> {
+impl<S: Simd> SecondDerivatives<S> {
     /// By nodes.
     #[inline(always)]
-    pub fn by_nodes(self) -> Hessian<S> {
-        let Second {
+    pub fn nodal_hessian(self) -> NodalHessian<S> {
+        let SecondDerivatives {
             xx,
             xa,
             xb,
@@ -410,23 +436,23 @@ impl<S: Simd> Second<S> {
                 across[3 + r][3 + c] = -xx[c];
             }
         }
-        Hessian {
-            own: [left, right],
-            across,
+        NodalHessian {
+            diagonal_blocks: [left, right],
+            off_diagonal_block: across,
         }
     }
 }
 
 /// Second derivatives with respect to the unknowns of the two nodes, the force condensed out.
-pub struct Hessian<S: Simd> {
+pub struct NodalHessian<S: Simd> {
     /// The nodes' own blocks, upper triangles.
-    pub own: [Block<S>; 2],
+    pub diagonal_blocks: [LaneBlock<S>; 2],
     /// The block between the first and the second.
-    pub across: Block<S>,
+    pub off_diagonal_block: LaneBlock<S>,
 }
 
 /// A block of a matrix of nodal unknowns, rows first.
-pub type Block<S> = [[Lanes<S>; UNKNOWNS]; UNKNOWNS];
+pub type LaneBlock<S> = [[Lanes<S>; UNKNOWNS]; UNKNOWNS];
 
 /// Unknowns of a node: rotation, then displacement.
 pub const UNKNOWNS: usize = 6;
@@ -443,7 +469,7 @@ pub fn transposed<S: Simd>([a, b, c]: Rows<S>) -> Rows<S> {
 
 /// First derivatives with respect to the unknowns of the two nodes.
 #[inline(always)]
-pub fn on_nodes<S: Simd>([x, a, b]: First<S>) -> [[Lanes<S>; UNKNOWNS]; 2] {
+pub fn nodal_gradient<S: Simd>([x, a, b]: FirstDerivatives<S>) -> [[Lanes<S>; UNKNOWNS]; 2] {
     [
         [a.x, a.y, a.z, -x.x, -x.y, -x.z],
         [b.x, b.y, b.z, x.x, x.y, x.z],

@@ -2,25 +2,25 @@
 //!
 //! Sections: the material data of segments.
 
-use crate::rod::{Element, Nodes};
+use crate::rod::{Element, LaneNodes};
 use crate::rotation;
-use crate::rotation::Relative;
-use crate::simd::{Four, GROUP, Lanes, Vectors};
+use crate::rotation::RelativeRotation;
+use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
 /// The two nodes of a segment.
 #[derive(Clone, Copy, Debug)]
-pub struct Ends {
+pub struct NodePair {
     /// Positions of the nodes.
     pub x: [DVec3; 2],
     /// Rotations of the nodes.
     pub q: [DQuat; 2],
 }
 
-impl From<&Ends> for Nodes<Scalar> {
-    fn from(ends: &Ends) -> Self {
-        Nodes {
+impl From<&NodePair> for LaneNodes<Scalar> {
+    fn from(ends: &NodePair) -> Self {
+        LaneNodes {
             x: ends.x.map(Vectors::from),
             q: ends.q.map(rotation::from_quaternion),
         }
@@ -29,7 +29,7 @@ impl From<&Ends> for Nodes<Scalar> {
 
 /// The derivative of a section with respect to a parameter.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct SectionRate {
+pub struct SectionParameterDerivative {
     /// Of its reference length.
     pub ds: f64,
     /// Of its couple stiffness.
@@ -45,7 +45,7 @@ pub struct SectionRate {
 /// The derivative of a segment with respect to a parameter of its section, with nodes and
 /// force fixed.
 #[derive(Clone, Copy, Debug)]
-pub struct SegmentRate {
+pub struct SegmentParameterDerivative {
     /// Of the derivatives of Pi with respect to the rotations of its nodes; that with
     /// respect to their positions does not change.
     pub gradient: [DVec3; 2],
@@ -70,13 +70,13 @@ pub struct Segment {
     pub w: DVec3,
     /// R^T (x1 - x0) - ds w: the residual of the constitutive law.
     pub gap: DVec3,
-    relative: Relative<Scalar>,
+    relative: RelativeRotation<Scalar>,
 }
 
 /// Second derivatives with respect to (x1 - x0) and the spatial rotation
 /// increments a, b of the two nodes, the force being condensed out.
 #[derive(Clone, Copy, Debug)]
-pub struct Blocks {
+pub struct SegmentHessian {
     /// d2/dx dx
     pub xx: DMat3,
     /// d2/dx da
@@ -109,7 +109,7 @@ impl Section {
 
 impl Segment {
     /// The segment between `ends` that carries the spatial force `n`.
-    pub fn new(section: &Section, ends: &Ends, n: DVec3) -> Self {
+    pub fn new(section: &Section, ends: &NodePair, n: DVec3) -> Self {
         let element = Element::new(&section.into(), &ends.into(), n.into());
         let [d1, d2, d3] = element.frame.map(DVec3::from);
         Segment {
@@ -125,7 +125,7 @@ impl Segment {
 
     /// The segment between `ends` that carries the force of its strains; in rigid directions it
     /// carries none, and the gap is what it is strained there.
-    pub fn strained(section: &Section, ends: &Ends) -> Self {
+    pub fn with_strain_force(section: &Section, ends: &NodePair) -> Self {
         let idle = Segment::new(section, ends, DVec3::ZERO);
         let strain = idle.v(section) - section.rest_strain;
         let rigid = section.compliance.cmpeq(DVec3::ZERO);
@@ -156,7 +156,7 @@ impl Segment {
     }
 
     /// Rotation between the two ends, in radians.
-    pub fn turn(&self) -> f64 {
+    pub fn end_rotation(&self) -> f64 {
         DVec3::from(self.relative.psi).length()
     }
 
@@ -197,13 +197,13 @@ impl Segment {
     }
 
     /// Second derivatives, the force condensed out.
-    pub fn hessian(&self, section: &Section) -> Blocks {
+    pub fn hessian(&self, section: &Section) -> SegmentHessian {
         let second = self.element().second(&section.into());
         let matrix = |rows: [Vectors<Scalar>; 3]| {
             let [a, b, c] = rows.map(DVec3::from);
             DMat3::from_cols(a, b, c).transpose()
         };
-        Blocks {
+        SegmentHessian {
             xx: matrix(second.xx),
             xa: matrix(second.xa),
             xb: matrix(second.xb),
@@ -232,20 +232,24 @@ impl Segment {
     }
 
     /// The derivative with respect to a parameter of the section.
-    pub fn rate(&self, section: &Section, rate: &SectionRate) -> SegmentRate {
+    pub fn parameter_derivative(
+        &self,
+        section: &Section,
+        rate: &SectionParameterDerivative,
+    ) -> SegmentParameterDerivative {
         let strain = rate.rest_strain + rate.compliance * self.nu;
         let bent = self.u - section.rest_curvature;
         // For fixed nodes the curvature is inversely proportional to ds.
         let bending = -self.u * (rate.ds / section.ds) - rate.rest_curvature;
         let moment = rate.couple_stiffness * bent + section.couple_stiffness * bending;
         let g_mu = rate.ds * self.nu.cross(self.w) + section.ds * self.nu.cross(strain);
-        let moment = DVec3::from(self.relative.derivative(moment.into()));
+        let moment = DVec3::from(self.relative.apply_derivative(moment.into()));
         let half = 0.5 * section.compliance * self.nu + section.rest_strain;
         let half_rate = 0.5 * rate.compliance * self.nu + rate.rest_strain;
         let bending_energy = 0.5 * rate.ds * self.m.dot(bent)
             + section.ds * (0.5 * (rate.couple_stiffness * bent).dot(bent) + self.m.dot(bending));
-        SegmentRate {
-            gradient: self.on_nodes(g_mu, moment),
+        SegmentParameterDerivative {
+            gradient: self.nodal_derivatives(g_mu, moment),
             gap: -rate.ds * self.w - section.ds * strain,
             energy: bending_energy - self.nu.dot(rate.ds * half + section.ds * half_rate),
         }
@@ -255,13 +259,13 @@ impl Segment {
     pub fn gap_gradient(&self, section: &Section, gap: DVec3) -> (DVec3, DVec3, DVec3) {
         let correction = section.condensing * gap;
         let g_mu = self.nu.cross(section.compliance * correction) - self.w.cross(correction);
-        let [a, b] = self.on_nodes(g_mu, DVec3::ZERO);
+        let [a, b] = self.nodal_derivatives(g_mu, DVec3::ZERO);
         (self.frame * (correction / section.ds), a, b)
     }
 
     /// Converts derivatives with respect to the rotation of the midpoint, and to the
     /// difference of the nodal rotations, to those with respect to the nodal rotations.
-    fn on_nodes(&self, g_mu: DVec3, moment: DVec3) -> [DVec3; 2] {
+    fn nodal_derivatives(&self, g_mu: DVec3, moment: DVec3) -> [DVec3; 2] {
         let g_delta = 0.5 * DVec3::from(self.relative.tau).cross(g_mu) + moment;
         [0.5 * g_mu - g_delta, 0.5 * g_mu + g_delta].map(|g| self.frame * g)
     }
@@ -281,7 +285,7 @@ pub struct Section {
     /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
     pub compliance: DVec3,
     /// Stiffness with which the force is condensed out: H, or an upper limit if H is larger
-    /// (see [`Section::condense`]).
+    /// (see [`Section::limit_condensing_stiffness`]).
     pub condensing: DVec3,
 }
 
@@ -290,7 +294,7 @@ impl Section {
     /// matrix is that of a softer rod while the residual stays exact: a proximal step in the
     /// force, which leaves solutions unchanged, adds linear convergence with a factor of the
     /// order of 1/`largest`, and keeps the pivots within double precision.
-    pub fn condense(mut self, largest: f64) -> Self {
+    pub fn limit_condensing_stiffness(mut self, largest: f64) -> Self {
         self.condensing = self.compliance.recip().min(DVec3::splat(largest));
         self
     }
@@ -298,7 +302,7 @@ impl Section {
 
 /// Sections of several segments.
 #[derive(Clone, Copy)]
-pub struct Sections<S: Simd> {
+pub struct LaneSections<S: Simd> {
     pub(crate) ds: Lanes<S>,
     pub(crate) per_ds: Lanes<S>,
     pub(crate) couple_stiffness: Vectors<S>,
@@ -308,15 +312,15 @@ pub struct Sections<S: Simd> {
     pub(crate) condensing: Vectors<S>,
 }
 
-impl<S: Simd> Sections<S> {
+impl<S: Simd> LaneSections<S> {
     /// The sections of the lanes from `part` on.
     #[inline(always)]
     pub fn gather(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
-        let ds = Four([a.ds, b.ds, c.ds, d.ds]);
-        let ds = Lanes::of(simd, &ds, part);
+        let ds = NumberGroup([a.ds, b.ds, c.ds, d.ds]);
+        let ds = Lanes::load_group(simd, &ds, part);
         let vectors =
             |of: fn(&Section) -> DVec3| Vectors::gather(simd, [of(a), of(b), of(c), of(d)], part);
-        Sections {
+        LaneSections {
             ds,
             per_ds: ds.recip(),
             couple_stiffness: vectors(|s| s.couple_stiffness),
@@ -328,10 +332,10 @@ impl<S: Simd> Sections<S> {
     }
 }
 
-impl From<&Section> for Sections<Scalar> {
+impl From<&Section> for LaneSections<Scalar> {
     #[inline]
     fn from(section: &Section) -> Self {
-        Sections::gather(Scalar, [section; GROUP], 0)
+        LaneSections::gather(Scalar, [section; GROUP], 0)
     }
 }
 
@@ -352,7 +356,7 @@ mod tests {
             compliance: DVec3::ZERO,
             condensing: DVec3::ZERO,
         };
-        let straight = Ends {
+        let straight = NodePair {
             x: [DVec3::ZERO, ds * DVec3::X],
             q: [DQuat::IDENTITY; 2],
         };

@@ -13,8 +13,8 @@
 //! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
 //! direction, in which it then carries no force.
 
-use crate::rod::segment::{Ends, Section, Sections};
-use crate::rod::{Element, First, Nodes, UNKNOWNS, on_nodes};
+use crate::rod::segment::{LaneSections, NodePair, Section};
+use crate::rod::{Element, FirstDerivatives, LaneNodes, UNKNOWNS, nodal_gradient};
 use crate::rotation;
 use crate::simd::Vectors;
 use glam::DVec3;
@@ -26,167 +26,187 @@ pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 /// The tissue that belongs to a node of two neighbouring veins; also its derivative with respect
 /// to a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Strip {
+pub struct TissueStrip {
     /// k: force per displacement along the veins, across, and normal to the leaf.
     pub stiffness: DVec3,
     /// c_1: moment per radian of a fold along the veins.
-    pub fold: f64,
+    pub fold_stiffness: f64,
     /// R^T (x1 - x0) in the natural leaf.
-    pub width: DVec3,
+    pub stress_free_gap: DVec3,
     /// log(q0^* q1) in the natural leaf.
-    pub turn: DVec3,
+    pub stress_free_rotation: DVec3,
 }
 
 /// The second derivatives of the energy of a strip.
 pub struct StripHessian {
     /// The blocks of the two nodes, upper triangles.
-    pub own: [NodeBlock; 2],
+    pub diagonal_blocks: [NodeBlock; 2],
     /// The block between the first and the second.
-    pub across: NodeBlock,
+    pub off_diagonal_block: NodeBlock,
 }
 
-impl Strip {
+impl TissueStrip {
     /// A strip that is without force between these ends.
-    pub fn natural(stiffness: DVec3, fold: f64, ends: &Ends) -> Strip {
+    pub fn stress_free_between(stiffness: DVec3, fold: f64, ends: &NodePair) -> TissueStrip {
         let middle = rotation::midpoint(ends.q[0], ends.q[1]);
-        Strip {
+        TissueStrip {
             stiffness,
-            fold,
-            width: middle.inverse() * (ends.x[1] - ends.x[0]),
-            turn: rotation::log(ends.q[0].conjugate() * ends.q[1]),
+            fold_stiffness: fold,
+            stress_free_gap: middle.inverse() * (ends.x[1] - ends.x[0]),
+            stress_free_rotation: rotation::log(ends.q[0].conjugate() * ends.q[1]),
         }
     }
 
     /// Whether it resists anything.
-    pub fn acts(&self) -> bool {
-        self.stiffness != DVec3::ZERO || self.fold != 0.0
+    pub fn has_stiffness(&self) -> bool {
+        self.stiffness != DVec3::ZERO || self.fold_stiffness != 0.0
     }
 
     /// The difference from another strip.
-    pub fn minus(&self, other: &Strip) -> Strip {
-        Strip {
+    pub fn difference_from(&self, other: &TissueStrip) -> TissueStrip {
+        TissueStrip {
             stiffness: self.stiffness - other.stiffness,
-            fold: self.fold - other.fold,
-            width: self.width - other.width,
-            turn: self.turn - other.turn,
+            fold_stiffness: self.fold_stiffness - other.fold_stiffness,
+            stress_free_gap: self.stress_free_gap - other.stress_free_gap,
+            stress_free_rotation: self.stress_free_rotation - other.stress_free_rotation,
         }
     }
 
     /// Adds `times` another strip.
-    pub fn add(&mut self, times: f64, other: &Strip) {
+    pub fn add(&mut self, times: f64, other: &TissueStrip) {
         self.stiffness += times * other.stiffness;
-        self.fold += times * other.fold;
-        self.width += times * other.width;
-        self.turn += times * other.turn;
+        self.fold_stiffness += times * other.fold_stiffness;
+        self.stress_free_gap += times * other.stress_free_gap;
+        self.stress_free_rotation += times * other.stress_free_rotation;
     }
 
     /// Between these ends, carrying the force of its strains.
-    fn element(&self, ends: &Ends) -> (Element<Scalar>, Sections<Scalar>) {
-        let sections = Sections::from(&Section {
+    fn strained_element(&self, ends: &NodePair) -> (Element<Scalar>, LaneSections<Scalar>) {
+        let sections = LaneSections::from(&Section {
             ds: 1.0,
-            couple_stiffness: self.fold * DVec3::X,
-            rest_curvature: self.turn,
-            rest_strain: self.width,
+            couple_stiffness: self.fold_stiffness * DVec3::X,
+            rest_curvature: self.stress_free_rotation,
+            rest_strain: self.stress_free_gap,
             compliance: DVec3::ZERO,
             condensing: self.stiffness,
         });
-        (Element::strained(&sections, &Nodes::from(ends)), sections)
+        (
+            Element::with_strain_forces(&sections, &LaneNodes::from(ends)),
+            sections,
+        )
     }
 
     /// Between these ends, carrying the spatial `force`. In directions without stiffness it carries
     /// none.
-    fn carrying(&self, ends: &Ends, force: DVec3) -> (Element<Scalar>, Sections<Scalar>) {
-        let (mut element, sections) = self.element(ends);
+    fn element_with_force(
+        &self,
+        ends: &NodePair,
+        force: DVec3,
+    ) -> (Element<Scalar>, LaneSections<Scalar>) {
+        let (mut element, sections) = self.strained_element(ends);
         let dx = DVec3::from(element.w);
         let stiff = self.stiffness.cmpgt(DVec3::ZERO);
-        let carried = DVec3::from(Vectors::from(force).onto(element.frame));
+        let carried = DVec3::from(Vectors::from(force).director_components(element.frame));
         let nu = DVec3::select(stiff, carried, DVec3::ZERO);
-        let w = DVec3::select(stiff, self.width + nu / self.stiffness, dx);
+        let w = DVec3::select(stiff, self.stress_free_gap + nu / self.stiffness, dx);
         (element.nu, element.w, element.gap) = (nu.into(), w.into(), (dx - w).into());
         (element, sections)
     }
 
     /// The spatial force of its strains between these ends.
-    pub fn force(&self, ends: &Ends) -> DVec3 {
-        let (element, _) = self.element(ends);
-        element.nu.along(element.frame).into()
+    pub fn force(&self, ends: &NodePair) -> DVec3 {
+        let (element, _) = self.strained_element(ends);
+        element.nu.from_director_components(element.frame).into()
     }
 
-    /// The right-hand side for [`Strip::hessian`] if it carries this spatial force, which is condensed
+    /// The right-hand side for [`TissueStrip::hessian`] if it carries this spatial force, which is condensed
     /// out: a moment and a force on either node.
-    pub fn condensed_loads(&self, ends: &Ends, force: DVec3) -> [[DVec3; 2]; 2] {
-        let (element, _) = self.carrying(ends, force);
+    pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [[DVec3; 2]; 2] {
+        let (element, _) = self.element_with_force(ends, force);
         let Element { nu, w, gap, .. } = element;
         let correction = Vectors::from(self.stiffness) * gap;
         let g_mu = nu.cross(w + gap) - w.cross(correction);
-        on_ends(element.pull_back(nu + correction, g_mu, element.m))
+        nodal_loads(element.nodal_derivatives(nu + correction, g_mu, element.m))
     }
 
     /// The change of the spatial force that it carries for the displacement `dx` of the second node
     /// against the first and the spatial rotations `turns` of both.
     pub fn force_increment(
         &self,
-        ends: &Ends,
+        ends: &NodePair,
         force: DVec3,
         dx: DVec3,
         turns: [DVec3; 2],
     ) -> DVec3 {
-        let (element, _) = self.carrying(ends, force);
-        let onto = |v: DVec3| DVec3::from(Vectors::from(v).onto(element.frame));
+        let (element, _) = self.element_with_force(ends, force);
+        let onto = |v: DVec3| DVec3::from(Vectors::from(v).director_components(element.frame));
         let [alpha, beta] = turns.map(onto);
         let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
         let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
         let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
         let change = self.stiffness * (onto(dx) + gap + w.cross(mu)) - nu.cross(mu);
-        Vectors::from(change).along(element.frame).into()
+        Vectors::from(change)
+            .from_director_components(element.frame)
+            .into()
     }
 
     /// The strains e and theta_1 between these ends.
     fn strains(&self, element: &Element<Scalar>) -> (DVec3, f64) {
         let [w, u] = [element.w, element.u].map(DVec3::from);
-        (w - self.width, u.x - self.turn.x)
+        (w - self.stress_free_gap, u.x - self.stress_free_rotation.x)
     }
 
     /// Its energy, and the moment and force that it exerts on either node.
-    pub fn energy_and_loads(&self, ends: &Ends) -> (f64, [[DVec3; 2]; 2]) {
-        let (element, sections) = self.element(ends);
+    pub fn energy_and_loads(&self, ends: &NodePair) -> (f64, [[DVec3; 2]; 2]) {
+        let (element, sections) = self.strained_element(ends);
         let (e, theta) = self.strains(&element);
-        let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold * theta * theta);
-        (energy, on_ends(element.gradient(&sections)))
+        let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold_stiffness * theta * theta);
+        (energy, nodal_loads(element.gradient(&sections)))
     }
 
     /// The change of its energy and of its loads by a change of the strip.
-    pub fn rates(&self, ends: &Ends, rate: &Strip) -> (f64, [[DVec3; 2]; 2]) {
-        let (mut element, sections) = self.element(ends);
+    pub fn parameter_derivative(
+        &self,
+        ends: &NodePair,
+        rate: &TissueStrip,
+    ) -> (f64, [[DVec3; 2]; 2]) {
+        let (mut element, sections) = self.strained_element(ends);
         let (e, theta) = self.strains(&element);
-        let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.width).dot(e)
-            + (0.5 * rate.fold * theta - self.fold * rate.turn.x) * theta;
-        element.nu = (rate.stiffness * e - self.stiffness * rate.width).into();
-        element.m = ((rate.fold * theta - self.fold * rate.turn.x) * DVec3::X).into();
-        (energy, on_ends(element.gradient(&sections)))
+        let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.stress_free_gap).dot(e)
+            + (0.5 * rate.fold_stiffness * theta
+                - self.fold_stiffness * rate.stress_free_rotation.x)
+                * theta;
+        element.nu = (rate.stiffness * e - self.stiffness * rate.stress_free_gap).into();
+        element.m = ((rate.fold_stiffness * theta
+            - self.fold_stiffness * rate.stress_free_rotation.x)
+            * DVec3::X)
+            .into();
+        (energy, nodal_loads(element.gradient(&sections)))
     }
 
     /// The second derivatives of its energy.
-    pub fn hessian(&self, ends: &Ends) -> StripHessian {
+    pub fn hessian(&self, ends: &NodePair) -> StripHessian {
         let force = self.force(ends);
         self.condensed_hessian(ends, force)
     }
 
     /// Second derivatives if it carries this spatial force, which is condensed out: those of its
     /// energy where the force is that of its strains.
-    pub fn condensed_hessian(&self, ends: &Ends, force: DVec3) -> StripHessian {
-        let (element, sections) = self.carrying(ends, force);
-        let hessian = element.second_strained(&sections).by_nodes();
+    pub fn condensed_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
+        let (element, sections) = self.element_with_force(ends, force);
+        let hessian = element.second_strained(&sections).nodal_hessian();
         StripHessian {
-            own: hessian.own.map(|block| block.map(|row| row.map(f64::from))),
-            across: hessian.across.map(|row| row.map(f64::from)),
+            diagonal_blocks: hessian
+                .diagonal_blocks
+                .map(|block| block.map(|row| row.map(f64::from))),
+            off_diagonal_block: hessian.off_diagonal_block.map(|row| row.map(f64::from)),
         }
     }
 }
 
 /// Moment and force on both nodes, minus the derivatives of an energy.
-fn on_ends(first: First<Scalar>) -> [[DVec3; 2]; 2] {
-    on_nodes(first).map(|node| {
+fn nodal_loads(first: FirstDerivatives<Scalar>) -> [[DVec3; 2]; 2] {
+    nodal_gradient(first).map(|node| {
         let [a, b, c, d, e, f] = node.map(f64::from);
         [-DVec3::new(a, b, c), -DVec3::new(d, e, f)]
     })
@@ -199,8 +219,8 @@ mod tests {
     use glam::DQuat;
 
     /// A strip far from its natural state, and its ends.
-    fn strained() -> (Strip, Ends) {
-        let ends = |scale: f64| Ends {
+    fn strained() -> (TissueStrip, NodePair) {
+        let ends = |scale: f64| NodePair {
             x: [
                 DVec3::new(0.1, -0.2, 0.3) * scale,
                 DVec3::new(0.15, 0.1, 0.25),
@@ -210,20 +230,20 @@ mod tests {
                 DQuat::from_scaled_axis(DVec3::new(-0.2, 0.5, 0.6) * scale),
             ],
         };
-        let strip = Strip::natural(DVec3::new(20.0, 40.0, 0.0), 0.5, &ends(0.3));
+        let strip = TissueStrip::stress_free_between(DVec3::new(20.0, 40.0, 0.0), 0.5, &ends(0.3));
         (strip, ends(1.0))
     }
 
-    fn energy(strip: &Strip, ends: &Ends) -> f64 {
+    fn energy(strip: &TissueStrip, ends: &NodePair) -> f64 {
         strip.energy_and_loads(ends).0
     }
 
-    fn loads(strip: &Strip, ends: &Ends) -> [[DVec3; 2]; 2] {
+    fn loads(strip: &TissueStrip, ends: &NodePair) -> [[DVec3; 2]; 2] {
         strip.energy_and_loads(ends).1
     }
 
     /// The ends with one of the 12 unknowns changed.
-    fn moved(ends: &Ends, k: usize, by: f64) -> Ends {
+    fn moved(ends: &NodePair, k: usize, by: f64) -> NodePair {
         let (mut ends, change) = (*ends, by * DVec3::AXES[k % 3]);
         match k % 6 / 3 {
             0 => ends.q[k / 6] = rotation::exp(change) * ends.q[k / 6],
@@ -254,7 +274,7 @@ mod tests {
             let slope = slope(|h| energy(&strip, &moved(&ends, k, h)));
             assert!((found[k] + slope).abs() < 1e-9, "{k}: {} {slope}", found[k]);
         }
-        let rest = Strip::natural(strip.stiffness, strip.fold, &ends);
+        let rest = TissueStrip::stress_free_between(strip.stiffness, strip.fold_stiffness, &ends);
         assert!(
             flat(loads(&rest, &ends))
                 .iter()
@@ -304,8 +324,8 @@ mod tests {
         let by = |r: usize, k: usize| slope(|h| -flat(loads(&strip, &moved(&ends, k, h)))[r]);
         for (r, k) in (0..12).flat_map(|r| (r..12).map(move |k| (r, k))) {
             let found = match (r / 6, k / 6) {
-                (a, b) if a == b => hessian.own[a][r % 6][k % 6],
-                _ => hessian.across[r % 6][k % 6],
+                (a, b) if a == b => hessian.diagonal_blocks[a][r % 6][k % 6],
+                _ => hessian.off_diagonal_block[r % 6][k % 6],
             };
             let expected = 0.5 * (by(r, k) + by(k, r));
             assert!(
@@ -318,19 +338,19 @@ mod tests {
     #[test]
     fn rates_are_derivatives_by_the_strip() {
         let (strip, ends) = strained();
-        let rate = Strip {
+        let rate = TissueStrip {
             stiffness: DVec3::new(1.0, -2.0, 3.0),
-            fold: 0.7,
-            width: DVec3::new(0.3, 0.1, -0.2),
-            turn: DVec3::new(0.2, -0.1, 0.4),
+            fold_stiffness: 0.7,
+            stress_free_gap: DVec3::new(0.3, 0.1, -0.2),
+            stress_free_rotation: DVec3::new(0.2, -0.1, 0.4),
         };
-        let changed = |h: f64| Strip {
+        let changed = |h: f64| TissueStrip {
             stiffness: strip.stiffness + h * rate.stiffness,
-            fold: strip.fold + h * rate.fold,
-            width: strip.width + h * rate.width,
-            turn: strip.turn + h * rate.turn,
+            fold_stiffness: strip.fold_stiffness + h * rate.fold_stiffness,
+            stress_free_gap: strip.stress_free_gap + h * rate.stress_free_gap,
+            stress_free_rotation: strip.stress_free_rotation + h * rate.stress_free_rotation,
         };
-        let (by_energy, by_loads) = strip.rates(&ends, &rate);
+        let (by_energy, by_loads) = strip.parameter_derivative(&ends, &rate);
         assert!((by_energy - slope(|h| energy(&changed(h), &ends))).abs() < 1e-9);
         for (k, load) in flat(by_loads).into_iter().enumerate() {
             let expected = slope(|h| flat(loads(&changed(h), &ends))[k]);

@@ -4,14 +4,16 @@
 //! All mistakes in the entries of a scenario, though reading it ends at the first.
 
 use crate::scenario::format::entries::{Entries, MOST_RODS};
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::{ScenarioError, ScenarioResult};
-use crate::scenario::format::{Form, Key, LeftOut};
-use crate::scenario::loads::{OUTPUTS, on_one_rod, round_inertia, wind};
+use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
+use crate::scenario::loads::{DEFAULT_OUTPUTS, check_single_rod_moments, round_inertia, wind};
 use crate::scenario::photo::photo;
 use crate::scenario::section::Property;
-use crate::scenario::veins::{Made, joined, tissue, veins};
-use crate::scenario::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, loads, supports};
+use crate::scenario::veins::{StiffnessSource, joined, tissue, veins};
+use crate::scenario::{
+    Dynamics, MotionStart, Profile, Rod, Scenario, Units, limits, loads, supports,
+};
 use std::path::Path;
 use toml::Value;
 
@@ -33,49 +35,49 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> ScenarioResult<Scenario> {
-        let scenario = self.read().map_err(|error| self.with_others(error))?;
+        let scenario = self.read().map_err(|error| self.error_with_others(error))?;
         limits::check(self, &scenario)?;
         Ok(scenario)
     }
 
     /// The scenario, entry by entry.
     pub(super) fn read(&self) -> ScenarioResult<Scenario> {
-        let name = match self.given(Key::Name) {
+        let name = match self.given_value(Key::Name) {
             Some(item) => name(item)?,
             None => self.name_of_file(),
         };
         let units = Units {
-            length: self.given(Key::UnitLength).map(unit).transpose()?,
-            force: self.given(Key::UnitForce).map(unit).transpose()?,
+            length: self.given_value(Key::UnitLength).map(unit).transpose()?,
+            force: self.given_value(Key::UnitForce).map(unit).transpose()?,
             time: self
-                .given(Key::UnitTime)
+                .given_value(Key::UnitTime)
                 .map(|item| unit_of_time(self, item))
                 .transpose()?,
         };
-        let rods = self.item(Key::Rods)?.whole(MOST_RODS)?;
-        let made = Made::from(self, rods)?;
+        let rods = self.value_or_default(Key::Rods)?.whole_number(MOST_RODS)?;
+        let made = StiffnessSource::from_entries(self, rods)?;
         let rods = veins(self, rods, &made)?;
         let joined = joined(self, made.blade())?;
         let coupling = coupling(self, rods.len() - 1)?;
         let base_held = supports::of_bases(self)?;
         let tissue = match &made {
-            Made::Blade(_, parts) => (rods.len() > 1).then(|| parts.tissue()),
+            StiffnessSource::Blade(_, parts) => (rods.len() > 1).then(|| parts.tissue()),
             _ => tissue(self, rods.len() - 1)?,
         };
         let (gravity, own_gravity) = loads::gravity(self, rods.len())?;
         let g = loads::g(self)?;
         let distributed = loads::distributed(self, rods.len())?;
         let points = loads::points(self, rods.len())?;
-        let tip_force = self.item(Key::TipForce)?.vector()?;
-        let item = self.item(Key::TipMoment)?;
+        let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
+        let item = self.value_or_default(Key::TipMoment)?;
         let tip_moment = item.vector()?;
-        on_one_rod(item, rods.len(), &[tip_moment])?;
+        check_single_rod_moments(item, rods.len(), &[tip_moment])?;
         let held_tip = supports::held(self, &rods, joined)?;
         let shared = held_tip.is_some() || joined && rods.len() > 1;
         let grips = supports::grips(self, &rods, shared)?;
         let wind = wind(self, rods.len())?;
         let photo = photo(self)?;
-        let tolerance = tolerance(self.item(Key::Tolerance)?)?;
+        let tolerance = tolerance(self.value_or_default(Key::Tolerance)?)?;
         let loads = [gravity, tip_force, tip_moment];
         let dynamics = dynamics(self, &rods, &made, loads)?;
         Ok(Scenario {
@@ -88,7 +90,7 @@ impl Entries {
             joined,
             coupling,
             tissue,
-            tissue_grown: self.item(Key::TissueGrown)?.switch()?,
+            tissue_grown: self.value_or_default(Key::TissueGrown)?.switch()?,
             gravity,
             own_gravity,
             g,
@@ -113,9 +115,9 @@ impl Entries {
     }
 }
 
-fn name(item: Item) -> ScenarioResult<String> {
+fn name(item: EntryValue) -> ScenarioResult<String> {
     let name = item.text()?;
-    item.ensure(
+    item.refuse_unless(
         is_name(name),
         format_args!(
             "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits, spaces and the \
@@ -133,10 +135,10 @@ fn is_name(name: &str) -> bool {
     starts_well && ends_well && name.len() <= LONGEST_NAME && name.chars().all(allowed)
 }
 
-fn unit(item: Item) -> ScenarioResult<String> {
+fn unit(item: EntryValue) -> ScenarioResult<String> {
     let unit = item.text()?;
     let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
-    item.ensure(
+    item.refuse_unless(
         printed && unit.chars().count() <= LONGEST_UNIT,
         format_args!("must be 1 to {LONGEST_UNIT} characters that can be printed"),
     )?;
@@ -144,9 +146,9 @@ fn unit(item: Item) -> ScenarioResult<String> {
 }
 
 /// The unit of time, which is that of the others only if the mass is given.
-fn unit_of_time(entries: &Entries, item: Item) -> ScenarioResult<String> {
+fn unit_of_time(entries: &Entries, item: EntryValue) -> ScenarioResult<String> {
     let densities = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
-    item.ensure(
+    item.refuse_unless(
         densities.iter().any(|key| entries.is_given(*key)),
         "without a density times are in units of T = sqrt(rho L^4/A), whatever the other units: \
          give dynamics.density or a mass_density, or leave this out",
@@ -157,7 +159,7 @@ fn unit_of_time(entries: &Entries, item: Item) -> ScenarioResult<String> {
 fn coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
     for (axis, key) in Key::COUPLING.into_iter().enumerate() {
-        let stiffness = entries.item(key)?.one_each(gaps)?;
+        let stiffness = entries.value_or_default(key)?.number_for_each(gaps)?;
         for (gap, stiffness) in coupling.iter_mut().zip(stiffness) {
             gap[axis] = stiffness;
         }
@@ -165,16 +167,16 @@ fn coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
     Ok(coupling)
 }
 
-fn tolerance(item: Item) -> ScenarioResult<f64> {
+fn tolerance(item: EntryValue) -> ScenarioResult<f64> {
     let tolerance = item.number()?;
-    item.ensure(
+    item.refuse_unless(
         tolerance > 0.0 && tolerance <= TOLERANCE_MOST,
         format_args!(
             "must be greater than 0 and at most {TOLERANCE_MOST}: \
              it is the error of the centerlines relative to the length of a rod"
         ),
     )?;
-    item.ensure(
+    item.refuse_unless(
         tolerance >= TOLERANCE_LEAST,
         format_args!(
             "must be at least {TOLERANCE_LEAST:e}: double precision carries 16 digits, \
@@ -188,19 +190,19 @@ fn tolerance(item: Item) -> ScenarioResult<f64> {
 fn dynamics(
     entries: &Entries,
     rods: &[Rod],
-    made: &Made,
+    made: &StiffnessSource,
     loads: [[f64; 3]; 3],
 ) -> ScenarioResult<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
     let mass = [Key::MassDensity, Key::BladeMassDensity];
     let mass = mass.into_iter().find(|key| entries.is_given(*key));
     let of_mass = |property| mass.and_then(|_| made.profiles(property));
-    let density = match entries.given(Key::Density) {
+    let density = match entries.given_value(Key::Density) {
         Some(item) => {
             if let Some(key) = mass {
                 let path = key.path();
                 let why = format!("{path} is given, too: leave one of them out");
-                return Err(item.refuse(why));
+                return Err(item.value_error(why));
             }
             Some(item.quantity(rods.len())?)
         }
@@ -211,8 +213,12 @@ fn dynamics(
         None => Dynamics::default_for(rods),
     }
     .with_loads(gravity, tip_force, tip_moment);
-    let number = |key, default| entries.given(key).map_or(Ok(default), |item| item.number());
-    let load = |key, default| match entries.given(key) {
+    let number = |key, default| {
+        entries
+            .given_value(key)
+            .map_or(Ok(default), |item| item.number())
+    };
+    let load = |key, default| match entries.given_value(key) {
         Some(item) => item.vectors_in_time(),
         None => Ok(default),
     };
@@ -220,18 +226,18 @@ fn dynamics(
     let section = rotary_inertia(entries, &preset.density)?;
     let section = section.or_else(|| of_mass(Property::RotaryInertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
-    let internal_damping = entries.item(Key::InternalDamping)?.number()?;
-    let output_interval = match entries.given(Key::OutputInterval) {
+    let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;
+    let output_interval = match entries.given_value(Key::OutputInterval) {
         Some(item) => output_interval(item, duration)?,
-        None => duration / OUTPUTS,
+        None => duration / DEFAULT_OUTPUTS,
     };
-    let clamped = clamped(entries.item(Key::Clamped)?, rods.len())?;
-    let start = start(entries.item(Key::Start)?, clamped)?;
+    let clamped = clamped(entries.value_or_default(Key::Clamped)?, rods.len())?;
+    let start = start(entries.value_or_default(Key::Start)?, clamped)?;
     let gravity = load(Key::GravityInTime, preset.gravity)?;
     let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
     let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
-    if let Some(item) = entries.given(Key::TipMomentInTime) {
-        on_one_rod(item, rods.len(), &tip_moment.value)?;
+    if let Some(item) = entries.given_value(Key::TipMomentInTime) {
+        check_single_rod_moments(item, rods.len(), &tip_moment.value)?;
     }
     Ok(Dynamics {
         polar_excess: if section.is_some() { 1.0 } else { 0.0 },
@@ -245,7 +251,7 @@ fn dynamics(
         gravity,
         tip_force,
         tip_moment,
-        rest: match entries.given(Key::RestInTime) {
+        rest: match entries.given_value(Key::RestInTime) {
             Some(item) => item.factors_in_time()?,
             None => preset.rest,
         },
@@ -254,15 +260,15 @@ fn dynamics(
 }
 
 fn rotary_inertia(entries: &Entries, density: &[Profile]) -> ScenarioResult<Option<Vec<Profile>>> {
-    let quantity = |item: Item| item.quantity(density.len());
+    let quantity = |item: EntryValue| item.quantity(density.len());
     let inertia = entries
-        .given(Key::RotaryInertia)
+        .given_value(Key::RotaryInertia)
         .map(quantity)
         .transpose()?;
-    let Some(item) = entries.given(Key::SectionRadius) else {
+    let Some(item) = entries.given_value(Key::SectionRadius) else {
         return Ok(inertia);
     };
-    item.ensure(
+    item.refuse_unless(
         inertia.is_none(),
         "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
          leave one of them out",
@@ -276,9 +282,9 @@ fn rotary_inertia(entries: &Entries, density: &[Profile]) -> ScenarioResult<Opti
     ))
 }
 
-fn output_interval(item: Item, duration: f64) -> ScenarioResult<f64> {
+fn output_interval(item: EntryValue, duration: f64) -> ScenarioResult<f64> {
     let interval = item.number()?;
-    item.ensure(
+    item.refuse_unless(
         interval <= duration,
         format_args!(
             "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
@@ -287,9 +293,9 @@ fn output_interval(item: Item, duration: f64) -> ScenarioResult<f64> {
     Ok(interval)
 }
 
-fn clamped(item: Item, rods: usize) -> ScenarioResult<bool> {
+fn clamped(item: EntryValue, rods: usize) -> ScenarioResult<bool> {
     let clamped = item.switch()?;
-    item.ensure(
+    item.refuse_unless(
         clamped || rods == 1,
         format_args!(
             "a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base"
@@ -298,28 +304,28 @@ fn clamped(item: Item, rods: usize) -> ScenarioResult<bool> {
     Ok(clamped)
 }
 
-fn start(item: Item, clamped: bool) -> ScenarioResult<Start> {
+fn start(item: EntryValue, clamped: bool) -> ScenarioResult<MotionStart> {
     let start = item.word(
         "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
          (in equilibrium under the loads at time 0)",
     )?;
-    item.ensure(
-        clamped || start == Start::Released,
+    item.refuse_unless(
+        clamped || start == MotionStart::Released,
         "a rod with a free base has no equilibrium to start from: use \"released\"",
     )?;
     Ok(start)
 }
 
 /// Most mistakes that are told at once.
-const MOST: usize = 8;
+const MAX_REPORTED_MISTAKES: usize = 8;
 
 impl Entries {
     /// The errors about the values of keys that are there.
-    pub(super) fn mistakes(&self) -> Vec<ScenarioError> {
+    pub(super) fn value_errors(&self) -> Vec<ScenarioError> {
         let Err(error) = self.read() else {
             return Vec::new();
         };
-        let ScenarioError { others, .. } = self.with_others(error.clone());
+        let ScenarioError { others, .. } = self.error_with_others(error.clone());
         let all = [error].into_iter().chain(others);
         let given = |error: &ScenarioError| error.key.is_some_and(|key| self.is_given(key));
         all.filter(given).collect()
@@ -327,14 +333,19 @@ impl Entries {
 
     /// An error, with those about other entries that do not follow from it: the refused entry gives
     /// way to one that is allowed, and all are read again.
-    pub(super) fn with_others(&self, error: ScenarioError) -> ScenarioError {
+    pub(super) fn error_with_others(&self, error: ScenarioError) -> ScenarioError {
         let mut entries = self.clone();
         let mut found = vec![error.clone()];
-        while found.len() < Key::COUNT && found.last().is_some_and(|last| entries.mend(last)) {
+        while found.len() < Key::COUNT
+            && found
+                .last()
+                .is_some_and(|last| entries.replace_refused_entry(last))
+        {
             let Err(next) = entries.read() else {
                 break;
             };
-            let follows = |told: &ScenarioError| told.key == next.key || depends(&next, told);
+            let follows =
+                |told: &ScenarioError| told.key == next.key || may_follow_from(&next, told);
             if found.iter().any(follows) {
                 break;
             }
@@ -345,18 +356,21 @@ impl Entries {
         let first = found.iter().position(is_missing);
         let others = found.into_iter().enumerate().skip(1);
         let others = others.filter(|(k, error)| first == Some(*k) || !is_missing(error));
-        let others = others.map(|(_, error)| error).take(MOST - 1).collect();
+        let others = others
+            .map(|(_, error)| error)
+            .take(MAX_REPORTED_MISTAKES - 1)
+            .collect();
         ScenarioError { others, ..error }
     }
 
     /// Replaces the entry that is refused by one that is allowed; false if none is known, or if others
     /// are right or wrong by what it says.
-    fn mend(&mut self, error: &ScenarioError) -> bool {
-        let Some(key) = error.key.filter(|key| !self.decides(*key)) else {
+    fn replace_refused_entry(&mut self, error: &ScenarioError) -> bool {
+        let Some(key) = error.key.filter(|key| !self.other_entries_depend(*key)) else {
             return false;
         };
-        let value = match key.left_out() {
-            LeftOut::Required(example) => Some(example),
+        let value = match key.missing_key_rule() {
+            MissingKeyRule::Required(example) => Some(example),
             _ => None,
         };
         self.replace(key, value);
@@ -365,10 +379,12 @@ impl Entries {
 
     /// Whether other entries are right or wrong by what this one says: lists are as long as
     /// `leaf.rods`, if there are any.
-    fn decides(&self, key: Key) -> bool {
+    fn other_entries_depend(&self, key: Key) -> bool {
         match key.form() {
-            Form::Whole if key == Key::Rods => Key::all().any(|key| self.is_list_of_rods(key)),
-            Form::Text | Form::Whole => key.parts().0 != "units",
+            ValueSchema::Whole if key == Key::Rods => {
+                Key::all().any(|key| self.is_list_of_rods(key))
+            }
+            ValueSchema::Text | ValueSchema::Whole => key.table_and_name().0 != "units",
             _ => false,
         }
     }
@@ -376,11 +392,14 @@ impl Entries {
     /// Whether a list is given, with as many entries as there are rods or gaps between them.
     fn is_list_of_rods(&self, key: Key) -> bool {
         let single = match key.form() {
-            Form::PerRod(_) | Form::Quantity(_) | Form::PerGap(_) | Form::Fan => 0,
-            Form::VectorPerRod | Form::VectorQuantity => 1,
+            ValueSchema::PerRod(_)
+            | ValueSchema::Quantity(_)
+            | ValueSchema::PerGap(_)
+            | ValueSchema::Fan => 0,
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity => 1,
             _ => return false,
         };
-        self.given(key)
+        self.given_value(key)
             .is_some_and(|item| depth(item.value) > single)
     }
 }
@@ -398,8 +417,10 @@ fn depth(value: &Value) -> usize {
 
 /// Whether an error may follow from the value that replaced that of another: a wall is compared with
 /// its diameter.
-fn depends(error: &ScenarioError, on: &ScenarioError) -> bool {
-    let in_section = on.key.is_some_and(|key| key.parts().0 == "section");
+fn may_follow_from(error: &ScenarioError, on: &ScenarioError) -> bool {
+    let in_section = on
+        .key
+        .is_some_and(|key| key.table_and_name().0 == "section");
     in_section && matches!(error.key, Some(Key::Wall | Key::InnerDiameter))
 }
 
@@ -445,7 +466,7 @@ mod tests {
 
     /// Asserts that there is one line about each of these keys, and no other.
     #[track_caller]
-    fn are_about(told: &[String], keys: &[&str]) {
+    fn assert_keys_mentioned(told: &[String], keys: &[&str]) {
         assert_eq!(told.len(), keys.len(), "{told:?}");
         for key in keys {
             let found = told.iter().any(|line| line.contains(key));
@@ -466,7 +487,7 @@ mod tests {
             "leaf.joined",
             "solve.tolerance",
         ];
-        are_about(&told, &keys);
+        assert_keys_mentioned(&told, &keys);
         let rods = refused("length = [1, 1, 1]\nfan = [0, 0, 0]", "torsion = 1");
         let rods = rods.to_string().lines().count();
         assert_eq!(rods, 1, "only the tolerance is wrong");
@@ -492,7 +513,7 @@ mod tests {
             "blade.thickness",
             "load.g",
         ];
-        are_about(&told, &keys);
+        assert_keys_mentioned(&told, &keys);
         let listed = text.replace("\"0,025\"", "[0.1, 0.2]");
         let listed = Scenario::from_toml(&listed).unwrap_err();
         assert!(listed.others.is_empty(), "{listed}");
@@ -511,7 +532,7 @@ mod tests {
             "stiffness.torsion",
             "solve.tolerance",
         ];
-        are_about(&told, &keys);
+        assert_keys_mentioned(&told, &keys);
     }
 
     /// What follows from a wrong entry alone is not told.

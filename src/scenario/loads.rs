@@ -6,9 +6,9 @@
 
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::{Profile, Rod, Scale, Scenario, Schedule, ascending};
+use crate::scenario::{Profile, Rod, Scale, Scenario, Schedule, sorted_distinct};
 use crate::words;
 use glam::DVec3;
 
@@ -143,13 +143,13 @@ impl Scenario {
 /// Reads `load.gravity`: the weight that all rods share, and their own besides; empty if these do
 /// not differ.
 pub(super) fn gravity(entries: &Entries, rods: usize) -> ScenarioResult<([f64; 3], Vec<[f64; 3]>)> {
-    let item = entries.item(Key::Gravity)?;
+    let item = entries.value_or_default(Key::Gravity)?;
     let each = item.vectors(rods)?;
     let first = each.first().copied().unwrap_or([0.0; 3]);
     if each.iter().all(|own| *own == first) {
         return Ok((first, Vec::new()));
     }
-    item.ensure(
+    item.refuse_unless(
         !entries.is_given(Key::GravityInTime),
         "dynamics.gravity, one vector for all rods, would replace these: leave one of them out",
     )?;
@@ -158,11 +158,11 @@ pub(super) fn gravity(entries: &Entries, rods: usize) -> ScenarioResult<([f64; 3
 
 /// Reads `load.g`, which needs a mass.
 pub(super) fn g(entries: &Entries) -> ScenarioResult<[f64; 3]> {
-    let item = entries.item(Key::G)?;
+    let item = entries.value_or_default(Key::G)?;
     let g = item.vector()?;
     let masses = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
     let has_mass = masses.into_iter().any(|key| entries.is_given(key));
-    item.ensure(
+    item.refuse_unless(
         has_mass || g == [0.0; 3],
         "is an acceleration and needs the mass that it pulls: give dynamics.density, or \
          mass_density in [section] or [blade]; a force per length is load.gravity",
@@ -175,7 +175,7 @@ pub(super) fn distributed(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
-    let Some(item) = entries.given(Key::Distributed) else {
+    let Some(item) = entries.given_value(Key::Distributed) else {
         return Ok(None);
     };
     let loads = item.vector_profiles(rods)?;
@@ -185,17 +185,17 @@ pub(super) fn distributed(
 
 /// Reads `[[load.point]]`.
 pub(super) fn points(entries: &Entries, rods: usize) -> ScenarioResult<Vec<PointLoad>> {
-    let count = entries.rows("load.point").unwrap_or(0);
+    let count = entries.table_count("load.point").unwrap_or(0);
     (0..count).map(|row| point(entries, row, rods)).collect()
 }
 
 fn point(entries: &Entries, row: usize, rods: usize) -> ScenarioResult<PointLoad> {
-    let item = |key| entries.item_of(key, row);
+    let item = |key| entries.value_in_row(key, row);
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
-    on_one_rod(turned, rods, &[moment])?;
+    check_single_rod_moments(turned, rods, &[moment])?;
     Ok(PointLoad {
-        vein: item(Key::PointVein)?.whole(rods)? - 1,
+        vein: item(Key::PointVein)?.whole_number(rods)? - 1,
         at: item(Key::PointAt)?.fraction()?,
         force: item(Key::PointForce)?.vector()?,
         moment,
@@ -204,13 +204,17 @@ fn point(entries: &Entries, row: usize, rods: usize) -> ScenarioResult<PointLoad
 }
 
 /// Refuses moments on more than one rod.
-pub(super) fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> ScenarioResult<()> {
+pub(super) fn check_single_rod_moments(
+    item: EntryValue,
+    rods: usize,
+    moments: &[[f64; 3]],
+) -> ScenarioResult<()> {
     let allowed = rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]);
     let (what, why) = match item.key() {
         Key::PointMoment => ("on a point", "a dead moment has no potential"),
         _ => ("at the tip", "joined tips pass on no moment"),
     };
-    item.ensure(
+    item.refuse_unless(
         allowed,
         format_args!("a moment {what} needs leaf.rods = 1 (here {rods}): {why}"),
     )
@@ -232,39 +236,41 @@ pub struct Wind {
 
 /// Reads `[wind]`; `None` if there is no such table.
 pub(super) fn wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
-    let mut table = Key::all().filter(|key| key.parts().0 == "wind");
+    let mut table = Key::all().filter(|key| key.table_and_name().0 == "wind");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
     }
     Ok(Some(Wind {
-        velocity: entries.item(Key::WindVelocity)?.vectors_in_time()?,
-        density: entries.item(Key::WindDensity)?.number()?,
-        drag: entries.item(Key::WindDrag)?.number()?,
-        width: entries.item(Key::WindWidth)?.quantity(rods)?,
+        velocity: entries
+            .value_or_default(Key::WindVelocity)?
+            .vectors_in_time()?,
+        density: entries.value_or_default(Key::WindDensity)?.number()?,
+        drag: entries.value_or_default(Key::WindDrag)?.number()?,
+        width: entries.value_or_default(Key::WindWidth)?.quantity(rods)?,
     }))
 }
 
 /// Radius of the section over the length of the longest rod: half of it, the radius of
 /// gyration, is that of the relaxation.
-const RADIUS: f64 = 0.2;
+const DEFAULT_RADIUS_RATIO: f64 = 0.2;
 
 /// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
 const LOWEST_FREQUENCY: f64 = 3.516;
 
 /// Duration, in units of sqrt(rho L^4/A).
-const DURATION: f64 = 10.0;
+const DEFAULT_DURATION: f64 = 10.0;
 
 /// Outputs in that time.
-pub(super) const OUTPUTS: f64 = 100.0;
+pub(super) const DEFAULT_OUTPUTS: f64 = 100.0;
 
 words! {
     /// Where a motion begins, at time 0 and without velocity.
-    pub enum Start {
+    pub enum MotionStart {
         /// In the shape from which a relaxation starts: arcs that meet in the tip,
         /// or the rest shape of free rods.
         Released = "released",
         /// In the equilibrium under the loads and with the rest shape of time 0.
-        AtRest = "at-rest",
+        ConfirmedEquilibrium = "at-rest",
     }
 }
 
@@ -296,7 +302,7 @@ pub struct Dynamics {
     /// Whether the base is clamped; free only on a single rod.
     pub clamped: bool,
     /// Where the motion begins.
-    pub start: Start,
+    pub start: MotionStart,
     /// Gravity, force per unit reference length.
     pub gravity: Schedule<[f64; 3]>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
@@ -354,12 +360,12 @@ impl Dynamics {
 
     /// rho: the mean of the mid-rod densities of the rods, mass per length.
     pub fn mean_density(&self) -> f64 {
-        mean_of(&self.density)
+        mean_mid_rod_value(&self.density)
     }
 
     /// The unit of time, sqrt(rho L^4/A), of these rods.
     pub fn natural_time(&self, rods: &[Rod]) -> f64 {
-        time(Scale::of(rods), &self.density)
+        natural_time_unit(Scale::of(rods), &self.density)
     }
 
     /// The external damping that is critical for the lowest mode of a clamped vein.
@@ -370,9 +376,9 @@ impl Dynamics {
     /// The default for rods of these densities.
     pub(super) fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
         let scale = Scale::of(rods);
-        let time = time(scale, &density);
-        let duration = DURATION * time;
-        let radius = Profile::Constant(RADIUS * scale.length);
+        let time = natural_time_unit(scale, &density);
+        let duration = DEFAULT_DURATION * time;
+        let radius = Profile::Constant(DEFAULT_RADIUS_RATIO * scale.length);
         let inertia = |density| round_inertia(density, &radius);
         Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
@@ -381,9 +387,9 @@ impl Dynamics {
             density,
             internal_damping: 0.0,
             duration,
-            output_interval: duration / OUTPUTS,
+            output_interval: duration / DEFAULT_OUTPUTS,
             clamped: true,
-            start: Start::Released,
+            start: MotionStart::Released,
             gravity: Schedule::constant([0.0; 3]),
             tip_force: Schedule::constant([0.0; 3]),
             tip_moment: Schedule::constant([0.0; 3]),
@@ -394,11 +400,11 @@ impl Dynamics {
 
 /// That is critical for the lowest mode of a clamped rod of the mean density.
 fn critical_damping(density: &[Profile], time: f64) -> f64 {
-    2.0 * LOWEST_FREQUENCY * mean_of(density) / time
+    2.0 * LOWEST_FREQUENCY * mean_mid_rod_value(density) / time
 }
 
 /// Mean of the mid-rod values; exact if all are equal.
-fn mean_of(profiles: &[Profile]) -> f64 {
+fn mean_mid_rod_value(profiles: &[Profile]) -> f64 {
     let counted = profiles.iter().zip(1..);
     counted.fold(0.0, |mean, (profile, count)| {
         mean + (profile.at(0.5) - mean) / f64::from(count)
@@ -406,8 +412,8 @@ fn mean_of(profiles: &[Profile]) -> f64 {
 }
 
 /// The unit of time sqrt(rho L^4/A); in this order nothing overflows.
-pub(super) fn time(scale: Scale, density: &[Profile]) -> f64 {
-    (mean_of(density) / (scale.stiffness / scale.length.powi(4))).sqrt()
+pub(super) fn natural_time_unit(scale: Scale, density: &[Profile]) -> f64 {
+    (mean_mid_rod_value(density) / (scale.stiffness / scale.length.powi(4))).sqrt()
 }
 
 /// Moment of inertia of a round section: rho I = density radius^2/4 at all knots of
@@ -418,7 +424,7 @@ pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {
         return Profile::Constant(at_fraction(0.0));
     }
-    let at = ascending([&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat());
+    let at = sorted_distinct([&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat());
     let value = at.iter().map(|&sigma| at_fraction(sigma)).collect();
     Profile::Linear { at, value }
 }
@@ -454,11 +460,11 @@ mod tests {
 
     #[test]
     fn the_mean_of_equal_densities_is_exact() {
-        assert_eq!(mean_of(&vec![Profile::Constant(0.1); 7]), 0.1);
+        assert_eq!(mean_mid_rod_value(&vec![Profile::Constant(0.1); 7]), 0.1);
         let taper = Profile::Linear {
             at: vec![0.0, 1.0],
             value: vec![4.0, 2.0],
         };
-        assert_eq!(mean_of(&[taper, Profile::Constant(1.0)]), 2.0);
+        assert_eq!(mean_mid_rod_value(&[taper, Profile::Constant(1.0)]), 2.0);
     }
 }

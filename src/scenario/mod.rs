@@ -18,29 +18,42 @@ mod plausibility;
 mod profile;
 mod section;
 mod supports;
+crate::renamed! {
+    Begin => BaseRotations,
+    Part => EntryPath,
+    PhotoRate => PhotoParameterDerivative,
+    Place => SourceLocation,
+    Start => MotionStart,
+    Turning => ZeroEnergyRotation,
+}
+
 #[cfg(test)]
 mod tests;
 mod veins;
 
 use crate::memory;
 pub use crate::scenario::blade::{Blade, BladePart, BladeProperty};
-pub(crate) use crate::scenario::format::Form;
 pub use crate::scenario::format::Key;
-pub use crate::scenario::format::entries::{Entries, Part};
+pub(crate) use crate::scenario::format::ValueSchema;
+pub use crate::scenario::format::entries::{Entries, EntryPath};
 pub use crate::scenario::format::schema::schema;
+pub(crate) use crate::scenario::format::source::intended_number;
 use crate::scenario::format::source::line_of;
-pub(crate) use crate::scenario::format::source::number_meant;
-pub use crate::scenario::format::source::{Place, ScenarioError, printable};
+pub use crate::scenario::format::source::{ScenarioError, SourceLocation, printable};
 pub use crate::scenario::format::units;
 pub use crate::scenario::format::units::Units;
-pub use crate::scenario::loads::{Dynamics, PointLoad, Start, Weight, Wind};
+pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, Weight, Wind};
 pub use crate::scenario::outline::{Moduli, Stress};
-pub use crate::scenario::photo::{Photo, PhotoRate};
-pub(crate) use crate::scenario::plausibility::{STRETCHED, obstacle, out_of_reach, slips};
-pub(crate) use crate::scenario::profile::ascending;
+pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
+pub(crate) use crate::scenario::plausibility::{
+    LARGEST_PLAUSIBLE_STRETCH, obstacle, out_of_reach, plausibility_warnings,
+};
+pub(crate) use crate::scenario::profile::sorted_distinct;
 pub use crate::scenario::profile::{Profile, Schedule};
 pub use crate::scenario::section::{Property, Radii, Section};
-pub use crate::scenario::supports::{Begin, Clamp, Grip, HeldTip, Hold, Turning, UnbalancedMoment};
+pub use crate::scenario::supports::{
+    BaseRotations, Clamp, Grip, HeldTip, SupportKind, UnbalancedMoment, ZeroEnergyRotation,
+};
 pub use crate::scenario::veins::Tissue;
 use glam::{DQuat, DVec3};
 use std::fs::File;
@@ -65,7 +78,7 @@ pub struct Scenario {
     /// The blade that the veins and the tissue follow from, if it is given in place of them.
     pub blade: Option<Arc<Blade>>,
     /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
-    pub base_held: Hold,
+    pub base_held: SupportKind,
     /// Whether all tips share one point.
     pub joined: bool,
     /// Coupling stiffness of each gap between neighbouring rods along the lab
@@ -122,7 +135,7 @@ impl Scenario {
 
     /// T: the natural unit of time, sqrt(rho L^4/A).
     fn time(&self) -> f64 {
-        loads::time(self.scale(), &self.dynamics.density)
+        loads::natural_time_unit(self.scale(), &self.dynamics.density)
     }
 }
 
@@ -217,7 +230,7 @@ pub fn longest(rods: &[Rod]) -> f64 {
 }
 
 /// Places that differ by less are the same: no segment may be so short.
-const ROUNDING: f64 = 1e-12;
+const PLACE_TOLERANCE: f64 = 1e-12;
 
 impl Rod {
     /// The rotation of the directors at the base: by the fan's angle about e3, after the elevation
@@ -262,8 +275,9 @@ impl Scenario {
         let ends = self.grips.iter().flat_map(|grip| grip.at);
         let inside = points.chain(ends);
         let all = profiles.flat_map(Profile::kinks).copied().chain(inside);
-        let mut kinks = ascending(all.filter(|&at| at > ROUNDING && at < 1.0 - ROUNDING));
-        kinks.dedup_by(|next, kept| *next - *kept <= ROUNDING);
+        let mut kinks =
+            sorted_distinct(all.filter(|&at| at > PLACE_TOLERANCE && at < 1.0 - PLACE_TOLERANCE));
+        kinks.dedup_by(|next, kept| *next - *kept <= PLACE_TOLERANCE);
         kinks
     }
 }
@@ -301,7 +315,7 @@ impl Scenario {
         file: &str,
         overrides: &[String],
     ) -> Result<Scenario, ScenarioError> {
-        let entries = Entries::of_text(text, file)?;
+        let entries = Entries::from_text(text, file)?;
         entries.replaced(overrides)?.check()
     }
 
@@ -321,7 +335,7 @@ impl Scenario {
 /// # Errors
 /// If it cannot be read, or is not text.
 pub fn text(path: &Path) -> Result<String, ScenarioError> {
-    utf8(bytes(path)?, &path.display().to_string())
+    decode_utf8(bytes(path)?, &path.display().to_string())
 }
 
 /// Reads a file, of at most one byte more than [`MOST_BYTES`].
@@ -347,12 +361,13 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
 }
 
 /// Decodes the text of a scenario's `file` from its first bytes.
-pub fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
+pub fn decode_utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
     if bytes.len() as u64 > MOST_BYTES {
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(ScenarioError::in_file(file, None, problem));
     }
-    memory::text(&bytes).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    memory::check_text_memory(&bytes)
+        .map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();

@@ -39,7 +39,7 @@
 //! rectangle concentrate stress, which is left out.
 
 use crate::scenario::Scenario;
-use crate::scenario::profile::GAUSS;
+use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
 use crate::words;
 use glam::DVec3;
 use serde::Serialize;
@@ -47,7 +47,7 @@ use std::f64::consts::PI;
 
 words! {
     /// The outline of a section.
-    pub enum Outline {
+    pub enum SectionOutline {
         /// A circle, whose width and thickness are the same.
         Circle = "circle",
         /// An ellipse with its width along d2 and its thickness along d3.
@@ -59,18 +59,18 @@ words! {
 
 /// A section at one place, with its wall if it is hollow.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sides {
-    pub outline: Outline,
+pub(super) struct SectionDimensions {
+    pub outline: SectionOutline,
     pub width: f64,
     pub thickness: f64,
     pub wall: Option<f64>,
 }
 
-impl Sides {
+impl SectionDimensions {
     /// Those of the hole.
-    pub fn hole(self) -> Option<Sides> {
+    pub fn hole(self) -> Option<SectionDimensions> {
         let inside = |side: f64, wall: f64| (side - 2.0 * wall).max(0.0);
-        self.wall.map(|wall| Sides {
+        self.wall.map(|wall| SectionDimensions {
             width: inside(self.width, wall),
             thickness: inside(self.thickness, wall),
             wall: None,
@@ -81,20 +81,22 @@ impl Sides {
     /// The area within the outline, with the hole.
     pub fn enclosed(self) -> f64 {
         match self.outline {
-            Outline::Circle | Outline::Ellipse => PI / 4.0 * self.width * self.thickness,
-            Outline::Rectangle => self.width * self.thickness,
+            SectionOutline::Circle | SectionOutline::Ellipse => {
+                PI / 4.0 * self.width * self.thickness
+            }
+            SectionOutline::Rectangle => self.width * self.thickness,
         }
     }
 
     pub fn area(self) -> f64 {
-        self.enclosed() - self.hole().map_or(0.0, Sides::enclosed)
+        self.enclosed() - self.hole().map_or(0.0, SectionDimensions::enclosed)
     }
 
     /// The second moments I2 and I3 of the area, about d2 and d3.
     pub fn second_moments(self) -> [f64; 2] {
         let factor = match self.outline {
-            Outline::Circle | Outline::Ellipse => PI / 64.0,
-            Outline::Rectangle => 1.0 / 12.0,
+            SectionOutline::Circle | SectionOutline::Ellipse => PI / 64.0,
+            SectionOutline::Rectangle => 1.0 / 12.0,
         };
         let (w, t) = (self.width, self.thickness);
         let full = [factor * w * t * t * t, factor * t * w * w * w];
@@ -113,22 +115,24 @@ impl Sides {
             return self.outline.torsion(self.width, self.thickness);
         };
         let panel = |from: f64| -> f64 {
-            let layers = GAUSS.iter();
+            let layers = GAUSS_LEGENDRE_RULE.iter();
             layers
-                .map(|(x, weight)| weight * self.layer((from + x / PANELS) * wall))
+                .map(|(x, weight)| weight * self.layer_torsion((from + x / WALL_PANELS) * wall))
                 .sum()
         };
-        let panels = (0..PANELS as usize).map(|k| panel(k as f64 / PANELS));
-        let below = 4.0 * wall / PANELS * panels.sum::<f64>();
+        let panels = (0..WALL_PANELS as usize).map(|k| panel(k as f64 / WALL_PANELS));
+        let below = 4.0 * wall / WALL_PANELS * panels.sum::<f64>();
         match self.outline {
-            Outline::Circle | Outline::Ellipse => below,
-            Outline::Rectangle => below + self.between(wall) * (self.most_torsion() - below),
+            SectionOutline::Circle | SectionOutline::Ellipse => below,
+            SectionOutline::Rectangle => {
+                below + self.torsion_interpolation(wall) * (self.torsion_upper_bound() - below)
+            }
         }
     }
 
     /// The torsion constant of the outline less that of the hole.
-    fn most_torsion(self) -> f64 {
-        let of = |sides: Sides| match sides.width.min(sides.thickness) > 0.0 {
+    fn torsion_upper_bound(self) -> f64 {
+        let of = |sides: SectionDimensions| match sides.width.min(sides.thickness) > 0.0 {
             true => sides.outline.torsion(sides.width, sides.thickness),
             false => 0.0,
         };
@@ -136,7 +140,7 @@ impl Sides {
     }
 
     /// Where the torsion constant of a rectangle lies between its bounds.
-    pub fn between(self, wall: f64) -> f64 {
+    pub fn torsion_interpolation(self, wall: f64) -> f64 {
         let (long, short) = (
             self.width.max(self.thickness),
             self.width.min(self.thickness),
@@ -146,15 +150,15 @@ impl Sides {
     }
 
     /// A^2/g of the line at this depth in the wall.
-    fn layer(self, depth: f64) -> f64 {
+    fn layer_torsion(self, depth: f64) -> f64 {
         let (w, t) = (self.width - 2.0 * depth, self.thickness - 2.0 * depth);
         let (area, gradient) = match self.outline {
-            Outline::Circle | Outline::Ellipse => {
+            SectionOutline::Circle | SectionOutline::Ellipse => {
                 // Of ellipses with the semi-axes a - x and b - x.
                 let (a, b) = (w / 2.0, t / 2.0);
                 (PI * a * b, 2.0 * PI * (a + b - (a * b).sqrt()))
             }
-            Outline::Rectangle => (w * t, 2.0 * (w + t)),
+            SectionOutline::Rectangle => (w * t, 2.0 * (w + t)),
         };
         area * area / gradient
     }
@@ -167,11 +171,12 @@ impl Sides {
                 return self.outline.shear_factor(along, across, nu);
             };
             match self.outline {
-                Outline::Rectangle => box_shear_factor(along - wall, across - wall, nu),
-                Outline::Circle | Outline::Ellipse => {
+                SectionOutline::Rectangle => box_shear_factor(along - wall, across - wall, nu),
+                SectionOutline::Circle | SectionOutline::Ellipse => {
                     let full = self.outline.shear_factor(along, across, nu);
                     let hole = ((along - 2.0 * wall) / along).powi(2);
-                    full * of_hollow_circle(hole, nu) / of_hollow_circle(0.0, nu)
+                    full * hollow_circle_shear_factor(hole, nu)
+                        / hollow_circle_shear_factor(0.0, nu)
                 }
             }
         })
@@ -179,12 +184,12 @@ impl Sides {
 }
 
 /// So many panels of five points resolve the layers of every wall to 1e-9.
-const PANELS: f64 = 4.0;
+const WALL_PANELS: f64 = 4.0;
 
 /// Cowper's factor of a hollow circle, the square of whose inner diameter is the part `hole` of
 /// that of the outer one. That of a hollow ellipse is that of the full one, reduced as for circles:
 /// an estimate.
-fn of_hollow_circle(hole: f64, nu: f64) -> f64 {
+fn hollow_circle_shear_factor(hole: f64, nu: f64) -> f64 {
     let both = (1.0 + hole) * (1.0 + hole);
     6.0 * (1.0 + nu) * both / ((7.0 + 6.0 * nu) * both + (20.0 + 12.0 * nu) * hole)
 }
@@ -198,17 +203,17 @@ fn box_shear_factor(along: f64, across: f64, nu: f64) -> f64 {
     10.0 * (1.0 + nu) * (1.0 + 3.0 * m).powi(2) / (walls + nu * of_nu + flanges)
 }
 
-impl Outline {
+impl SectionOutline {
     /// The torsion constant J. Of a rectangle with the long side a and the short
     /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
     fn torsion(self, width: f64, thickness: f64) -> f64 {
         match self {
-            Outline::Circle | Outline::Ellipse => {
+            SectionOutline::Circle | SectionOutline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
                 // In this order equal sides give the circle's value to the last bit but one.
                 PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
             }
-            Outline::Rectangle => {
+            SectionOutline::Rectangle => {
                 let (long, short) = (width.max(thickness), width.min(thickness));
                 let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
                 // From n = 17 on every tanh is 1, so the rest of the sum is known (zeta(5)
@@ -225,8 +230,8 @@ impl Outline {
     /// Cowper's factor for a shear force along the side `along`.
     fn shear_factor(self, along: f64, across: f64, nu: f64) -> f64 {
         match self {
-            Outline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
-            Outline::Circle | Outline::Ellipse => {
+            SectionOutline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
+            SectionOutline::Circle | SectionOutline::Ellipse => {
                 let (a, b) = (along * along, across * across);
                 12.0 * (1.0 + nu) * a * (3.0 * a + b)
                     / ((40.0 + 37.0 * nu) * a * a + (16.0 + 10.0 * nu) * a * b + nu * b * b)
@@ -290,9 +295,9 @@ impl Moduli {
     }
 
     /// Those of a strip of a plate, which twists with it: J = w t^3/3.
-    fn of_strip(width: f64, thickness: f64) -> Moduli {
-        let sides = Sides {
-            outline: Outline::Rectangle,
+    fn for_strip(width: f64, thickness: f64) -> Moduli {
+        let sides = SectionDimensions {
+            outline: SectionOutline::Rectangle,
             width,
             thickness,
             wall: None,
@@ -304,12 +309,12 @@ impl Moduli {
     }
 }
 
-impl Sides {
+impl SectionDimensions {
     /// Its moduli.
     pub fn moduli(self) -> Moduli {
         let (w, t) = (self.width, self.thickness);
         let [second, third] = self.second_moments();
-        let turned = Sides {
+        let turned = SectionDimensions {
             width: t,
             thickness: w,
             ..self
@@ -317,66 +322,70 @@ impl Sides {
         Moduli {
             area: self.area(),
             bending: [0.5 * t / second, 0.5 * w / third],
-            torsion: self.slope() / self.torsion(),
+            torsion: self.stress_function_slope() / self.torsion(),
             shear: [
-                turned.first_moment() / (third * turned.across()),
-                self.first_moment() / (second * self.across()),
+                turned.first_moment() / (third * turned.central_material_width()),
+                self.first_moment() / (second * self.central_material_width()),
             ],
-            corners: self.outline == Outline::Rectangle,
+            corners: self.outline == SectionOutline::Rectangle,
         }
     }
 
     /// The hole, if it has an area.
-    fn open(self) -> Option<Sides> {
+    fn open_hole(self) -> Option<SectionDimensions> {
         self.hole().filter(|hole| hole.enclosed() > 0.0)
     }
 
     /// The first moment of its upper half about d2.
     fn first_moment(self) -> f64 {
         let factor = match self.outline {
-            Outline::Circle | Outline::Ellipse => 1.0 / 12.0,
-            Outline::Rectangle => 1.0 / 8.0,
+            SectionOutline::Circle | SectionOutline::Ellipse => 1.0 / 12.0,
+            SectionOutline::Rectangle => 1.0 / 8.0,
         };
         let full = factor * self.width * self.thickness * self.thickness;
-        full - self.open().map_or(0.0, Sides::first_moment)
+        full - self
+            .open_hole()
+            .map_or(0.0, SectionDimensions::first_moment)
     }
 
     /// The material along d2 through its centre.
-    fn across(self) -> f64 {
-        self.width - self.open().map_or(0.0, |hole| hole.width)
+    fn central_material_width(self) -> f64 {
+        self.width - self.open_hole().map_or(0.0, |hole| hole.width)
     }
 
     /// The largest slope of the stress function per twist, D.
-    fn slope(self) -> f64 {
+    fn stress_function_slope(self) -> f64 {
         let (w, t) = (self.width, self.thickness);
-        let full = self.outline.slope(w, t);
-        let Some(wall) = self.wall.filter(|_| self.open().is_some()) else {
+        let full = self.outline.stress_function_slope(w, t);
+        let Some(wall) = self.wall.filter(|_| self.open_hole().is_some()) else {
             return full;
         };
         let thin = match self.outline {
             // The length of an ellipse as for the torsion constant.
-            Outline::Circle | Outline::Ellipse => w * t / (w + t - (w * t).sqrt()) / 2.0,
-            Outline::Rectangle => w * t / (w + t),
+            SectionOutline::Circle | SectionOutline::Ellipse => {
+                w * t / (w + t - (w * t).sqrt()) / 2.0
+            }
+            SectionOutline::Rectangle => w * t / (w + t),
         };
-        thin + self.between(wall) * (full - thin)
+        thin + self.torsion_interpolation(wall) * (full - thin)
     }
 }
 
 /// Terms of the series of a rectangle, which falls off as exp(-n pi/2).
-const TERMS: i32 = 12;
+const RECTANGLE_SERIES_TERMS: i32 = 12;
 
-impl Outline {
+impl SectionOutline {
     /// The largest slope of the stress function of the full outline per twist. Of a rectangle with
     /// the long side a and the short side b: b (1 - 8/pi^2 sum over odd n of 1/(n^2 cosh(n pi a/(2 b)))).
-    fn slope(self, width: f64, thickness: f64) -> f64 {
+    fn stress_function_slope(self, width: f64, thickness: f64) -> f64 {
         let (long, short) = (width.max(thickness), width.min(thickness));
         match self {
-            Outline::Circle | Outline::Ellipse => {
+            SectionOutline::Circle | SectionOutline::Ellipse => {
                 let ratio = short / long;
                 short / (1.0 + ratio * ratio)
             }
-            Outline::Rectangle => {
-                let odd = (0..TERMS).map(|k| f64::from(2 * k + 1));
+            SectionOutline::Rectangle => {
+                let odd = (0..RECTANGLE_SERIES_TERMS).map(|k| f64::from(2 * k + 1));
                 let terms = odd.map(|n| 1.0 / (n * n * (n * PI * long / (2.0 * short)).cosh()));
                 short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
             }
@@ -398,7 +407,7 @@ impl Scenario {
             let bending = rod.couple_stiffness[axis].at(sigma);
             (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
         };
-        Some(Moduli::of_strip(side(2), side(1)))
+        Some(Moduli::for_strip(side(2), side(1)))
     }
 }
 
@@ -421,7 +430,7 @@ mod tests {
             (10.0, 0.312_332_5),
         ] {
             for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
-                let found = Outline::Rectangle.torsion(width, thickness);
+                let found = SectionOutline::Rectangle.torsion(width, thickness);
                 close(found, constant * sides, 3e-5);
             }
         }
@@ -431,13 +440,17 @@ mod tests {
             long * (1.0 / 3.0 - 64.0 / PI.powi(5) / long * sum)
         };
         for long in [1.0, 1.3, 4.0, 50.0] {
-            close(Outline::Rectangle.torsion(long, 1.0), direct(long), 1e-13);
+            close(
+                SectionOutline::Rectangle.torsion(long, 1.0),
+                direct(long),
+                1e-13,
+            );
         }
-        close(Outline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
+        close(SectionOutline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
     }
 
-    fn hollow(outline: Outline, width: f64, thickness: f64, wall: f64) -> Sides {
-        Sides {
+    fn hollow(outline: SectionOutline, width: f64, thickness: f64, wall: f64) -> SectionDimensions {
+        SectionDimensions {
             outline,
             width,
             thickness,
@@ -452,7 +465,7 @@ mod tests {
         for wall in [0.001, 0.1, 0.3, 0.5] {
             let inner = 1.0 - 2.0 * wall;
             let polar = PI / 32.0 * (1.0 - f64::powi(inner, 4));
-            for outline in [Outline::Circle, Outline::Ellipse] {
+            for outline in [SectionOutline::Circle, SectionOutline::Ellipse] {
                 let tube = hollow(outline, 1.0, 1.0, wall);
                 close(tube.torsion(), polar, 1e-13);
                 close(tube.area(), PI / 4.0 * (1.0 - inner * inner), 1e-13);
@@ -461,7 +474,7 @@ mod tests {
                 close(third, polar / 2.0, 1e-13);
             }
         }
-        let [thin, full] = [1e-6, 0.5].map(|wall| hollow(Outline::Circle, 1.0, 1.0, wall));
+        let [thin, full] = [1e-6, 0.5].map(|wall| hollow(SectionOutline::Circle, 1.0, 1.0, wall));
         close(thin.shear_factors(0.3)[0], 2.6 / 4.9, 1e-5);
         close(full.shear_factors(0.3)[1], 7.8 / 8.8, 1e-14);
     }
@@ -471,7 +484,7 @@ mod tests {
     #[test]
     fn thin_walls() {
         let (w, t, wall) = (2.0, 1.0, 1e-7);
-        let tube = hollow(Outline::Rectangle, w, t, wall);
+        let tube = hollow(SectionOutline::Rectangle, w, t, wall);
         close(
             tube.torsion(),
             4.0 * (w * t).powi(2) * wall / (2.0 * (w + t)),
@@ -481,7 +494,7 @@ mod tests {
         let [soft, stiff] = tube.second_moments();
         close(soft, wall * (t.powi(3) / 6.0 + w * t * t / 2.0), 1e-6);
         close(stiff, wall * (w.powi(3) / 6.0 + t * w * w / 2.0), 1e-6);
-        let square = hollow(Outline::Rectangle, 1.0, 1.0, 1e-9);
+        let square = hollow(SectionOutline::Rectangle, 1.0, 1.0, 1e-9);
         close(square.shear_factors(0.3)[0], 26.0 / 59.7, 1e-8);
     }
 
@@ -489,7 +502,7 @@ mod tests {
     /// the stress function on three grids, extrapolated.
     #[test]
     fn torsion_of_hollow_sections() {
-        use Outline::{Ellipse, Rectangle};
+        use SectionOutline::{Ellipse, Rectangle};
         for (outline, width, thickness, wall, torsion, within) in [
             (Rectangle, 1.0, 1.0, 0.02, 0.018_998, 2e-3),
             (Rectangle, 1.0, 1.0, 0.1, 0.077_092, 3e-3),
@@ -504,7 +517,7 @@ mod tests {
         ] {
             let tube = hollow(outline, width, thickness, wall);
             close(tube.torsion(), torsion, within);
-            assert!(tube.torsion() < tube.most_torsion());
+            assert!(tube.torsion() < tube.torsion_upper_bound());
         }
         // A wall of half the thickness leaves no hole.
         let full = hollow(Rectangle, 1.7, 1.0, 0.5);
@@ -521,8 +534,8 @@ mod moduli_tests {
         assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
     }
 
-    fn moduli(outline: Outline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
-        let sides = Sides {
+    fn moduli(outline: SectionOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
+        let sides = SectionDimensions {
             outline,
             width,
             thickness,
@@ -544,9 +557,9 @@ mod moduli_tests {
             (10.0, 0.312),
         ] {
             for (width, thickness) in [(long, 1.0), (1.0, long)] {
-                let found = moduli(Outline::Rectangle, width, thickness, None).torsion;
+                let found = moduli(SectionOutline::Rectangle, width, thickness, None).torsion;
                 close(found, 1.0 / (k * long), 3e-3);
-                let found = moduli(Outline::Ellipse, width, thickness, None).torsion;
+                let found = moduli(SectionOutline::Ellipse, width, thickness, None).torsion;
                 close(found, 16.0 / (PI * long), 1e-14);
             }
         }
@@ -556,7 +569,7 @@ mod moduli_tests {
     /// differences for the stress function on two grids, over J.
     #[test]
     fn torsion_of_hollow_sections() {
-        use crate::scenario::outline::Outline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for wall in [0.01, 0.2, 0.5] {
             let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
             close(
@@ -588,7 +601,7 @@ mod moduli_tests {
     /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
     #[test]
     fn shear_by_forces() {
-        use crate::scenario::outline::Outline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for (outline, width, thickness, wall, factor) in [
             (Rectangle, 3.0, 0.7, None, 1.5),
             (Rectangle, 3.0, 0.7, Some(0.35), 1.5),
@@ -608,7 +621,7 @@ mod moduli_tests {
     fn bending_about_both_axes() {
         let (w, t, about) = (2.0, 0.5, [0.7, 1.9]);
         let around = (0..100_000).map(|k| f64::from(k) / 1e5 * 2.0 * PI);
-        let ellipse = moduli(Outline::Ellipse, w, t, None);
+        let ellipse = moduli(SectionOutline::Ellipse, w, t, None);
         let [second, third] = [w * t * t * t, t * w * w * w].map(|it| PI / 64.0 * it);
         let stress = around.map(|angle: f64| {
             let (y, z) = (0.5 * w * angle.cos(), 0.5 * t * angle.sin());
@@ -618,7 +631,7 @@ mod moduli_tests {
         let n = DVec3::new(-2.0, 0.0, 0.0);
         let m = DVec3::new(0.0, -about[0], about[1]);
         close(ellipse.stress(n, m).normal, most, 1e-8);
-        let rectangle = moduli(Outline::Rectangle, w, t, None);
+        let rectangle = moduli(SectionOutline::Rectangle, w, t, None);
         let most = 2.0 / (w * t) + 6.0 * (about[0] / (w * t * t) + about[1] / (t * w * w));
         close(rectangle.stress(n, m).normal, most, 1e-14);
     }

@@ -1,9 +1,9 @@
 //! A photograph of the leaf: the table `[photo]`.
 
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::format::{Key, Range};
+use crate::scenario::format::{Key, NumberRange};
 use glam::DVec3;
 
 /// How a photograph shows the leaf: as seen from far away along an axis, pixels counted to the right
@@ -24,7 +24,7 @@ pub struct Photo {
 
 /// What changes of a photograph with a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PhotoRate {
+pub struct PhotoParameterDerivative {
     scale: f64,
     origin: [f64; 2],
     rotation: f64,
@@ -46,7 +46,7 @@ impl Photo {
     }
 
     /// The derivative of the pixel of a point that does not move.
-    pub fn rate(&self, point: DVec3, by: &PhotoRate) -> [f64; 2] {
+    pub fn rate(&self, point: DVec3, by: &PhotoParameterDerivative) -> [f64; 2] {
         let [right, up] = self.turned().map(|axis| axis.dot(point) / self.scale);
         let growth = by.scale / self.scale;
         let [x, y] = by.origin;
@@ -57,7 +57,7 @@ impl Photo {
     }
 
     /// The coordinates of a point that are seen at a pixel: the third is not.
-    pub fn place(&self, pixel: [f64; 2]) -> [Option<f64>; 3] {
+    pub fn point_at_pixel(&self, pixel: [f64; 2]) -> [Option<f64>; 3] {
         let [x, y] = [0, 1].map(|k| (pixel[k] - self.origin[k]) * self.scale);
         let [right, up] = self.turned();
         let place = right * x - up * y;
@@ -66,10 +66,12 @@ impl Photo {
     }
 }
 
-impl PhotoRate {
+impl PhotoParameterDerivative {
     /// The derivative as a weighted sum of photographs.
-    pub fn of<'p>(terms: impl Iterator<Item = (f64, &'p Photo)>) -> PhotoRate {
-        let mut rate = PhotoRate::default();
+    pub fn from_terms<'p>(
+        terms: impl Iterator<Item = (f64, &'p Photo)>,
+    ) -> PhotoParameterDerivative {
+        let mut rate = PhotoParameterDerivative::default();
         for (weight, photo) in terms {
             rate.scale += weight * photo.scale;
             rate.rotation += weight * photo.rotation;
@@ -81,24 +83,24 @@ impl PhotoRate {
 
 /// Reads `[photo]`; `None` if there is no such table.
 pub(super) fn photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
-    let mut table = Key::all().filter(|key| key.parts().0 == "photo");
+    let mut table = Key::all().filter(|key| key.table_and_name().0 == "photo");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
     }
-    let [right, up] = [Key::PhotoRight, Key::PhotoUp].map(|key| entries.item(key));
+    let [right, up] = [Key::PhotoRight, Key::PhotoUp].map(|key| entries.value_or_default(key));
     let (right, up) = (right?, up?);
     let (towards, upwards) = (direction(right)?, direction(up)?);
-    up.ensure(
+    up.refuse_unless(
         towards.dot(upwards) == 0.0,
         "is the axis of photo.right: choose another",
     )?;
     Ok(Some(Photo {
         scale: scale(entries)?,
         origin: [
-            entries.item(Key::PhotoX)?.number()?,
-            entries.item(Key::PhotoY)?.number()?,
+            entries.value_or_default(Key::PhotoX)?.number()?,
+            entries.value_or_default(Key::PhotoY)?.number()?,
         ],
-        rotation: entries.item(Key::PhotoRotation)?.number()?,
+        rotation: entries.value_or_default(Key::PhotoRotation)?.number()?,
         right: towards,
         up: upwards,
     }))
@@ -108,36 +110,38 @@ pub(super) fn photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
 fn scale(entries: &Entries) -> ScenarioResult<f64> {
     let ruler = [Key::RulerFrom, Key::RulerTo, Key::RulerLength];
     let given = ruler.into_iter().find(|key| entries.is_given(*key));
-    match (entries.given(Key::PhotoScale), given) {
+    match (entries.given_value(Key::PhotoScale), given) {
         (Some(scale), None) => scale.number(),
-        (Some(scale), Some(_)) => Err(scale
-            .refuse("a ruler says so, too: leave this out, or photo.ruler_from and the others")),
-        (None, None) => entries.item(Key::PhotoScale)?.number(),
+        (Some(scale), Some(_)) => Err(scale.value_error(
+            "a ruler says so, too: leave this out, or photo.ruler_from and the others",
+        )),
+        (None, None) => entries.value_or_default(Key::PhotoScale)?.number(),
         (None, Some(_)) => {
-            let [from, to] = [Key::RulerFrom, Key::RulerTo].map(|key| entries.item(key));
+            let [from, to] =
+                [Key::RulerFrom, Key::RulerTo].map(|key| entries.value_or_default(key));
             let to = to?;
             let ([x, y], [end_x, end_y]) = (pixel(from?)?, pixel(to)?);
             let pixels = (end_x - x).hypot(end_y - y);
-            to.ensure(
+            to.refuse_unless(
                 pixels > 0.0,
                 "is photo.ruler_from: give two points on a ruler",
             )?;
-            Ok(entries.item(Key::RulerLength)?.number()? / pixels)
+            Ok(entries.value_or_default(Key::RulerLength)?.number()? / pixels)
         }
     }
 }
 
-fn pixel(item: Item) -> ScenarioResult<[f64; 2]> {
+fn pixel(item: EntryValue) -> ScenarioResult<[f64; 2]> {
     let needed = "a list of two numbers: pixels to the right, and down";
     let mut pixel = [0.0; 2];
-    let numbers = item.list_of(2, "pixels to the right, and down", needed)?;
+    let numbers = item.list_of_length(2, "pixels to the right, and down", needed)?;
     for (number, item) in pixel.iter_mut().zip(numbers) {
-        *number = item.number_in(Range::Finite)?;
+        *number = item.number_in(NumberRange::Finite)?;
     }
     Ok(pixel)
 }
 
-fn direction(item: Item) -> ScenarioResult<DVec3> {
+fn direction(item: EntryValue) -> ScenarioResult<DVec3> {
     let (sign, axis) = match item.text()?.strip_prefix('-') {
         Some(axis) => (-1.0, axis),
         None => (1.0, item.text()?),
@@ -146,12 +150,12 @@ fn direction(item: Item) -> ScenarioResult<DVec3> {
         "x" => Ok(sign * DVec3::X),
         "y" => Ok(sign * DVec3::Y),
         "z" => Ok(sign * DVec3::Z),
-        _ => Err(item.refuse("must be \"x\", \"y\", \"z\", \"-x\", \"-y\" or \"-z\"")),
+        _ => Err(item.value_error("must be \"x\", \"y\", \"z\", \"-x\", \"-y\" or \"-z\"")),
     }
 }
 
 /// The axis along a direction, as it is written.
-pub(super) fn axis_of(direction: DVec3) -> String {
+pub(super) fn axis_name(direction: DVec3) -> String {
     let axes = direction.to_array().into_iter().zip(["x", "y", "z"]);
     let mut along = axes.filter(|(component, _)| *component != 0.0);
     let (component, axis) = along.next().unwrap_or((1.0, "x"));
@@ -189,7 +193,7 @@ mod tests {
         let photo = picture();
         let point = DVec3::new(0.7, -1.3, 2.1);
         let pixel = photo.projection().map(|(a, b)| a.dot(point) + b);
-        let [x, y, z] = photo.place(pixel);
+        let [x, y, z] = photo.point_at_pixel(pixel);
         assert_eq!(x, None);
         assert!((y.unwrap() + 1.3).abs() < 1e-12 && (z.unwrap() - 2.1).abs() < 1e-12);
         // To the right and up, where the picture is not turned.
@@ -216,7 +220,7 @@ mod tests {
         ];
         for which in 0..4 {
             let unit = |k: usize| f64::from(u8::from(k == which));
-            let rate = PhotoRate {
+            let rate = PhotoParameterDerivative {
                 scale: unit(0),
                 origin: [unit(1), unit(2)],
                 rotation: unit(3),

@@ -5,45 +5,49 @@ use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Largest plausible stretch of a vein relative to its rest stretch.
-pub(crate) const STRETCHED: f64 = 0.2;
+pub(crate) const LARGEST_PLAUSIBLE_STRETCH: f64 = 0.2;
 
 /// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under
 /// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
-const TOO_LONG: f64 = 30.0;
+const HANGING_LENGTH_FACTOR: f64 = 30.0;
 
 /// Gravity if entered by mistake as an acceleration in metres and seconds, and the relative
 /// tolerance with which that number is recognised.
-const ACCELERATION: f64 = 9.81;
+const GRAVITY_ACCELERATION: f64 = 9.81;
 
-const ROUNDED: f64 = 2e-3;
+const GRAVITY_TOLERANCE: f64 = 2e-3;
 
 /// Multiple of that length from which on such a number is taken for this mistake.
-const SUSPICIOUS: f64 = 5.0;
+const SUSPICIOUS_LENGTH_FACTOR: f64 = 5.0;
 
 /// Multiple of the acceleration of gravity, and part of it, by which a weight contradicts a mass.
-const CONTRADICTS: f64 = 10.0;
+const WEIGHT_CONTRADICTION_FACTOR: f64 = 10.0;
 
 /// Part by which two statements of a weight differ in rounding, and their angle in radians.
-const SAME_WEIGHT: f64 = 0.01;
+const WEIGHT_TOLERANCE: f64 = 0.01;
 
 /// The acceleration of gravity in units of length of these names per second squared, and its range
 /// in any of them.
-const ACCELERATIONS: [(&str, f64); 4] = [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
+const GRAVITY_BY_LENGTH_UNIT: [(&str, f64); 4] =
+    [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
 
-const ANY_UNIT: [f64; 2] = [9.81, 9810.0];
+const GRAVITY_RANGE: [f64; 2] = [9.81, 9810.0];
 
 /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
 /// a turn that are multiples of this.
-const DEGREES: f64 = 15.0;
+const DEGREE_MULTIPLE: f64 = 15.0;
 
 /// What is probably not what was intended, one short sentence each.
-pub fn slips(scenario: &Scenario) -> Vec<String> {
-    let heavy = two_weights(scenario).or_else(|| too_long(scenario));
+pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
+    let heavy = weight_stated_twice(scenario).or_else(|| too_long(scenario));
     let heavy = heavy
         .or_else(|| weight_of_another_mass(scenario))
         .or_else(|| gravity_of_another_unit(scenario));
     let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
-    let angles = [in_degrees(scenario), held_in_degrees(scenario)];
+    let angles = [
+        fan_angles_in_degrees(scenario),
+        clamp_angle_in_degrees(scenario),
+    ];
     angles.into_iter().chain(lengths).flatten().collect()
 }
 
@@ -51,10 +55,10 @@ pub fn slips(scenario: &Scenario) -> Vec<String> {
 pub fn obstacle(scenario: &Scenario) -> Option<String> {
     let slips = [
         out_of_reach,
-        held_in_degrees,
-        in_degrees,
+        clamp_angle_in_degrees,
+        fan_angles_in_degrees,
         thicker_than_long,
-        two_weights,
+        weight_stated_twice,
         weight_of_another_mass,
     ];
     slips.into_iter().find_map(|slip| slip(scenario))
@@ -70,7 +74,7 @@ pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
     };
     let all = scenario.rods.iter().map(of).enumerate();
     let (j, (stretch, away, length)) = all.min_by(|(_, a), (_, b)| b.0.total_cmp(&a.0))?;
-    (stretch > STRETCHED).then(|| {
+    (stretch > LARGEST_PLAUSIBLE_STRETCH).then(|| {
         format!(
             "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
             four_digits(away),
@@ -86,15 +90,20 @@ fn four_digits(number: f64) -> f64 {
 }
 
 /// Base angles of more than a right angle: a vein that grows backwards.
-fn in_degrees(scenario: &Scenario) -> Option<String> {
+fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
     type Angle = fn(&Rod) -> f64;
     let kinds: [(&str, Angle); 2] = [
         ("leaf.fan", |rod| rod.angle),
         ("leaf.elevation", |rod| rod.elevation),
     ];
     let doubt = |key: &str, angle: f64| {
-        let turned = angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED);
-        turned.then(|| format!("{key} is in radians, and {angle} is {}", turned_by(angle)))
+        let turned = angle.abs() > FRAC_PI_2 * (1.0 + GRAVITY_TOLERANCE);
+        turned.then(|| {
+            format!(
+                "{key} is in radians, and {angle} is {}",
+                clamp_turn_meaning(angle)
+            )
+        })
     };
     if let Some(blade) = &scenario.blade {
         // The directions of its veins follow from this angle and its outline.
@@ -107,24 +116,24 @@ fn in_degrees(scenario: &Scenario) -> Option<String> {
 }
 
 /// An angle by which a clamped tip is turned that looks like one in degrees.
-fn held_in_degrees(scenario: &Scenario) -> Option<String> {
+fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<String> {
     let clamps = scenario.held_tip.as_ref()?.clamps.as_ref()?;
     let angle = |clamp: &Clamp| {
         let whole = clamp.angle.fract() == 0.0 && clamp.angle.abs() > FRAC_PI_2;
         whole.then_some(("angles", clamp.angle))
     };
     let twist = |clamp: &Clamp| {
-        let whole = clamp.twist % DEGREES == 0.0 && clamp.twist.abs() > TAU;
+        let whole = clamp.twist % DEGREE_MULTIPLE == 0.0 && clamp.twist.abs() > TAU;
         whole.then_some(("twist", clamp.twist))
     };
     let (key, angle) = clamps
         .iter()
         .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
-    let turned = turned_by(angle);
+    let turned = clamp_turn_meaning(angle);
     Some(format!("tip.{key} is in radians, and {angle} is {turned}"))
 }
 
-fn turned_by(angle: f64) -> &'static str {
+fn clamp_turn_meaning(angle: f64) -> &'static str {
     match angle.abs() > TAU {
         true => "more than a turn",
         false => "more than a right angle",
@@ -146,7 +155,7 @@ fn thicker_than_long(scenario: &Scenario) -> Option<String> {
 
 /// A weight per length besides an acceleration that pulls the mass: they add up, and state either the
 /// same weight twice or two weights.
-fn two_weights(scenario: &Scenario) -> Option<String> {
+fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
     let weights = |vein: usize| {
         let weight = scenario.weight(vein);
         let given = DVec3::from_array(weight.even);
@@ -157,12 +166,12 @@ fn two_weights(scenario: &Scenario) -> Option<String> {
     let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
     let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
     let angle = given.angle_between(pulled);
-    let states = match given.distance(pulled) <= SAME_WEIGHT * pulled.length() {
+    let states = match given.distance(pulled) <= WEIGHT_TOLERANCE * pulled.length() {
         true => format!(
             "state the same weight, {other} per length of vein {}, which then counts twice",
             vein + 1
         ),
-        false if angle > SAME_WEIGHT => format!(
+        false if angle > WEIGHT_TOLERANCE => format!(
             "contradict each other: as weights per length of vein {}, {one} and {other}, they are {:.0} degrees apart",
             vein + 1,
             angle.to_degrees()
@@ -187,16 +196,18 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     if scenario.units.time.is_some() && !scenario.units.is_in_seconds() {
         return None;
     }
-    let known = ACCELERATIONS.iter().find(|(name, _)| Some(*name) == unit);
+    let known = GRAVITY_BY_LENGTH_UNIT
+        .iter()
+        .find(|(name, _)| Some(*name) == unit);
     let [least, most] = match known {
         Some((_, acceleration)) if given => [*acceleration; 2],
         // In units without names densities alone may be dimensionless, those of a material not.
-        None if unit.is_none() && scenario.radii.have_mass() => ANY_UNIT,
+        None if unit.is_none() && scenario.radii.have_mass() => GRAVITY_RANGE,
         _ => return None,
     };
     let mass = scenario.dynamics.mean_density();
     let found = weight / mass;
-    let allowed = least / CONTRADICTS..=most * CONTRADICTS;
+    let allowed = least / WEIGHT_CONTRADICTION_FACTOR..=most * WEIGHT_CONTRADICTION_FACTOR;
     (weight > 0.0 && !allowed.contains(&found)).then(|| {
         format!(
             "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
@@ -214,11 +225,13 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
         return None;
     }
     let own = units.length.as_deref()?;
-    let (_, known) = ACCELERATIONS.iter().find(|(name, _)| *name == own)?;
+    let (_, known) = GRAVITY_BY_LENGTH_UNIT
+        .iter()
+        .find(|(name, _)| *name == own)?;
     let given = DVec3::from_array(scenario.g).length();
-    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < ROUNDED;
+    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < GRAVITY_TOLERANCE;
     let of_other = |(name, acceleration): &&(&str, f64)| *name != own && is(*acceleration);
-    let (other, _) = ACCELERATIONS.iter().find(of_other)?;
+    let (other, _) = GRAVITY_BY_LENGTH_UNIT.iter().find(of_other)?;
     Some(format!(
         "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
         four_digits(given)
@@ -234,9 +247,9 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     let weights = weights.map(|weight| DVec3::from_array(weight).length());
     let weight = weights.fold(0.0, f64::max);
     // 9.81 times a power of ten, for other units of length.
-    let digits = weight / 10_f64.powf((weight / ACCELERATION).log10().round());
+    let digits = weight / 10_f64.powf((weight / GRAVITY_ACCELERATION).log10().round());
     let of_mass = scenario.g != [0.0; 3];
-    let slip = !of_mass && (digits / ACCELERATION - 1.0).abs() < ROUNDED;
+    let slip = !of_mass && (digits / GRAVITY_ACCELERATION - 1.0).abs() < GRAVITY_TOLERANCE;
     // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
     let stiffness = |rod: &Rod| {
         let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));
@@ -252,7 +265,14 @@ fn too_long(scenario: &Scenario) -> Option<String> {
         .iter()
         .map(times)
         .fold(f64::INFINITY, f64::min);
-    if weight == 0.0 || shortest < if slip { SUSPICIOUS } else { TOO_LONG } {
+    if weight == 0.0
+        || shortest
+            < if slip {
+                SUSPICIOUS_LENGTH_FACTOR
+            } else {
+                HANGING_LENGTH_FACTOR
+            }
+    {
         return None;
     }
     let advice = match slip {
@@ -284,7 +304,7 @@ mod tests {
                 section = {{ shape = "circle", diameter = 0.2, young = 1e5, mass_density = 1e-5 }}
                 load = {{ g = [0.0, 0.0, -{g}] }}"#
             );
-            slips(&Scenario::from_toml(&text).unwrap())
+            plausibility_warnings(&Scenario::from_toml(&text).unwrap())
         };
         assert!(doubts("cm", 9.81)[0].contains("there it is 981"));
         assert!(doubts("cm", 9.8)[0].contains("in m/s²"));
@@ -304,7 +324,7 @@ mod tests {
                 leaf = {{ rods = 5, elevation = {elevation} }}
                 blade = {{ length = 20.0, width = {{ at = [0.0, 0.4, 1.0], value = [1.0, 2.0, 0.2] }}, thickness = 0.03, young = 1e5 }}"#
             );
-            slips(&Scenario::from_toml(&text).unwrap())
+            plausibility_warnings(&Scenario::from_toml(&text).unwrap())
         };
         for elevation in [45.0, 2.0] {
             let said = doubts(elevation);

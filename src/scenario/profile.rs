@@ -9,7 +9,7 @@ use crate::scenario::section::{Property, Section};
 use std::sync::Arc;
 
 /// Parts of the length of a blade over which an integral is a sum.
-const PANELS: usize = 32;
+const INTEGRATION_PANELS: usize = 32;
 
 /// A quantity along a rod: constant, linear between knots given at fractions
 /// sigma = s/L of the rod's length, or determined by its section or the blade.
@@ -63,17 +63,17 @@ impl Profile {
                 section,
                 property,
                 factor,
-            } => factor * section.at(*property, sigma),
+            } => factor * section.property_value(*property, sigma),
             Profile::Blade {
                 part,
                 property,
                 factor,
-            } => factor * part.at(*property, sigma),
+            } => factor * part.property_value(*property, sigma),
         }
     }
 
     /// The values of three at once: what they have in common is computed once.
-    pub fn all(profiles: &[Profile; 3], sigma: f64) -> [f64; 3] {
+    pub fn values_of_three(profiles: &[Profile; 3], sigma: f64) -> [f64; 3] {
         if let [
             Profile::Blade {
                 part,
@@ -116,12 +116,12 @@ impl Profile {
                 let inside = inside.filter(|&knot| knot < sigma).chain([0.0, sigma]);
                 let part = |w: &[f64]| -> f64 {
                     let width = w[1] - w[0];
-                    let points = GAUSS.iter();
+                    let points = GAUSS_LEGENDRE_RULE.iter();
                     points
                         .map(|(x, weight)| width * weight * self.at(w[0] + x * width))
                         .sum()
                 };
-                ascending(inside).windows(2).map(part).sum()
+                sorted_distinct(inside).windows(2).map(part).sum()
             }
         }
     }
@@ -129,7 +129,7 @@ impl Profile {
     /// Fractions at which an integral is divided, besides kinks.
     fn panels(&self) -> impl Iterator<Item = f64> + use<> {
         let count = match self {
-            Profile::Blade { .. } => PANELS,
+            Profile::Blade { .. } => INTEGRATION_PANELS,
             _ => 1,
         };
         (1..count).map(move |k| k as f64 / count as f64)
@@ -149,19 +149,19 @@ impl Profile {
     /// order stops there.
     pub(crate) fn seams(&self) -> &[f64] {
         match self {
-            Profile::Blade { part, .. } => part.seams(),
+            Profile::Blade { part, .. } => part.outline_points(),
             _ => &[],
         }
     }
 
     /// The largest absolute value along the rod.
     pub fn max_abs(&self) -> f64 {
-        self.fold(0.0, |m, v| m.max(v.abs()))
+        self.fold_extremes(0.0, |m, v| m.max(v.abs()))
     }
 
     /// The smallest value along the rod.
     pub fn min(&self) -> f64 {
-        self.fold(f64::INFINITY, f64::min)
+        self.fold_extremes(f64::INFINITY, f64::min)
     }
 
     /// The same profile times a factor.
@@ -194,7 +194,7 @@ impl Profile {
     }
 
     /// Folds values that include the extremes.
-    fn fold(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
+    fn fold_extremes(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
             Profile::Section {
                 section,
@@ -219,7 +219,7 @@ impl Profile {
 }
 
 /// Numbers in ascending order, each once.
-pub(crate) fn ascending(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
+pub(crate) fn sorted_distinct(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut numbers: Vec<f64> = numbers.into_iter().collect();
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
@@ -288,7 +288,7 @@ impl<T> Schedule<T> {
     }
 
     /// The values on both sides of `time`, and the fraction of the step between them.
-    fn around(&self, time: f64) -> (&T, &T, f64) {
+    fn bracketing_values(&self, time: f64) -> (&T, &T, f64) {
         let last = self.at.len() - 1;
         match self.at.partition_point(|&known| known <= time) {
             0 => (&self.value[0], &self.value[0], 0.0),
@@ -305,8 +305,8 @@ impl<T> Schedule<T> {
 impl Schedule<f64> {
     /// The value at `time`.
     pub fn at(&self, time: f64) -> f64 {
-        let (from, to, fraction) = self.around(time);
-        between(*from, *to, fraction)
+        let (from, to, fraction) = self.bracketing_values(time);
+        interpolate_linearly(*from, *to, fraction)
     }
 
     /// The mean over an interval, exact however short the pulses in it.
@@ -319,8 +319,8 @@ impl Schedule<f64> {
 impl Schedule<[f64; 3]> {
     /// The value at `time`.
     pub fn at(&self, time: f64) -> [f64; 3] {
-        let (from, to, fraction) = self.around(time);
-        std::array::from_fn(|axis| between(from[axis], to[axis], fraction))
+        let (from, to, fraction) = self.bracketing_values(time);
+        std::array::from_fn(|axis| interpolate_linearly(from[axis], to[axis], fraction))
     }
 
     /// The mean over an interval, exact however short the pulses in it.
@@ -333,12 +333,12 @@ impl Schedule<[f64; 3]> {
     }
 }
 
-fn between(from: f64, to: f64, fraction: f64) -> f64 {
+fn interpolate_linearly(from: f64, to: f64, fraction: f64) -> f64 {
     from + fraction * (to - from)
 }
 
 /// Abscissae and weights of the Gauss-Legendre rule of five points on (0, 1).
-pub(super) const GAUSS: [(f64, f64); 5] = [
+pub(super) const GAUSS_LEGENDRE_RULE: [(f64, f64); 5] = [
     (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
     (0.5, 0.284_444_444_444_444_44),

@@ -19,10 +19,10 @@
 
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::outline::{Moduli, Outline, Sides};
-use crate::scenario::{Profile, ascending};
+use crate::scenario::outline::{Moduli, SectionDimensions, SectionOutline};
+use crate::scenario::{Profile, sorted_distinct};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -60,7 +60,7 @@ impl Property {
     };
 
     /// Its number among all.
-    fn number(self) -> usize {
+    fn property_index(self) -> usize {
         match self {
             Property::Couple(axis) => axis,
             Property::Force(axis) => 3 + axis,
@@ -72,17 +72,17 @@ impl Property {
 
 /// What makes a section hollow, as it is given.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Hollow {
+pub(super) enum HollowSection {
     /// The thickness of the wall.
     Wall(Profile),
     /// The inner diameter of a circle.
     Bore(Profile),
 }
 
-impl Hollow {
+impl HollowSection {
     pub(super) fn profile(&self) -> &Profile {
         match self {
-            Hollow::Wall(profile) | Hollow::Bore(profile) => profile,
+            HollowSection::Wall(profile) | HollowSection::Bore(profile) => profile,
         }
     }
 }
@@ -90,10 +90,10 @@ impl Hollow {
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    pub(super) outline: Outline,
+    pub(super) outline: SectionOutline,
     pub(super) width: Profile,
     pub(super) thickness: Profile,
-    pub(super) hollow: Option<Hollow>,
+    pub(super) hollow: Option<HollowSection>,
     pub(super) young: Profile,
     pub(super) poisson: Profile,
     /// Mass per volume; zero where it is not given.
@@ -107,9 +107,9 @@ pub struct Section {
 
 impl Section {
     pub(super) fn new(
-        outline: Outline,
+        outline: SectionOutline,
         [width, thickness]: [Profile; 2],
-        hollow: Option<Hollow>,
+        hollow: Option<HollowSection>,
         [young, poisson, mass_density]: [Profile; 3],
     ) -> Section {
         let mut section = Section {
@@ -124,12 +124,12 @@ impl Section {
             extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
         };
         let profiles = section.profiles();
-        section.kinks = ascending(profiles.flat_map(Profile::kinks).copied());
+        section.kinks = sorted_distinct(profiles.flat_map(Profile::kinks).copied());
         let varies = !section.is_constant();
         for sigma in section.fractions().filter(|_| varies) {
             for property in Property::ALL {
-                let value = section.at(property, sigma);
-                let [least, most] = &mut section.extremes[property.number()];
+                let value = section.property_value(property, sigma);
+                let [least, most] = &mut section.extremes[property.property_index()];
                 (*least, *most) = (least.min(value), most.max(value));
             }
         }
@@ -147,7 +147,8 @@ impl Section {
             ..
         } = self;
         let all = [width, thickness, young, poisson, mass_density];
-        all.into_iter().chain(hollow.iter().map(Hollow::profile))
+        all.into_iter()
+            .chain(hollow.iter().map(HollowSection::profile))
     }
 
     /// Whether it is the same along the whole rod.
@@ -162,15 +163,15 @@ impl Section {
     }
 
     /// Its sides at a fraction of the length.
-    fn sides(&self, sigma: f64) -> Sides {
+    fn dimensions_at(&self, sigma: f64) -> SectionDimensions {
         let (width, thickness) = (self.width.at(sigma), self.thickness.at(sigma));
-        Sides {
+        SectionDimensions {
             outline: self.outline,
             width,
             thickness,
             wall: self.hollow.as_ref().map(|hollow| match hollow {
-                Hollow::Wall(wall) => wall.at(sigma),
-                Hollow::Bore(inner) => 0.5 * (width - inner.at(sigma)),
+                HollowSection::Wall(wall) => wall.at(sigma),
+                HollowSection::Bore(inner) => 0.5 * (width - inner.at(sigma)),
             }),
         }
     }
@@ -181,8 +182,8 @@ impl Section {
     }
 
     /// A property at a fraction of the length.
-    pub fn at(&self, property: Property, sigma: f64) -> f64 {
-        let sides = self.sides(sigma);
+    pub fn property_value(&self, property: Property, sigma: f64) -> f64 {
+        let sides = self.dimensions_at(sigma);
         let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
         let shear = young / (2.0 * (1.0 + poisson));
         let area = sides.area();
@@ -200,7 +201,7 @@ impl Section {
     /// A property along the rod.
     pub(super) fn profile(self: &Arc<Section>, property: Property) -> Profile {
         match self.is_constant() {
-            true => Profile::Constant(self.at(property, 0.5)),
+            true => Profile::Constant(self.property_value(property, 0.5)),
             false => Profile::Section {
                 section: self.clone(),
                 property,
@@ -211,13 +212,16 @@ impl Section {
 
     /// The least and the largest value of a property, of those at the knots and between them.
     pub(super) fn extremes(&self, property: Property) -> [f64; 2] {
-        self.extremes[property.number()]
+        self.extremes[property.property_index()]
     }
 
     /// Cowper's factors for both shear forces, likewise.
     pub(super) fn shear_factors(&self) -> impl Iterator<Item = f64> {
         let fractions = self.fractions();
-        fractions.flat_map(|sigma| self.sides(sigma).shear_factors(self.poisson.at(sigma)))
+        fractions.flat_map(|sigma| {
+            self.dimensions_at(sigma)
+                .shear_factors(self.poisson.at(sigma))
+        })
     }
 
     fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
@@ -248,12 +252,12 @@ impl Radii {
     /// the outline of its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some((section.sides(sigma).enclosed() / PI).sqrt())
+        Some((section.dimensions_at(sigma).enclosed() / PI).sqrt())
     }
 
     /// The moduli of the section of a rod at a fraction of its length.
     pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        Some(self.0.get(rod)?.sides(sigma).moduli())
+        Some(self.0.get(rod)?.dimensions_at(sigma).moduli())
     }
 }
 
@@ -280,9 +284,9 @@ impl PartialEq for Radii {
 }
 
 /// The entry with the size of the sections, or of the blade.
-pub(super) fn size(entries: &Entries) -> Option<Item<'_>> {
+pub(super) fn size_entry(entries: &Entries) -> Option<EntryValue<'_>> {
     let sizes = [Key::Diameter, Key::Thickness, Key::BladeThickness];
-    sizes.into_iter().find_map(|key| entries.given(key))
+    sizes.into_iter().find_map(|key| entries.given_value(key))
 }
 
 /// A property of all rods.
@@ -296,23 +300,23 @@ pub(super) fn sections(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<Arc<Section>>>> {
-    let mut table = Key::all().filter(|key| key.parts().0 == "section");
+    let mut table = Key::all().filter(|key| key.table_and_name().0 == "section");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
     }
     for key in Key::COUPLE.into_iter().chain(Key::FORCE) {
-        if let Some(item) = entries.given(key) {
+        if let Some(item) = entries.given_value(key) {
             let why = "[section] gives the stiffnesses: leave out either [stiffness] or [section]";
-            return Err(item.refuse(why));
+            return Err(item.value_error(why));
         }
     }
-    let quantity = |key| entries.item(key)?.quantity(rods);
+    let quantity = |key| entries.value_or_default(key)?.quantity(rods);
     let (outline, sides) = outline(entries)?;
     let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
     let hollow = hollow(entries, outline, [&width, &thickness])?;
     let young = quantity(Key::Young)?;
-    let poisson = poisson(entries.item(Key::Poisson)?, rods)?;
-    let mass_density = match entries.given(Key::MassDensity) {
+    let poisson = poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+    let mass_density = match entries.given_value(Key::MassDensity) {
         Some(item) => item.quantity(rods)?,
         None => vec![Profile::Constant(0.0); rods],
     };
@@ -340,28 +344,31 @@ pub(super) fn sections(
 /// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
 fn check(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     for (rod, section) in sections.iter().enumerate() {
-        entries.item(Key::Poisson)?.entry(rod).ensure(
-            section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
-            "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
+        entries
+            .value_or_default(Key::Poisson)?
+            .entry(rod)
+            .refuse_unless(
+                section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+                "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
              so flat a section with a negative ratio: choose a larger one, or give the \
              stiffnesses in place of a section",
-        )?;
+            )?;
     }
     Ok(())
 }
 
 /// The outline, and the keys of its two sides.
-fn outline(entries: &Entries) -> ScenarioResult<(Outline, [Key; 2])> {
-    let item = entries.item(Key::SectionShape)?;
+fn outline(entries: &Entries) -> ScenarioResult<(SectionOutline, [Key; 2])> {
+    let item = entries.value_or_default(Key::SectionShape)?;
     let outline = item.word("must be \"circle\", \"ellipse\" or \"rectangle\"")?;
     let (sides, diameter) = ([Key::Width, Key::Thickness], [Key::Diameter; 2]);
     let (sides, others) = match outline {
-        Outline::Circle => (diameter, sides),
-        Outline::Ellipse | Outline::Rectangle => (sides, diameter),
+        SectionOutline::Circle => (diameter, sides),
+        SectionOutline::Ellipse | SectionOutline::Rectangle => (sides, diameter),
     };
-    match others.into_iter().find_map(|key| entries.given(key)) {
+    match others.into_iter().find_map(|key| entries.given_value(key)) {
         None => Ok((outline, sides)),
-        Some(other) => Err(other.refuse(
+        Some(other) => Err(other.value_error(
             "a circle has a diameter; an ellipse and a rectangle have a width (along d2) and a \
              thickness (along d3): leave this out, or change section.shape",
         )),
@@ -371,18 +378,21 @@ fn outline(entries: &Entries) -> ScenarioResult<(Outline, [Key; 2])> {
 /// The walls or bores of the rods; `None` if their sections are full.
 fn hollow(
     entries: &Entries,
-    outline: Outline,
+    outline: SectionOutline,
     [width, thickness]: [&[Profile]; 2],
-) -> ScenarioResult<Option<Vec<Hollow>>> {
-    let (bore, wall) = (entries.given(Key::InnerDiameter), entries.given(Key::Wall));
+) -> ScenarioResult<Option<Vec<HollowSection>>> {
+    let (bore, wall) = (
+        entries.given_value(Key::InnerDiameter),
+        entries.given_value(Key::Wall),
+    );
     let Some(item) = bore.or(wall) else {
         return Ok(None);
     };
     if let Some(bore) = bore {
         let round = "belongs to a circle: give section.wall, the thickness of the wall";
-        bore.ensure(outline == Outline::Circle, round)?;
+        bore.refuse_unless(outline == SectionOutline::Circle, round)?;
         let twice = "section.wall is given, too: leave one of them out";
-        bore.ensure(wall.is_none(), twice)?;
+        bore.refuse_unless(wall.is_none(), twice)?;
     }
     let profiles = item.quantity(width.len())?;
     for (rod, profile) in profiles.iter().enumerate() {
@@ -394,11 +404,11 @@ fn hollow(
             let side = sides.map(|side| side.at(sigma));
             let (value, least) = (profile.at(sigma), side[0].min(side[1]));
             match bore {
-                Some(_) => item.entry(rod).ensure(
+                Some(_) => item.entry(rod).refuse_unless(
                     value < least,
                     "must be less than section.diameter, all along the rod",
                 )?,
-                None => item.entry(rod).ensure(
+                None => item.entry(rod).refuse_unless(
                     2.0 * value <= least,
                     "must be at most half of the section's smaller side, all along the rod",
                 )?,
@@ -406,17 +416,17 @@ fn hollow(
         }
     }
     let of = |profile| match bore {
-        Some(_) => Hollow::Bore(profile),
-        None => Hollow::Wall(profile),
+        Some(_) => HollowSection::Bore(profile),
+        None => HollowSection::Wall(profile),
     };
     Ok(Some(profiles.into_iter().map(of).collect()))
 }
 
-pub(super) fn poisson(item: Item, rods: usize) -> ScenarioResult<Vec<Profile>> {
+pub(super) fn poisson(item: EntryValue, rods: usize) -> ScenarioResult<Vec<Profile>> {
     let poisson = item.quantity(rods)?;
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();
-        item.entry(rod).ensure(
+        item.entry(rod).refuse_unless(
             profile.min() > -1.0 && -most <= 0.5,
             "must be greater than -1 and at most 0.5, as of every isotropic material",
         )?;
@@ -430,7 +440,7 @@ mod tests {
     use crate::scenario::Scenario;
     use leafdyn_testing::pairs;
 
-    fn section(outline: Outline, width: f64, thickness: f64, poisson: f64) -> Section {
+    fn section(outline: SectionOutline, width: f64, thickness: f64, poisson: f64) -> Section {
         let constant = Profile::Constant;
         let material = [constant(2.0), constant(poisson), constant(3.0)];
         let sides = [constant(width), constant(thickness)];
@@ -447,7 +457,7 @@ mod tests {
     #[test]
     fn an_ellipse_with_equal_axes_is_a_circle() {
         let nu = 0.37;
-        let circle = section(Outline::Ellipse, 0.2, 0.2, nu);
+        let circle = section(SectionOutline::Ellipse, 0.2, 0.2, nu);
         let (shear, area) = (2.0 / (2.0 * (1.0 + nu)), PI * 0.01);
         let i = PI * 0.2_f64.powi(4) / 64.0;
         let factor = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
@@ -461,21 +471,24 @@ mod tests {
             (Property::Density, 3.0 * area),
             (Property::RotaryInertia, 3.0 * i),
         ] {
-            close(circle.at(property, 0.5), value, 1e-14);
+            close(circle.property_value(property, 0.5), value, 1e-14);
         }
     }
 
     /// The stiff direction of a flat section is sideways: A3 about d3, H2 along d2.
     #[test]
     fn a_flat_section_is_soft_up_and_down() {
-        let flat = section(Outline::Rectangle, 0.4, 0.1, 0.3);
-        let [up, sideways] = [1, 2].map(|k| flat.at(Property::Couple(k), 0.0));
+        let flat = section(SectionOutline::Rectangle, 0.4, 0.1, 0.3);
+        let [up, sideways] = [1, 2].map(|k| flat.property_value(Property::Couple(k), 0.0));
         close(up, 2.0 * 0.4 * 1e-3 / 12.0, 1e-14);
         close(sideways, 2.0 * 0.1 * 0.064 / 12.0, 1e-14);
-        let ellipse = section(Outline::Ellipse, 0.4, 0.1, 0.3);
-        assert!(ellipse.at(Property::Force(1), 0.0) > ellipse.at(Property::Force(2), 0.0));
+        let ellipse = section(SectionOutline::Ellipse, 0.4, 0.1, 0.3);
+        assert!(
+            ellipse.property_value(Property::Force(1), 0.0)
+                > ellipse.property_value(Property::Force(2), 0.0)
+        );
         let second = PI / 64.0 * 0.4 * 0.1 * (0.16 + 0.01);
-        let inertia = ellipse.at(Property::RotaryInertia, 0.0);
+        let inertia = ellipse.property_value(Property::RotaryInertia, 0.0);
         close(inertia, 1.5 * second, 1e-14);
     }
 

@@ -2,7 +2,7 @@
 //! refused and written.
 
 use crate::scenario::format::entries::Entries;
-use crate::scenario::{Hold, Key, Part, Profile, Scenario, Tissue, schema};
+use crate::scenario::{EntryPath, Key, Profile, Scenario, SupportKind, Tissue, schema};
 use leafdyn_testing::pairs;
 use serde_json::{Value, json};
 
@@ -56,26 +56,26 @@ const LEAF: &str = r#"
 "#;
 
 /// The leaf with overrides between `; `.
-fn given(overrides: &str) -> Result<Entries, String> {
+fn entries_with_overrides(overrides: &str) -> Result<Entries, String> {
     let overrides = overrides.split("; ").filter(|it| !it.is_empty());
     let overrides: Vec<String> = overrides.map(str::to_string).collect();
-    let entries = Entries::of_text(LEAF, "held.toml").unwrap();
+    let entries = Entries::from_text(LEAF, "held.toml").unwrap();
     let replaced = entries.replaced(&overrides);
     replaced.map_err(|refused| refused.to_string())
 }
 
-fn with(overrides: &str) -> Result<Scenario, String> {
-    let checked = given(overrides)?.check();
+fn scenario_with_overrides(overrides: &str) -> Result<Scenario, String> {
+    let checked = entries_with_overrides(overrides)?.check();
     checked.map_err(|refused| refused.to_string())
 }
 
 #[test]
 fn all_that_is_given_arrives() {
-    let leaf = with("").unwrap();
+    let leaf = scenario_with_overrides("").unwrap();
     assert_eq!(leaf.rods[2].base, [0.0, 0.1, 0.0]);
     assert_eq!(
         (leaf.rods[1].elevation, leaf.base_held),
-        (0.3, Hold::Pinned)
+        (0.3, SupportKind::Pinned)
     );
     let gap = |across: f64| Tissue {
         stiffness: [20.0, across, 0.0].map(Profile::Constant),
@@ -101,17 +101,20 @@ fn all_that_is_given_arrives() {
     };
     assert_eq!(
         (stretch.vein, stretch.at, stretch.held),
-        (0, [0.3, 0.7], Hold::Clamped)
+        (0, [0.3, 0.7], SupportKind::Clamped)
     );
     assert_eq!(
         (point.vein, point.at, point.held),
-        (1, [0.9, 0.9], Hold::Pinned)
+        (1, [0.9, 0.9], SupportKind::Pinned)
     );
     assert_eq!(stretch.displacement, [0.0, -0.2, 0.0]);
     // Of the bore, the load, the point that is not the tip, the grips, and the wind's width.
     assert_eq!(leaf.kinks(), [0.15, 0.3, 0.35, 0.5, 0.6, 0.7, 0.9]);
     let beside = "load.point[0].at=0.35000000000000003; grip[1].at=0.9999999999999999";
-    assert_eq!(with(beside).unwrap().kinks(), [0.15, 0.3, 0.35, 0.6, 0.7]);
+    assert_eq!(
+        scenario_with_overrides(beside).unwrap().kinks(),
+        [0.15, 0.3, 0.35, 0.6, 0.7]
+    );
     let wind = leaf.wind.as_ref().unwrap();
     assert_eq!(wind.velocity.at(7.0), [0.01, 0.0, 0.0]);
 }
@@ -129,10 +132,13 @@ fn what_is_written_is_read_again_as_the_same() {
         tissue.along=0; tissue.across=0; tissue.fold=0 =>
     ";
     for (overrides, _) in pairs(table) {
-        let (entries, leaf) = (given(overrides).unwrap(), with(overrides).unwrap());
+        let (entries, leaf) = (
+            entries_with_overrides(overrides).unwrap(),
+            scenario_with_overrides(overrides).unwrap(),
+        );
         let written = serde_json::to_string(&leaf).unwrap();
         for text in [&written, &entries.to_toml()] {
-            let again = Entries::of_text(text, "again").unwrap().check();
+            let again = Entries::from_text(text, "again").unwrap().check();
             assert_eq!(again.unwrap(), leaf, "{text}");
         }
         let written: Value = serde_json::from_str(&written).unwrap();
@@ -142,7 +148,8 @@ fn what_is_written_is_read_again_as_the_same() {
         assert_eq!(written["grip"][1]["at"], 0.9);
         assert!(written["section"].get("inner_diameter").is_some());
     }
-    let shared = serde_json::to_value(with("leaf.base=[0.1, 0, 0]").unwrap()).unwrap();
+    let shared =
+        serde_json::to_value(scenario_with_overrides("leaf.base=[0.1, 0, 0]").unwrap()).unwrap();
     assert_eq!(shared["leaf"]["base"], json!([0.1, 0.0, 0.0]));
 }
 
@@ -169,8 +176,8 @@ fn parts_are_reached_by_their_indices() {
         wind.velocity[0]=0.02 => wind.velocity=[0.02, 0, 0]
     ";
     for (parts, whole) in pairs(table) {
-        let mut one = with(parts).unwrap();
-        let other = with(whole).unwrap();
+        let mut one = scenario_with_overrides(parts).unwrap();
+        let other = scenario_with_overrides(whole).unwrap();
         if let ([.., a], [.., b]) = (&mut one.grips[..], &other.grips[..])
             && a.at == [0.8; 2]
         {
@@ -179,10 +186,10 @@ fn parts_are_reached_by_their_indices() {
         assert_eq!(one, other, "{parts}");
         let text = parts.split('=').next().unwrap();
         if !parts.contains(';') {
-            assert_eq!(Part::parse(text).unwrap().to_string(), text);
+            assert_eq!(EntryPath::parse(text).unwrap().to_string(), text);
         }
     }
-    let entries = given("load.gravity=[0, 0, -1e-4]").unwrap();
+    let entries = entries_with_overrides("load.gravity=[0, 0, -1e-4]").unwrap();
     for (part, number) in [
         ("load.gravity[1][2]", Some(-1e-4)),
         ("load.gravity[2]", Some(-1e-4)),
@@ -195,12 +202,13 @@ fn parts_are_reached_by_their_indices() {
         ("load.point[1].mass", Some(0.01)),
     ] {
         assert_eq!(
-            entries.number_at(Part::parse(part).unwrap()),
+            entries.number_at(EntryPath::parse(part).unwrap()),
             number,
             "{part}"
         );
     }
-    let [one, other] = ["grip[0].move[1]", "grip[1].move[1]"].map(|it| Part::parse(it).unwrap());
+    let [one, other] =
+        ["grip[0].move[1]", "grip[1].move[1]"].map(|it| EntryPath::parse(it).unwrap());
     assert!(one.overlaps(&one) && !one.overlaps(&other));
 }
 
@@ -258,7 +266,7 @@ fn what_cannot_be_is_refused() {
         section.shape=ellipse => a circle has a diameter
     "#;
     for (overrides, said) in pairs(table) {
-        let refused = with(overrides).unwrap_err();
+        let refused = scenario_with_overrides(overrides).unwrap_err();
         assert!(refused.contains(said), "{overrides}: {refused}");
         assert!(refused.len() < 400, "{refused}");
     }
@@ -288,7 +296,7 @@ fn tables_that_are_not_as_they_should_be_are_refused() {
             None => (entry, "clamped"),
         };
         let text = format!("name = 'held'\n{entry}{}", rest.replace("HELD", held));
-        let entries = Entries::of_text(&text, "held.toml");
+        let entries = Entries::from_text(&text, "held.toml");
         let refused = entries.and_then(|entries| entries.check()).unwrap_err();
         let refused = refused.to_string();
         assert!(refused.contains(said), "{entry}: {refused}");
@@ -306,7 +314,7 @@ fn what_has_no_effect_is_none() {
         load = { gravity = [[0, 0, -1], [0, 0, -1]], g = [0, 0, 0], distributed = [0, 0, 0] }
         dynamics = { density = 1 }";
     let text = text.replace("fold = [0, 0]", "fold = [0]");
-    let plain = Entries::of_text(&text, "plain.toml").unwrap();
+    let plain = Entries::from_text(&text, "plain.toml").unwrap();
     let leaf = plain.check().unwrap();
     assert_eq!((leaf.gravity, leaf.tissue), ([0.0, 0.0, -1.0], None));
 }
@@ -314,7 +322,7 @@ fn what_has_no_effect_is_none() {
 /// The same leaf in other units of length, force and time.
 #[test]
 fn limits_do_not_depend_on_units() {
-    let leaf = with("").unwrap();
+    let leaf = scenario_with_overrides("").unwrap();
     for key in [
         Key::Base,
         Key::TissueFold,

@@ -2,10 +2,10 @@
 //!
 //! Tissue between neighbouring veins: the table `[tissue]`.
 
-use crate::scenario::blade::{Blade, BladeProperty, Parts, blade};
+use crate::scenario::blade::{Blade, BladeParts, BladeProperty, blade};
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioResult;
 use crate::scenario::section::{Property, Section};
 use crate::scenario::{Profile, Radii, Rod, section};
@@ -13,35 +13,35 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// What the stiffnesses of the veins follow from.
-pub(super) enum Made {
+pub(super) enum StiffnessSource {
     /// Numbers.
     Stiffnesses,
     Sections(Vec<Arc<Section>>),
-    Blade(Arc<Blade>, Parts),
+    Blade(Arc<Blade>, BladeParts),
 }
 
-impl Made {
-    pub fn from(entries: &Entries, rods: usize) -> ScenarioResult<Made> {
+impl StiffnessSource {
+    pub fn from_entries(entries: &Entries, rods: usize) -> ScenarioResult<StiffnessSource> {
         if let Some(blade) = blade(entries, rods)? {
             let parts = blade.parts();
-            return Ok(Made::Blade(Arc::new(blade), parts));
+            return Ok(StiffnessSource::Blade(Arc::new(blade), parts));
         }
         Ok(match section::sections(entries, rods)? {
-            Some(sections) => Made::Sections(sections),
-            None => Made::Stiffnesses,
+            Some(sections) => StiffnessSource::Sections(sections),
+            None => StiffnessSource::Stiffnesses,
         })
     }
 
     pub fn blade(&self) -> Option<&Arc<Blade>> {
         match self {
-            Made::Blade(blade, _) => Some(blade),
+            StiffnessSource::Blade(blade, _) => Some(blade),
             _ => None,
         }
     }
 
     pub fn radii(&self) -> Radii {
         match self {
-            Made::Sections(sections) => Radii::of(sections.clone()),
+            StiffnessSource::Sections(sections) => Radii::of(sections.clone()),
             _ => Radii::default(),
         }
     }
@@ -49,16 +49,16 @@ impl Made {
     /// What sections or a blade determine of all veins; `None` if numbers are given.
     pub fn profiles(&self, property: Property) -> Option<Vec<Profile>> {
         match self {
-            Made::Stiffnesses => None,
-            Made::Sections(sections) => Some(section::profiles(sections, property)),
-            Made::Blade(_, parts) => Some(parts.profiles(property.into())),
+            StiffnessSource::Stiffnesses => None,
+            StiffnessSource::Sections(sections) => Some(section::profiles(sections, property)),
+            StiffnessSource::Blade(_, parts) => Some(parts.profiles(property.into())),
         }
     }
 }
 
 /// Whether the tips are joined: those of a blade are if it ends in a point.
 pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> ScenarioResult<bool> {
-    let item = entries.item(Key::Joined)?;
+    let item = entries.value_or_default(Key::Joined)?;
     let Some(blade) = blade else {
         return item.switch();
     };
@@ -66,15 +66,19 @@ pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> ScenarioR
         return Ok(blade.is_pointed());
     }
     let joined = item.switch()?;
-    item.ensure(
+    item.refuse_unless(
         !joined || blade.is_pointed(),
         "the blade has a width at its tip (blade.width): let it end at 0, or leave this out",
     )?;
     Ok(joined)
 }
 
-pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> ScenarioResult<Vec<Rod>> {
-    let quantity = |key| entries.item(key)?.quantity(rods);
+pub(super) fn veins(
+    entries: &Entries,
+    rods: usize,
+    made: &StiffnessSource,
+) -> ScenarioResult<Vec<Rod>> {
+    let quantity = |key| entries.value_or_default(key)?.quantity(rods);
     let triple = |keys: [Key; 3], of: fn(usize) -> Property| -> ScenarioResult<[Vec<Profile>; 3]> {
         let one = |axis: usize| match made.profiles(of(axis)) {
             Some(profiles) => Ok(profiles),
@@ -83,27 +87,33 @@ pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> ScenarioResu
         Ok([one(0)?, one(1)?, one(2)?])
     };
     let rest_of_blade = |axis: usize| match made {
-        Made::Blade(blade, parts) if axis == 2 || blade.curvature().is_some() => {
+        StiffnessSource::Blade(blade, parts) if axis == 2 || blade.curvature().is_some() => {
             Some(parts.profiles(BladeProperty::Rest(axis)))
         }
         _ => None,
     };
     let rest = |axis: usize| match rest_of_blade(axis) {
         Some(profiles) => Ok(profiles),
-        None => quantity(Key::REST[axis]),
+        None => quantity(Key::REST_CURVATURE[axis]),
     };
     let (length, base, directions) = match made {
-        Made::Blade(blade, parts) => (
+        StiffnessSource::Blade(blade, parts) => (
             parts.lengths(),
             parts.bases(),
             parts.directions(blade.elevation),
         ),
         _ => {
-            let angle = angles(entries.item(Key::Fan)?, rods)?.into_iter();
-            let each = angle.zip(entries.item(Key::Elevation)?.one_each(rods)?);
+            let angle = angles(entries.value_or_default(Key::Fan)?, rods)?.into_iter();
+            let each = angle.zip(
+                entries
+                    .value_or_default(Key::Elevation)?
+                    .number_for_each(rods)?,
+            );
             (
-                entries.item(Key::Length)?.one_each(rods)?,
-                entries.item(Key::Base)?.vectors(rods)?,
+                entries
+                    .value_or_default(Key::Length)?
+                    .number_for_each(rods)?,
+                entries.value_or_default(Key::Base)?.vectors(rods)?,
                 each.map(|(angle, elevation)| [angle, elevation, 0.0])
                     .collect(),
             )
@@ -133,7 +143,7 @@ pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> ScenarioResu
 }
 
 /// Base angles phi_n of the rods n = 1..N (paper, section 2.4 (c)).
-fn angles(item: Item, rods: usize) -> ScenarioResult<Vec<f64>> {
+fn angles(item: EntryValue, rods: usize) -> ScenarioResult<Vec<f64>> {
     let step = PI / (3.0 * rods as f64);
     // -pi/3 + 2 pi n / (3N) = step (2n - N); with n - 1/2 the fan is exactly antisymmetric.
     let fan = |odd: f64| {
@@ -144,8 +154,8 @@ fn angles(item: Item, rods: usize) -> ScenarioResult<Vec<f64>> {
     match item.value.as_str() {
         Some("paper") => Ok(fan(0.0)),
         Some("symmetric") => Ok(fan(1.0)),
-        None if item.value.is_array() => item.one_each(rods),
-        _ => Err(item.refuse(format_args!(
+        None if item.value.is_array() => item.number_for_each(rods),
+        _ => Err(item.value_error(format_args!(
             "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
         ))),
     }
@@ -184,12 +194,12 @@ impl Tissue {
 pub(super) fn tissue(entries: &Entries, gaps: usize) -> ScenarioResult<Option<Vec<Tissue>>> {
     let mut tissue = vec![Tissue::default(); gaps];
     for (which, key) in Key::TISSUE.into_iter().enumerate() {
-        let Some(item) = entries.given(key) else {
+        let Some(item) = entries.given_value(key) else {
             continue;
         };
         let why = "tissue lies between veins: it needs leaf.rods = 2 or more";
-        item.ensure(gaps > 0, why)?;
-        for (gap, stiffness) in tissue.iter_mut().zip(item.one_each(gaps)?) {
+        item.refuse_unless(gaps > 0, why)?;
+        for (gap, stiffness) in tissue.iter_mut().zip(item.number_for_each(gaps)?) {
             match which {
                 3 => gap.fold = Profile::Constant(stiffness),
                 axis => gap.stiffness[axis] = Profile::Constant(stiffness),

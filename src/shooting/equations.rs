@@ -24,8 +24,8 @@
 mod tests;
 
 use crate::run::Limit;
-use crate::scenario::{Hold, Profile, Scenario, Turning, longest};
-use crate::shooting::sensitivities::{Tangent, Tissue};
+use crate::scenario::{Profile, Scenario, SupportKind, ZeroEnergyRotation, longest};
+use crate::shooting::sensitivities::{TissueEnergy, TissueTangent};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -34,15 +34,15 @@ use std::f64::consts::PI;
 /// A flat state holds [`STATE`] numbers per rod and, last, the potential
 /// energy of everything from the base up to sigma.
 #[derive(Clone, Debug)]
-pub struct Equations<'a> {
+pub struct BoundaryValueProblem<'a> {
     pub(super) scenario: &'a Scenario,
     /// Unit of length: the longest rod.
-    pub length: f64,
+    pub length_unit: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
-    pub force: f64,
+    pub force_unit: f64,
     pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
-    tissue: Option<Tissue<'a>>,
+    tissue: Option<TissueEnergy<'a>>,
     /// Whether veins have loads of their own.
     pub(super) own_loads: bool,
     gravity: DVec3,
@@ -53,30 +53,30 @@ pub struct Equations<'a> {
     /// Whether hinges hold the bases.
     hinged: bool,
     /// The smallest couple stiffness along each rod.
-    pub softest: Vec<f64>,
+    pub softest_couple_stiffness: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
-    coupled_rate: Vec<f64>,
+    coupling_growth_rate: Vec<f64>,
     /// The veins that can turn without resistance.
-    turnings: Vec<Turning>,
-    arcs: Vec<Arc>,
+    turnings: Vec<ZeroEnergyRotation>,
+    arcs: Vec<RestArc>,
     /// Fractions of the length where a profile has a kink, ascending.
     kinks: Vec<f64>,
     /// Homotopy parameter between 0, a leaf without loads that rests in the shape of arcs with a
     /// common tip, and 1, the leaf of the scenario.
-    pub part: f64,
+    pub load_lambda: f64,
     /// Homotopy parameter between 0, rods with their largest stiffness in every direction, and 1,
     /// the rods of the scenario.
-    pub softened: f64,
+    pub softening_lambda: f64,
     /// Time limit of their solution.
     pub limit: Limit,
 }
 
 /// Fractions of the length closer to each other than this are the same.
-pub(super) const SAME_PLACE: f64 = 1e-11;
+pub(super) const FRACTION_TOLERANCE: f64 = 1e-11;
 
 /// Constraint on the tips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tip {
+pub enum TipConstraint {
     /// None.
     Free,
     /// A common position.
@@ -88,21 +88,21 @@ pub enum Tip {
 }
 
 /// The rotation vector from `b` to `a`, to first order.
-pub fn difference(a: DQuat, b: DQuat) -> DVec3 {
+pub fn rotation_difference(a: DQuat, b: DQuat) -> DVec3 {
     let turn = a * b.conjugate();
     let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
     sign * DVec3::new(turn.x, turn.y, turn.z)
 }
 
 /// Material of a rod at one sigma.
-struct Material {
+struct SectionLaw {
     compliance: DVec3,
     flexibility: DVec3,
     rest_strain: DVec3,
     rest_curvature: DVec3,
 }
 
-impl<'a> Equations<'a> {
+impl<'a> BoundaryValueProblem<'a> {
     pub fn new(scenario: &'a Scenario) -> Self {
         let rods = &scenario.rods;
         let length = longest(rods);
@@ -123,7 +123,7 @@ impl<'a> Equations<'a> {
         let softest: Vec<f64> = (rods.iter())
             .map(|rod| least(&rod.couple_stiffness) / (force * length * length))
             .collect();
-        let tissue = Tissue::new(scenario, length, force);
+        let tissue = TissueEnergy::new(scenario, length, force);
         let pull = |gap: usize| {
             let tissue = tissue.as_ref().map_or(0.0, |tissue| tissue.largest(gap));
             coupling[gap] + tissue
@@ -142,11 +142,11 @@ impl<'a> Equations<'a> {
                 (grown * bend).max((pull / stiffness).sqrt())
             })
             .collect();
-        Equations {
+        BoundaryValueProblem {
             scenario,
-            length,
-            force,
-            coupled_rate,
+            length_unit: length,
+            force_unit: force,
+            coupling_growth_rate: coupled_rate,
             coupling,
             tissue,
             own_loads: scenario.has_own_loads(),
@@ -161,14 +161,14 @@ impl<'a> Equations<'a> {
                     Some((position, clamp.unwrap_or_default()))
                 })
                 .collect(),
-            hinged: scenario.base_held == Hold::Pinned,
-            softest,
-            turnings: scenario.turnings(),
-            arcs: arcs(scenario, &lengths),
+            hinged: scenario.base_held == SupportKind::Pinned,
+            softest_couple_stiffness: softest,
+            turnings: scenario.zero_energy_rotations(),
+            arcs: rest_arcs(scenario, &lengths),
             kinks: scenario.kinks(),
             lengths,
-            part: 1.0,
-            softened: 1.0,
+            load_lambda: 1.0,
+            softening_lambda: 1.0,
             limit: Limit::default(),
         }
     }
@@ -178,16 +178,16 @@ impl<'a> Equations<'a> {
     }
 
     /// Length of a flat state.
-    pub fn size(&self) -> usize {
-        STATE * self.rods() + 1
+    pub fn state_size(&self) -> usize {
+        STATE_SIZE * self.rods() + 1
     }
 
     /// Rate per sigma at which perturbations of rod `j` grow or turn: a rod
     /// under the axial force T bends with the wavenumber sqrt(T/A).
-    pub fn rate(&self, j: usize, force: f64) -> f64 {
+    pub fn perturbation_rate(&self, j: usize, force: f64) -> f64 {
         let grown = self.scenario.rods[j].rest_stretch.max_abs();
-        let tension = self.lengths[j] * (grown * force / self.softest[j]).sqrt();
-        tension.max(self.coupled_rate[j])
+        let tension = self.lengths[j] * (grown * force / self.softest_couple_stiffness[j]).sqrt();
+        tension.max(self.coupling_growth_rate[j])
     }
 
     /// Rest length of rod `j` from the base up to `sigma`, with its growth.
@@ -198,7 +198,7 @@ impl<'a> Equations<'a> {
     /// Coupling of gap `g`: force per unit displacement and unit of sigma.
     #[inline]
     pub fn coupling(&self, g: usize) -> DVec3 {
-        self.part * self.coupling[g]
+        self.load_lambda * self.coupling[g]
     }
 
     pub fn coupled(&self, g: usize) -> bool {
@@ -206,62 +206,68 @@ impl<'a> Equations<'a> {
     }
 
     /// Whether tissue ties neighbouring rods.
-    pub fn is_tied(&self) -> bool {
+    pub fn has_tissue(&self) -> bool {
         self.tissue.is_some()
     }
 
     /// The linearised loads by the tissue of gap `g`, if there is any.
-    pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<Tangent> {
+    pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<TissueTangent> {
         let tissue = self.tissue.as_ref()?;
-        let rods = [g, g + 1].map(|j| RodState::read(y, j));
-        let Tangent(matrix) = tissue.tangent(g, sigma, rods.each_ref());
-        Some(Tangent(matrix * self.part))
+        let rods = [g, g + 1].map(|j| RodState::from_flat_state(y, j));
+        let TissueTangent(matrix) = tissue.tangent(g, sigma, rods.each_ref());
+        Some(TissueTangent(matrix * self.load_lambda))
     }
 
     /// Where an integration step from `from` towards `to` must end: at a kink before it, or there. A
     /// station beside a kink is this kink: a load there would be passed at both.
-    pub fn stop(&self, from: f64, to: f64) -> f64 {
+    pub fn step_end(&self, from: f64, to: f64) -> f64 {
         let next = self
             .kinks
-            .partition_point(|kink| *kink <= from + SAME_PLACE);
-        let before = self.kinks.get(next).filter(|kink| **kink < to - SAME_PLACE);
+            .partition_point(|kink| *kink <= from + FRACTION_TOLERANCE);
+        let before = self
+            .kinks
+            .get(next)
+            .filter(|kink| **kink < to - FRACTION_TOLERANCE);
         before.copied().unwrap_or(to)
     }
 
     /// The veins that can turn without resistance, if the leaf has its own shape at rest.
-    pub fn turnings(&self) -> &[Turning] {
-        match self.part == 1.0 && self.softened == 1.0 {
+    pub fn turnings(&self) -> &[ZeroEnergyRotation] {
+        match self.load_lambda == 1.0 && self.softening_lambda == 1.0 {
             true => &self.turnings,
             false => &[],
         }
     }
 
-    fn material(&self, j: usize, sigma: f64) -> Material {
+    fn material(&self, j: usize, sigma: f64) -> SectionLaw {
         let rod = &self.scenario.rods[j];
         let at = |p: &[Profile; 3]| DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma));
         let mut stiffness = at(&rod.couple_stiffness);
-        if self.softened < 1.0 {
+        if self.softening_lambda < 1.0 {
             let stiffest = stiffness.max_element();
-            stiffness = stiffest * (stiffness / stiffest).powf(self.softened);
+            stiffness = stiffest * (stiffness / stiffest).powf(self.softening_lambda);
         }
-        let (arc, part) = (self.arcs.get(j), self.part);
+        let (arc, part) = (self.arcs.get(j), self.load_lambda);
         let stretch = rod.rest_stretch.at(sigma);
         // The scenario's own law without rounding errors.
         let (rest_strain, rest_curvature) = match part == 1.0 {
-            true => (DVec3::X * stretch, at(&rod.rest_curvature) * self.length),
+            true => (
+                DVec3::X * stretch,
+                at(&rod.rest_curvature) * self.length_unit,
+            ),
             false => {
                 let own = at(&rod.rest_curvature);
                 let first = arc.map_or(stretch, |arc| arc.stretch);
-                let bend = arc.map_or(self.length * own, |arc| arc.bend * DVec3::Z);
+                let bend = arc.map_or(self.length_unit * own, |arc| arc.bend * DVec3::Z);
                 (
                     DVec3::X * (part * stretch + (1.0 - part) * first),
-                    own * (part * self.length) + bend * (1.0 - part),
+                    own * (part * self.length_unit) + bend * (1.0 - part),
                 )
             }
         };
-        Material {
-            compliance: self.force * at(&rod.force_stiffness).recip(),
-            flexibility: self.force * self.length * self.length * stiffness.recip(),
+        SectionLaw {
+            compliance: self.force_unit * at(&rod.force_stiffness).recip(),
+            flexibility: self.force_unit * self.length_unit * self.length_unit * stiffness.recip(),
             rest_strain,
             rest_curvature,
         }
@@ -277,13 +283,13 @@ impl<'a> Equations<'a> {
     }
 
     /// Slopes of the flat state `y` at `sigma`.
-    pub fn slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
+    pub fn write_slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
         let mut energy = 0.0;
         let mut pull = DVec3::ZERO;
         // Force and moment by the tissue of the gap before the rod.
         let mut before = [DVec3::ZERO; 2];
         for j in 0..self.rods() {
-            let rod = RodState::read(y, j);
+            let rod = RodState::from_flat_state(y, j);
             let (law, length) = (self.material(j, sigma), self.lengths[j]);
             let frame = DMat3::from_quat(rod.q);
             let (n, m) = (frame.transpose() * rod.n, frame.transpose() * rod.m);
@@ -291,21 +297,21 @@ impl<'a> Equations<'a> {
             let bend = length * (frame * (law.rest_curvature + law.flexibility * m));
             energy += 0.5 * length * (n.dot(law.compliance * n) + m.dot(law.flexibility * m));
             let gravity = self.gravity + self.own_load(j, sigma);
-            energy -= self.part * length * gravity.dot(rod.r);
-            let mut load = self.part * length * gravity - pull;
+            energy -= self.load_lambda * length * gravity.dot(rod.r);
+            let mut load = self.load_lambda * length * gravity - pull;
             pull = DVec3::ZERO;
             if j + 1 < self.rods() {
-                let gap = DVec3::from_slice(&y[STATE * (j + 1)..]) - rod.r;
+                let gap = DVec3::from_slice(&y[STATE_SIZE * (j + 1)..]) - rod.r;
                 pull = self.coupling(j) * gap;
                 energy += 0.5 * gap.dot(pull);
                 load += pull;
             }
             let [mut force, mut moment] = std::mem::take(&mut before);
             if let Some(tissue) = self.tissue.as_ref().filter(|_| j + 1 < self.rods()) {
-                let next = RodState::read(y, j + 1);
-                let (own, loads) = tissue.loads(j, sigma, [&rod, &next]);
-                let [here, there] = loads.map(|load| load.map(|it| self.part * it));
-                energy += self.part * own;
+                let next = RodState::from_flat_state(y, j + 1);
+                let (own, loads) = tissue.energy_and_loads(j, sigma, [&rod, &next]);
+                let [here, there] = loads.map(|load| load.map(|it| self.load_lambda * it));
+                energy += self.load_lambda * own;
                 (force, moment, before) = (force + here[0], moment + here[1], there);
             }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
@@ -315,29 +321,29 @@ impl<'a> Equations<'a> {
                 n: -load - force,
                 m: rod.n.cross(tangent) - moment,
             }
-            .write(slopes, j);
+            .write_flat_state(slopes, j);
         }
-        slopes[STATE * self.rods()] = energy;
+        slopes[STATE_SIZE * self.rods()] = energy;
     }
 
     /// Derivatives of the slopes of rod `j` with respect to its own state: with the frame
     /// turned by theta, R^T n changes by R^T (dn - theta x n).
-    pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> Derivatives {
-        let rod = RodState::read(y, j);
+    pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> SlopeDerivatives {
+        let rod = RodState::from_flat_state(y, j);
         let (law, length) = (self.material(j, sigma), self.lengths[j]);
         let frame = DMat3::from_quat(rod.q);
         let spatial = |c: DVec3| length * (frame * DMat3::from_diagonal(c) * frame.transpose());
         let (r_n, theta_m) = (spatial(law.compliance), spatial(law.flexibility));
         let n = frame.transpose() * rod.n;
-        let tangent = cross(length * (frame * (law.rest_strain + law.compliance * n)));
-        let r_theta = r_n * cross(rod.n) - tangent;
-        Derivatives {
+        let tangent = cross_matrix(length * (frame * (law.rest_strain + law.compliance * n)));
+        let r_theta = r_n * cross_matrix(rod.n) - tangent;
+        SlopeDerivatives {
             r_theta,
             r_n,
-            theta_theta: theta_m * cross(rod.m),
+            theta_theta: theta_m * cross_matrix(rod.m),
             theta_m,
-            m_theta: cross(rod.n) * r_theta,
-            m_n: cross(rod.n) * r_n - tangent,
+            m_theta: cross_matrix(rod.n) * r_theta,
+            m_n: cross_matrix(rod.n) * r_n - tangent,
         }
     }
 
@@ -346,35 +352,39 @@ impl<'a> Equations<'a> {
     /// the force; free tips: the force; held tips: the distance from
     /// their given position. Then the moment, or for a clamped tip the rotation.
     pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
-        let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
+        let rods: Vec<RodState> = (0..self.rods())
+            .map(|j| RodState::from_flat_state(y, j))
+            .collect();
         let forces = rods
             .iter()
             .enumerate()
-            .map(|(j, rod)| rod.n - self.on_tip(j)[0]);
+            .map(|(j, rod)| rod.n - self.tip_point_load(j)[0]);
         let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
-                let first = match (self.tip(), j) {
-                    (Tip::Joint, 0) => force - self.part * self.tip_force,
-                    (Tip::Joint, _) => rod.r - rods[0].r,
-                    (Tip::Free, _) => rod.n - self.part * self.tip_force - self.on_tip(j)[0],
-                    (Tip::Pinned | Tip::Clamped, _) => rod.r - self.held[j].0,
+                let first = match (self.tip_constraint(), j) {
+                    (TipConstraint::Joint, 0) => force - self.load_lambda * self.tip_force,
+                    (TipConstraint::Joint, _) => rod.r - rods[0].r,
+                    (TipConstraint::Free, _) => {
+                        rod.n - self.load_lambda * self.tip_force - self.tip_point_load(j)[0]
+                    }
+                    (TipConstraint::Pinned | TipConstraint::Clamped, _) => rod.r - self.held[j].0,
                 };
-                let second = match self.tip() {
-                    Tip::Clamped => difference(rod.q, self.held[j].1),
-                    _ => rod.m - self.part * self.tip_moment - self.on_tip(j)[1],
+                let second = match self.tip_constraint() {
+                    TipConstraint::Clamped => rotation_difference(rod.q, self.held[j].1),
+                    _ => rod.m - self.load_lambda * self.tip_moment - self.tip_point_load(j)[1],
                 };
                 [first.to_array(), second.to_array()].concat()
             })
             .collect()
     }
 
-    pub fn tip(&self) -> Tip {
+    pub fn tip_constraint(&self) -> TipConstraint {
         match &self.scenario.held_tip {
-            Some(held) if held.clamps.is_some() => Tip::Clamped,
-            Some(_) => Tip::Pinned,
-            None if self.scenario.joined => Tip::Joint,
-            None => Tip::Free,
+            Some(held) if held.clamps.is_some() => TipConstraint::Clamped,
+            Some(_) => TipConstraint::Pinned,
+            None if self.scenario.joined => TipConstraint::Joint,
+            None => TipConstraint::Free,
         }
     }
 
@@ -382,24 +392,24 @@ impl<'a> Equations<'a> {
     pub fn tip_potential(&self, y: &[f64]) -> f64 {
         let tips = if self.scenario.joined { 1 } else { self.rods() };
         let work: f64 = (0..tips)
-            .map(|j| self.tip_force.dot(RodState::read(y, j).r))
+            .map(|j| self.tip_force.dot(RodState::from_flat_state(y, j).r))
             .sum();
         let points = self
-            .on_points(1.0)
-            .map(|(j, [force, _])| force.dot(RodState::read(y, j).r));
-        -self.part * work - points.sum::<f64>()
+            .point_loads_at(1.0)
+            .map(|(j, [force, _])| force.dot(RodState::from_flat_state(y, j).r));
+        -self.load_lambda * work - points.sum::<f64>()
     }
 }
 
 /// The matrix \[a\] with \[a\] b = a x b.
-fn cross(a: DVec3) -> DMat3 {
+fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
 }
 
-impl Equations<'_> {
+impl BoundaryValueProblem<'_> {
     /// The first of the six components of a rod's perturbation that are free at its base: of the force
     /// and the moment at a clamp, of the rotation and the force at a hinge.
-    pub fn free_at_base(&self) -> usize {
+    pub fn first_free_component(&self) -> usize {
         match self.hinged {
             true => 3,
             false => 6,
@@ -407,7 +417,7 @@ impl Equations<'_> {
     }
 
     /// The state at the base nearest to a given one: a hinge carries no moment.
-    pub fn held_base(&self, j: usize, rod: &RodState) -> RodState {
+    pub fn constrained_base(&self, j: usize, rod: &RodState) -> RodState {
         let clamped = self.base(j, rod.n, rod.m);
         match self.hinged {
             true => RodState {
@@ -423,7 +433,7 @@ impl Equations<'_> {
     pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
         let (position, q) = self.scenario.base(j);
         RodState {
-            r: position / self.length,
+            r: position / self.length_unit,
             q,
             n,
             m,
@@ -431,16 +441,17 @@ impl Equations<'_> {
     }
 
     /// A flat state at the base without stress.
-    pub fn clamped(&self) -> Vec<f64> {
-        let mut y = vec![0.0; self.size()];
+    pub fn unstressed_base_state(&self) -> Vec<f64> {
+        let mut y = vec![0.0; self.state_size()];
         for j in 0..self.rods() {
-            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
+            self.base(j, DVec3::ZERO, DVec3::ZERO)
+                .write_flat_state(&mut y, j);
         }
         y
     }
 }
 
-impl Equations<'_> {
+impl BoundaryValueProblem<'_> {
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is
     /// distributed along it.
     pub(super) fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
@@ -452,33 +463,33 @@ impl Equations<'_> {
         let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
             DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
         });
-        (weight + along) * (self.length / self.force)
+        (weight + along) * (self.length_unit / self.force_unit)
     }
 
     /// Passes the loads on points at `sigma`, by which forces and moments jump, on the way to the tip; false if
     /// there are none.
-    pub fn pass_points(&self, sigma: f64, y: &mut [f64]) -> bool {
+    pub fn apply_point_loads(&self, sigma: f64, y: &mut [f64]) -> bool {
         let mut any = false;
-        for (j, [force, moment]) in self.on_points(sigma) {
-            let mut rod = RodState::read(y, j);
+        for (j, [force, moment]) in self.point_loads_at(sigma) {
+            let mut rod = RodState::from_flat_state(y, j);
             rod.n -= force;
             rod.m -= moment;
-            y[STATE * self.rods()] -= force.dot(rod.r);
-            rod.write(y, j);
+            y[STATE_SIZE * self.rods()] -= force.dot(rod.r);
+            rod.write_flat_state(y, j);
             any = true;
         }
         any
     }
 
     /// Rods, forces and moments of the loads on points at `sigma`.
-    pub(super) fn on_points(&self, sigma: f64) -> impl Iterator<Item = (usize, [DVec3; 2])> {
+    pub(super) fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = (usize, [DVec3; 2])> {
         let points = self
             .scenario
             .points
             .iter()
-            .filter(move |point| (point.at - sigma).abs() < SAME_PLACE);
-        let unit = self.part / self.force;
-        let units = [unit, unit / self.length];
+            .filter(move |point| (point.at - sigma).abs() < FRACTION_TOLERANCE);
+        let unit = self.load_lambda / self.force_unit;
+        let units = [unit, unit / self.length_unit];
         points.map(move |point| {
             let [force, moment] = [self.scenario.force_on(point), point.moment];
             let loads = [0, 1].map(|k| units[k] * DVec3::from_array([force, moment][k]));
@@ -487,8 +498,8 @@ impl Equations<'_> {
     }
 
     /// The force and the moment on the tip of rod `j` by loads on points.
-    pub(super) fn on_tip(&self, j: usize) -> [DVec3; 2] {
-        let here = self.on_points(1.0).filter(|(rod, _)| *rod == j);
+    pub(super) fn tip_point_load(&self, j: usize) -> [DVec3; 2] {
+        let here = self.point_loads_at(1.0).filter(|(rod, _)| *rod == j);
         here.fold([DVec3::ZERO; 2], |sum, (_, [force, moment])| {
             [sum[0] + force, sum[1] + moment]
         })
@@ -501,14 +512,14 @@ const SHORTEST_CHORD: f64 = 0.05;
 
 /// Rest shape of one rod of that leaf: stretch v1, and bend about d3.
 #[derive(Clone, Copy, Debug)]
-pub struct Arc {
+pub struct RestArc {
     pub stretch: f64,
     pub bend: f64,
 }
 
 /// One arc per rod, for these dimensionless lengths without growth; none
 /// for free rods.
-pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
+pub fn rest_arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<RestArc> {
     if !scenario.joined || lengths.len() == 1 {
         return Vec::new();
     }
@@ -532,7 +543,7 @@ pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
     let chords = (openings.iter().zip(grown)).map(|(&opening, length)| length * chord(opening));
     let tip = chords.sum::<f64>() / lengths.len() as f64;
     (openings.iter().zip(lengths))
-        .map(|(&opening, length)| Arc {
+        .map(|(&opening, length)| RestArc {
             stretch: tip / (length * chord(opening)),
             bend: -2.0 * opening / length,
         })
@@ -540,11 +551,11 @@ pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
 }
 
 /// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
-pub const STATE: usize = 13;
+pub const STATE_SIZE: usize = 13;
 
 /// Numbers that describe its perturbation: displacement, spatial rotation,
 /// and the changes of n and m.
-pub const TANGENT: usize = 12;
+pub const PERTURBATION_SIZE: usize = 12;
 
 /// One rod at one sigma.
 #[derive(Clone, Copy, Debug)]
@@ -562,8 +573,8 @@ pub struct RodState {
 impl RodState {
     /// The numbers of rod `j` in a flat state; q of any length but zero.
     #[inline]
-    pub fn read(y: &[f64], j: usize) -> Self {
-        let y = &y[STATE * j..STATE * (j + 1)];
+    pub fn from_flat_state(y: &[f64], j: usize) -> Self {
+        let y = &y[STATE_SIZE * j..STATE_SIZE * (j + 1)];
         RodState {
             r: DVec3::from_slice(y),
             q: DQuat::from_slice(&y[3..]).normalize(),
@@ -573,8 +584,8 @@ impl RodState {
     }
 
     #[inline]
-    pub fn write(&self, y: &mut [f64], j: usize) {
-        let y = &mut y[STATE * j..STATE * (j + 1)];
+    pub fn write_flat_state(&self, y: &mut [f64], j: usize) {
+        let y = &mut y[STATE_SIZE * j..STATE_SIZE * (j + 1)];
         self.r.write_to_slice(y);
         self.q.write_to_slice(&mut y[3..]);
         self.n.write_to_slice(&mut y[7..]);
@@ -584,7 +595,7 @@ impl RodState {
 
 /// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Derivatives {
+pub struct SlopeDerivatives {
     /// Of r' with respect to the rotation.
     pub r_theta: DMat3,
     /// Of r' with respect to n.

@@ -3,10 +3,12 @@
 //! A leaf along sigma: the start or the result of a boundary-value
 //! solution.
 
-use crate::natural::{A, B, C, E3, E5, STAGES};
+use crate::natural::{
+    ERROR_WEIGHTS_3, ERROR_WEIGHTS_5, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES,
+};
 use crate::numbers::{larger, largest};
 use crate::shape::{NodeState, RodShape};
-use crate::shooting::equations::{Equations, RodState, SAME_PLACE, STATE};
+use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE, RodState, STATE_SIZE};
 use glam::DVec3;
 
 /// Largest number of steps of an initial-value problem.
@@ -25,23 +27,23 @@ const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
 /// The solution of an initial-value problem could not be continued beyond
 /// `sigma`: it grows without bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unbounded {
+pub struct UnboundedSolution {
     /// How far it went.
     pub sigma: f64,
 }
 
 /// Integration of an initial-value problem from one sigma to the next.
-pub struct Integrator<'e, 'a> {
-    equations: &'e Equations<'a>,
+pub struct InitialValueIntegrator<'e, 'a> {
+    equations: &'e BoundaryValueProblem<'a>,
     tolerance: f64,
     pub sigma: f64,
     pub y: Vec<f64>,
     /// Where it passed the last loads on points.
-    passed: f64,
+    last_point_load: f64,
     /// Proposed size of the next step.
     step: f64,
     /// Width of the last step.
-    pub width: f64,
+    pub last_step: f64,
     /// States at the stages of the last step.
     pub stages: Vec<Vec<f64>>,
     slopes: Vec<Vec<f64>>,
@@ -50,18 +52,23 @@ pub struct Integrator<'e, 'a> {
     pub evaluations: usize,
 }
 
-impl<'e, 'a> Integrator<'e, 'a> {
+impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
     /// Starts at `sigma` with the state `y`; local errors of the dimensionless
     /// state are kept below `tolerance` per step.
-    pub fn new(equations: &'e Equations<'a>, sigma: f64, y: Vec<f64>, tolerance: f64) -> Self {
+    pub fn new(
+        equations: &'e BoundaryValueProblem<'a>,
+        sigma: f64,
+        y: Vec<f64>,
+        tolerance: f64,
+    ) -> Self {
         let blank = || vec![vec![0.0; y.len()]; STAGES];
-        let mut integrator = Integrator {
+        let mut integrator = InitialValueIntegrator {
             equations,
             tolerance,
             sigma,
-            passed: f64::NEG_INFINITY,
+            last_point_load: f64::NEG_INFINITY,
             step: 0.0,
-            width: 0.0,
+            last_step: 0.0,
             stages: blank(),
             slopes: blank(),
             next: y.clone(),
@@ -69,7 +76,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
             steps: 0,
             evaluations: 1,
         };
-        equations.slopes(sigma, &integrator.y, &mut integrator.slopes[0]);
+        equations.write_slopes(sigma, &integrator.y, &mut integrator.slopes[0]);
         integrator.step = 0.1 * tolerance.powf(0.125) / integrator.slope().max(1e-3);
         integrator
     }
@@ -81,16 +88,20 @@ impl<'e, 'a> Integrator<'e, 'a> {
 
     /// Bound on the step due to the growth of perturbations.
     fn longest_step(&self) -> f64 {
-        let force = |j| RodState::read(&self.y, j).n.length();
+        let force = |j| RodState::from_flat_state(&self.y, j).n.length();
         let rate = (0..self.equations.rods())
-            .map(|j| self.equations.rate(j, force(j)))
+            .map(|j| self.equations.perturbation_rate(j, force(j)))
             .fold(1.0, f64::max);
         let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
         longest.min(LONGEST_STEP[1]) / rate
     }
 
     /// Integrates to `end`; `after_step` is called after each step.
-    pub fn run(&mut self, end: f64, mut after_step: impl FnMut(&Self)) -> Result<(), Unbounded> {
+    pub fn run(
+        &mut self,
+        end: f64,
+        mut after_step: impl FnMut(&Self),
+    ) -> Result<(), UnboundedSolution> {
         while self.sigma < end {
             self.step(end)?;
             after_step(self);
@@ -99,17 +110,17 @@ impl<'e, 'a> Integrator<'e, 'a> {
     }
 
     /// One step towards `until`, never beyond it or a kink.
-    pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
-        let failed = Unbounded { sigma: self.sigma };
+    pub fn step(&mut self, until: f64) -> Result<(), UnboundedSolution> {
+        let failed = UnboundedSolution { sigma: self.sigma };
         // States are those just before a load on a point, which the first step beyond it passes; a
         // second stop within rounding of it does not.
-        let beyond = self.sigma - self.passed > SAME_PLACE;
-        if beyond && self.equations.pass_points(self.sigma, &mut self.y) {
-            self.passed = self.sigma;
+        let beyond = self.sigma - self.last_point_load > FRACTION_TOLERANCE;
+        if beyond && self.equations.apply_point_loads(self.sigma, &mut self.y) {
+            self.last_point_load = self.sigma;
             self.equations
-                .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+                .write_slopes(self.sigma, &self.y, &mut self.slopes[0]);
         }
-        let until = self.equations.stop(self.sigma, until);
+        let until = self.equations.step_end(self.sigma, until);
         loop {
             self.steps += 1;
             let left = until - self.sigma;
@@ -136,7 +147,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
             let proposed = h * factor.clamp(0.2, 5.0);
             // A step cut short by `until` does not limit the next.
             self.step = proposed.max(if last { self.step } else { 0.0 });
-            self.width = h;
+            self.last_step = h;
             self.sigma = if last { until } else { self.sigma + h };
             self.accept();
             return Ok(());
@@ -148,12 +159,13 @@ impl<'e, 'a> Integrator<'e, 'a> {
         self.stages[0].copy_from_slice(&self.y);
         for i in 1..STAGES {
             let (before, after) = self.slopes.split_at_mut(i);
-            combine(&self.y, h, A[i], before, &mut self.stages[i]);
-            let sigma = self.sigma + C[i] * h;
-            self.equations.slopes(sigma, &self.stages[i], &mut after[0]);
+            weighted_slope_sum(&self.y, h, STAGE_WEIGHTS[i], before, &mut self.stages[i]);
+            let sigma = self.sigma + STAGE_NODES[i] * h;
+            self.equations
+                .write_slopes(sigma, &self.stages[i], &mut after[0]);
         }
         self.evaluations += STAGES - 1;
-        combine(&self.y, h, &B, &self.slopes, &mut self.next);
+        weighted_slope_sum(&self.y, h, &RESULT_WEIGHTS, &self.slopes, &mut self.next);
     }
 
     /// Error of the attempted step relative to the tolerance.
@@ -164,7 +176,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
                 h * terms.map(|(w, slopes)| w * slopes[i]).sum::<f64>()
             })
         };
-        let (fifth, third) = (weighted(&E5), weighted(&E3));
+        let (fifth, third) = (weighted(&ERROR_WEIGHTS_5), weighted(&ERROR_WEIGHTS_3));
         if fifth == 0.0 {
             return 0.0;
         }
@@ -175,16 +187,22 @@ impl<'e, 'a> Integrator<'e, 'a> {
     fn accept(&mut self) {
         std::mem::swap(&mut self.y, &mut self.next);
         for j in 0..self.equations.rods() {
-            RodState::read(&self.y, j).write(&mut self.y, j);
+            RodState::from_flat_state(&self.y, j).write_flat_state(&mut self.y, j);
         }
         self.equations
-            .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+            .write_slopes(self.sigma, &self.y, &mut self.slopes[0]);
         self.evaluations += 1;
     }
 }
 
 /// y + h sum of weights times slopes.
-pub fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut [f64]) {
+pub fn weighted_slope_sum(
+    y: &[f64],
+    h: f64,
+    weights: &[f64],
+    slopes: &[Vec<f64>],
+    result: &mut [f64],
+) {
     result.copy_from_slice(y);
     for (weight, slopes) in weights.iter().zip(slopes) {
         if *weight != 0.0 {
@@ -198,24 +216,32 @@ pub fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: 
 /// Root mean square of a rod's numbers, the maximum over all rods. Positions and
 /// rotations are not scaled; moments are in units of what bends the softest
 /// direction by one radian, unless they are larger; forces likewise.
-fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+fn norm(
+    equations: &BoundaryValueProblem,
+    y: &[f64],
+    next: &[f64],
+    value: impl Fn(usize) -> f64,
+) -> f64 {
     let mut largest: f64 = 0.0;
     for j in 0..equations.rods() {
-        let (a, b) = (RodState::read(y, j), RodState::read(next, j));
-        let soft = equations.softest[j];
+        let (a, b) = (
+            RodState::from_flat_state(y, j),
+            RodState::from_flat_state(next, j),
+        );
+        let soft = equations.softest_couple_stiffness[j];
         let unit = |a: glam::DVec3, b: glam::DVec3| soft + a.length().max(b.length());
         let (force, moment) = (unit(a.n, b.n), unit(a.m, b.m));
-        let sum: f64 = (0..STATE)
+        let sum: f64 = (0..STATE_SIZE)
             .map(|i| {
                 let scale = match i {
                     0..7 => 1.0,
                     7..10 => force,
                     _ => moment,
                 };
-                (value(STATE * j + i) / scale).powi(2)
+                (value(STATE_SIZE * j + i) / scale).powi(2)
             })
             .sum();
-        largest = larger(largest, (sum / STATE as f64).sqrt());
+        largest = larger(largest, (sum / STATE_SIZE as f64).sqrt());
     }
     largest
 }
@@ -223,7 +249,7 @@ fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) ->
 /// Ends of the intervals: 0 = sigma_0 < ... < sigma_K = 1, and the
 /// states at the K beginnings.
 #[derive(Clone, Debug)]
-pub struct Nodes {
+pub struct ShootingNodes {
     /// K + 1 fractions of the length.
     pub sigma: Vec<f64>,
     /// K flat states.
@@ -232,35 +258,39 @@ pub struct Nodes {
 
 /// Flat states at some sigmas, with cubic Hermite interpolation between them.
 #[derive(Clone, Debug)]
-pub struct Trajectory {
+pub struct LeafTrajectory {
     sigma: Vec<f64>,
     states: Vec<Vec<f64>>,
     slopes: Vec<Vec<f64>>,
 }
 
-impl Trajectory {
+impl LeafTrajectory {
     /// From states of the equations in their present form.
-    pub fn new(equations: &Equations, sigma: Vec<f64>, mut states: Vec<Vec<f64>>) -> Self {
+    pub fn new(
+        equations: &BoundaryValueProblem,
+        sigma: Vec<f64>,
+        mut states: Vec<Vec<f64>>,
+    ) -> Self {
         for i in 1..states.len() {
             let (before, after) = states.split_at_mut(i);
             for j in 0..equations.rods() {
-                let a = RodState::read(&before[i - 1], j);
-                let mut b = RodState::read(&after[0], j);
+                let a = RodState::from_flat_state(&before[i - 1], j);
+                let mut b = RodState::from_flat_state(&after[0], j);
                 // The sign of a quaternion is chosen by continuity.
                 if a.q.dot(b.q) < 0.0 {
                     b.q = -b.q;
-                    b.write(&mut after[0], j);
+                    b.write_flat_state(&mut after[0], j);
                 }
             }
         }
         let slopes = (sigma.iter().zip(&states))
             .map(|(&sigma, y)| {
                 let mut slopes = vec![0.0; y.len()];
-                equations.slopes(sigma, y, &mut slopes);
+                equations.write_slopes(sigma, y, &mut slopes);
                 slopes
             })
             .collect();
-        Trajectory {
+        LeafTrajectory {
             sigma,
             states,
             slopes,
@@ -268,53 +298,65 @@ impl Trajectory {
     }
 
     /// From the shape of a leaf in the units of the scenario.
-    pub fn of_leaf(equations: &Equations, stations: &[f64], rods: &[RodShape]) -> Self {
+    pub fn from_leaf_shape(
+        equations: &BoundaryValueProblem,
+        stations: &[f64],
+        rods: &[RodShape],
+    ) -> Self {
         let states = (0..stations.len())
             .map(|i| {
-                let mut y = vec![0.0; equations.size()];
+                let mut y = vec![0.0; equations.state_size()];
                 for (j, rod) in rods.iter().enumerate() {
                     let node = &rod.nodes[i];
                     RodState {
-                        r: node.position / equations.length,
+                        r: node.position / equations.length_unit,
                         q: node.rotation,
-                        n: node.rotation * node.n / equations.force,
-                        m: node.rotation * node.m / (equations.force * equations.length),
+                        n: node.rotation * node.n / equations.force_unit,
+                        m: node.rotation * node.m / (equations.force_unit * equations.length_unit),
                     }
-                    .write(&mut y, j);
+                    .write_flat_state(&mut y, j);
                 }
                 y
             })
             .collect();
-        Trajectory::new(equations, stations.to_vec(), states)
+        LeafTrajectory::new(equations, stations.to_vec(), states)
     }
 
     /// The leaf without stress: rods in their rest shapes.
-    pub fn unstressed(equations: &Equations, tolerance: f64) -> Result<Self, Unbounded> {
-        let mut integrator = Integrator::new(equations, 0.0, equations.clamped(), tolerance);
+    pub fn unstressed_leaf(
+        equations: &BoundaryValueProblem,
+        tolerance: f64,
+    ) -> Result<Self, UnboundedSolution> {
+        let mut integrator = InitialValueIntegrator::new(
+            equations,
+            0.0,
+            equations.unstressed_base_state(),
+            tolerance,
+        );
         let (mut sigma, mut states) = (vec![0.0], vec![integrator.y.clone()]);
         integrator.run(1.0, |integrator| {
             sigma.push(integrator.sigma);
             states.push(integrator.y.clone());
         })?;
-        Ok(Trajectory::new(equations, sigma, states))
+        Ok(LeafTrajectory::new(equations, sigma, states))
     }
 
     /// The solution at the stations, integrated from the nodes before them.
-    pub fn sampled(
-        equations: &Equations,
-        nodes: &Nodes,
+    pub fn sample_solution(
+        equations: &BoundaryValueProblem,
+        nodes: &ShootingNodes,
         stations: &[f64],
         tolerance: f64,
-    ) -> Result<Self, Unbounded> {
+    ) -> Result<Self, UnboundedSolution> {
         let mut states: Vec<Vec<f64>> = Vec::new();
         let mut energy = 0.0;
-        let slot = equations.size() - 1;
+        let slot = equations.state_size() - 1;
         let mut wanted = stations.iter().copied().peekable();
         for (k, begin) in nodes.states.iter().enumerate() {
             let (from, to) = (nodes.sigma[k], nodes.sigma[k + 1]);
             let mut y = begin.clone();
             y[slot] = energy;
-            let mut integrator = Integrator::new(equations, from, y, tolerance);
+            let mut integrator = InitialValueIntegrator::new(equations, from, y, tolerance);
             let last = k + 1 == nodes.states.len();
             while let Some(station) = wanted.next_if(|s| *s < to || last) {
                 integrator.run(station.clamp(from, to), |_| ())?;
@@ -323,21 +365,21 @@ impl Trajectory {
             integrator.run(to, |_| ())?;
             energy = integrator.y[slot];
         }
-        Ok(Trajectory::new(equations, stations.to_vec(), states))
+        Ok(LeafTrajectory::new(equations, stations.to_vec(), states))
     }
 
     /// Straight, untwisted rods without stress.
-    pub fn straight(equations: &Equations) -> Self {
+    pub fn straight(equations: &BoundaryValueProblem) -> Self {
         let at = |sigma: f64| {
-            let mut y = vec![0.0; equations.size()];
+            let mut y = vec![0.0; equations.state_size()];
             for j in 0..equations.rods() {
                 let mut rod = equations.base(j, DVec3::ZERO, DVec3::ZERO);
                 rod.r = rod.q * DVec3::X * equations.grown(j, sigma);
-                rod.write(&mut y, j);
+                rod.write_flat_state(&mut y, j);
             }
             y
         };
-        Trajectory::new(equations, vec![0.0, 1.0], vec![at(0.0), at(1.0)])
+        LeafTrajectory::new(equations, vec![0.0, 1.0], vec![at(0.0), at(1.0)])
     }
 
     /// The state at the tip.
@@ -350,7 +392,7 @@ impl Trajectory {
         self.sigma.iter().copied().rfind(|s| *s <= sigma)
     }
 
-    pub fn at(&self, sigma: f64) -> Vec<f64> {
+    pub fn interpolate_state(&self, sigma: f64) -> Vec<f64> {
         let last = self.sigma.len() - 1;
         let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);
         let h = self.sigma[i] - self.sigma[i - 1];
@@ -365,29 +407,34 @@ impl Trajectory {
     }
 
     /// Extrapolates this trajectory by `step` times its difference from an earlier one.
-    pub fn beyond(&self, equations: &Equations, earlier: &Trajectory, step: f64) -> Self {
+    pub fn extrapolate(
+        &self,
+        equations: &BoundaryValueProblem,
+        earlier: &LeafTrajectory,
+        step: f64,
+    ) -> Self {
         let states = (self.sigma.iter().zip(&self.states))
             .map(|(&sigma, now)| {
-                let pairs = now.iter().zip(earlier.at(sigma));
+                let pairs = now.iter().zip(earlier.interpolate_state(sigma));
                 let moved = pairs.map(|(now, before)| now + step * (now - before));
                 moved.collect()
             })
             .collect();
-        Trajectory::new(equations, self.sigma.clone(), states)
+        LeafTrajectory::new(equations, self.sigma.clone(), states)
     }
 
     /// Largest force and moment of rod `j`.
-    pub fn largest(&self, j: usize) -> (f64, f64) {
+    pub fn largest_force_and_moment(&self, j: usize) -> (f64, f64) {
         self.states.iter().fold((0.0, 0.0), |(n, m), y| {
-            let rod = RodState::read(y, j);
+            let rod = RodState::from_flat_state(y, j);
             (larger(n, rod.n.length()), larger(m, rod.m.length()))
         })
     }
 
     /// Largest angle by which the directors of a rod turn along it.
-    pub fn turn(&self, equations: &Equations) -> f64 {
+    pub fn largest_turn(&self, equations: &BoundaryValueProblem) -> f64 {
         let turn = |j: usize| {
-            let q = |y: &[f64]| RodState::read(y, j).q;
+            let q = |y: &[f64]| RodState::from_flat_state(y, j).q;
             let turns = self.states.windows(2);
             turns.map(|y| q(&y[0]).angle_between(q(&y[1]))).sum::<f64>()
         };
@@ -395,30 +442,30 @@ impl Trajectory {
     }
 
     /// The shape in the units of the scenario, at its stations.
-    pub fn shape(&self, equations: &Equations) -> Vec<RodShape> {
+    pub fn shape(&self, equations: &BoundaryValueProblem) -> Vec<RodShape> {
         (0..equations.rods())
             .map(|j| RodShape {
-                length: equations.lengths[j] * equations.length,
+                length: equations.lengths[j] * equations.length_unit,
                 nodes: (self.sigma.iter().zip(&self.states))
-                    .map(|(&sigma, y)| node(equations, j, sigma, y))
+                    .map(|(&sigma, y)| node_state(equations, j, sigma, y))
                     .collect(),
             })
             .collect()
     }
 }
 
-fn node(equations: &Equations, j: usize, sigma: f64, y: &[f64]) -> NodeState {
-    let rod = RodState::read(y, j);
+fn node_state(equations: &BoundaryValueProblem, j: usize, sigma: f64, y: &[f64]) -> NodeState {
+    let rod = RodState::from_flat_state(y, j);
     let directors = rod.q.conjugate();
     let (n, m) = (directors * rod.n, directors * rod.m);
     let (v, u) = equations.strains(j, sigma, n, m);
     NodeState {
-        position: rod.r * equations.length,
+        position: rod.r * equations.length_unit,
         rotation: rod.q,
         v,
-        u: u / equations.length,
-        n: n * equations.force,
-        m: m * (equations.force * equations.length),
+        u: u / equations.length_unit,
+        n: n * equations.force_unit,
+        m: m * (equations.force_unit * equations.length_unit),
     }
 }
 
@@ -442,12 +489,12 @@ mod tests {
     }
 
     /// A state at the clamp that is far from equilibrium.
-    fn clamped(equations: &Equations, strength: f64) -> Vec<f64> {
-        let mut y = vec![0.0; equations.size()];
+    fn clamped(equations: &BoundaryValueProblem, strength: f64) -> Vec<f64> {
+        let mut y = vec![0.0; equations.state_size()];
         for (j, side) in [1.0, -0.7].into_iter().enumerate() {
             let (n, m) = (DVec3::new(2.0, side, -1.0), DVec3::new(0.5, -side, 2.0));
             let base = equations.base(j, strength * n, strength * m);
-            base.write(&mut y, j);
+            base.write_flat_state(&mut y, j);
         }
         y
     }
@@ -458,9 +505,13 @@ mod tests {
     }
 
     /// The result of so many equal steps.
-    fn in_steps(equations: &Equations, strength: f64, count: usize) -> Vec<f64> {
+    fn integrate_equal_steps(
+        equations: &BoundaryValueProblem,
+        strength: f64,
+        count: usize,
+    ) -> Vec<f64> {
         let begin = clamped(equations, strength);
-        let mut integrator = Integrator::new(equations, 0.0, begin, 1e-10);
+        let mut integrator = InitialValueIntegrator::new(equations, 0.0, begin, 1e-10);
         for k in 1..=count {
             integrator.attempt(1.0 / count as f64);
             integrator.sigma = k as f64 / count as f64;
@@ -469,8 +520,9 @@ mod tests {
         integrator.y
     }
 
-    fn to(equations: &Equations, end: f64, tolerance: f64) -> (Vec<f64>, usize) {
-        let mut integrator = Integrator::new(equations, 0.0, clamped(equations, 1.0), tolerance);
+    fn to(equations: &BoundaryValueProblem, end: f64, tolerance: f64) -> (Vec<f64>, usize) {
+        let mut integrator =
+            InitialValueIntegrator::new(equations, 0.0, clamped(equations, 1.0), tolerance);
         integrator.run(end, |_| ()).unwrap();
         assert_eq!(integrator.sigma, end);
         (integrator.y, integrator.evaluations)
@@ -479,9 +531,10 @@ mod tests {
     #[test]
     fn fixed_steps_converge_with_order_8() {
         let scenario = pair();
-        let equations = Equations::new(&scenario);
-        let exact = in_steps(&equations, 3.0, 512);
-        let errors = [8, 12, 18, 27].map(|count| apart(&in_steps(&equations, 3.0, count), &exact));
+        let equations = BoundaryValueProblem::new(&scenario);
+        let exact = integrate_equal_steps(&equations, 3.0, 512);
+        let errors = [8, 12, 18, 27]
+            .map(|count| apart(&integrate_equal_steps(&equations, 3.0, count), &exact));
         assert!(errors[0] < 1e-3 && errors[3] > 1e-12, "{errors:?}");
         let order = (errors[0] / errors[3]).ln() / (27.0_f64 / 8.0).ln();
         assert!((order - 8.0).abs() < 0.5, "{errors:?}: order {order}");
@@ -492,14 +545,14 @@ mod tests {
     #[test]
     fn the_error_follows_the_tolerance() {
         let scenario = pair();
-        let equations = Equations::new(&scenario);
-        let exact = in_steps(&equations, 1.0, 512);
+        let equations = BoundaryValueProblem::new(&scenario);
+        let exact = integrate_equal_steps(&equations, 1.0, 512);
         let mut work = Vec::new();
         for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
             let (end, evaluations) = to(&equations, 1.0, tolerance);
             let error = apart(&end, &exact);
             assert!(error < 30.0 * tolerance, "{tolerance:e}: {error:.1e}");
-            for q in [3, STATE + 3].map(|at| &end[at..at + 4]) {
+            for q in [3, STATE_SIZE + 3].map(|at| &end[at..at + 4]) {
                 let squares: f64 = q.iter().map(|c| c * c).sum();
                 assert!((squares - 1.0).abs() < 1e-15, "{squares}");
             }
@@ -513,8 +566,9 @@ mod tests {
     #[test]
     fn stops_may_lie_a_rounding_error_apart() {
         let scenario = pair();
-        let equations = Equations::new(&scenario);
-        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-10);
+        let equations = BoundaryValueProblem::new(&scenario);
+        let mut integrator =
+            InitialValueIntegrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-10);
         for stop in [0.3, 0.1 + 0.2, 0.3 + 1e-15, 1.0] {
             integrator.run(stop, |_| ()).unwrap();
             assert_eq!(integrator.sigma, stop);
@@ -528,8 +582,9 @@ mod tests {
     fn what_grows_out_of_bounds_is_given_up() {
         let mut scenario = pair();
         scenario.coupling = vec![[1e9; 3]];
-        let equations = Equations::new(&scenario);
-        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-8);
+        let equations = BoundaryValueProblem::new(&scenario);
+        let mut integrator =
+            InitialValueIntegrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-8);
         let failed = integrator.run(1.0, |_| ()).expect_err("it was to grow");
         assert!(failed.sigma > 0.0 && failed.sigma < 0.5, "{failed:?}");
     }

@@ -13,53 +13,60 @@
 mod tests;
 
 use crate::numbers::{larger, largest};
-use crate::shooting::equations::{Equations, RodState, TANGENT, Tip, difference};
-use crate::shooting::integrate::{Integrator, Nodes, Trajectory, Unbounded};
-use crate::shooting::sensitivities::{LinearStep, Perturbations, group};
+use crate::shooting::equations::{
+    BoundaryValueProblem, PERTURBATION_SIZE, RodState, TipConstraint, rotation_difference,
+};
+use crate::shooting::integrate::{
+    InitialValueIntegrator, LeafTrajectory, ShootingNodes, UnboundedSolution,
+};
+use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Largest growth of a perturbation over one interval.
-pub const GROWTH: f64 = 1e3;
+pub const MAX_INTERVAL_GROWTH: f64 = 1e3;
 
 /// Most intervals chosen automatically, summed over rods: of N rods their matrices take
 /// 24 N MB (see [`crate::memory`]).
-const MOST_PIECES: usize = 4096;
+const MAX_ROD_INTERVALS: usize = 4096;
 
 /// Accuracy of the integration that measures growth.
-const ROUGH: f64 = 1e-4;
+const GROWTH_TOLERANCE: f64 = 1e-4;
 
 /// Accuracy to which a start is continued beyond its stations.
-const START: f64 = 1e-8;
+const START_TOLERANCE: f64 = 1e-8;
 
 /// Units of perturbations, so that none dominates the
 /// others: lengths and angles are not scaled, forces and moments of a rod are in
 /// units of the larger of what it carries and what bends it.
 #[derive(Clone, Debug)]
-pub struct Units {
+pub struct PerturbationUnits {
     force: Vec<f64>,
     moment: Vec<f64>,
 }
 
-impl Units {
+impl PerturbationUnits {
     /// Units for a leaf near a trajectory.
-    pub fn new(equations: &Equations, near: &Trajectory) -> Self {
+    pub fn new(equations: &BoundaryValueProblem, near: &LeafTrajectory) -> Self {
         let (force, moment) = (0..equations.rods())
             .map(|j| {
-                let ((n, m), soft) = (near.largest(j), equations.softest[j]);
+                let ((n, m), soft) = (
+                    near.largest_force_and_moment(j),
+                    equations.softest_couple_stiffness[j],
+                );
                 (soft + n, soft + m)
             })
             .unzip();
-        Units { force, moment }
+        PerturbationUnits { force, moment }
     }
 
     /// The unit of the `k`-th component of a leaf's perturbation.
-    pub fn of(&self, k: usize) -> f64 {
-        match k % TANGENT {
+    pub fn component_unit(&self, k: usize) -> f64 {
+        match k % PERTURBATION_SIZE {
             0..6 => 1.0,
-            6..9 => self.force[k / TANGENT],
-            _ => self.moment[k / TANGENT],
+            6..9 => self.force[k / PERTURBATION_SIZE],
+            _ => self.moment[k / PERTURBATION_SIZE],
         }
     }
 
@@ -76,10 +83,13 @@ impl Units {
     pub fn difference(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
         (0..self.force.len())
             .flat_map(|j| {
-                let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+                let (a, b) = (
+                    RodState::from_flat_state(a, j),
+                    RodState::from_flat_state(b, j),
+                );
                 [
                     a.r - b.r,
-                    difference(a.q, b.q),
+                    rotation_difference(a.q, b.q),
                     (a.n - b.n) / self.force[j],
                     (a.m - b.m) / self.moment[j],
                 ]
@@ -91,50 +101,51 @@ impl Units {
     /// Adds `step` times an increment to a flat state.
     pub fn advance(&self, y: &mut [f64], increment: &[f64], step: f64) {
         for j in 0..self.force.len() {
-            let mut rod = RodState::read(y, j);
-            let part = |k: usize| step * DVec3::from_slice(&increment[TANGENT * j + 3 * k..]);
+            let mut rod = RodState::from_flat_state(y, j);
+            let part =
+                |k: usize| step * DVec3::from_slice(&increment[PERTURBATION_SIZE * j + 3 * k..]);
             rod.r += part(0);
             rod.q = (glam::DQuat::from_scaled_axis(part(1)) * rod.q).normalize();
             rod.n += part(2) * self.force[j];
             rod.m += part(3) * self.moment[j];
-            rod.write(y, j);
+            rod.write_flat_state(y, j);
         }
     }
 }
 
 /// Result of the integration over an interval.
-pub struct Integrated {
-    pub end: Vec<f64>,
+pub struct IntegratedInterval {
+    pub end_state: Vec<f64>,
     /// The linearised equations along it, if requested.
     steps: Vec<LinearStep>,
-    pub count: usize,
+    pub step_count: usize,
     pub evaluations: usize,
 }
 
 /// Integrates over all intervals, in parallel.
 pub fn integrate(
-    equations: &Equations,
-    nodes: &Nodes,
+    equations: &BoundaryValueProblem,
+    nodes: &ShootingNodes,
     tolerance: f64,
     linearise: bool,
-) -> Result<Vec<Integrated>, Unbounded> {
+) -> Result<Vec<IntegratedInterval>, UnboundedSolution> {
     (0..nodes.states.len())
         .into_par_iter()
         .map(|k| {
             let (begin, end) = (nodes.sigma[k], nodes.sigma[k + 1]);
             let y = nodes.states[k].clone();
-            let mut integrator = Integrator::new(equations, begin, y, tolerance);
+            let mut integrator = InitialValueIntegrator::new(equations, begin, y, tolerance);
             let (mut steps, mut count) = (Vec::new(), 0);
             integrator.run(end, |integrator| {
                 count += 1;
                 if linearise {
-                    steps.push(LinearStep::of(equations, integrator));
+                    steps.push(LinearStep::from_last_step(equations, integrator));
                 }
             })?;
-            Ok(Integrated {
-                end: integrator.y,
+            Ok(IntegratedInterval {
+                end_state: integrator.y,
                 steps,
-                count,
+                step_count: count,
                 evaluations: integrator.evaluations,
             })
         })
@@ -143,21 +154,21 @@ pub fn integrate(
 
 /// Response of a group of rods at the end of an interval to perturbations of one rod,
 /// dimensionless: its first rod, and rows of numbers from there on.
-type Responses = (usize, Vec<f64>);
+type RodResponses = (usize, Vec<f64>);
 
 /// Pairs of interval and rod that a thread processes between progress reports.
-const CHUNK: usize = 4;
+const PAIRS_PER_CHUNK: usize = 4;
 
 /// The responses of all rods over all intervals, in parallel. `proceed` is called with the part
 /// that is done, and returns whether to continue.
 pub fn responses(
-    equations: &Equations,
-    integrated: &[Integrated],
+    equations: &BoundaryValueProblem,
+    integrated: &[IntegratedInterval],
     proceed: &mut dyn FnMut(f64) -> bool,
-) -> Option<Vec<Responses>> {
+) -> Option<Vec<RodResponses>> {
     let rods = equations.rods();
     let all = integrated.len() * rods;
-    let together = CHUNK * rayon::current_num_threads();
+    let together = PAIRS_PER_CHUNK * rayon::current_num_threads();
     let mut found = Vec::with_capacity(all);
     while found.len() < all {
         if !proceed(found.len() as f64 / all as f64) {
@@ -167,8 +178,12 @@ pub fn responses(
         let some = some.into_par_iter().map(|task| {
             let (steps, j) = (&integrated[task / rods].steps, task % rods);
             match task < rods {
-                true => responses_of::<6>(equations, steps, (j, equations.free_at_base())),
-                false => responses_of::<TANGENT>(equations, steps, (j, 0)),
+                true => perturbation_responses::<6>(
+                    equations,
+                    steps,
+                    (j, equations.first_free_component()),
+                ),
+                false => perturbation_responses::<PERTURBATION_SIZE>(equations, steps, (j, 0)),
             }
         });
         found.par_extend(some);
@@ -180,28 +195,28 @@ pub fn responses(
 /// given units: square, except in the first interval, which begins at the base,
 /// where only [six components](Equations::free_at_base) are perturbed.
 pub fn sensitivities(
-    equations: &Equations,
-    units: &Units,
-    responses: &[Responses],
+    equations: &BoundaryValueProblem,
+    units: &PerturbationUnits,
+    responses: &[RodResponses],
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
     (responses.chunks(rods).enumerate())
         .map(|(k, columns)| {
             let (kinds, first_kind) = match k {
-                0 => (6, equations.free_at_base()),
-                _ => (TANGENT, 0),
+                0 => (6, equations.first_free_component()),
+                _ => (PERTURBATION_SIZE, 0),
             };
-            let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
+            let mut matrix = Mat::zeros(PERTURBATION_SIZE * rods, kinds * rods);
             let mut largest: f64 = 1.0;
             for (j, (first, rows)) in columns.iter().enumerate() {
                 for (i, row) in rows.chunks(kinds).enumerate() {
-                    let row_index = TANGENT * first + i;
+                    let row_index = PERTURBATION_SIZE * first + i;
                     for (k, value) in row.iter().enumerate() {
-                        let from = TANGENT * j + first_kind + k;
+                        let from = PERTURBATION_SIZE * j + first_kind + k;
                         matrix[(row_index, kinds * j + k)] =
-                            value * units.of(from) / units.of(row_index);
-                        if from % TANGENT / 3 == row_index % TANGENT / 3 {
+                            value * units.component_unit(from) / units.component_unit(row_index);
+                        if from % PERTURBATION_SIZE / 3 == row_index % PERTURBATION_SIZE / 3 {
                             largest = larger(largest, value.abs());
                         }
                     }
@@ -214,16 +229,17 @@ pub fn sensitivities(
 }
 
 /// Responses to the perturbations of rod `j`, of its components from the `first` on.
-fn responses_of<const W: usize>(
-    equations: &Equations,
+fn perturbation_responses<const W: usize>(
+    equations: &BoundaryValueProblem,
     steps: &[LinearStep],
     (j, first): (usize, usize),
-) -> Responses {
-    let mut perturbations = Perturbations::<W>::unit(group(equations, j), j, first);
+) -> RodResponses {
+    let mut perturbations =
+        Perturbations::<W>::unit_perturbations(coupled_rods(equations, j), j, first);
     for step in steps {
-        perturbations.advance(equations, step);
+        perturbations.propagate(equations, step);
     }
-    (perturbations.rods.start, perturbations.all)
+    (perturbations.rods.start, perturbations.entries)
 }
 
 /// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
@@ -231,25 +247,33 @@ fn responses_of<const W: usize>(
 /// Growth is measured separately for positions, rotations, forces and moments, which makes it
 /// independent of units, for every rod with its neighbours held.
 /// Fails if too many intervals would be needed.
-pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
+pub fn choose_intervals(
+    equations: &BoundaryValueProblem,
+    near: &LeafTrajectory,
+) -> Result<ShootingNodes, UnboundedSolution> {
     let mut sigma = vec![0.0];
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];
-        if sigma.len() * equations.rods() > MOST_PIECES.max(equations.rods()) {
-            return Err(Unbounded { sigma: begin });
+        if sigma.len() * equations.rods() > MAX_ROD_INTERVALS.max(equations.rods()) {
+            return Err(UnboundedSolution { sigma: begin });
         }
-        let mut integrator = Integrator::new(equations, begin, near.at(begin), ROUGH);
-        let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
-            .map(|j| Perturbations::unit(j..j + 1, j, 0))
+        let mut integrator = InitialValueIntegrator::new(
+            equations,
+            begin,
+            near.interpolate_state(begin),
+            GROWTH_TOLERANCE,
+        );
+        let mut rods: Vec<Perturbations<PERTURBATION_SIZE>> = (0..equations.rods())
+            .map(|j| Perturbations::unit_perturbations(j..j + 1, j, 0))
             .collect();
         while integrator.sigma < 1.0 {
             let before = integrator.sigma;
             let failed = integrator.step(1.0).is_err();
             let grown = failed || {
-                let step = LinearStep::of(equations, &integrator);
+                let step = LinearStep::from_last_step(equations, &integrator);
                 rods.iter_mut().any(|rod| {
-                    rod.advance(equations, &step);
-                    own_growth(rod.rows()) > GROWTH
+                    rod.propagate(equations, &step);
+                    largest_growth(rod.rows()) > MAX_INTERVAL_GROWTH
                 })
             };
             if grown {
@@ -268,40 +292,45 @@ pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Node
     }
     sigma.push(1.0);
     let states = begin(equations, near, &sigma);
-    Ok(Nodes { sigma, states })
+    Ok(ShootingNodes { sigma, states })
 }
 
 /// States at the beginnings of intervals. Interpolation far from
 /// stations may lead Newton's method to another solution.
-fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64>> {
+fn begin(equations: &BoundaryValueProblem, near: &LeafTrajectory, sigma: &[f64]) -> Vec<Vec<f64>> {
     let known = |sigma: f64| near.last_station(sigma) == Some(sigma);
     let at = |k: usize| {
         let here = sigma[k];
         if k == 0 || known(here) || !known(sigma[k - 1]) {
-            return near.at(here);
+            return near.interpolate_state(here);
         }
         let before = sigma[k - 1];
-        let mut integrator = Integrator::new(equations, before, near.at(before), START);
+        let mut integrator = InitialValueIntegrator::new(
+            equations,
+            before,
+            near.interpolate_state(before),
+            START_TOLERANCE,
+        );
         match integrator.run(here, |_| ()) {
             Ok(()) => integrator.y,
-            Err(_) => near.at(here),
+            Err(_) => near.interpolate_state(here),
         }
     };
     (0..sigma.len() - 1).map(at).collect()
 }
 
 /// Largest sensitivity within one kind of quantity.
-fn own_growth(rows: &[[f64; TANGENT]]) -> f64 {
-    let own = (0..TANGENT).flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)));
+fn largest_growth(rows: &[[f64; PERTURBATION_SIZE]]) -> f64 {
+    let own = (0..PERTURBATION_SIZE).flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)));
     largest(own.map(|(i, c)| rows[i][c].abs()))
 }
 
 /// Directions of the tip's conditions with singular values below this part
 /// of the largest count as undetermined.
-const SINGULAR: f64 = 1e-10;
+const UNDETERMINED_SINGULAR_RATIO: f64 = 1e-10;
 
 /// Cosine from which on that direction is the turn of a leaf without resistance.
-const ALONG_TURN: f64 = 0.9;
+const ZERO_ENERGY_COSINE: f64 = 0.9;
 
 /// The condensed equations, factorised.
 pub struct CondensedEquations {
@@ -317,10 +346,10 @@ pub struct CondensedEquations {
     /// How many directions the conditions determine: all, or all but the turns of veins that can
     /// turn without resistance.
     determined: usize,
-    tip: Tip,
+    tip: TipConstraint,
     /// The first of the components that are free at the base.
     free_at_base: usize,
-    units: Units,
+    units: PerturbationUnits,
 }
 
 impl CondensedEquations {
@@ -328,8 +357,8 @@ impl CondensedEquations {
     /// veins that can turn without resistance, at the base, are left undetermined where they are
     /// what the conditions determine least.
     pub fn new(
-        equations: &Equations,
-        units: &Units,
+        equations: &BoundaryValueProblem,
+        units: &PerturbationUnits,
         maps: Vec<Mat<f64>>,
         turns: &[Vec<f64>],
     ) -> Option<Self> {
@@ -342,9 +371,9 @@ impl CondensedEquations {
             bases.push(basis);
             growths.push(qr.thin_R().to_owned());
         }
-        let tip = equations.tip();
+        let tip = equations.tip_constraint();
         let columns: Vec<Vec<f64>> = (reached.col_iter())
-            .map(|column| at_tip(tip, units, column))
+            .map(|column| linearized_tip_conditions(tip, units, column))
             .collect();
         let conditions = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
         if !conditions.is_all_finite() {
@@ -361,32 +390,35 @@ impl CondensedEquations {
             right: svd.V().to_owned(),
             determined,
             tip,
-            free_at_base: equations.free_at_base(),
+            free_at_base: equations.first_free_component(),
             units: units.clone(),
         };
-        let least = orthonormal((0..turns.len()).map(|k| march.direction(k).swap_remove(0)));
+        let least = orthonormal_basis(
+            (0..turns.len()).map(|k| march.weakly_determined_direction(k).swap_remove(0)),
+        );
         let along = |turn: &&Vec<f64>| {
             let parts = least.iter().map(|direction| dot(direction, turn).powi(2));
-            (parts.sum::<f64>() / dot(turn, turn)).sqrt() > ALONG_TURN
+            (parts.sum::<f64>() / dot(turn, turn)).sqrt() > ZERO_ENERGY_COSINE
         };
         march.determined -= turns.iter().filter(along).count();
         Some(march)
     }
 
     /// The tip conditions of a state, in the same units.
-    pub fn scaled(&self, conditions: &[f64]) -> Vec<f64> {
+    pub fn scaled_tip_conditions(&self, conditions: &[f64]) -> Vec<f64> {
         let total_force = self.units.total_force();
         (conditions.iter().enumerate())
             .map(|(i, value)| match (self.tip, i / 6, i % 6) {
-                (Tip::Joint, 0, 0..3) => value / total_force,
-                (Tip::Joint | Tip::Pinned, _, 0..3) | (Tip::Clamped, ..) => *value,
-                (_, j, k) => value / self.units.of(TANGENT * j + 6 + k),
+                (TipConstraint::Joint, 0, 0..3) => value / total_force,
+                (TipConstraint::Joint | TipConstraint::Pinned, _, 0..3)
+                | (TipConstraint::Clamped, ..) => *value,
+                (_, j, k) => value / self.units.component_unit(PERTURBATION_SIZE * j + 6 + k),
             })
             .collect()
     }
 
     /// Smallest singular value of the tip's conditions over the largest.
-    pub fn condition(&self) -> f64 {
+    pub fn singular_value_ratio(&self) -> f64 {
         match &self.singular_values[..self.determined] {
             [largest, .., smallest] => smallest / largest,
             _ => 1.0,
@@ -412,41 +444,46 @@ impl CondensedEquations {
         }
         let mut missed = Col::from_fn(conditions.len(), |i| -conditions[i]);
         if let Some(carried) = &carried {
-            for (sum, value) in
-                missed
-                    .iter_mut()
-                    .zip(at_tip(self.tip, &self.units, carried.as_ref()))
-            {
+            for (sum, value) in missed.iter_mut().zip(linearized_tip_conditions(
+                self.tip,
+                &self.units,
+                carried.as_ref(),
+            )) {
                 *sum -= value;
             }
         }
         let mut amounts = self.left.transpose() * &missed;
         let values = self.singular_values.iter().enumerate();
         for (amount, (k, value)) in amounts.iter_mut().zip(values) {
-            let singular = *value <= SINGULAR * self.singular_values[0];
+            let singular = *value <= UNDETERMINED_SINGULAR_RATIO * self.singular_values[0];
             let undetermined = singular || k >= self.determined;
             *amount = if undetermined { 0.0 } else { *amount / value };
         }
-        self.back(&self.right * &amounts, &offsets, &shifts)
+        self.substitute_to_base(&self.right * &amounts, &offsets, &shifts)
     }
 
     /// The direction that the tip's conditions determine least, at the beginnings of all
     /// intervals; not the turns of veins that can turn without resistance.
-    pub fn null(&self) -> Vec<Vec<f64>> {
-        self.direction(0)
+    pub fn least_determined_direction(&self) -> Vec<Vec<f64>> {
+        self.weakly_determined_direction(0)
     }
 
     /// Of the directions that are determined, one of those that are least.
-    fn direction(&self, from_least: usize) -> Vec<Vec<f64>> {
+    fn weakly_determined_direction(&self, from_least: usize) -> Vec<Vec<f64>> {
         let none = |matrix: &Mat<f64>| Col::zeros(matrix.nrows());
         let offsets: Vec<Col<f64>> = self.bases.iter().map(none).collect();
         let shifts: Vec<Col<f64>> = self.growths.iter().map(none).collect();
         let last = self.right.col(self.determined - 1 - from_least).to_owned();
-        self.back(last, &offsets, &shifts)
+        self.substitute_to_base(last, &offsets, &shifts)
     }
 
     /// Back substitution from the free coefficients at the last node to the base.
-    fn back(&self, last: Col<f64>, offsets: &[Col<f64>], shifts: &[Col<f64>]) -> Vec<Vec<f64>> {
+    fn substitute_to_base(
+        &self,
+        last: Col<f64>,
+        offsets: &[Col<f64>],
+        shifts: &[Col<f64>],
+    ) -> Vec<Vec<f64>> {
         let mut increments = Vec::new();
         let mut free = last;
         for k in (0..self.bases.len()).rev() {
@@ -460,7 +497,7 @@ impl CondensedEquations {
         let rods = free.nrows() / 6;
         let base = (0..rods).flat_map(|j| {
             let free = &free;
-            (0..TANGENT).map(move |k| match k.checked_sub(first) {
+            (0..PERTURBATION_SIZE).map(move |k| match k.checked_sub(first) {
                 Some(k) if k < 6 => free[6 * j + k],
                 _ => 0.0,
             })
@@ -472,18 +509,23 @@ impl CondensedEquations {
 }
 
 /// Linearised tip conditions of a perturbation at the tip.
-fn at_tip(tip: Tip, units: &Units, perturbation: ColRef<f64>) -> Vec<f64> {
-    let rods = perturbation.nrows() / TANGENT;
-    let get = |j: usize, k: usize| perturbation[TANGENT * j + k];
+fn linearized_tip_conditions(
+    tip: TipConstraint,
+    units: &PerturbationUnits,
+    perturbation: ColRef<f64>,
+) -> Vec<f64> {
+    let rods = perturbation.nrows() / PERTURBATION_SIZE;
+    let get = |j: usize, k: usize| perturbation[PERTURBATION_SIZE * j + k];
     (0..rods)
         .flat_map(|j| (0..6).map(move |k| (j, k)))
         .map(|(j, k)| match (tip, k) {
-            (Tip::Joint, 0..3) if j == 0 => {
-                let force = |j: usize| get(j, 6 + k) * units.of(TANGENT * j + 6);
+            (TipConstraint::Joint, 0..3) if j == 0 => {
+                let force =
+                    |j: usize| get(j, 6 + k) * units.component_unit(PERTURBATION_SIZE * j + 6);
                 (0..rods).map(force).sum::<f64>() / units.total_force()
             }
-            (Tip::Joint, 0..3) => get(j, k) - get(0, k),
-            (Tip::Pinned, 0..3) | (Tip::Clamped, _) => get(j, k),
+            (TipConstraint::Joint, 0..3) => get(j, k) - get(0, k),
+            (TipConstraint::Pinned, 0..3) | (TipConstraint::Clamped, _) => get(j, k),
             _ => get(j, 6 + k),
         })
         .collect()
@@ -501,7 +543,7 @@ fn back_substitute(r: &Mat<f64>, x: &mut Col<f64>) {
 }
 
 /// An orthonormal basis of what these directions span.
-fn orthonormal(directions: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+fn orthonormal_basis(directions: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut direction in directions {
         for other in &basis {

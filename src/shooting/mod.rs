@@ -47,9 +47,9 @@ mod sensitivities;
 mod solve;
 
 use crate::memory::TooMuch;
-use crate::run::{Limit, Unmodelled};
+use crate::run::{Limit, UnmodelledFeature};
 use crate::shape::{Difference, RodShape};
-use crate::shooting::integrate::Unbounded;
+use crate::shooting::integrate::UnboundedSolution;
 pub use crate::shooting::solve::{check_models, solve};
 use glam::DVec3;
 use serde::Serialize;
@@ -58,7 +58,7 @@ use std::ops::AddAssign;
 
 /// Work of the shooting, counted so that tests can check it exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
+pub struct ShootingCounts {
     /// Number of corrections.
     pub iterations: usize,
     /// Linearisations: sensitivities of all intervals, and their factorisation.
@@ -69,8 +69,8 @@ pub struct Work {
     pub slopes: usize,
 }
 
-impl AddAssign for Work {
-    fn add_assign(&mut self, other: Work) {
+impl AddAssign for ShootingCounts {
+    fn add_assign(&mut self, other: ShootingCounts) {
         self.iterations += other.iterations;
         self.linearizations += other.linearizations;
         self.steps += other.steps;
@@ -80,10 +80,10 @@ impl AddAssign for Work {
 
 /// Progress of a shooting.
 #[derive(Clone, Copy, Debug)]
-pub struct Correction {
+pub struct CorrectionProgress {
     /// From arcs: the part of the present change towards the scenario's leaf (of its
     /// loads, or of its stiffness) that is done, from 0 to 1; 1 for a start near the leaf.
-    pub way: f64,
+    pub lambda: f64,
     /// Number of corrections for the present solution.
     pub iteration: usize,
     /// Part of the linearisation for the next correction that is done, from 0 to 1.
@@ -92,24 +92,24 @@ pub struct Correction {
     /// infinite before the first.
     pub size: f64,
     /// The size below which corrections have converged.
-    pub wanted: f64,
+    pub convergence_size: f64,
 }
 
 /// Counts the work of a shooting and reports its progress.
-struct Log<'p> {
-    pub work: Work,
+struct ShootingLog<'p> {
+    pub work: ShootingCounts,
     /// Part of the present change of the leaf of arcs that is done.
-    pub part: f64,
+    pub lambda: f64,
     /// Called for each correction.
-    pub progress: &'p mut dyn FnMut(&Correction),
+    pub progress: &'p mut dyn FnMut(&CorrectionProgress),
 }
 
 /// Displacements below this part of the largest are not mentioned.
-const MOVES: f64 = 0.2;
+const MENTIONED_DISPLACEMENT_FRACTION: f64 = 0.2;
 
 /// The start of a solution.
 #[derive(Clone, Copy, Debug)]
-pub enum Start<'s> {
+pub enum ShootingStart<'s> {
     /// Without a given start: from arcs by continuation.
     Arcs,
     /// From the shape of the leaf at some stations, in the scenario's units.
@@ -123,23 +123,23 @@ pub enum Start<'s> {
 
 /// Required precision of a solution.
 #[derive(Clone, Copy, Debug)]
-pub enum Precision {
+pub enum RequiredPrecision {
     /// Estimated error of the positions relative to the longest rod, or the best that
-    /// double precision allows: see [`Solution::error`].
-    Error(f64),
+    /// double precision allows: see [`ShootingSolution::error`].
+    EstimatedError(f64),
     /// Local error allowed per integration step, in dimensionless form.
     LocalError(f64),
 }
 
 /// Options of the shooting.
 #[derive(Clone, Debug)]
-pub struct Options<'s> {
+pub struct ShootingOptions<'s> {
     /// The start.
-    pub start: Start<'s>,
+    pub start: ShootingStart<'s>,
     /// Fractions of the length at which the solution is returned, from 0 to 1.
     pub stations: &'s [f64],
     /// The required precision.
-    pub precision: Precision,
+    pub precision: RequiredPrecision,
     /// Number of intervals; `None`: as many as the growth of perturbations needs.
     pub intervals: Option<usize>,
     /// Time limit of Newton's method.
@@ -149,10 +149,14 @@ pub struct Options<'s> {
     pub gives_up: bool,
 }
 
-impl<'s> Options<'s> {
+impl<'s> ShootingOptions<'s> {
     /// With automatic intervals and without a time limit.
-    pub fn new(start: Start<'s>, stations: &'s [f64], precision: Precision) -> Self {
-        Options {
+    pub fn new(
+        start: ShootingStart<'s>,
+        stations: &'s [f64],
+        precision: RequiredPrecision,
+    ) -> Self {
+        ShootingOptions {
             start,
             stations,
             precision,
@@ -166,7 +170,7 @@ impl<'s> Options<'s> {
 /// A direction that the equations leave undetermined, or nearly so: the leaf
 /// is at a bifurcation, or its equilibria form a family.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Neutral {
+pub struct NeutralDirection {
     /// Smallest singular value of the condensed equations over the largest.
     pub ratio: f64,
     /// Displacement of every rod along it at the stations, scaled so that the largest
@@ -176,7 +180,7 @@ pub struct Neutral {
 
 /// A solution of the boundary-value problem, in the units of the scenario.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub struct ShootingSolution {
     /// Fractions of the length.
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
@@ -197,12 +201,12 @@ pub struct Solution {
     /// Smallest singular value of the condensed equations over the largest.
     pub condition: f64,
     /// The corresponding direction, where the equations are nearly singular.
-    pub neutral: Option<Neutral>,
+    pub neutral: Option<NeutralDirection>,
     /// Why no attempt to reach the accuracy with smaller local errors succeeded, if this is the
     /// solution before it.
-    pub unsharpened: Option<Reason>,
+    pub unsharpened: Option<ShootingFailureReason>,
     /// Work done.
-    pub work: Work,
+    pub work: ShootingCounts,
 }
 
 /// Growth over an interval to which a failure is attributed, as a power of ten.
@@ -210,7 +214,7 @@ const TOO_MUCH_GROWTH: f64 = 5.0;
 
 /// Why there is no solution.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reason {
+pub enum ShootingFailureReason {
     /// An initial-value problem grows without bound before its interval ends.
     Unbounded {
         /// The sigma it reached.
@@ -240,30 +244,30 @@ pub enum Reason {
         growth: f64,
     },
     /// The equations are singular.
-    Singular(Neutral),
+    Singular(NeutralDirection),
     /// The necessary number of intervals takes too much memory.
-    TooMuch(TooMuch),
+    TooMuchMemory(TooMuch),
     /// The time allowed was over, or the run was cancelled.
     OutOfTime,
     /// The boundary-value problem does not contain all of the scenario.
-    Unmodelled(Unmodelled),
+    Unmodelled(UnmodelledFeature),
 }
 
-impl From<Unmodelled> for Reason {
-    fn from(unmodelled: Unmodelled) -> Self {
-        Reason::Unmodelled(unmodelled)
+impl From<UnmodelledFeature> for ShootingFailureReason {
+    fn from(unmodelled: UnmodelledFeature) -> Self {
+        ShootingFailureReason::Unmodelled(unmodelled)
     }
 }
 
-impl From<TooMuch> for Reason {
+impl From<TooMuch> for ShootingFailureReason {
     fn from(too_much: TooMuch) -> Self {
-        Reason::TooMuch(too_much)
+        ShootingFailureReason::TooMuchMemory(too_much)
     }
 }
 
-impl From<Unbounded> for Reason {
-    fn from(Unbounded { sigma }: Unbounded) -> Self {
-        Reason::Unbounded {
+impl From<UnboundedSolution> for ShootingFailureReason {
+    fn from(UnboundedSolution { sigma }: UnboundedSolution) -> Self {
+        ShootingFailureReason::Unbounded {
             sigma,
             fixed: false,
             from_leaf: false,
@@ -271,13 +275,13 @@ impl From<Unbounded> for Reason {
     }
 }
 
-impl Reason {
+impl ShootingFailureReason {
     /// What may help is known where the number of intervals and the start are.
     fn in_context(mut self, given: bool, leaf: bool) -> Self {
-        if let Reason::Unbounded {
+        if let ShootingFailureReason::Unbounded {
             fixed, from_leaf, ..
         }
-        | Reason::NoConvergence {
+        | ShootingFailureReason::NoConvergence {
             fixed, from_leaf, ..
         } = &mut self
         {
@@ -289,16 +293,16 @@ impl Reason {
     /// What to change.
     fn advice(&self) -> &'static str {
         match *self {
-            Reason::Unbounded { fixed: true, .. } => "use more intervals",
-            Reason::NoConvergence {
+            ShootingFailureReason::Unbounded { fixed: true, .. } => "use more intervals",
+            ShootingFailureReason::NoConvergence {
                 fixed: true,
                 growth,
                 ..
             } if growth > TOO_MUCH_GROWTH => "use more intervals",
-            Reason::Unbounded {
+            ShootingFailureReason::Unbounded {
                 from_leaf: true, ..
             } => "more intervals than are allowed would be needed",
-            Reason::NoConvergence {
+            ShootingFailureReason::NoConvergence {
                 from_leaf: true, ..
             } => "lower the load",
             _ => "lower the load, or start from the relaxed leaf",
@@ -306,37 +310,37 @@ impl Reason {
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for ShootingFailureReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let advice = self.advice();
         match self {
-            Reason::Unbounded { sigma, .. } => write!(
+            ShootingFailureReason::Unbounded { sigma, .. } => write!(
                 f,
                 "integrated from the start, the leaf grows out of all bounds at {sigma:.3} of its length: {advice}"
             ),
-            Reason::NoConvergence {
+            ShootingFailureReason::NoConvergence {
                 correction, growth, ..
             } if *growth > TOO_MUCH_GROWTH => write!(
                 f,
                 "Newton's method stops at corrections of {correction:.1e}; perturbations grow 10^{growth:.0} times over an interval: {advice}"
             ),
-            Reason::NoConvergence { correction, .. } => write!(
+            ShootingFailureReason::NoConvergence { correction, .. } => write!(
                 f,
                 "Newton's method stops at corrections of {correction:.1e}: {advice}"
             ),
-            Reason::Rounding { correction, growth } => write!(
+            ShootingFailureReason::Rounding { correction, growth } => write!(
                 f,
                 "shooting cannot resolve this leaf: perturbations grow 10^{growth:.0} times from base to tip, and \
                  from the leaf at rest corrections of {correction:.1e} do not decrease"
             ),
-            Reason::Singular(neutral) => write!(
+            ShootingFailureReason::Singular(neutral) => write!(
                 f,
                 "the equations are singular (ratio of singular values {:.1e}): {neutral}",
                 neutral.ratio
             ),
-            Reason::TooMuch(too_much) => too_much.fmt(f),
-            Reason::Unmodelled(unmodelled) => unmodelled.fmt(f),
-            Reason::OutOfTime => {
+            ShootingFailureReason::TooMuchMemory(too_much) => too_much.fmt(f),
+            ShootingFailureReason::Unmodelled(unmodelled) => unmodelled.fmt(f),
+            ShootingFailureReason::OutOfTime => {
                 f.write_str("the time allowed was over before shooting had converged: allow more")
             }
         }
@@ -344,14 +348,14 @@ impl fmt::Display for Reason {
 }
 
 /// The meaning of the direction, in words.
-impl fmt::Display for Neutral {
+impl fmt::Display for NeutralDirection {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let longer = |a: DVec3, b: &DVec3| if b.length() > a.length() { *b } else { a };
         let largest: Vec<DVec3> = (self.displacement.iter())
             .map(|rod| rod.iter().fold(DVec3::ZERO, longer))
             .collect();
         let veins: Vec<String> = (largest.iter().enumerate())
-            .filter(|(_, moved)| moved.length() > MOVES)
+            .filter(|(_, moved)| moved.length() > MENTIONED_DISPLACEMENT_FRACTION)
             .map(|(j, _)| (j + 1).to_string())
             .collect();
         let who = match veins.as_slice() {
@@ -370,13 +374,13 @@ impl fmt::Display for Neutral {
 
 /// Why no solution was found.
 #[derive(Clone, Debug)]
-pub struct Failure {
+pub struct ShootingFailure {
     /// The reason.
-    pub reason: Reason,
+    pub reason: ShootingFailureReason,
     /// Part of the change from the leaf of arcs to the scenario's that was made.
-    pub part: f64,
+    pub lambda: f64,
     /// The last shape computed, at the stations.
     pub rods: Vec<RodShape>,
     /// Work done.
-    pub work: Work,
+    pub work: ShootingCounts,
 }

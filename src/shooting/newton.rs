@@ -11,44 +11,44 @@
 
 use crate::memory;
 use crate::numbers::largest;
-use crate::scenario::{Begin, Turning};
+use crate::scenario::{BaseRotations, ZeroEnergyRotation};
 use crate::shape::equally_spaced;
-use crate::shooting::equations::{Equations, RodState, TANGENT};
-use crate::shooting::integrate::{Nodes, Trajectory};
+use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, RodState};
+use crate::shooting::integrate::{LeafTrajectory, ShootingNodes};
 use crate::shooting::intervals::{
-    CondensedEquations, GROWTH, Integrated, Units, choose_intervals, integrate, responses,
-    sensitivities,
+    CondensedEquations, IntegratedInterval, MAX_INTERVAL_GROWTH, PerturbationUnits,
+    choose_intervals, integrate, responses, sensitivities,
 };
-use crate::shooting::{Correction, Log, Neutral, Reason};
+use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
 use glam::DVec3;
 
 /// A leaf that turned by less than this (radians) keeps its linearisation.
-const SAME_LINEARIZATION: f64 = 1e-3;
+const RELINEARIZATION_ANGLE: f64 = 1e-3;
 
 /// Distance from an axis (lengths) within which a point is on it.
-const ON_AXIS: f64 = 1e-6;
+const AXIS_DISTANCE_TOLERANCE: f64 = 1e-6;
 
 /// Changes of a base's force and moment, in their units, below which a leaf does not turn: it is
 /// straight.
-const NO_TURN: f64 = 1e-6;
+const TURN_LOAD_TOLERANCE: f64 = 1e-6;
 
 const MAX_ITERATIONS: usize = 60;
 
 const LEAST_FACTOR: f64 = 1e-3;
 
 /// Contraction below which a start counts as near its solution.
-const NEAR: f64 = 0.3;
+const NEAR_START_CONTRACTION: f64 = 0.3;
 
 /// Largest defect of a solution, in its units. Corrections are no measure of it where
 /// the linearised equations are singular.
 const LARGEST_DEFECT: f64 = 1e-6;
 
 /// A linearisation is kept while it reduces corrections at least by this factor.
-const KEEP: f64 = 0.1;
+const REUSE_CONTRACTION: f64 = 0.1;
 
 /// Corrections below this multiple of the integration's tolerance need not decrease
 /// further: they are noise of its step control.
-const NOISE: f64 = 1e3;
+const CORRECTION_NOISE_FACTOR: f64 = 1e3;
 
 /// Singular values of the tip's conditions below this part of the largest are
 /// reported as a bifurcation nearby.
@@ -56,34 +56,34 @@ const NEARLY_SINGULAR: f64 = 1e-7;
 
 /// Corrections of a leaf at rest below this that a full step does not reduce are what rounding makes
 /// of perturbations that grow: no part of a step and no other linearisation reduces them.
-const ROUNDED: f64 = 1e-5;
+const CORRECTION_ROUNDING: f64 = 1e-5;
 
 /// Cost of linearisations, in rods times steps of the integration, beyond which Newton's method that
 /// may give up has to converge as it does near a solution: some seconds.
-const MOST_LINEARIZED: usize = 300_000;
+const MAX_LINEARIZATION_COST: usize = 300_000;
 
 /// Parts of steps of a fresh linearisation below which it gives up: a leaf at rest is near.
-const LEAST_PART: f64 = 0.125;
+const MIN_FRESH_DAMPING: f64 = 0.125;
 
 /// The cost of the tissue of a gap in that of a rod.
-const TISSUE: usize = 20;
+const TISSUE_LINEARIZATION_COST: usize = 20;
 
 /// Contraction by a full step near a solution.
-const CONVERGING: f64 = 0.25;
+const CONVERGING_CONTRACTION: f64 = 0.25;
 
 /// Unless perturbations grow by more than this over an interval, which
 /// alone makes the equations nearly singular.
-const LARGEST_GROWTH: f64 = 100.0 * GROWTH;
+const LARGEST_GROWTH: f64 = 100.0 * MAX_INTERVAL_GROWTH;
 
 /// Size of the perturbation along a neutral direction whose effect is computed.
-const NUDGE: f64 = 1e-5;
+const NEUTRAL_PERTURBATION: f64 = 1e-5;
 
 /// Stations at which it is computed.
-const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+const NEUTRAL_STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
 /// Corrections do not decrease; the last one, relative.
-fn no_progress(correction: f64) -> Reason {
-    Reason::NoConvergence {
+fn no_convergence_reason(correction: f64) -> ShootingFailureReason {
+    ShootingFailureReason::NoConvergence {
         correction,
         growth: 0.0,
         fixed: false,
@@ -92,28 +92,28 @@ fn no_progress(correction: f64) -> Reason {
 }
 
 /// The state of a run; its linearisation is kept between calls.
-pub struct Newton<'e, 'a, 'p> {
-    pub equations: &'e Equations<'a>,
-    pub units: Units,
-    pub nodes: Nodes,
+pub struct ShootingNewton<'e, 'a, 'p> {
+    pub equations: &'e BoundaryValueProblem<'a>,
+    pub units: PerturbationUnits,
+    pub nodes: ShootingNodes,
     /// Whether to solve without damping, only if the start is near the solution.
-    pub only_near: bool,
+    pub requires_near_start: bool,
     /// Whether it gives up where it does not converge as it does near a solution.
     pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
     /// Cost of all linearisations.
-    linearized: usize,
+    linearization_cost_sum: usize,
     /// Which of the turns without resistance move something.
-    moved: Vec<bool>,
+    effective_rotations: Vec<bool>,
     /// The last linearisation.
     pub condensed: Option<CondensedEquations>,
     /// Growth of perturbations over each interval, at that linearisation.
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
-    now: Correction,
-    log: &'e mut Log<'p>,
+    progress: CorrectionProgress,
+    log: &'e mut ShootingLog<'p>,
 }
 
 struct Residuals {
@@ -122,65 +122,70 @@ struct Residuals {
     conditions: Vec<f64>,
 }
 
-impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
+impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
     /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
     /// as many as the growth of perturbations needs, if that is possible and
     /// memory allows it.
     pub fn from_trajectory(
-        equations: &'e Equations<'a>,
-        near: &Trajectory,
+        equations: &'e BoundaryValueProblem<'a>,
+        near: &LeafTrajectory,
         intervals: Option<usize>,
-        log: &'e mut Log<'p>,
-    ) -> Result<Self, Reason> {
+        log: &'e mut ShootingLog<'p>,
+    ) -> Result<Self, ShootingFailureReason> {
         let mut nodes = match intervals {
             Some(count) => {
                 let sigma = equally_spaced(count);
-                let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
-                Nodes { sigma, states }
+                let states = sigma[..count]
+                    .iter()
+                    .map(|&sigma| near.interpolate_state(sigma))
+                    .collect();
+                ShootingNodes { sigma, states }
             }
             None => choose_intervals(equations, near)?,
         };
-        memory::shooting(equations.rods(), nodes.states.len())?;
+        memory::check_shooting_memory(equations.rods(), nodes.states.len())?;
         let first = &mut nodes.states[0];
         for j in 0..equations.rods() {
-            let rod = RodState::read(first, j);
-            equations.held_base(j, &rod).write(first, j);
+            let rod = RodState::from_flat_state(first, j);
+            equations
+                .constrained_base(j, &rod)
+                .write_flat_state(first, j);
         }
-        Ok(Newton {
+        Ok(ShootingNewton {
             equations,
-            units: Units::new(equations, near),
+            units: PerturbationUnits::new(equations, near),
             nodes,
-            only_near: false,
+            requires_near_start: false,
             gives_up: false,
             steps: 0,
-            linearized: 0,
-            moved: (equations.turnings().iter())
-                .map(|turning| turns_something(equations, near, turning))
+            linearization_cost_sum: 0,
+            effective_rotations: (equations.turnings().iter())
+                .map(|turning| rotation_moves_leaf(equations, near, turning))
                 .collect(),
             condensed: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
-            now: Correction {
-                way: log.part,
+            progress: CorrectionProgress {
+                lambda: log.lambda,
                 iteration: 0,
                 linearized: 0.0,
                 size: f64::INFINITY,
-                wanted: 0.0,
+                convergence_size: 0.0,
             },
             log,
         })
     }
 
     /// Solves to the accuracy of an integration with `tolerance`.
-    pub fn solve(&mut self, tolerance: f64) -> Result<(), Reason> {
+    pub fn solve(&mut self, tolerance: f64) -> Result<(), ShootingFailureReason> {
         self.iterate(tolerance)
-            .map_err(|reason| self.explained(reason))?;
-        self.lean_down();
+            .map_err(|reason| self.diagnose_failure(reason))?;
+        self.rotate_to_representative();
         Ok(())
     }
 
-    fn iterate(&mut self, tolerance: f64) -> Result<(), Reason> {
-        self.now.wanted = tolerance;
+    fn iterate(&mut self, tolerance: f64) -> Result<(), ShootingFailureReason> {
+        self.progress.convergence_size = tolerance;
         let mut factor: f64 = 1.0;
         let mut fresh = self.condensed.is_none();
         let mut residuals = match fresh {
@@ -189,32 +194,34 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let mut size = f64::INFINITY;
         'iterations: for iteration in 0..MAX_ITERATIONS {
-            self.now.iteration = iteration;
+            self.progress.iteration = iteration;
             let step = self.correction(&residuals);
-            size = size_of(&step);
+            size = largest_component(&step);
             if !size.is_finite() {
                 break;
             }
-            self.now.size = size;
+            self.progress.size = size;
             self.report(1.0);
             factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
-                let trial = self.moved(&step, factor);
+                let trial = self.advanced_nodes(&step, factor);
                 let tried = self.residuals_at(&trial, tolerance);
-                if let Err(Reason::OutOfTime) = tried {
-                    return Err(Reason::OutOfTime);
+                if let Err(ShootingFailureReason::OutOfTime) = tried {
+                    return Err(ShootingFailureReason::OutOfTime);
                 }
                 if let Ok(next) = tried {
-                    let remaining = size_of(&self.correction(&next));
+                    let remaining = largest_component(&self.correction(&next));
                     if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance {
                         break (trial, next, remaining / size);
                     }
                     // Below the noise of the integrator corrections do not decrease.
-                    if size <= NOISE * tolerance && remaining <= NOISE * tolerance {
+                    if size <= CORRECTION_NOISE_FACTOR * tolerance
+                        && remaining <= CORRECTION_NOISE_FACTOR * tolerance
+                    {
                         break (trial, next, 0.0);
                     }
                 }
-                let far = || size <= ROUNDED || 0.5 * factor < LEAST_PART;
+                let far = || size <= CORRECTION_ROUNDING || 0.5 * factor < MIN_FRESH_DAMPING;
                 if self.costs_too_much() || self.gives_up && fresh && far() {
                     break 'iterations;
                 }
@@ -224,7 +231,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                     continue 'iterations;
                 }
                 factor *= 0.5;
-                if factor < LEAST_FACTOR || self.only_near {
+                if factor < LEAST_FACTOR || self.requires_near_start {
                     break 'iterations;
                 }
             };
@@ -232,24 +239,27 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             self.nodes = trial;
             self.defect = next.largest(self.condensed.as_ref());
             let remaining = ratio * size;
-            if factor == 1.0 && (remaining <= tolerance || size <= NOISE * tolerance) {
+            if factor == 1.0
+                && (remaining <= tolerance || size <= CORRECTION_NOISE_FACTOR * tolerance)
+            {
                 let last = self.correction(&next);
-                if size_of(&last) <= NOISE * tolerance {
-                    self.nodes = self.moved(&last, 1.0);
+                if largest_component(&last) <= CORRECTION_NOISE_FACTOR * tolerance {
+                    self.nodes = self.advanced_nodes(&last, 1.0);
                 }
-                return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
+                return match self.defect <= LARGEST_DEFECT.max(CORRECTION_NOISE_FACTOR * tolerance)
+                {
                     true => Ok(()),
-                    false => Err(no_progress(size)),
+                    false => Err(no_convergence_reason(size)),
                 };
             }
-            if self.only_near && ratio > NEAR {
+            if self.requires_near_start && ratio > NEAR_START_CONTRACTION {
                 break;
             }
-            let converges = factor == 1.0 && ratio <= CONVERGING;
+            let converges = factor == 1.0 && ratio <= CONVERGING_CONTRACTION;
             if self.costs_too_much() && !converges {
                 break;
             }
-            let keep = factor == 1.0 && ratio <= KEEP;
+            let keep = factor == 1.0 && ratio <= REUSE_CONTRACTION;
             residuals = if keep {
                 next
             } else {
@@ -257,26 +267,27 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             };
             fresh = !keep;
         }
-        Err(no_progress(size))
+        Err(no_convergence_reason(size))
     }
 
     /// Whether another linearisation would cost too much for what may give up.
     fn costs_too_much(&self) -> bool {
-        self.gives_up && self.linearized + self.cost() > MOST_LINEARIZED
+        self.gives_up
+            && self.linearization_cost_sum + self.linearization_cost() > MAX_LINEARIZATION_COST
     }
 
     /// The cost of a linearisation along the last integration.
-    fn cost(&self) -> usize {
+    fn linearization_cost(&self) -> usize {
         let rods = self.equations.rods();
-        let gaps = if self.equations.is_tied() {
+        let gaps = if self.equations.has_tissue() {
             rods - 1
         } else {
             0
         };
-        self.steps * (rods + TISSUE * gaps)
+        self.steps * (rods + TISSUE_LINEARIZATION_COST * gaps)
     }
 
-    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Reason> {
+    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, ShootingFailureReason> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
@@ -285,33 +296,38 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             !self.equations.limit.reached()
         });
         let Some(responses) = responses else {
-            return Err(Reason::OutOfTime);
+            return Err(ShootingFailureReason::OutOfTime);
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.linearized += self.cost();
-        self.condensed = CondensedEquations::new(self.equations, &self.units, maps, &self.turns());
+        self.linearization_cost_sum += self.linearization_cost();
+        self.condensed = CondensedEquations::new(
+            self.equations,
+            &self.units,
+            maps,
+            &self.zero_energy_changes(),
+        );
         match self.condensed {
             Some(_) => Ok(residuals),
-            None => Err(no_progress(f64::INFINITY)),
+            None => Err(no_convergence_reason(f64::INFINITY)),
         }
     }
 
     /// The changes at the base as veins turn that can without resistance, in the units; none of those
     /// that move nothing.
-    fn turns(&self) -> Vec<Vec<f64>> {
+    fn zero_energy_changes(&self) -> Vec<Vec<f64>> {
         let base = &self.nodes.states[0];
-        let turn = |turning: &Turning| {
+        let turn = |turning: &ZeroEnergyRotation| {
             let (rods, axis) = (&turning.rods, turning.axis);
-            let mut turn = vec![0.0; TANGENT * self.equations.rods()];
+            let mut turn = vec![0.0; PERTURBATION_SIZE * self.equations.rods()];
             for j in rods.clone() {
-                let rod = RodState::read(base, j);
-                let unit = |k: usize| self.units.of(TANGENT * j + k);
+                let rod = RodState::from_flat_state(base, j);
+                let unit = |k: usize| self.units.component_unit(PERTURBATION_SIZE * j + k);
                 let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
-                let [spin, _] = turning.rates(rod.r, rod.q, self.equations.length);
-                let own = &mut turn[TANGENT * j..TANGENT * (j + 1)];
+                let [spin, _] = turning.node_velocity(rod.r, rod.q, self.equations.length_unit);
+                let own = &mut turn[PERTURBATION_SIZE * j..PERTURBATION_SIZE * (j + 1)];
                 // A clamp does not turn.
-                if self.equations.free_at_base() == 3 {
+                if self.equations.first_free_component() == 3 {
                     own[3..6].copy_from_slice(&spin.to_array());
                 }
                 own[6..9].copy_from_slice(&force.to_array());
@@ -319,38 +335,38 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             }
             turn
         };
-        let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > NO_TURN);
+        let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > TURN_LOAD_TOLERANCE);
         let turns = self.turnings().map(turn);
         turns.filter(carries).collect()
     }
 
     /// The turns of the leaf without resistance: on hinges those that moved something in the start.
-    fn turnings(&self) -> impl Iterator<Item = &Turning> {
+    fn turnings(&self) -> impl Iterator<Item = &ZeroEnergyRotation> {
         let turnings = self.equations.turnings().iter().enumerate();
-        let moved = turnings.filter(|(k, _)| self.moved[*k]);
+        let moved = turnings.filter(|(k, _)| self.effective_rotations[*k]);
         moved.map(|(_, turning)| turning)
     }
 
     /// Turns veins that can turn without resistance as those of a relaxed leaf are turned.
-    fn lean_down(&mut self) {
-        let turnings: Vec<Turning> = self.turnings().cloned().collect();
+    fn rotate_to_representative(&mut self) {
+        let turnings: Vec<ZeroEnergyRotation> = self.turnings().cloned().collect();
         for turning in turnings {
             let rods = &turning.rods;
-            let bases = |j: usize| RodState::read(&self.nodes.states[0], j);
-            let natural = self.equations.clamped();
-            let begin = |j: usize| Begin {
-                natural: RodState::read(&natural, j).q,
+            let bases = |j: usize| RodState::from_flat_state(&self.nodes.states[0], j);
+            let natural = self.equations.unstressed_base_state();
+            let begin = |j: usize| BaseRotations {
+                stress_free: RodState::from_flat_state(&natural, j).q,
                 now: bases(j).q,
             };
-            let begins: Vec<Begin> = rods.clone().map(begin).collect();
-            let clamped = self.equations.free_at_base() == 6;
+            let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
+            let clamped = self.equations.first_free_component() == 6;
             let moments = clamped.then(|| rods.clone().map(|j| bases(j).m).sum());
-            let angle = turning.angle_to_lean(&begins, moments);
+            let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
-            let point = turning.point / self.equations.length;
+            let point = turning.point / self.equations.length_unit;
             for (k, state) in self.nodes.states.iter_mut().enumerate() {
                 for j in rods.clone() {
-                    let rod = RodState::read(state, j);
+                    let rod = RodState::from_flat_state(state, j);
                     let turned = RodState {
                         r: point + turn * (rod.r - point),
                         q: turn * rod.q * back,
@@ -358,13 +374,13 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                         m: turn * rod.m,
                     };
                     let turned = match k {
-                        0 => self.equations.held_base(j, &turned),
+                        0 => self.equations.constrained_base(j, &turned),
                         _ => turned,
                     };
-                    turned.write(state, j);
+                    turned.write_flat_state(state, j);
                 }
             }
-            if angle.abs() > SAME_LINEARIZATION {
+            if angle.abs() > RELINEARIZATION_ANGLE {
                 self.condensed = None;
             }
         }
@@ -372,26 +388,30 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
 
     /// Reports progress, with this part of the linearisation done.
     fn report(&mut self, linearized: f64) {
-        self.now.linearized = linearized;
-        (self.log.progress)(&self.now);
+        self.progress.linearized = linearized;
+        (self.log.progress)(&self.progress);
     }
 
-    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Reason> {
+    fn residuals_at(
+        &mut self,
+        nodes: &ShootingNodes,
+        tolerance: f64,
+    ) -> Result<Residuals, ShootingFailureReason> {
         let integrated = self.integrate(nodes, tolerance, false)?;
         Ok(self.residuals(nodes, &integrated))
     }
 
     fn integrate(
         &mut self,
-        nodes: &Nodes,
+        nodes: &ShootingNodes,
         tolerance: f64,
         linear: bool,
-    ) -> Result<Vec<Integrated>, Reason> {
+    ) -> Result<Vec<IntegratedInterval>, ShootingFailureReason> {
         if self.equations.limit.reached() {
-            return Err(Reason::OutOfTime);
+            return Err(ShootingFailureReason::OutOfTime);
         }
         let integrated = integrate(self.equations, nodes, tolerance, linear)?;
-        self.steps = integrated.iter().map(|interval| interval.count).sum();
+        self.steps = integrated.iter().map(|interval| interval.step_count).sum();
         self.log.work.steps += self.steps;
         for interval in &integrated {
             self.log.work.slopes += interval.evaluations;
@@ -399,23 +419,26 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         Ok(integrated)
     }
 
-    fn residuals(&self, nodes: &Nodes, integrated: &[Integrated]) -> Residuals {
+    fn residuals(&self, nodes: &ShootingNodes, integrated: &[IntegratedInterval]) -> Residuals {
         let (last, inner) = integrated.split_last().expect("there is an interval");
         Residuals {
             defects: (inner.iter().zip(&nodes.states[1..]))
-                .map(|(interval, begin)| self.units.difference(&interval.end, begin))
+                .map(|(interval, begin)| self.units.difference(&interval.end_state, begin))
                 .collect(),
-            conditions: self.equations.tip_conditions(&last.end),
+            conditions: self.equations.tip_conditions(&last.end_state),
         }
     }
 
     fn correction(&self, residuals: &Residuals) -> Vec<Vec<f64>> {
         let condensed = self.condensed.as_ref().expect("linearised before");
-        condensed.solve(&residuals.defects, &condensed.scaled(&residuals.conditions))
+        condensed.solve(
+            &residuals.defects,
+            &condensed.scaled_tip_conditions(&residuals.conditions),
+        )
     }
 
     /// The unknowns plus `factor` times a step.
-    fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
+    fn advanced_nodes(&self, step: &[Vec<f64>], factor: f64) -> ShootingNodes {
         let mut nodes = self.nodes.clone();
         for (y, increment) in nodes.states.iter_mut().zip(step) {
             self.units.advance(y, increment, factor);
@@ -426,38 +449,48 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
 
 impl Residuals {
     fn largest(&self, condensed: Option<&CondensedEquations>) -> f64 {
-        let tip = condensed.map(|condensed| condensed.scaled(&self.conditions));
+        let tip = condensed.map(|condensed| condensed.scaled_tip_conditions(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();
         largest(defects.map(|value| value.abs()))
     }
 }
 
 /// Whether a turn moves something of the leaf at the start; for clamped veins their forces tell it.
-fn turns_something(equations: &Equations, near: &Trajectory, turning: &Turning) -> bool {
-    let stations = STATIONS.iter().map(|sigma| near.at(*sigma));
+fn rotation_moves_leaf(
+    equations: &BoundaryValueProblem,
+    near: &LeafTrajectory,
+    turning: &ZeroEnergyRotation,
+) -> bool {
+    let stations = NEUTRAL_STATIONS
+        .iter()
+        .map(|sigma| near.interpolate_state(*sigma));
     let states: Vec<Vec<f64>> = stations.collect();
-    let of_rod = |j: usize| states.iter().map(move |y| RodState::read(y, j).r);
+    let of_rod = |j: usize| {
+        states
+            .iter()
+            .map(move |y| RodState::from_flat_state(y, j).r)
+    };
     let points: Vec<DVec3> = turning.rods.clone().flat_map(of_rod).collect();
-    let point = turning.point / equations.length;
-    turning.own < 0.0 || turning.moves(&points, point, ON_AXIS)
+    let point = turning.point / equations.length_unit;
+    turning.section_rate < 0.0 || turning.moves_something(&points, point, AXIS_DISTANCE_TOLERANCE)
 }
 
 /// The largest component of an increment.
-fn size_of(step: &[Vec<f64>]) -> f64 {
+fn largest_component(step: &[Vec<f64>]) -> f64 {
     largest(step.iter().flatten().map(|value| value.abs()))
 }
 
-impl Newton<'_, '_, '_> {
+impl ShootingNewton<'_, '_, '_> {
     /// Smallest singular value of the condensed equations over the largest.
-    pub fn condition(&self) -> f64 {
+    pub fn singular_value_ratio(&self) -> f64 {
         self.condensed
             .as_ref()
-            .map_or(1.0, |condensed| condensed.condition())
+            .map_or(1.0, |condensed| condensed.singular_value_ratio())
     }
 
     /// Why there is no convergence, as far as the last linearisation shows it.
-    pub(super) fn explained(&self, reason: Reason) -> Reason {
-        let Reason::NoConvergence {
+    pub(super) fn diagnose_failure(&self, reason: ShootingFailureReason) -> ShootingFailureReason {
+        let ShootingFailureReason::NoConvergence {
             correction,
             fixed,
             from_leaf,
@@ -466,16 +499,16 @@ impl Newton<'_, '_, '_> {
         else {
             return reason;
         };
-        match self.neutral(&STATIONS) {
-            Some(neutral) => Reason::Singular(neutral),
-            None if self.gives_up => Reason::Rounding {
+        match self.neutral(&NEUTRAL_STATIONS) {
+            Some(neutral) => ShootingFailureReason::Singular(neutral),
+            None if self.gives_up => ShootingFailureReason::Rounding {
                 correction,
                 growth: self.growth.iter().map(|growth| growth.log10()).sum(),
             },
             None => {
                 let growths = self.growth.iter().map(|growth| growth.log10());
                 let growth = largest(growths);
-                Reason::NoConvergence {
+                ShootingFailureReason::NoConvergence {
                     correction,
                     growth,
                     fixed,
@@ -487,16 +520,25 @@ impl Newton<'_, '_, '_> {
 
     /// The neutral direction, if the equations are nearly singular: the effect on the rods of a
     /// small perturbation along it.
-    pub fn neutral(&self, stations: &[f64]) -> Option<Neutral> {
+    pub fn neutral(&self, stations: &[f64]) -> Option<NeutralDirection> {
         let trusted = self.growth.iter().all(|growth| *growth < LARGEST_GROWTH);
         let condensed = self.condensed.as_ref()?;
-        if !trusted || condensed.condition() > NEARLY_SINGULAR {
+        if !trusted || condensed.singular_value_ratio() > NEARLY_SINGULAR {
             return None;
         }
-        let direction = condensed.null();
-        let nudged = self.moved(&direction, NUDGE / size_of(&direction));
-        let sampled =
-            |nodes: &Nodes| Trajectory::sampled(self.equations, nodes, stations, NUDGE * NUDGE);
+        let direction = condensed.least_determined_direction();
+        let nudged = self.advanced_nodes(
+            &direction,
+            NEUTRAL_PERTURBATION / largest_component(&direction),
+        );
+        let sampled = |nodes: &ShootingNodes| {
+            LeafTrajectory::sample_solution(
+                self.equations,
+                nodes,
+                stations,
+                NEUTRAL_PERTURBATION * NEUTRAL_PERTURBATION,
+            )
+        };
         let (at, perturbed) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
         let (at, perturbed) = (at.shape(self.equations), perturbed.shape(self.equations));
         let mut displacement: Vec<Vec<DVec3>> = (at.iter().zip(&perturbed))
@@ -510,8 +552,8 @@ impl Newton<'_, '_, '_> {
         for displacement in displacement.iter_mut().flatten() {
             *displacement /= most;
         }
-        Some(Neutral {
-            ratio: self.condition(),
+        Some(NeutralDirection {
+            ratio: self.singular_value_ratio(),
             displacement,
         })
     }

@@ -6,10 +6,12 @@
 //! derivatives, from which forces, moments and their linearisation follow. It shares only the
 //! natural leaf with the element of the relaxation.
 
-use crate::natural::{A, B, C, Natural, STAGES};
+use crate::natural::{Natural, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::scenario::{Profile, Scenario};
-use crate::shooting::equations::{Derivatives, Equations, RodState, TANGENT};
-use crate::shooting::integrate::{Integrator, combine};
+use crate::shooting::equations::{
+    BoundaryValueProblem, PERTURBATION_SIZE, RodState, SlopeDerivatives,
+};
+use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{SMatrix, SVector};
 use num_dual::{DualNum, gradient, hessian};
@@ -19,17 +21,23 @@ use std::ops::Range;
 pub struct LinearStep {
     width: f64,
     /// Stage by stage, rod by rod.
-    derivatives: Vec<Derivatives>,
+    derivatives: Vec<SlopeDerivatives>,
     /// Of the tissue, stage by stage, gap by gap; empty if there is none.
-    tissue: Vec<Tangent>,
+    tissue: Vec<TissueTangent>,
 }
 
 impl LinearStep {
     /// For the last step of the integrator.
-    pub fn of(equations: &Equations, integrator: &Integrator) -> Self {
-        let (width, begin) = (integrator.width, integrator.sigma - integrator.width);
+    pub fn from_last_step(
+        equations: &BoundaryValueProblem,
+        integrator: &InitialValueIntegrator,
+    ) -> Self {
+        let (width, begin) = (
+            integrator.last_step,
+            integrator.sigma - integrator.last_step,
+        );
         let gap = |(i, g): (usize, usize)| {
-            let sigma = begin + C[i] * width;
+            let sigma = begin + STAGE_NODES[i] * width;
             equations.tissue_tangent(g, sigma, &integrator.stages[i])
         };
         let gaps = (0..STAGES).flat_map(|i| (1..equations.rods()).map(move |j| (i, j - 1)));
@@ -38,7 +46,7 @@ impl LinearStep {
             width,
             derivatives: (0..STAGES)
                 .flat_map(|i| {
-                    let (y, sigma) = (&integrator.stages[i], begin + C[i] * width);
+                    let (y, sigma) = (&integrator.stages[i], begin + STAGE_NODES[i] * width);
                     (0..equations.rods()).map(move |j| equations.derivatives(j, sigma, y))
                 })
                 .collect(),
@@ -47,69 +55,81 @@ impl LinearStep {
 }
 
 /// Perturbations of `W` different kinds of a range of rods, all others being
-/// fixed: [`TANGENT`] rows of `W` numbers per rod.
+/// fixed: [`PERTURBATION_SIZE`] rows of `W` numbers per rod.
 #[derive(Clone, Debug)]
 pub struct Perturbations<const W: usize> {
     pub rods: Range<usize>,
     /// Row after row.
-    pub all: Vec<f64>,
+    pub entries: Vec<f64>,
     stage: Vec<f64>,
     slopes: Vec<Vec<f64>>,
 }
 
 impl<const W: usize> Perturbations<W> {
     /// Unit perturbations of the `W` components of rod `j` from the `first` on.
-    pub fn unit(rods: Range<usize>, j: usize, first: usize) -> Self {
-        let mut all = vec![0.0; TANGENT * rods.len() * W];
+    pub fn unit_perturbations(rods: Range<usize>, j: usize, first: usize) -> Self {
+        let mut all = vec![0.0; PERTURBATION_SIZE * rods.len() * W];
         for k in 0..W {
-            all[(TANGENT * (j - rods.start) + first + k) * W + k] = 1.0;
+            all[(PERTURBATION_SIZE * (j - rods.start) + first + k) * W + k] = 1.0;
         }
         Perturbations {
             rods,
             stage: all.clone(),
             slopes: vec![all.clone(); STAGES],
-            all,
+            entries: all,
         }
     }
 
     pub fn rows(&self) -> &[[f64; W]] {
-        self.all.as_chunks().0
+        self.entries.as_chunks().0
     }
 
     /// Propagates them through a step.
-    pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
+    pub fn propagate(&mut self, equations: &BoundaryValueProblem, step: &LinearStep) {
         for i in 0..STAGES {
-            combine(&self.all, step.width, A[i], &self.slopes, &mut self.stage);
+            weighted_slope_sum(
+                &self.entries,
+                step.width,
+                STAGE_WEIGHTS[i],
+                &self.slopes,
+                &mut self.stage,
+            );
             let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
             let (stage, out) = (self.stage.as_chunks().0, self.slopes[i].as_chunks_mut().0);
-            slopes::<W>(equations, derivatives, self.rods.start, stage, out);
+            linearized_slopes::<W>(equations, derivatives, self.rods.start, stage, out);
             if !step.tissue.is_empty() {
                 let gaps = equations.rods() - 1;
                 let tissue = &step.tissue[i * gaps..(i + 1) * gaps];
                 add_tissue::<W>(tissue, self.rods.clone(), stage, out);
             }
         }
-        combine(&self.all, step.width, &B, &self.slopes, &mut self.stage);
-        std::mem::swap(&mut self.all, &mut self.stage);
+        weighted_slope_sum(
+            &self.entries,
+            step.width,
+            &RESULT_WEIGHTS,
+            &self.slopes,
+            &mut self.stage,
+        );
+        std::mem::swap(&mut self.entries, &mut self.stage);
     }
 }
 
 /// The linearised equations of rods `first..`.
-fn slopes<const W: usize>(
-    equations: &Equations,
-    derivatives: &[Derivatives],
+fn linearized_slopes<const W: usize>(
+    equations: &BoundaryValueProblem,
+    derivatives: &[SlopeDerivatives],
     first: usize,
     rows: &[[f64; W]],
     slopes: &mut [[f64; W]],
 ) {
     for (j, d) in derivatives.iter().enumerate() {
-        let at = TANGENT * j;
+        let at = PERTURBATION_SIZE * j;
         let part = |k: usize| &rows[at + 3 * k..at + 3 * k + 3];
         let (theta, n, m) = (part(1), part(2), part(3));
-        let out = &mut slopes[at..at + TANGENT];
-        products(&mut out[0..3], [(&d.r_theta, theta), (&d.r_n, n)]);
-        products(&mut out[3..6], [(&d.theta_theta, theta), (&d.theta_m, m)]);
-        products(&mut out[9..12], [(&d.m_theta, theta), (&d.m_n, n)]);
+        let out = &mut slopes[at..at + PERTURBATION_SIZE];
+        sum_products(&mut out[0..3], [(&d.r_theta, theta), (&d.r_n, n)]);
+        sum_products(&mut out[3..6], [(&d.theta_theta, theta), (&d.theta_m, m)]);
+        sum_products(&mut out[9..12], [(&d.m_theta, theta), (&d.m_n, n)]);
         for k in 0..3 {
             let mut force = [0.0; W];
             // A rod outside the range is fixed, but its coupling still acts.
@@ -119,7 +139,8 @@ fn slopes<const W: usize>(
                     return;
                 }
                 for w in 0..W {
-                    let other = neighbour.map_or(0.0, |other| rows[TANGENT * other + k][w]);
+                    let other =
+                        neighbour.map_or(0.0, |other| rows[PERTURBATION_SIZE * other + k][w]);
                     force[w] += kappa * (rows[at + k][w] - other);
                 }
             };
@@ -138,17 +159,17 @@ fn slopes<const W: usize>(
 /// Adds what the tissue contributes to the linearised equations of these rods; rods outside are
 /// fixed.
 fn add_tissue<const W: usize>(
-    tissue: &[Tangent],
+    tissue: &[TissueTangent],
     rods: Range<usize>,
     rows: &[[f64; W]],
     slopes: &mut [[f64; W]],
 ) {
-    for (g, Tangent(matrix)) in tissue.iter().enumerate() {
+    for (g, TissueTangent(matrix)) in tissue.iter().enumerate() {
         // Displacements and rotations of both rods, where the rows of their forces and moments are.
         let place = |k: usize| {
             let j = g + k / 6;
             rods.contains(&j)
-                .then(|| TANGENT * (j - rods.start) + k % 6)
+                .then(|| PERTURBATION_SIZE * (j - rods.start) + k % 6)
         };
         for r in 0..12 {
             let Some(out) = place(r) else { continue };
@@ -164,7 +185,7 @@ fn add_tissue<const W: usize>(
 
 /// out = sum of matrix times rows.
 #[inline]
-fn products<const W: usize>(out: &mut [[f64; W]], terms: [(&DMat3, &[[f64; W]]); 2]) {
+fn sum_products<const W: usize>(out: &mut [[f64; W]], terms: [(&DMat3, &[[f64; W]]); 2]) {
     for r in 0..3 {
         let mut sum = [0.0; W];
         for (matrix, rows) in terms {
@@ -180,7 +201,7 @@ fn products<const W: usize>(out: &mut [[f64; W]], terms: [(&DMat3, &[[f64; W]]);
 }
 
 /// The rods coupled with rod `j`, directly or through others.
-pub fn group(equations: &Equations, j: usize) -> Range<usize> {
+pub fn coupled_rods(equations: &BoundaryValueProblem, j: usize) -> Range<usize> {
     let mut group = j..j + 1;
     while group.start > 0 && equations.coupled(group.start - 1) {
         group.start -= 1;
@@ -192,24 +213,24 @@ pub fn group(equations: &Equations, j: usize) -> Range<usize> {
 }
 
 /// Numbers that perturb the two rods at a gap: displacement and spatial rotation of either.
-const BOTH: usize = 12;
+const PAIR_PERTURBATION_SIZE: usize = 12;
 
 /// Numbers that turn both.
 const TURNS: usize = 6;
 
 /// A rod's force and moment by the tissue of a gap.
-pub type Load = [DVec3; 2];
+pub type TissueLoad = [DVec3; 2];
 
 /// The linearised loads of a gap: minus the derivatives of forces and moments on both rods (rows)
 /// with respect to displacements and spatial rotations of both.
 #[derive(Clone, Copy, Debug)]
-pub struct Tangent(pub SMatrix<f64, BOTH, BOTH>);
+pub struct TissueTangent(pub SMatrix<f64, PAIR_PERTURBATION_SIZE, PAIR_PERTURBATION_SIZE>);
 
 /// The tissue of a leaf, dimensionless.
 #[derive(Clone, Debug)]
-pub struct Tissue<'a> {
+pub struct TissueEnergy<'a> {
     gaps: &'a [crate::scenario::Tissue],
-    natural: Natural<'a>,
+    stress_free: Natural<'a>,
     /// Unit of length.
     length: f64,
     /// Of every gap the factors that make k and c_1 those per unit of sigma.
@@ -217,11 +238,11 @@ pub struct Tissue<'a> {
 }
 
 /// A number with its derivatives.
-trait Number: DualNum<Primitive = f64> + Copy {}
+trait DifferentiableNumber: DualNum<Primitive = f64> + Copy {}
 
-impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
+impl<D: DualNum<Primitive = f64> + Copy> DifferentiableNumber for D {}
 
-impl<'a> Tissue<'a> {
+impl<'a> TissueEnergy<'a> {
     /// Of a scenario with these units of length and force; `None` if it has none.
     pub fn new(scenario: &'a Scenario, length: f64, force: f64) -> Option<Self> {
         let gaps = scenario.tissue.as_ref()?;
@@ -230,8 +251,8 @@ impl<'a> Tissue<'a> {
             let k = mean * length * length / force;
             [k, k, k, mean / force]
         });
-        Some(Tissue {
-            natural: Natural::new(scenario, scenario.tissue_grown),
+        Some(TissueEnergy {
+            stress_free: Natural::new(scenario, scenario.tissue_grown),
             length,
             gaps,
             factors: factors.collect(),
@@ -252,26 +273,31 @@ impl<'a> Tissue<'a> {
     }
 
     /// The strains of the natural leaf in gap `g` at `sigma`.
-    fn at_rest(&self, g: usize, sigma: f64) -> [f64; 4] {
-        let [a, b] = [g, g + 1].map(|j| self.natural.at(j, sigma));
+    fn rest_strains(&self, g: usize, sigma: f64) -> [f64; 4] {
+        let [a, b] = [g, g + 1].map(|j| self.stress_free.vein_pose(j, sigma));
         let rods = [a, b].map(|(x, q)| (x / self.length, q));
         strains::<f64>(&SVector::zeros(), &rods)
     }
 
     /// The energy of gap `g` and its loads on both rods.
-    pub fn loads(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> (f64, [Load; 2]) {
-        let (rest, rods) = (self.at_rest(g, sigma), rods.map(|rod| (rod.r, rod.q)));
+    pub fn energy_and_loads(
+        &self,
+        g: usize,
+        sigma: f64,
+        rods: [&RodState; 2],
+    ) -> (f64, [TissueLoad; 2]) {
+        let (rest, rods) = (self.rest_strains(g, sigma), rods.map(|rod| (rod.r, rod.q)));
         let k = self.stiffness(g, sigma);
         let energy = |z| energy(&k, &rest, &z, &rods);
-        let (energy, slopes) = gradient(energy, &SVector::<f64, BOTH>::zeros());
+        let (energy, slopes) = gradient(energy, &SVector::<f64, PAIR_PERTURBATION_SIZE>::zeros());
         let vector = |k: usize| -DVec3::from_slice(&slopes.as_slice()[k..k + 3]);
         (energy, [0, 6].map(|k| [vector(k), vector(k + 3)]))
     }
 
     /// The linearised loads of gap `g`: strains are linear in displacements, so that only rotations
     /// need second derivatives.
-    pub fn tangent(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> Tangent {
-        let rest = self.at_rest(g, sigma);
+    pub fn tangent(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> TissueTangent {
+        let rest = self.rest_strains(g, sigma);
         let k = self.stiffness(g, sigma);
         let apart = rods[1].r - rods[0].r;
         let turned = |z: SVector<_, TURNS>| turned(&z, rods.map(|rod| rod.q));
@@ -304,7 +330,7 @@ impl<'a> Tissue<'a> {
                 turns_turns[(first + c, first + r)] += 0.5 * value;
             }
         }
-        let mut second = SMatrix::<f64, BOTH, BOTH>::zeros();
+        let mut second = SMatrix::<f64, PAIR_PERTURBATION_SIZE, PAIR_PERTURBATION_SIZE>::zeros();
         for (rod, sign) in [(0, -1.0), (1, 1.0)] {
             for (other, other_sign) in [(0, -1.0), (1, 1.0)] {
                 let (at, to) = (6 * rod, 6 * other);
@@ -322,15 +348,15 @@ impl<'a> Tissue<'a> {
                     .copy_from(&turns);
             }
         }
-        Tangent(second)
+        TissueTangent(second)
     }
 }
 
 /// The energy of a gap with the stiffnesses `k`, whose strains at rest are `rest`.
-fn energy<D: Number>(
+fn energy<D: DifferentiableNumber>(
     k: &[f64; 4],
     rest: &[f64; 4],
-    z: &SVector<D, BOTH>,
+    z: &SVector<D, PAIR_PERTURBATION_SIZE>,
     rods: &[(DVec3, DQuat); 2],
 ) -> D {
     let strains = strains(z, rods);
@@ -341,7 +367,10 @@ fn energy<D: Number>(
 }
 
 /// R^T (r_1 - r_0), R being the mean rotation, and the rotation between both about its first axis.
-fn strains<D: Number>(z: &SVector<D, BOTH>, rods: &[(DVec3, DQuat); 2]) -> [D; 4] {
+fn strains<D: DifferentiableNumber>(
+    z: &SVector<D, PAIR_PERTURBATION_SIZE>,
+    rods: &[(DVec3, DQuat); 2],
+) -> [D; 4] {
     let turns = SVector::from_fn(|k, _| z[3 + k + k / 3 * 3]);
     let (frame, fold) = turned(&turns, rods.map(|(_, q)| q));
     let apart = rods[1].0 - rods[0].0;
@@ -352,7 +381,7 @@ fn strains<D: Number>(z: &SVector<D, BOTH>, rods: &[(DVec3, DQuat); 2]) -> [D; 4
 
 /// The columns of R, the mean of two rotations turned by `z`, and the rotation between both about its first
 /// axis.
-fn turned<D: Number>(z: &SVector<D, TURNS>, rods: [DQuat; 2]) -> ([[D; 3]; 3], D) {
+fn turned<D: DifferentiableNumber>(z: &SVector<D, TURNS>, rods: [DQuat; 2]) -> ([[D; 3]; 3], D) {
     let one = D::one();
     let rotated = |first: usize, q: DQuat| -> [D; 4] {
         let t = [z[first], z[first + 1], z[first + 2]];
@@ -394,7 +423,7 @@ fn turned<D: Number>(z: &SVector<D, TURNS>, rods: [DQuat; 2]) -> ([[D; 3]; 3], D
 }
 
 /// The product of quaternions (x, y, z, w).
-fn product<D: Number>(a: [D; 4], b: [D; 4]) -> [D; 4] {
+fn product<D: DifferentiableNumber>(a: [D; 4], b: [D; 4]) -> [D; 4] {
     [
         a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
         a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2],
@@ -408,7 +437,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::scenario::{Hold, Scenario};
+    use crate::scenario::{Scenario, SupportKind};
     use crate::shooting::equations::RodState;
 
     const END: f64 = 0.8;
@@ -427,8 +456,8 @@ mod tests {
     }
 
     /// An arbitrary state of all rods, not at the clamp.
-    fn begin(equations: &Equations) -> Vec<f64> {
-        let mut y = vec![0.0; equations.size()];
+    fn begin(equations: &BoundaryValueProblem) -> Vec<f64> {
+        let mut y = vec![0.0; equations.state_size()];
         for j in 0..3 {
             let side = j as f64 - 0.7;
             RodState {
@@ -437,7 +466,7 @@ mod tests {
                 n: DVec3::new(2.0, side, -1.0),
                 m: DVec3::new(0.5, -side, 2.0),
             }
-            .write(&mut y, j);
+            .write_flat_state(&mut y, j);
         }
         y
     }
@@ -445,7 +474,7 @@ mod tests {
     /// The state with the `k`-th component of rod `j` perturbed.
     fn perturbed(y: &[f64], j: usize, k: usize, by: f64) -> Vec<f64> {
         let mut y = y.to_vec();
-        let mut rod = RodState::read(&y, j);
+        let mut rod = RodState::from_flat_state(&y, j);
         let change = by * DVec3::AXES[k % 3];
         match k / 3 {
             0 => rod.r += change,
@@ -453,19 +482,22 @@ mod tests {
             2 => rod.n += change,
             _ => rod.m += change,
         }
-        rod.write(&mut y, j);
+        rod.write_flat_state(&mut y, j);
         y
     }
 
-    fn end(equations: &Equations, y: Vec<f64>) -> Vec<f64> {
-        let mut integrator = Integrator::new(equations, 0.0, y, 1e-13);
+    fn integrate_to_end(equations: &BoundaryValueProblem, y: Vec<f64>) -> Vec<f64> {
+        let mut integrator = InitialValueIntegrator::new(equations, 0.0, y, 1e-13);
         integrator.run(END, |_| ()).unwrap();
         integrator.y
     }
 
-    fn differences(equations: &Equations, a: &[f64], b: &[f64]) -> Vec<f64> {
+    fn differences(equations: &BoundaryValueProblem, a: &[f64], b: &[f64]) -> Vec<f64> {
         let of_rod = |j: usize| {
-            let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+            let (a, b) = (
+                RodState::from_flat_state(a, j),
+                RodState::from_flat_state(b, j),
+            );
             let turn = (a.q * b.q.conjugate()).to_scaled_axis();
             [a.r - b.r, turn, a.n - b.n, a.m - b.m]
         };
@@ -475,13 +507,17 @@ mod tests {
 
     /// Responses of its group to unit perturbations of rod `j`.
     fn linear<const W: usize>(
-        equations: &Equations,
+        equations: &BoundaryValueProblem,
         (j, first): (usize, usize),
     ) -> Perturbations<W> {
-        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j, first);
-        let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);
-        let mut advance = |integrator: &Integrator| {
-            perturbations.advance(equations, &LinearStep::of(equations, integrator));
+        let mut perturbations =
+            Perturbations::<W>::unit_perturbations(coupled_rods(equations, j), j, first);
+        let mut integrator = InitialValueIntegrator::new(equations, 0.0, begin(equations), 1e-12);
+        let mut advance = |integrator: &InitialValueIntegrator| {
+            perturbations.propagate(
+                equations,
+                &LinearStep::from_last_step(equations, integrator),
+            );
         };
         integrator.run(END, &mut advance).unwrap();
         perturbations
@@ -491,22 +527,22 @@ mod tests {
     #[test]
     fn sensitivities_are_the_derivatives_of_the_integration() {
         let scenario = three();
-        let equations = Equations::new(&scenario);
+        let equations = BoundaryValueProblem::new(&scenario);
         let begin = begin(&equations);
         for j in 0..3 {
-            let linear = linear::<TANGENT>(&equations, (j, 0));
+            let linear = linear::<PERTURBATION_SIZE>(&equations, (j, 0));
             assert_eq!(linear.rods, if j < 2 { 0..2 } else { 2..3 });
-            for k in 0..TANGENT {
+            for k in 0..PERTURBATION_SIZE {
                 let central = |h: f64| {
-                    let side = |h| end(&equations, perturbed(&begin, j, k, h));
+                    let side = |h| integrate_to_end(&equations, perturbed(&begin, j, k, h));
                     differences(&equations, &side(h), &side(-h))
                 };
                 let (wide, narrow) = (central(2e-3), central(1e-3));
                 for (i, (wide, narrow)) in wide.iter().zip(&narrow).enumerate() {
                     let slope = (8.0 * narrow - wide) / 12e-3;
-                    let rod = i / TANGENT;
+                    let rod = i / PERTURBATION_SIZE;
                     let found = match linear.rods.contains(&rod) {
-                        true => linear.rows()[i - TANGENT * linear.rods.start][k],
+                        true => linear.rows()[i - PERTURBATION_SIZE * linear.rods.start][k],
                         false => 0.0,
                     };
                     let what = format!("number {i} by {k} of rod {j}: {found}, {slope}");
@@ -519,11 +555,11 @@ mod tests {
     #[test]
     fn at_the_base_six_components_are_perturbed() {
         let mut scenario = three();
-        for (held, free) in [(Hold::Clamped, 6), (Hold::Pinned, 3)] {
+        for (held, free) in [(SupportKind::Clamped, 6), (SupportKind::Pinned, 3)] {
             scenario.base_held = held;
-            let equations = Equations::new(&scenario);
-            let all = linear::<TANGENT>(&equations, (1, 0));
-            let some = linear::<6>(&equations, (1, equations.free_at_base()));
+            let equations = BoundaryValueProblem::new(&scenario);
+            let all = linear::<PERTURBATION_SIZE>(&equations, (1, 0));
+            let some = linear::<6>(&equations, (1, equations.first_free_component()));
             for (all, some) in all.rows().iter().zip(some.rows()) {
                 assert_eq!(all[free..free + 6], some[..]);
             }
@@ -533,13 +569,13 @@ mod tests {
     #[test]
     fn coupled_rods_are_a_group() {
         let mut scenario = three();
-        assert_eq!(group(&Equations::new(&scenario), 0), 0..2);
+        assert_eq!(coupled_rods(&BoundaryValueProblem::new(&scenario), 0), 0..2);
         scenario.coupling[1] = [0.0, 1e-9, 0.0];
         for j in 0..3 {
-            assert_eq!(group(&Equations::new(&scenario), j), 0..3);
+            assert_eq!(coupled_rods(&BoundaryValueProblem::new(&scenario), j), 0..3);
         }
         scenario.coupling[0] = [0.0; 3];
-        let groups = [0, 1, 2].map(|j| group(&Equations::new(&scenario), j));
+        let groups = [0, 1, 2].map(|j| coupled_rods(&BoundaryValueProblem::new(&scenario), j));
         assert_eq!(groups, [0..1, 1..3, 1..3]);
     }
 }

@@ -4,51 +4,52 @@
 //! that rests in arcs, whose solution is known, to the scenario's.
 
 use crate::homotopy::Homotopy;
-use crate::run::Unmodelled;
-use crate::scenario::{Hold, Scenario, longest};
+use crate::run::UnmodelledFeature;
+use crate::scenario::{Scenario, SupportKind, longest};
 use crate::shape::{Difference, equally_spaced};
-use crate::shooting::equations::Equations;
-use crate::shooting::integrate::Trajectory;
-use crate::shooting::newton::Newton;
+use crate::shooting::equations::BoundaryValueProblem;
+use crate::shooting::integrate::LeafTrajectory;
+use crate::shooting::newton::ShootingNewton;
 use crate::shooting::{
-    Correction, Failure, Log, Options, Precision, Reason, Solution, Start, Work,
+    CorrectionProgress, RequiredPrecision, ShootingCounts, ShootingFailure, ShootingFailureReason,
+    ShootingLog, ShootingOptions, ShootingSolution, ShootingStart,
 };
 
 /// The error is estimated by comparison with a solution whose local errors may
 /// be larger by this factor.
-const COARSER: f64 = 100.0;
+const COMPARISON_TOLERANCE_FACTOR: f64 = 100.0;
 
 /// Local error allowed per step of the integration, as a part of the required
 /// accuracy, and its bounds: below them rounding dominates, above them step control
 /// becomes unreliable.
-const LOCAL_PART: f64 = 1e-4;
+const LOCAL_ERROR_FRACTION: f64 = 1e-4;
 
-const LEAST_LOCAL: f64 = 1e-13;
+const MIN_LOCAL_ERROR: f64 = 1e-13;
 
-const MOST_LOCAL: f64 = 1e-9;
+const MAX_LOCAL_ERROR: f64 = 1e-9;
 
 /// Factor between attempts to reach the accuracy.
-const SHARPER: f64 = 1e-2;
+const SHARPENING_FACTOR: f64 = 1e-2;
 
 /// Refuses scenarios with what the boundary-value problem does not contain and, unless the start is
 /// a leaf at rest, those to which the continuation from arcs does not lead.
 ///
 /// [`solve`] refuses them itself: whoever asks before saves a relaxation.
-pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodelled> {
+pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), UnmodelledFeature> {
     if !scenario.grips.is_empty() {
-        return Err(Unmodelled::Grips { what: "shooting" });
+        return Err(UnmodelledFeature::Grips { what: "shooting" });
     }
     if scenario.wind.is_some() {
-        return Err(Unmodelled::Wind { what: "shooting" });
+        return Err(UnmodelledFeature::Wind { what: "shooting" });
     }
-    let from_arcs = |why| Err(Unmodelled::FromArcs { why });
+    let from_arcs = |why| Err(UnmodelledFeature::FromArcs { why });
     if from_rest {
         return Ok(());
     }
     if scenario.joined && scenario.rods.len() > 1 && !scenario.is_fan() {
         return from_arcs("veins that begin apart are led to their joint tip by the relaxation");
     }
-    if scenario.base_held == Hold::Pinned {
+    if scenario.base_held == SupportKind::Pinned {
         // Without loads the leaf of arcs turns about its hinges.
         return from_arcs("a leaf on hinges (leaf.base_held) is led to rest by the relaxation");
     }
@@ -62,16 +63,16 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
 /// If no solution is found at all: the reason, and the last shape.
 pub fn solve(
     scenario: &Scenario,
-    options: &Options,
-    progress: &mut dyn FnMut(&Correction),
-) -> Result<Solution, Failure> {
+    options: &ShootingOptions,
+    progress: &mut dyn FnMut(&CorrectionProgress),
+) -> Result<ShootingSolution, ShootingFailure> {
     let accuracy = match options.precision {
-        Precision::Error(accuracy) => accuracy,
-        Precision::LocalError(tolerance) => {
+        RequiredPrecision::EstimatedError(accuracy) => accuracy,
+        RequiredPrecision::LocalError(tolerance) => {
             return solve_once(scenario, options.start, tolerance, options, progress);
         }
     };
-    let tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
+    let tolerance = (LOCAL_ERROR_FRACTION * accuracy).clamp(MIN_LOCAL_ERROR, MAX_LOCAL_ERROR);
     let solution = solve_once(scenario, options.start, tolerance, options, progress)?;
     let enough = accuracy * longest(&scenario.rods);
     Ok(sharpened(
@@ -80,7 +81,7 @@ pub fn solve(
         enough,
         |solution, tolerance| {
             let (stations, rods) = (options.stations, &solution.rods[..]);
-            let start = Start::Leaf { stations, rods };
+            let start = ShootingStart::Leaf { stations, rods };
             solve_once(scenario, start, tolerance, options, progress)
         },
     ))
@@ -89,13 +90,13 @@ pub fn solve(
 /// A solution with the local error `tolerance`, or the last of the attempts with smaller ones that
 /// start from the one before, until the error of its positions is at most `enough`.
 fn sharpened(
-    mut solution: Solution,
+    mut solution: ShootingSolution,
     mut tolerance: f64,
     enough: f64,
-    mut attempt: impl FnMut(&Solution, f64) -> Result<Solution, Failure>,
-) -> Solution {
-    while solution.error.position > enough && tolerance > LEAST_LOCAL {
-        tolerance = (SHARPER * tolerance).max(LEAST_LOCAL);
+    mut attempt: impl FnMut(&ShootingSolution, f64) -> Result<ShootingSolution, ShootingFailure>,
+) -> ShootingSolution {
+    while solution.error.position > enough && tolerance > MIN_LOCAL_ERROR {
+        tolerance = (SHARPENING_FACTOR * tolerance).max(MIN_LOCAL_ERROR);
         match attempt(&solution, tolerance) {
             Ok(mut sharper) => {
                 sharper.work += solution.work;
@@ -114,29 +115,31 @@ fn sharpened(
 /// Solves with one tolerance, and with a coarser one for comparison.
 fn solve_once(
     scenario: &Scenario,
-    start: Start,
+    start: ShootingStart,
     tolerance: f64,
-    options: &Options,
-    progress: &mut dyn FnMut(&Correction),
-) -> Result<Solution, Failure> {
-    let mut equations = Equations::new(scenario);
+    options: &ShootingOptions,
+    progress: &mut dyn FnMut(&CorrectionProgress),
+) -> Result<ShootingSolution, ShootingFailure> {
+    let mut equations = BoundaryValueProblem::new(scenario);
     equations.limit = options.limit.clone();
-    let mut log = Log {
-        work: Work::default(),
-        part: 1.0,
+    let mut log = ShootingLog {
+        work: ShootingCounts::default(),
+        lambda: 1.0,
         progress,
     };
-    let from_leaf = matches!(start, Start::Leaf { .. });
+    let from_leaf = matches!(start, ShootingStart::Leaf { .. });
     let modelled = check_models(scenario, from_leaf);
     let found = match (modelled, start) {
-        (Err(missing), _) => Err(Interrupted {
+        (Err(missing), _) => Err(InterruptedHomotopy {
             reason: missing.into(),
-            part: 1.0,
-            near: Trajectory::straight(&equations),
+            lambda: 1.0,
+            last_trajectory: LeafTrajectory::straight(&equations),
         }),
-        (Ok(()), Start::Arcs) => from_arcs(&mut equations, options.intervals, &mut log),
-        (Ok(()), Start::Leaf { stations, rods }) => {
-            Ok(Trajectory::of_leaf(&equations, stations, rods))
+        (Ok(()), ShootingStart::Arcs) => {
+            continue_from_arcs(&mut equations, options.intervals, &mut log)
+        }
+        (Ok(()), ShootingStart::Leaf { stations, rods }) => {
+            Ok(LeafTrajectory::from_leaf_shape(&equations, stations, rods))
         }
     };
     let end = match found {
@@ -144,130 +147,140 @@ fn solve_once(
         Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut log) {
             Ok(solution) => {
                 let work = log.work;
-                return Ok(Solution { work, ..solution });
+                return Ok(ShootingSolution { work, ..solution });
             }
-            Err(reason) => Interrupted {
+            Err(reason) => InterruptedHomotopy {
                 reason,
-                part: 1.0,
-                near,
+                lambda: 1.0,
+                last_trajectory: near,
             },
         },
     };
-    let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
-    let near = Trajectory::new(&equations, options.stations.to_vec(), states.collect());
-    Err(Failure {
+    let states = options
+        .stations
+        .iter()
+        .map(|&sigma| end.last_trajectory.interpolate_state(sigma));
+    let near = LeafTrajectory::new(&equations, options.stations.to_vec(), states.collect());
+    Err(ShootingFailure {
         reason: (end.reason).in_context(options.intervals.is_some(), from_leaf),
-        part: end.part,
+        lambda: end.lambda,
         rods: near.shape(&equations),
         work: log.work,
     })
 }
 
 fn solve_near(
-    equations: &Equations,
-    near: &Trajectory,
+    equations: &BoundaryValueProblem,
+    near: &LeafTrajectory,
     tolerance: f64,
-    options: &Options,
-    log: &mut Log,
-) -> Result<Solution, Reason> {
+    options: &ShootingOptions,
+    log: &mut ShootingLog,
+) -> Result<ShootingSolution, ShootingFailureReason> {
     let stations = options.stations;
-    let mut newton = Newton::from_trajectory(equations, near, options.intervals, log)?;
+    let mut newton = ShootingNewton::from_trajectory(equations, near, options.intervals, log)?;
     // Over intervals that are given perturbations may grow too much for another reason.
     newton.gives_up = options.gives_up && options.intervals.is_none();
-    let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
+    let mut at = |tolerance: f64| -> Result<LeafTrajectory, ShootingFailureReason> {
         newton.solve(tolerance)?;
-        let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);
+        let sampled =
+            LeafTrajectory::sample_solution(equations, &newton.nodes, stations, tolerance);
         Ok(sampled?)
     };
-    let (coarse, fine) = (at(COARSER * tolerance)?, at(tolerance)?);
+    let (coarse, fine) = (at(COMPARISON_TOLERANCE_FACTOR * tolerance)?, at(tolerance)?);
     let (rods, tip) = (fine.shape(equations), fine.tip());
     let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
     // Steps that end at the same stations share errors, which the
     // difference does not show: it is at least one local error.
     let difference = Difference::between(&coarse.shape(equations), &rods);
-    let (length, force) = (equations.length, equations.force);
+    let (length, force) = (equations.length_unit, equations.force_unit);
     let error = Difference {
         position: difference.position + tolerance * length,
         rotation: difference.rotation + tolerance,
         force: difference.force + tolerance * newton.units.total_force() * force,
         moment: difference.moment + tolerance * newton.units.largest_moment() * force * length,
     };
-    Ok(Solution {
+    Ok(ShootingSolution {
         stations: stations.to_vec(),
         error,
         rods,
         energy: energy * force * length,
         defect: newton.defect,
         growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
-        condition: newton.condition(),
+        condition: newton.singular_value_ratio(),
         neutral: newton.neutral(stations),
         unsharpened: None,
         intervals: newton.nodes.sigma,
-        work: Work::default(),
+        work: ShootingCounts::default(),
     })
 }
 
 /// Accuracy of intermediate solutions.
-const ROUGH: f64 = 1e-6;
+const INTERMEDIATE_TOLERANCE: f64 = 1e-6;
 
 /// Smallest step, as a part of the whole change.
 const LEAST_STEP: f64 = 1.0 / 16384.0;
 
 /// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
-const BUDGET: usize = 4_000_000;
+const MAX_SLOPE_EVALUATIONS: usize = 4_000_000;
 
 /// Stations per interval at which a solution is stored as the start of the next one.
-const STATIONS: usize = 4;
+const STATIONS_PER_INTERVAL: usize = 4;
 
 /// Over many short intervals, Newton's method has a larger region of convergence.
 /// Rotation over one of them, in radians, and their largest number.
-const TURN: f64 = 0.3;
+const MAX_INTERVAL_TURN: f64 = 0.3;
 
 const LEAST_INTERVALS: usize = 8;
 
 const MOST_INTERVALS: usize = 256;
 
 /// A continuation that ended before the scenario's leaf was reached.
-pub struct Interrupted {
-    pub reason: Reason,
+pub struct InterruptedHomotopy {
+    pub reason: ShootingFailureReason,
     /// Part of the change that was made.
-    pub part: f64,
-    pub near: Trajectory,
+    pub lambda: f64,
+    pub last_trajectory: LeafTrajectory,
 }
 
 /// How the leaf of arcs is changed into the scenario's, in the order of attempts.
 /// The last one may end far from its start.
-const STRATEGIES: [Strategy; 3] = [Strategy::Near, Strategy::Stiff, Strategy::Far];
+const STRATEGIES: [HomotopyStrategy; 3] = [
+    HomotopyStrategy::LimitedSteps,
+    HomotopyStrategy::InitiallyStiff,
+    HomotopyStrategy::UnlimitedSteps,
+];
 
 #[derive(Clone, Copy, PartialEq)]
-enum Strategy {
+enum HomotopyStrategy {
     /// Newton's steps are limited to solutions nearby.
-    Near,
+    LimitedSteps,
     /// Steps limited like those of [`Strategy::Near`], with rods that initially have their
     /// largest stiffness in all directions.
-    Stiff,
+    InitiallyStiff,
     /// Newton's steps are not limited.
-    Far,
+    UnlimitedSteps,
 }
 
 /// Follows the equilibrium from the leaf of arcs to the scenario's. Returns a
 /// trajectory near the solution.
-pub fn from_arcs(
-    equations: &mut Equations,
+pub fn continue_from_arcs(
+    equations: &mut BoundaryValueProblem,
     intervals: Option<usize>,
-    log: &mut Log,
-) -> Result<Trajectory, Interrupted> {
+    log: &mut ShootingLog,
+) -> Result<LeafTrajectory, InterruptedHomotopy> {
     let mut first = None;
     for strategy in STRATEGIES {
-        let mut attempt = Attempt {
+        let mut attempt = HomotopyAttempt {
             strategy,
             equations,
             intervals,
             log,
         };
-        match attempt.follow() {
+        match attempt.follow_stages() {
             Ok(near) => return Ok(near),
-            Err(failure) if failure.reason == Reason::OutOfTime => return Err(failure),
+            Err(failure) if failure.reason == ShootingFailureReason::OutOfTime => {
+                return Err(failure);
+            }
             Err(failure) => first = first.or(Some(failure)),
         }
     }
@@ -275,27 +288,27 @@ pub fn from_arcs(
 }
 
 /// A continuation by one of the strategies.
-struct Attempt<'c, 'a, 'p> {
-    strategy: Strategy,
-    equations: &'c mut Equations<'a>,
+struct HomotopyAttempt<'c, 'a, 'p> {
+    strategy: HomotopyStrategy,
+    equations: &'c mut BoundaryValueProblem<'a>,
     intervals: Option<usize>,
-    log: &'c mut Log<'p>,
+    log: &'c mut ShootingLog<'p>,
 }
 
-impl Attempt<'_, '_, '_> {
-    fn follow(&mut self) -> Result<Trajectory, Interrupted> {
-        self.equations.part = 0.0;
-        let stiff = self.strategy == Strategy::Stiff;
-        self.equations.softened = if stiff { 0.0 } else { 1.0 };
-        let unstressed = Trajectory::unstressed(self.equations, ROUGH);
-        let near = unstressed.map_err(|unbounded| Interrupted {
+impl HomotopyAttempt<'_, '_, '_> {
+    fn follow_stages(&mut self) -> Result<LeafTrajectory, InterruptedHomotopy> {
+        self.equations.load_lambda = 0.0;
+        let stiff = self.strategy == HomotopyStrategy::InitiallyStiff;
+        self.equations.softening_lambda = if stiff { 0.0 } else { 1.0 };
+        let unstressed = LeafTrajectory::unstressed_leaf(self.equations, INTERMEDIATE_TOLERANCE);
+        let near = unstressed.map_err(|unbounded| InterruptedHomotopy {
             reason: unbounded.into(),
-            part: 0.0,
-            near: Trajectory::straight(self.equations),
+            lambda: 0.0,
+            last_trajectory: LeafTrajectory::straight(self.equations),
         })?;
-        let near = self.follow_stage(|equations| &mut equations.part, near)?;
+        let near = self.follow_stage(|equations| &mut equations.load_lambda, near)?;
         match stiff {
-            true => self.follow_stage(|equations| &mut equations.softened, near),
+            true => self.follow_stage(|equations| &mut equations.softening_lambda, near),
             false => Ok(near),
         }
     }
@@ -303,65 +316,80 @@ impl Attempt<'_, '_, '_> {
     /// Changes the equations by one stage; the first attempt is the whole change.
     fn follow_stage(
         &mut self,
-        stage: Stage,
-        mut near: Trajectory,
-    ) -> Result<Trajectory, Interrupted> {
+        stage: HomotopyParameter,
+        mut near: LeafTrajectory,
+    ) -> Result<LeafTrajectory, InterruptedHomotopy> {
         let mut path = Homotopy::new(1.0, [LEAST_STEP, 1.0]);
-        let mut before: Option<(Trajectory, f64)> = None;
+        let mut before: Option<(LeafTrajectory, f64)> = None;
         let (begun, rods) = (self.log.work.slopes, self.equations.rods());
-        while path.part < 1.0 {
-            let part = path.part;
-            self.log.part = part;
-            *stage(self.equations) = path.next();
+        while path.lambda < 1.0 {
+            let part = path.lambda;
+            self.log.lambda = part;
+            *stage(self.equations) = path.next_lambda();
             let predicted = match &before {
-                Some((earlier, at)) => {
-                    near.beyond(self.equations, earlier, path.length() / (part - at))
-                }
+                Some((earlier, at)) => near.extrapolate(
+                    self.equations,
+                    earlier,
+                    path.next_step_length() / (part - at),
+                ),
                 None => near.clone(),
             };
             match self.solve_near(&predicted) {
                 Ok(trajectory) => {
                     before = Some((std::mem::replace(&mut near, trajectory), part));
-                    path.advance(2.0 * path.length());
+                    path.advance(2.0 * path.next_step_length());
                 }
                 Err(reason) => {
                     let spent = (self.log.work.slopes - begun) * rods;
-                    let ends = reason == Reason::OutOfTime || spent >= BUDGET;
+                    let ends = reason == ShootingFailureReason::OutOfTime
+                        || spent >= MAX_SLOPE_EVALUATIONS;
                     if ends || !path.shorten(0.5) {
-                        return Err(Interrupted { reason, part, near });
+                        return Err(InterruptedHomotopy {
+                            reason,
+                            lambda: part,
+                            last_trajectory: near,
+                        });
                     }
                 }
             }
         }
-        self.log.part = 1.0;
+        self.log.lambda = 1.0;
         Ok(near)
     }
 
-    fn solve_near(&mut self, near: &Trajectory) -> Result<Trajectory, Reason> {
+    fn solve_near(
+        &mut self,
+        near: &LeafTrajectory,
+    ) -> Result<LeafTrajectory, ShootingFailureReason> {
         let equations = &*self.equations;
         let count = self.intervals.unwrap_or_else(|| {
-            let turns = (near.turn(equations) / TURN).ceil() as usize;
+            let turns = (near.largest_turn(equations) / MAX_INTERVAL_TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::from_trajectory(equations, near, Some(count), self.log)?;
-        newton.only_near = self.strategy != Strategy::Far;
-        newton.solve(ROUGH)?;
-        let stations = equally_spaced(STATIONS * count.max(LEAST_INTERVALS));
-        let sampled = Trajectory::sampled(equations, &newton.nodes, &stations, ROUGH);
+        let mut newton = ShootingNewton::from_trajectory(equations, near, Some(count), self.log)?;
+        newton.requires_near_start = self.strategy != HomotopyStrategy::UnlimitedSteps;
+        newton.solve(INTERMEDIATE_TOLERANCE)?;
+        let stations = equally_spaced(STATIONS_PER_INTERVAL * count.max(LEAST_INTERVALS));
+        let sampled = LeafTrajectory::sample_solution(
+            equations,
+            &newton.nodes,
+            &stations,
+            INTERMEDIATE_TOLERANCE,
+        );
         Ok(sampled?)
     }
 }
 
 /// The parameter that varies from 0 to 1 along a stage.
-type Stage = for<'e> fn(&'e mut Equations) -> &'e mut f64;
+type HomotopyParameter = for<'e> fn(&'e mut BoundaryValueProblem) -> &'e mut f64;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// A solution with this error of its positions.
-    fn within(position: f64) -> Solution {
-        Solution {
+    fn solution_with_error(position: f64) -> ShootingSolution {
+        ShootingSolution {
             stations: vec![0.0, 1.0],
             rods: Vec::new(),
             energy: 1.0,
@@ -375,21 +403,21 @@ mod tests {
             condition: 1.0,
             neutral: None,
             unsharpened: None,
-            work: Work {
+            work: ShootingCounts {
                 iterations: 1,
-                ..Work::default()
+                ..ShootingCounts::default()
             },
         }
     }
 
-    fn failed() -> Failure {
-        Failure {
-            reason: Reason::OutOfTime,
-            part: 1.0,
+    fn failed_solution() -> ShootingFailure {
+        ShootingFailure {
+            reason: ShootingFailureReason::OutOfTime,
+            lambda: 1.0,
             rods: Vec::new(),
-            work: Work {
+            work: ShootingCounts {
                 iterations: 10,
-                ..Work::default()
+                ..ShootingCounts::default()
             },
         }
     }
@@ -398,22 +426,29 @@ mod tests {
     /// improved.
     #[test]
     fn a_failed_attempt_leaves_the_solution_before() {
-        let mut attempts = vec![Err(failed()), Ok(within(1e-5))];
+        let mut attempts = vec![Err(failed_solution()), Ok(solution_with_error(1e-5))];
         let mut tolerances = Vec::new();
-        let found = sharpened(within(1e-3), 1e-9, 1e-6, |before, tolerance| {
-            tolerances.push((before.error.position, tolerance));
-            attempts.pop().unwrap()
-        });
+        let found = sharpened(
+            solution_with_error(1e-3),
+            1e-9,
+            1e-6,
+            |before, tolerance| {
+                tolerances.push((before.error.position, tolerance));
+                attempts.pop().unwrap()
+            },
+        );
         for (found, wanted) in tolerances.iter().zip([(1e-3, 1e-11), (1e-5, 1e-13)]) {
             assert_eq!(found.0, wanted.0);
             assert!((found.1 / wanted.1 - 1.0).abs() < 1e-12, "{tolerances:?}");
         }
         assert_eq!(tolerances.len(), 2);
         assert_eq!(found.error.position, 1e-5);
-        assert_eq!(found.unsharpened, Some(Reason::OutOfTime));
+        assert_eq!(found.unsharpened, Some(ShootingFailureReason::OutOfTime));
         assert_eq!(found.work.iterations, 12);
 
-        let enough = sharpened(within(1e-6), 1e-9, 1e-6, |_, _| Err(failed()));
+        let enough = sharpened(solution_with_error(1e-6), 1e-9, 1e-6, |_, _| {
+            Err(failed_solution())
+        });
         assert_eq!(enough.unsharpened, None);
     }
 }

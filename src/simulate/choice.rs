@@ -4,8 +4,8 @@
 //! measured times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Physics, SemiImplicit, Steps, TimeIntegrator};
-use crate::numbers::two_digits;
+use crate::motion::{Explicit, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::numbers::format_two_digits;
 use crate::simulate::{Options, Scheme};
 use crate::words;
 use serde::{Serialize, Serializer};
@@ -13,7 +13,7 @@ use std::fmt;
 
 words! {
     /// Why a motion has its method.
-    pub enum Reason {
+    pub enum SchemeReason {
         /// It was requested.
         Requested = "requested",
         /// The explicit method has no stable step for rigid rods.
@@ -35,7 +35,7 @@ pub struct Choice {
     /// The method.
     pub scheme: Scheme,
     /// Why.
-    pub reason: Reason,
+    pub reason: SchemeReason,
     /// The costs that were compared, if any were: of the explicit and of the semi-implicit
     /// method.
     pub costs: Option<[Cost; 2]>,
@@ -43,24 +43,24 @@ pub struct Choice {
 
 impl Choice {
     /// The choice that does not depend on costs, if there is one.
-    pub(super) fn without_costs(options: &Options, physics: &Physics, rigid: bool) -> Option<Self> {
+    pub(super) fn forced_choice(options: &Options, physics: &Physics, rigid: bool) -> Option<Self> {
         let of = |scheme, reason| Choice {
             scheme,
             reason,
             costs: None,
         };
         if let Some(scheme) = options.scheme {
-            return Some(of(scheme, Reason::Requested));
+            return Some(of(scheme, SchemeReason::Requested));
         }
         if rigid {
-            return Some(of(Scheme::SemiImplicit, Reason::RigidRods));
+            return Some(of(Scheme::SemiImplicit, SchemeReason::RigidRods));
         }
         let reason = if !physics.clamped() {
-            Reason::FreeBase
-        } else if physics.too_short_a_pulse().is_some() {
-            Reason::ShortPulse
+            SchemeReason::FreeBase
+        } else if physics.unresolved_pulse_time().is_some() {
+            SchemeReason::ShortPulse
         } else if options.step.is_some() {
-            Reason::GivenStep
+            SchemeReason::GivenStep
         } else {
             return None;
         };
@@ -68,13 +68,13 @@ impl Choice {
     }
 
     /// The cheaper method.
-    pub(super) fn by_costs(explicit: Cost, semi_implicit: Cost) -> Self {
+    pub(super) fn cheaper_method(explicit: Cost, semi_implicit: Cost) -> Self {
         Choice {
             scheme: match explicit.seconds <= semi_implicit.seconds {
                 true => Scheme::Explicit,
                 false => Scheme::SemiImplicit,
             },
-            reason: Reason::Cost,
+            reason: SchemeReason::Cost,
             costs: Some([explicit, semi_implicit]),
         }
     }
@@ -83,12 +83,16 @@ impl Choice {
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self.reason {
-            Reason::Requested => "as requested",
-            Reason::RigidRods => "the explicit method cannot move rigid rods (a stiffness is inf)",
-            Reason::FreeBase => "the semi-implicit method holds the base, and this one is free",
-            Reason::ShortPulse => "a load has a pulse too short for the semi-implicit method",
-            Reason::GivenStep => "of steps of a given length the explicit ones are cheaper",
-            Reason::Cost => "it costs less: ",
+            SchemeReason::Requested => "as requested",
+            SchemeReason::RigidRods => {
+                "the explicit method cannot move rigid rods (a stiffness is inf)"
+            }
+            SchemeReason::FreeBase => {
+                "the semi-implicit method holds the base, and this one is free"
+            }
+            SchemeReason::ShortPulse => "a load has a pulse too short for the semi-implicit method",
+            SchemeReason::GivenStep => "of steps of a given length the explicit ones are cheaper",
+            SchemeReason::Cost => "it costs less: ",
         })?;
         let Some([explicit, semi_implicit]) = self.costs else {
             return Ok(());
@@ -103,7 +107,7 @@ impl fmt::Display for Choice {
 impl fmt::Display for Cost {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let about = if self.at_least { "more than" } else { "some" };
-        let [steps, seconds] = [self.steps, self.seconds].map(two_digits);
+        let [steps, seconds] = [self.steps, self.seconds].map(format_two_digits);
         write!(f, "{about} {steps} steps in {seconds} s")
     }
 }
@@ -112,7 +116,7 @@ impl Serialize for Choice {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys {
-            reason: Reason,
+            reason: SchemeReason,
             explanation: String,
             explicit: Option<Cost>,
             semi_implicit: Option<Cost>,
@@ -131,26 +135,26 @@ impl Serialize for Choice {
 /// Measured seconds of an explicit step: in all, and per segment.
 const EXPLICIT_STEP: f64 = 1e-7;
 
-const EXPLICIT_SEGMENT: f64 = 2e-8;
+const EXPLICIT_SEGMENT_SECONDS: f64 = 2e-8;
 
 /// Measured seconds of a semi-implicit step, with the iterations and the rejected attempts that
 /// belong to it: in all, and per segment of rods processed four at a time.
 const SEMI_IMPLICIT_STEP: f64 = 3e-6;
 
-const SEMI_IMPLICIT_SEGMENT: f64 = 8e-7;
+const SEMI_IMPLICIT_SEGMENT_SECONDS: f64 = 8e-7;
 
-const LANES: usize = 4;
+const SIMD_LANES: usize = 4;
 
 /// The permitted local error of the pilot's steps, as a multiple of the tolerance and at most, and
 /// the exponent with which the number of steps grows with the accuracy. By the order of the method
 /// it is 1/3; measured, it is a little more, as fast motions count that longer steps pass over.
 /// Of 60 leaves as people measure them the estimates were 0.54 to 1.45 of the true numbers, of 200
 /// with internal damping, which need few steps, 1.2 to 3.2.
-const LARGER_ERROR: f64 = 1000.0;
+const PILOT_ERROR_RATIO: f64 = 1000.0;
 
-const LARGEST_ERROR: f64 = 0.1;
+const LARGEST_PILOT_ERROR: f64 = 0.1;
 
-const GROWTH: f64 = 0.357;
+const STEP_COUNT_EXPONENT: f64 = 0.357;
 
 /// Measured part of a step's time that a step of the pilot takes, whose equations are solved with
 /// lower accuracy, and the longest time of the pilot in seconds.
@@ -171,18 +175,18 @@ pub struct Cost {
 
 /// Approximate seconds of an explicit step.
 pub(super) fn explicit_step(rods: usize, segments: usize) -> f64 {
-    EXPLICIT_STEP + EXPLICIT_SEGMENT * (rods * segments) as f64
+    EXPLICIT_STEP + EXPLICIT_SEGMENT_SECONDS * (rods * segments) as f64
 }
 
 /// Approximate seconds of a semi-implicit step.
 pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
-    let segments = rods.next_multiple_of(LANES) * segments;
-    SEMI_IMPLICIT_STEP + SEMI_IMPLICIT_SEGMENT * segments as f64
+    let segments = rods.next_multiple_of(SIMD_LANES) * segments;
+    SEMI_IMPLICIT_STEP + SEMI_IMPLICIT_SEGMENT_SECONDS * segments as f64
 }
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
-pub(super) fn explicit(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
-    let (duration, _) = physics.duration();
+pub(super) fn explicit_cost(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
+    let (duration, _) = physics.duration_and_interval();
     let steps = duration / method.longest_step();
     Cost {
         steps,
@@ -196,16 +200,18 @@ pub(super) fn explicit(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit
 /// `most` seconds, and where it takes long itself; then the rest of the motion is taken to need
 /// as many steps as the half or more of the pilot's that are the last. None is needed where the
 /// outputs alone take more.
-pub(super) fn semi_implicit(
+pub(super) fn semi_implicit_cost(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     tolerance: f64,
     most: f64,
 ) -> Cost {
-    let (duration, interval) = physics.duration();
-    let error = (LARGER_ERROR * tolerance).min(LARGEST_ERROR).max(tolerance);
-    let of_step = (error / tolerance).powf(GROWTH);
+    let (duration, interval) = physics.duration_and_interval();
+    let error = (PILOT_ERROR_RATIO * tolerance)
+        .min(LARGEST_PILOT_ERROR)
+        .max(tolerance);
+    let of_step = (error / tolerance).powf(STEP_COUNT_EXPONENT);
     let seconds = semi_implicit_step(leaf.rods(), leaf.segments());
     let cost = |steps: f64, at_least: bool| Cost {
         steps,
@@ -219,7 +225,7 @@ pub(super) fn semi_implicit(
         return cost(outputs, true);
     }
     let longest = (LONGEST_PILOT / (PILOT_STEP * seconds)) as usize;
-    let steps = Steps::ToCount(error);
+    let steps = StepControl::CountOnly(error);
     let mut pilot = SemiImplicit::new(leaf.clone(), physics.clone(), state, steps);
     let (mut steps, mut attempts, mut failed) = (0.0, 0_usize, false);
     // The time and the number of steps at the last two powers of two of attempts.

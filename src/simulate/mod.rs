@@ -32,21 +32,29 @@ mod record;
 mod refinement;
 
 pub use crate::leaf::HalfTurn;
-use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, State, System, shift, turn};
-use crate::modes::{Eigenpair, Wanted, lowest};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Increment, Leaf, State, System, displacement_part, rotation_part,
+};
+use crate::modes::{Eigenpair, ModeRequest, lowest};
 pub use crate::motion::{Energy, Stopped};
 use crate::motion::{
-    Explicit, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps, TimeIntegrator, unstrained,
+    Explicit, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
+    TimeIntegrator, project_constraints,
 };
-use crate::newton::{Newton, Work};
-use crate::numbers::two_digits;
-use crate::relax::{ANY_SIGN, Equilibrium, Follower, RelaxError, Route, polish};
+use crate::newton::{NewtonIteration, SolverCounts};
+use crate::numbers::format_two_digits;
+use crate::relax::{
+    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route,
+    converge_saddle,
+};
 use crate::run::{Instant, Limit, RefusedOption};
-use crate::scenario::{Scenario, Schedule, Start, slips};
-pub use crate::simulate::choice::{Choice, Cost, Reason};
-pub use crate::simulate::record::{Frame, Imbalance, Moment, Record, Still, film, stills};
+use crate::scenario::{MotionStart, Scenario, Schedule, plausibility_warnings};
+pub use crate::simulate::choice::{Choice, Cost, SchemeReason};
+pub use crate::simulate::record::{
+    Frame, Imbalance, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
+};
 use crate::simulate::refinement::{Comparison, Trajectory, compared_points};
-pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, Watch};
+pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
 use crate::{relax, words};
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -56,7 +64,7 @@ const SEGMENTS: usize = 16;
 
 /// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
 /// longest rod.
-pub const AIM: f64 = 1e-3;
+pub const DEFAULT_TIP_ERROR: f64 = 1e-3;
 
 words! {
     /// The method of time integration.
@@ -81,7 +89,7 @@ pub struct Options {
     pub step: Option<f64>,
     /// Replaces the scenario's tolerance: for the semi-implicit method, the
     /// local error of a step relative to the longest rod. Of a [`Refinement`] also the error of
-    /// tips that it aims at, in place of [`AIM`].
+    /// tips that it aims at, in place of [`DEFAULT_TIP_ERROR`].
     pub tolerance: Option<f64>,
     /// When the motion ends early, as [`Stopped::Interrupted`].
     pub limit: Limit,
@@ -114,21 +122,21 @@ pub struct Simulation {
 
 impl Simulation {
     /// The leaf at time 0.
-    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
+    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let from = |leaf: &Leaf, grid: &Grid| state(leaf, grid, tolerance, options.limit.clone());
-        Simulation::from(scenario, options, &from)
+        Simulation::with_initial_state(scenario, options, &from)
     }
 
     /// The same from where a leaf is that followed another scenario, without velocity: what it is
     /// released from, or where its stable equilibria end.
-    pub fn released(
-        follower: &Follower,
+    pub fn from_tracker(
+        follower: &EquilibriumTracker,
         scenario: &Scenario,
         options: &Options,
-    ) -> Result<Self, Refused> {
+    ) -> Result<Self, SimulationError> {
         let from = |leaf: &Leaf, grid: &Grid| Ok(follower.state_on(leaf, grid));
-        Simulation::from(scenario, options, &from)
+        Simulation::with_initial_state(scenario, options, &from)
     }
 
     /// Brings the leaf from where it is now to rest under this scenario, with which the
@@ -136,20 +144,20 @@ impl Simulation {
     ///
     /// # Errors
     /// Requests that cannot be met.
-    pub fn land(
+    pub fn relax_into_tracker(
         &mut self,
-        follower: &mut Follower,
+        follower: &mut EquilibriumTracker,
         scenario: &Scenario,
     ) -> Result<Equilibrium, RelaxError> {
         let now = self.method.snapshot();
-        follower.settle_from(scenario, (self.grid.clone(), now.state))
+        follower.relax_from_state(scenario, (self.grid.clone(), now.state))
     }
 
-    fn from(
+    fn with_initial_state(
         scenario: &Scenario,
         options: &Options,
-        state: &dyn Fn(&Leaf, &Grid) -> Result<State, Refused>,
-    ) -> Result<Self, Refused> {
+        state: &dyn Fn(&Leaf, &Grid) -> Result<State, SimulationError>,
+    ) -> Result<Self, SimulationError> {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)
         {
@@ -164,26 +172,31 @@ impl Simulation {
         let physics = Physics::new(&leaf);
         let state = state(&leaf, &grid)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
-        let doubt = unstable(&discrete, &physics, &state);
+        let doubt = unstable_start_doubt(&discrete, &physics, &state);
         let rigid = discrete.least_compliance() == 0.0;
         let mut begun = None;
-        let choice = match Choice::without_costs(options, &physics, rigid) {
+        let choice = match Choice::forced_choice(options, &physics, rigid) {
             Some(choice) => choice,
             None => {
                 let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
-                let cost = choice::explicit(&discrete, &physics, explicit);
-                let other =
-                    choice::semi_implicit(&discrete, &physics, &state, tolerance, cost.seconds);
-                Choice::by_costs(cost, other)
+                let cost = choice::explicit_cost(&discrete, &physics, explicit);
+                let other = choice::semi_implicit_cost(
+                    &discrete,
+                    &physics,
+                    &state,
+                    tolerance,
+                    cost.seconds,
+                );
+                Choice::cheaper_method(cost, other)
             }
         };
         if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
-            return Err(Refused::Held { rigid });
+            return Err(SimulationError::Held { rigid });
         }
         if choice.scheme == Scheme::SemiImplicit
-            && let Some(at) = physics.too_short_a_pulse()
+            && let Some(at) = physics.unresolved_pulse_time()
         {
-            return Err(Refused::Pulse { at, rigid });
+            return Err(SimulationError::Pulse { at, rigid });
         }
         let mut step = options.step;
         let mut stable = None;
@@ -193,23 +206,26 @@ impl Simulation {
                     Some(begun) => begun,
                     None => explicit(&discrete, &physics, &state, step)?,
                 };
-                step = Some(explicit.longest_step() * physics.time);
+                step = Some(explicit.longest_step() * physics.time_unit);
                 stable = Some(bound);
                 Box::new(explicit)
             }
             Scheme::SemiImplicit => {
-                let step = step.map(|step| step / physics.time);
-                let steps = step.map_or(Steps::Error(tolerance), Steps::Fixed);
+                let step = step.map(|step| step / physics.time_unit);
+                let steps = step.map_or(StepControl::LocalError(tolerance), StepControl::Fixed);
                 let physics = physics.clone();
                 Box::new(SemiImplicit::new(discrete, physics, &state, steps))
             }
         };
         method.set_limit(options.limit.clone());
-        let (duration, interval) = physics.duration();
+        let (duration, interval) = physics.duration_and_interval();
         let simulation = Simulation {
             leaf,
             choice,
-            doubts: doubt.into_iter().chain(slips(scenario)).collect(),
+            doubts: doubt
+                .into_iter()
+                .chain(plausibility_warnings(scenario))
+                .collect(),
             stable,
             step,
             method,
@@ -228,8 +244,8 @@ impl Simulation {
             physics,
         };
         match (simulation.step, simulation.expected()) {
-            (Some(step), Some((steps, seconds))) if seconds > MOST_SECONDS => {
-                Err(Refused::TooLong {
+            (Some(step), Some((steps, seconds))) if seconds > MAX_SIMULATION_SECONDS => {
+                Err(SimulationError::TooLong {
                     step,
                     steps,
                     seconds,
@@ -243,11 +259,13 @@ impl Simulation {
     /// Steps from here to the end, and the approximate number of seconds they take on one core
     /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
-        let (duration, _) = self.physics.duration();
-        let left = (duration * self.physics.time - self.time()).max(0.0);
+        let (duration, _) = self.physics.duration_and_interval();
+        let left = (duration * self.physics.time_unit - self.time()).max(0.0);
         let steps = match (self.step, self.choice.costs) {
             (Some(step), _) => left / step,
-            (None, Some([_, estimated])) => estimated.steps * left / (duration * self.physics.time),
+            (None, Some([_, estimated])) => {
+                estimated.steps * left / (duration * self.physics.time_unit)
+            }
             (None, None) => return None,
         };
         Some((steps, steps * self.seconds_of_a_step()))
@@ -263,7 +281,7 @@ impl Simulation {
 
     /// Seconds that the steps so far take on one core of a machine of 2020: no clock decides how
     /// far a motion is refined.
-    fn seconds(&self) -> f64 {
+    fn seconds_so_far(&self) -> f64 {
         self.steps() as f64 * self.seconds_of_a_step()
     }
 
@@ -284,8 +302,11 @@ impl Simulation {
         let points = compared_points(frame, self.grid.sigma(), self.leaf.joined());
         if let Some(comparison) = &mut self.comparison {
             comparison.compare(self.made, &points);
-            frame.error = comparison.bar;
-            self.known_until = comparison.bar.map(|_| frame.time).or(self.known_until);
+            frame.error = comparison.error_bar;
+            self.known_until = comparison
+                .error_bar
+                .map(|_| frame.time)
+                .or(self.known_until);
         }
         if let Some(trajectory) = &mut self.trajectory {
             trajectory.add(&points);
@@ -297,21 +318,21 @@ impl Simulation {
     }
 
     /// Bounds the steps to half of those of a coarser run.
-    fn limit_steps_by(&mut self, coarser: &Trajectory) {
+    fn halve_coarser_steps(&mut self, coarser: &Trajectory) {
         let halves = coarser.longest_steps.iter().map(|longest| 0.5 * longest);
         self.longest_steps = halves.collect();
     }
 
     /// Bounds the steps to half of the time between outputs.
     fn halve_outputs(&mut self) {
-        let (_, interval) = self.physics.duration();
+        let (_, interval) = self.physics.duration_and_interval();
         self.longest_steps = vec![0.5 * interval; self.outputs];
     }
 
     /// A bound on the error of the tips and of the middles of all rods so far, in units of
     /// length; `None` where no other run tells it, as from where two have parted.
     pub fn error_bar(&self) -> Option<f64> {
-        self.comparison.as_ref()?.bar
+        self.comparison.as_ref()?.error_bar
     }
 
     /// The time of the last output whose error is known.
@@ -394,7 +415,7 @@ impl Simulation {
 
     /// The time now, in the scenario's unit.
     pub fn time(&self) -> f64 {
-        self.method.time() * self.physics.time
+        self.method.time() * self.physics.time_unit
     }
 
     /// Whether the duration is over.
@@ -420,7 +441,7 @@ impl Simulation {
     /// If the motion is not reliable any more; [`Simulation::frame`] then
     /// returns its present state.
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
-        let (clock, unit) = (Instant::now(), self.physics.time);
+        let (clock, unit) = (Instant::now(), self.physics.time_unit);
         if let Some(&longest) = self.longest_steps.get(self.made) {
             self.method.limit_steps(longest);
         }
@@ -440,7 +461,7 @@ impl Simulation {
 
     /// The time of an output, in the method's unit.
     fn output_time(&self, number: usize) -> f64 {
-        let (duration, interval) = self.physics.duration();
+        let (duration, interval) = self.physics.duration_and_interval();
         match number >= self.outputs {
             true => duration,
             false => interval * number as f64,
@@ -455,12 +476,12 @@ fn explicit(
     physics: &Physics,
     state: &State,
     step: Option<f64>,
-) -> Result<(Explicit, StableStep), Refused> {
-    let own = step.map(|step| step / physics.time);
-    let explicit =
-        Explicit::new(leaf.clone(), physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
+) -> Result<(Explicit, StableStep), SimulationError> {
+    let own = step.map(|step| step / physics.time_unit);
+    let explicit = Explicit::new(leaf.clone(), physics.clone(), state, own)
+        .map_err(|RigidRodError| SimulationError::Rigid)?;
     let bound = explicit.stable_step();
-    let stable = bound.step * physics.time;
+    let stable = bound.step * physics.time_unit;
     match step {
         Some(found) if found > stable => {
             let why = format!(
@@ -488,31 +509,40 @@ pub(super) fn state(
     grid: &Grid,
     tolerance: f64,
     limit: Limit,
-) -> Result<State, Refused> {
+) -> Result<State, SimulationError> {
     match leaf.scenario().dynamics.start {
-        Start::Released if !leaf.is_held() => Ok(released(&DiscreteLeaf::new(leaf, grid.clone()))),
+        MotionStart::Released if !leaf.has_placed_supports() => {
+            Ok(released(&DiscreteLeaf::new(leaf, grid.clone())))
+        }
         // Held tips and grips are moved to their positions by the relaxation.
-        Start::Released | Start::AtRest => at_rest(leaf, grid, tolerance, limit),
+        MotionStart::Released | MotionStart::ConfirmedEquilibrium => {
+            at_rest(leaf, grid, tolerance, limit)
+        }
     }
 }
 
 /// The initial state of a relaxation or, where its arcs would strain rods that hardly yield, a
 /// state near it without such strains: otherwise the energy of these would drive the motion.
 fn released(leaf: &DiscreteLeaf) -> State {
-    let mut arcs = relax::start(leaf);
+    let mut arcs = relax::initial_state(leaf);
     leaf.strain_forces(&mut arcs);
-    let strained = leaf.each(0..leaf.segments()).any(|(j, i)| {
+    let strained = leaf.rod_index_pairs(0..leaf.segments()).any(|(j, i)| {
         let softest = leaf.section(j, i).couple_stiffness.min_element();
         let unit = softest / leaf.leaf.length(j).powi(2);
         arcs.n[j * leaf.segments() + i].length() > LARGEST_FORCE * unit
     });
-    let unstrained = strained.then(|| unstrained(leaf, &arcs)).flatten();
+    let unstrained = strained.then(|| project_constraints(leaf, &arcs)).flatten();
     unstrained.unwrap_or(arcs)
 }
 
 /// The equilibrium under the loads, in the wind and with the rest shape at time 0.
-fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64, limit: Limit) -> Result<State, Refused> {
-    let scenario = at_beginning(leaf.scenario());
+fn at_rest(
+    leaf: &Leaf,
+    grid: &Grid,
+    tolerance: f64,
+    limit: Limit,
+) -> Result<State, SimulationError> {
+    let scenario = scenario_at_start(leaf.scenario());
     let options = relax::Options {
         method: relax::Method::default().on_grid(Some(grid.segments())),
         tolerance: Some(tolerance),
@@ -525,7 +555,7 @@ fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64, limit: Limit) -> Result<Sta
     };
     let found = relax::relax(&scenario, &options, &mut |_| {})?;
     if !found.outcome.is_success() {
-        return Err(Refused::NoRest {
+        return Err(SimulationError::NoRest {
             outcome: found.outcome.word(),
         });
     }
@@ -536,7 +566,7 @@ fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64, limit: Limit) -> Result<Sta
 }
 
 /// The scenario with the loads, the wind and the rest shape at time 0.
-fn at_beginning(scenario: &Scenario) -> Scenario {
+fn scenario_at_start(scenario: &Scenario) -> Scenario {
     let mut scenario = scenario.clone();
     let dynamics = &scenario.dynamics;
     scenario.gravity = dynamics.gravity.at(0.0);
@@ -556,13 +586,13 @@ fn at_beginning(scenario: &Scenario) -> Scenario {
 }
 
 /// Longest expected duration of a simulation that is accepted, in seconds.
-pub const MOST_SECONDS: f64 = 3.0 * DAY;
+pub const MAX_SIMULATION_SECONDS: f64 = 3.0 * DAY;
 
 const DAY: f64 = 86_400.0;
 
 /// Why a request cannot be simulated. Times are in the scenario's unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refused {
+pub enum SimulationError {
     /// The explicit method has no stable time step.
     #[error(
         "the explicit method has no stable time step for rigid rods (a stiffness is inf): \
@@ -598,7 +628,7 @@ pub enum Refused {
     #[error(
         "the time step of {step:.3e} makes {steps:.1e} steps, which take some {} days, and at most {} are allowed: \
          use {}",
-        (.seconds / DAY).ceil(), MOST_SECONDS / DAY,
+        (.seconds / DAY).ceil(), MAX_SIMULATION_SECONDS / DAY,
         match .given {
             true => "a longer step, or leave it out",
             false => "the semi-implicit method, softer rods, fewer segments, or a shorter duration",
@@ -628,47 +658,53 @@ pub enum Refused {
 }
 
 /// Largest distance of a start from the equilibrium that it is compared with, in lengths.
-const NEAR: f64 = 0.1;
+const LARGEST_START_DISTANCE: f64 = 0.1;
 
 /// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
 /// none: it would have to grow by e fourteen times.
-const NO_DEVIATION: f64 = 1e-6;
+const NEGLIGIBLE_MODE_DEVIATION: f64 = 1e-6;
 
 /// Accuracy of these modes.
 const MODE_ACCURACY: f64 = 1e-9;
 
 /// A sentence on a start at an unstable equilibrium, or beside one but without a deviation along
 /// its unstable modes, such as that of a straight column under its weight.
-pub(super) fn unstable(leaf: &DiscreteLeaf, physics: &Physics, start: &State) -> Option<String> {
+pub(super) fn unstable_start_doubt(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    start: &State,
+) -> Option<String> {
     let mut leaf = leaf.clone();
     leaf.loads = physics.loads(0.0);
     if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
         // Its rest is no minimum of an energy, or it has none.
         return None;
     }
-    leaf.set_rest(physics.rest(0.0));
-    let (mut system, mut work) = (System::new(&leaf), Work::default());
+    leaf.scale_rest_curvatures(physics.rest_curvature_factor(0.0));
+    let (mut system, mut work) = (System::new(&leaf), SolverCounts::default());
     if !may_be_near(&leaf, start, &mut system) {
         return None;
     }
     let mut exact = start.clone();
-    let index = polish(&leaf, &mut exact, &mut system, &mut work).filter(|&index| index > 0)?;
-    let wanted = Wanted {
+    let index =
+        converge_saddle(&leaf, &mut exact, &mut system, &mut work).filter(|&index| index > 0)?;
+    let wanted = ModeRequest {
         count: index,
-        above: None,
+        modes_below: None,
         accuracy: MODE_ACCURACY,
-        near: &[],
+        approximate_modes: &[],
         time: &Limit::default(),
     };
     let mut modes = lowest(&leaf, physics, &exact, wanted)?;
     modes.retain(|mode| mode.eigenvalue < 0.0);
     let fastest = -modes.first()?.eigenvalue;
-    let deviates =
-        |mode: &Eigenpair| deviation(&leaf, physics, (&exact, start), &mode.shape) > NO_DEVIATION;
+    let deviates = |mode: &Eigenpair| {
+        deviation(&leaf, physics, (&exact, start), &mode.shape) > NEGLIGIBLE_MODE_DEVIATION
+    };
     if modes.iter().any(deviates) {
         return None;
     }
-    let time = two_digits(physics.time / fastest.sqrt());
+    let time = format_two_digits(physics.time_unit / fastest.sqrt());
     Some(format!(
         "the motion starts at an unstable equilibrium (negative eigenvalues: {index}), and nothing displaces the leaf \
          the way it would leave: a deviation grows by e in {time}, and rounding decides when and to which side; \
@@ -679,15 +715,15 @@ pub(super) fn unstable(leaf: &DiscreteLeaf, physics: &Physics, start: &State) ->
 /// Whether the first step of Newton's method is short enough for an equilibrium nearby.
 fn may_be_near(leaf: &DiscreteLeaf, start: &State, system: &mut System) -> bool {
     let mut next = start.clone();
-    let first = Newton {
+    let first = NewtonIteration {
         accuracy: 0.0,
         iterations: 1,
-        work: &mut Work::default(),
+        work: &mut SolverCounts::default(),
         progress: &mut |_, _| {},
     };
     // It is not converged after one step.
-    let _ = first.solve(leaf, &mut next, system, ANY_SIGN);
-    start.shift_to(&next) < NEAR
+    let _ = first.solve(leaf, &mut next, system, INDEFINITE_NEWTON_EQUATIONS);
+    start.largest_displacement_to(&next) < LARGEST_START_DISTANCE
 }
 
 /// The largest rotation or displacement in the part along a mode of what leads from one state to
@@ -700,15 +736,24 @@ fn deviation(
 ) -> f64 {
     let (mut field, mut along, mut largest) = (Vec::new(), 0.0, 0.0_f64);
     from.increments_to(to, leaf.first_node(), &mut field);
-    for (j, i) in leaf.each(leaf.moving_nodes()) {
+    for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
         let (k, inertia) = (from.base(j) + i, physics.inertia(leaf, j, i));
         let (off, mode, tensor) = (
             &field[j][i - leaf.first_node()],
             &mode[k],
             inertia.tensor(from.q[k]),
         );
-        along += turn(mode).dot(tensor * turn(off)) + inertia.mass * shift(mode).dot(shift(off));
-        largest = largest.max(turn(mode).length()).max(shift(mode).length());
+        along += rotation_part(mode).dot(tensor * rotation_part(off))
+            + inertia.mass * displacement_part(mode).dot(displacement_part(off));
+        largest = largest
+            .max(rotation_part(mode).length())
+            .max(displacement_part(mode).length());
     }
     along.abs() * largest
+}
+
+crate::renamed! {
+    Moment => OutputSample,
+    Refused => SimulationError,
+    Still => ShapeSnapshot,
 }

@@ -5,7 +5,7 @@
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
 use crate::scenario;
-use crate::shape::{serialize_tips, weights};
+use crate::shape::{interpolation_weights, serialize_tips};
 use crate::simulate::{Choice, Scheme, Simulation, Stopped};
 use glam::{DQuat, DVec3};
 use serde::ser::SerializeMap;
@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Data recorded at every output, in the units of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct OutputSample {
     /// Time.
     pub time: f64,
     /// Number of time steps so far.
@@ -34,12 +34,12 @@ pub struct Moment {
     pub error: Option<f64>,
 }
 
-impl Moment {
+impl OutputSample {
     /// The data of a frame. Negative zeros become zeros, as in the files,
     /// so that data read back are the same.
-    pub fn of(frame: &Frame, joined: bool) -> Self {
+    pub fn from_frame(frame: &Frame, joined: bool) -> Self {
         let tips = frame.tips(joined);
-        Moment {
+        OutputSample {
             time: frame.time + 0.0,
             steps: frame.steps,
             energy: frame.energy.map(|e| e + 0.0),
@@ -60,11 +60,11 @@ pub struct Imbalance(pub f64);
 
 impl Imbalance {
     /// That of the outputs of a motion, if it is more than a few per cent.
-    fn of(moments: &[Moment], rounding: f64) -> Option<Self> {
+    fn from_samples(moments: &[OutputSample], rounding: f64) -> Option<Self> {
         let start = moments.first()?.energy;
         let (mut moved, mut off) = (rounding, 0.0_f64);
-        for Moment { energy: e, .. } in moments {
-            moved = moved.max(e.moved(start.potential));
+        for OutputSample { energy: e, .. } in moments {
+            moved = moved.max(e.exchanged_energy(start.potential));
             off = off.max((e.balance() - start.balance()).abs());
         }
         (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))
@@ -79,7 +79,7 @@ impl Serialize for Imbalance {
 
 /// The shape of a leaf at an instant, for pictures.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Still {
+pub struct ShapeSnapshot {
     /// Index of its moment.
     pub moment: usize,
     /// Positions of the nodes of every rod, base to tip.
@@ -141,7 +141,7 @@ pub struct Record {
     pub steps: usize,
     /// All outputs; the first at time 0.
     #[serde(flatten, serialize_with = "serialize_moments")]
-    pub moments: Vec<Moment>,
+    pub moments: Vec<OutputSample>,
     /// The shared tip at the last output, or the tips of all rods.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
@@ -150,10 +150,10 @@ pub struct Record {
     pub stations: Vec<f64>,
     /// Shapes at some of the outputs, the last among them.
     #[serde(skip)]
-    pub stills: Vec<Still>,
+    pub stills: Vec<ShapeSnapshot>,
     /// Shapes at many outputs, for films, if requested.
     #[serde(skip)]
-    pub film: Vec<Still>,
+    pub film: Vec<ShapeSnapshot>,
     /// Wall-clock time of the motion alone.
     pub wall_seconds: f64,
 }
@@ -163,8 +163,8 @@ impl Record {
     pub fn new(
         simulation: &Simulation,
         stopped: Option<Stopped>,
-        moments: Vec<Moment>,
-        stills: Vec<Still>,
+        moments: Vec<OutputSample>,
+        stills: Vec<ShapeSnapshot>,
     ) -> Self {
         let scenario = simulation.leaf().scenario();
         let last = stills.last().map_or(&[][..], |still| &still.curves);
@@ -174,7 +174,7 @@ impl Record {
             scheme: simulation.scheme(),
             stopped,
             imbalance: match stopped {
-                None => Imbalance::of(&moments, ROUNDING * scenario.scale().moment()),
+                None => Imbalance::from_samples(&moments, ROUNDING * scenario.scale().moment()),
                 Some(_) => None,
             },
             doubts: simulation.doubts().to_vec(),
@@ -237,7 +237,10 @@ fn serialize_outcome<S: Serializer>(
 
 /// Their number, all energies at the last one, and the conserved quantity at the first and the
 /// last.
-fn serialize_moments<S: Serializer>(moments: &[Moment], serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_moments<S: Serializer>(
+    moments: &[OutputSample],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Energies {
         #[serde(flatten)]
@@ -278,13 +281,13 @@ pub struct Frame {
     pub velocities: Vec<Velocity>,
     /// Energies.
     pub energy: Energy,
-    /// As of a [`Moment`].
+    /// As of a [`OutputSample`].
     pub error: Option<f64>,
 }
 
 impl Frame {
     pub(super) fn new(leaf: &Leaf, physics: &Physics, snapshot: &Snapshot, steps: usize) -> Self {
-        let (length, time, energy) = (leaf.scale.length, physics.time, leaf.scale.moment());
+        let (length, time, energy) = (leaf.scale.length, physics.time_unit, leaf.scale.moment());
         let velocity = |v: &Velocity| Velocity {
             angular: v.angular / time,
             linear: v.linear * (length / time),
@@ -303,8 +306,11 @@ impl Frame {
 
     /// The leaf with nodes at the fractions `to` of the length, by cubic interpolation between
     /// those at the fractions `from`.
-    pub fn at(&self, from: &[f64], to: &[f64]) -> Frame {
-        let weights: Vec<_> = to.iter().map(|&at| weights(from, at, CUBIC)).collect();
+    pub fn interpolated_to_stations(&self, from: &[f64], to: &[f64]) -> Frame {
+        let weights: Vec<_> = to
+            .iter()
+            .map(|&at| interpolation_weights(from, at, CUBIC))
+            .collect();
         let mut there = Frame {
             positions: Vec::new(),
             rotations: Vec::new(),
@@ -354,23 +360,23 @@ impl Frame {
 }
 
 /// A tip that moves by less than this part of the longest rod counts as hardly moving.
-const HARDLY: f64 = 1e-3;
+const NEGLIGIBLE_TIP_MOTION: f64 = 1e-3;
 
 /// Number of moments from which those shown are selected.
-const CANDIDATES: usize = 400;
+const MAX_SNAPSHOT_CANDIDATES: usize = 400;
 
 /// The indices of `count` moments that show a motion, or of all if there are
 /// no more: the first, the last, and others with the tip far from that of
 /// the previous one, such as the turning points of a swing. If the tip hardly
 /// moves (`length`: the longest rod), they are at equal intervals.
-pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
+pub fn snapshot_indices(moments: &[OutputSample], count: usize, length: f64) -> Vec<usize> {
     if moments.len() <= count {
         return (0..moments.len()).collect();
     }
     let pairs = moments.windows(2);
     let distance: f64 = pairs.map(|pair| pair[0].tip.distance(pair[1].tip)).sum();
-    if distance.is_finite() && distance > HARDLY * length {
-        return far_apart(moments, count);
+    if distance.is_finite() && distance > NEGLIGIBLE_TIP_MOTION * length {
+        return distant_tip_indices(moments, count);
     }
     let (last, gaps) = (moments.len() - 1, count - 1);
     let nearest = |k: usize| (2 * k * last + gaps) / (2 * gaps);
@@ -380,9 +386,9 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
 /// The first, the last, and others between, such that the sum of the square roots of the
 /// distances between successive tips is largest: turning points, and equal distances between
 /// them, as the root is concave. By dynamic programming.
-fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
+fn distant_tip_indices(moments: &[OutputSample], count: usize) -> Vec<usize> {
     let last = moments.len() - 1;
-    let most = moments.len().min(CANDIDATES.max(count));
+    let most = moments.len().min(MAX_SNAPSHOT_CANDIDATES.max(count));
     let candidates: Vec<usize> = (0..most).map(|k| k * last / (most - 1)).collect();
     let n = candidates.len();
     let gain = |i: usize, j: usize| {
@@ -415,14 +421,14 @@ fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
 }
 
 /// Largest number of shapes of a film, and of nodes of all of them.
-const FILM: usize = 401;
+const MAX_FILM_SHAPES: usize = 401;
 
 const FILM_NODES: usize = 4_000_000;
 
 /// Which of so many outputs, each with so many nodes, a film shows: at equal intervals, including
 /// the last.
-pub fn film(outputs: usize, nodes: usize) -> Vec<usize> {
-    let most = FILM.min(FILM_NODES / nodes.max(1)).max(2);
+pub fn film_indices(outputs: usize, nodes: usize) -> Vec<usize> {
+    let most = MAX_FILM_SHAPES.min(FILM_NODES / nodes.max(1)).max(2);
     let stride = outputs.saturating_sub(1).div_ceil(most - 1).max(1);
     let last = outputs.checked_sub(1);
     let evenly = (0..outputs).step_by(stride);
@@ -437,8 +443,8 @@ mod tests {
     use crate::motion::Energy;
     use glam::DVec3;
 
-    fn moments(count: usize, tip: impl Fn(f64) -> f64) -> Vec<Moment> {
-        let moment = |i| Moment {
+    fn moments(count: usize, tip: impl Fn(f64) -> f64) -> Vec<OutputSample> {
+        let moment = |i| OutputSample {
             time: i as f64,
             steps: i,
             energy: Energy::default(),
@@ -450,19 +456,19 @@ mod tests {
 
     #[test]
     fn a_film_is_even_and_ends_with_the_last_output() {
-        assert!(film(0, 10).is_empty());
-        assert_eq!(film(1, 10), [0]);
-        assert_eq!(film(400, 10).len(), 400);
-        assert_eq!(film(401, 10).len(), 401);
-        assert_eq!(film(402, 10).len(), 202);
-        let long = film(10_002, 10);
+        assert!(film_indices(0, 10).is_empty());
+        assert_eq!(film_indices(1, 10), [0]);
+        assert_eq!(film_indices(400, 10).len(), 400);
+        assert_eq!(film_indices(401, 10).len(), 401);
+        assert_eq!(film_indices(402, 10).len(), 202);
+        let long = film_indices(10_002, 10);
         assert!(long.len() <= 401 && *long.last().unwrap() == 10_001);
-        assert_eq!(film(50, 4_000_000), [0, 49]);
+        assert_eq!(film_indices(50, 4_000_000), [0, 49]);
     }
 
     #[test]
     fn a_fast_start_is_shown() {
-        let chosen = stills(&moments(101, |t| (-t / 5.0).exp()), 8, 1.0);
+        let chosen = snapshot_indices(&moments(101, |t| (-t / 5.0).exp()), 8, 1.0);
         assert_eq!((chosen[0], chosen[7]), (0, 100));
         assert!(chosen[6] < 15, "{chosen:?}");
     }
@@ -471,7 +477,7 @@ mod tests {
     fn a_swing_is_shown_at_its_turning_points() {
         // Turns every 5 outputs, and decays.
         let swing = |t: f64| (0.1 * std::f64::consts::TAU * t).cos() * (-t / 40.0).exp();
-        let chosen = stills(&moments(1001, swing), 8, 1.0);
+        let chosen = snapshot_indices(&moments(1001, swing), 8, 1.0);
         assert_eq!((chosen[0], chosen[7]), (0, 1000));
         let tips: Vec<f64> = chosen.iter().map(|&k| swing(k as f64)).collect();
         for pair in tips[..7].windows(2) {
@@ -482,7 +488,7 @@ mod tests {
     #[test]
     fn what_hardly_moves_is_shown_at_equal_times() {
         for still in [|_: f64| 0.3, |t: f64| 1e-9 * t, |_: f64| f64::NAN] {
-            let chosen = stills(&moments(71, still), 8, 1.0);
+            let chosen = snapshot_indices(&moments(71, still), 8, 1.0);
             assert_eq!(chosen, [0, 10, 20, 30, 40, 50, 60, 70]);
         }
     }
@@ -491,7 +497,7 @@ mod tests {
     fn none_is_shown_twice() {
         let jump = |at: f64| move |t: f64| if t < at { 0.0 } else { 1.0 };
         for at in [0.5, 7.5, 11.5] {
-            let chosen = stills(&moments(13, jump(at)), 8, 1.0);
+            let chosen = snapshot_indices(&moments(13, jump(at)), 8, 1.0);
             assert_eq!((chosen[0], chosen[7]), (0, 12), "{chosen:?}");
             assert!(chosen.windows(2).all(|w| w[0] < w[1]), "{chosen:?}");
         }
@@ -499,6 +505,6 @@ mod tests {
 
     #[test]
     fn few_are_all_shown() {
-        assert_eq!(stills(&moments(3, |t| t), 8, 1.0), [0, 1, 2]);
+        assert_eq!(snapshot_indices(&moments(3, |t| t), 8, 1.0), [0, 1, 2]);
     }
 }

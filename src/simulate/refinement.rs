@@ -13,10 +13,12 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
-use crate::numbers::{larger, largest, two_digits};
+use crate::numbers::{format_two_digits, larger, largest};
 use crate::scenario::Scenario;
-use crate::shape::weights;
-use crate::simulate::{AIM, Choice, Frame, Options, Refused, Scheme, Simulation};
+use crate::shape::interpolation_weights;
+use crate::simulate::{
+    Choice, DEFAULT_TIP_ERROR, Frame, Options, Scheme, Simulation, SimulationError,
+};
 use crate::{relax, scenario, simulate};
 use glam::DVec3;
 
@@ -37,11 +39,11 @@ const LOCAL_ERROR: (f64, f64) = (1e-12, 0.1);
 const COST_RATIO: f64 = 4.0;
 
 /// Explicit steps that are longer by no more than this factor count as equally long.
-const HARDLY_LONGER: f64 = 1.1;
+const EQUAL_STEP_FACTOR: f64 = 1.1;
 
 /// Where runs part later than runs on coarser grids by less than this factor, they part for
 /// another reason than the phases of vibrations, and finer grids do not help.
-const LATER: f64 = 1.3;
+const LATER_PARTING_FACTOR: f64 = 1.3;
 
 /// The grid of a run, and its steps as in [`Options`].
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +54,7 @@ struct Resolution {
 }
 
 /// What is told of a run that unrecorded runs make, and whether they go on.
-pub type Watch<'a> = dyn FnMut(&Simulation) -> bool + 'a;
+pub type RunObserver<'a> = dyn FnMut(&Simulation) -> bool + 'a;
 
 /// A motion on finer and finer grids. Segments or a step that are requested fix the grid and the
 /// steps: then there is one run, compared with another that costs less.
@@ -113,7 +115,7 @@ impl Refinement {
     ///
     /// # Errors
     /// As of [`Simulation::new`].
-    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
+    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
         let first = Simulation::new(scenario, options)?;
         let length = scenario::longest(&scenario.rods);
         let mut refinement = Refinement {
@@ -139,7 +141,7 @@ impl Refinement {
             expected: (0.0, 0.0),
         };
         if refinement.refines() || options.tolerance.is_some() {
-            refinement.aim = Some(length * options.tolerance.unwrap_or(AIM));
+            refinement.aim = Some(length * options.tolerance.unwrap_or(DEFAULT_TIP_ERROR));
         }
         if let Some(first) = &mut refinement.next {
             first.aim = refinement.aim;
@@ -167,7 +169,7 @@ impl Refinement {
 
     /// The next run, at time 0; none behind the last, or if `watch`, which sees runs that it is
     /// compared with, or the limit ends them.
-    pub fn next_run(&mut self, watch: &mut Watch) -> Option<Simulation> {
+    pub fn next_run(&mut self, watch: &mut RunObserver) -> Option<Simulation> {
         let mut simulation = self.next.take()?;
         let comparison = match self.runs {
             0 => self.compare_first(&mut simulation, watch)?,
@@ -183,7 +185,7 @@ impl Refinement {
     /// to it.
     pub fn end_run(&mut self, simulation: &mut Simulation, stopped: Option<Stopped>) {
         let trajectory = simulation.trajectory.take();
-        self.seconds += simulation.seconds();
+        self.seconds += simulation.seconds_so_far();
         self.runs += 1;
         let bar = simulation.error_bar().filter(|_| stopped.is_none());
         let met = self
@@ -209,7 +211,7 @@ impl Refinement {
             && !met
             && stopped.is_none()
         {
-            let doubt = missed(simulation, aim, self.refines());
+            let doubt = missed_accuracy_doubt(simulation, aim, self.refines());
             simulation.doubts.push(doubt);
         }
     }
@@ -230,12 +232,12 @@ impl Refinement {
         let until = ended.known_until().filter(|_| ended.error_bar().is_none());
         if let (Some(until), Some(before)) = (until, self.known_until)
             && before > 0.0
-            && until < LATER * before
+            && until < LATER_PARTING_FACTOR * before
         {
             return;
         }
         let part = ended.time() / self.scenario.dynamics.duration;
-        let expected = COST_RATIO * ended.seconds() / part.clamp(f64::EPSILON, 1.0);
+        let expected = COST_RATIO * ended.seconds_so_far() / part.clamp(f64::EPSILON, 1.0);
         if self.seconds + expected > REFINEMENT_SECONDS {
             return;
         }
@@ -269,7 +271,7 @@ impl Refinement {
         }
     }
 
-    fn build(&self, at: Resolution) -> Result<Simulation, Refused> {
+    fn build(&self, at: Resolution) -> Result<Simulation, SimulationError> {
         let start_tolerance = self.options.tolerance.unwrap_or(self.scenario.tolerance);
         let options = Options {
             scheme: Some(self.choice.scheme),
@@ -281,22 +283,26 @@ impl Refinement {
         let from = |leaf: &Leaf, grid: &Grid| {
             simulate::state(leaf, grid, start_tolerance, options.limit.clone())
         };
-        Simulation::from(&self.scenario, &options, &from)
+        Simulation::with_initial_state(&self.scenario, &options, &from)
     }
 
     /// With steps of this length or, by the explicit method, the longest stable ones if they are
     /// hardly longer, or shorter.
-    fn build_with_steps(&self, at: Resolution) -> Result<Simulation, Refused> {
+    fn build_with_steps(&self, at: Resolution) -> Result<Simulation, SimulationError> {
         let stable = self.build(Resolution { step: None, ..at })?;
         match (at.step, stable.longest_step()) {
-            (Some(step), Some(longest)) if longest > HARDLY_LONGER * step => self.build(at),
+            (Some(step), Some(longest)) if longest > EQUAL_STEP_FACTOR * step => self.build(at),
             _ => Ok(stable),
         }
     }
 
     /// The points of a run that is not recorded, as far as it goes; none if `watch` or the limit
     /// ends it.
-    fn follow(&mut self, mut run: Simulation, watch: &mut Watch) -> Option<Trajectory> {
+    fn run_unrecorded(
+        &mut self,
+        mut run: Simulation,
+        watch: &mut RunObserver,
+    ) -> Option<Trajectory> {
         run.choice = self.choice;
         run.compare_with(None, true);
         while !run.done() && run.next_frame().is_ok() {
@@ -307,7 +313,7 @@ impl Refinement {
         if self.options.limit.reached() {
             return None;
         }
-        self.seconds += run.seconds();
+        self.seconds += run.seconds_so_far();
         run.trajectory
     }
 
@@ -315,7 +321,7 @@ impl Refinement {
     fn compare_first(
         &mut self,
         first: &mut Simulation,
-        watch: &mut Watch,
+        watch: &mut RunObserver,
     ) -> Option<Option<Comparison>> {
         let own = self.resolution;
         let coarser = own.segments.div_ceil(2);
@@ -335,8 +341,8 @@ impl Refinement {
             let [Some(same), Some(halved)] = runs else {
                 return Some(None);
             };
-            let same = self.follow(same, watch)?;
-            let halved = self.follow(halved, watch)?;
+            let same = self.run_unrecorded(same, watch)?;
+            let halved = self.run_unrecorded(halved, watch)?;
             let comparison = Comparison::new(own.segments, (segments, same), self.length);
             return Some(Some(comparison.with_half_steps(&halved)));
         }
@@ -346,7 +352,7 @@ impl Refinement {
         };
         if let (Some(step), Some(longer)) = (run.longest_step(), longer)
             && factor > 1.0
-            && HARDLY_LONGER * step < longer
+            && EQUAL_STEP_FACTOR * step < longer
         {
             // The coarser grid does not allow explicit steps twice as long.
             self.resolution.step = Some(0.5 * step);
@@ -359,9 +365,9 @@ impl Refinement {
         if factor < 1.0 {
             run.halve_outputs();
         }
-        let trajectory = self.follow(run, watch)?;
+        let trajectory = self.run_unrecorded(run, watch)?;
         if factor > 1.0 {
-            first.limit_steps_by(&trajectory);
+            first.halve_coarser_steps(&trajectory);
             self.coarser = Some((segments, trajectory.clone()));
         }
         Some(Some(Comparison::new(
@@ -379,15 +385,15 @@ impl Refinement {
     /// The comparison of a later run with the one before.
     fn compare_next(&self, next: &mut Simulation) -> Option<Comparison> {
         let (segments, trajectory) = self.coarser.clone()?;
-        next.limit_steps_by(&trajectory);
+        next.halve_coarser_steps(&trajectory);
         let run = (segments, trajectory);
         Some(Comparison::new(next.segments(), run, self.length))
     }
 }
 
 /// A sentence on a motion that is not as accurate as it was to be.
-fn missed(simulation: &Simulation, aim: f64, refined: bool) -> String {
-    let aim = two_digits(aim);
+fn missed_accuracy_doubt(simulation: &Simulation, aim: f64, refined: bool) -> String {
+    let aim = format_two_digits(aim);
     let why = match refined {
         true => format!(
             "finer grids would take more than {REFINEMENT_SECONDS} seconds, or cannot be followed; give more segments"
@@ -397,11 +403,11 @@ fn missed(simulation: &Simulation, aim: f64, refined: bool) -> String {
     match (simulation.error_bar(), simulation.known_until()) {
         (Some(bar), _) => format!(
             "the error of the tips may be {}, and {aim} was aimed at: {why}",
-            two_digits(bar)
+            format_two_digits(bar)
         ),
         (None, Some(until)) => format!(
             "from t = {} on runs on two grids part, as where a leaf snaps: how accurate the tips are is known until then",
-            two_digits(until)
+            format_two_digits(until)
         ),
         (None, None) => {
             "how accurate the tips are is not known: there is no second run to compare with".into()
@@ -414,17 +420,17 @@ const SAFETY: f64 = 3.0;
 
 /// Two runs have parted where they differ by more than this part of the largest displacement in
 /// the motion: phases differ by so many radians, or one has snapped and the other has not.
-const PARTED: f64 = 0.2;
+const PARTED_DISPLACEMENT_FRACTION: f64 = 0.2;
 
 /// As long as displacements since the start differ by more than that part of the largest of them
 /// so far, as those of a shared tip do while waves cross the first segments, the order of the
 /// methods is not to be seen, and this factor is in its place. (A joined
 /// leaf let go needed 8.)
-const UNRESOLVED: f64 = 10.0;
+const UNRESOLVED_ERROR_FACTOR: f64 = 10.0;
 
 /// Runs that differ by less than this part of the longest rod have not parted, however little the
 /// leaf moves: they have come to rest, or vibrate with such an amplitude.
-const CLOSE: f64 = 1e-3;
+const NEGLIGIBLE_RUN_DIFFERENCE: f64 = 1e-3;
 
 /// What rounding leaves of differences, relative to the longest rod.
 const ROUNDING: f64 = 1e-12;
@@ -437,7 +443,7 @@ const CUBIC: usize = 4;
 pub(super) struct Trajectory {
     points: Vec<DVec3>,
     /// Number of points at an output.
-    each: usize,
+    points_per_output: usize,
     /// The longest step before every output but the first, in the method's unit; infinite where
     /// all steps have the same length.
     pub longest_steps: Vec<f64>,
@@ -446,17 +452,19 @@ pub(super) struct Trajectory {
 impl Trajectory {
     pub fn add(&mut self, points: &[DVec3]) {
         self.points.extend_from_slice(points);
-        self.each = points.len();
+        self.points_per_output = points.len();
     }
 
-    fn at(&self, output: usize) -> Option<&[DVec3]> {
-        self.points.chunks(self.each.max(1)).nth(output)
+    fn output_points(&self, output: usize) -> Option<&[DVec3]> {
+        self.points
+            .chunks(self.points_per_output.max(1))
+            .nth(output)
     }
 
     /// The largest displacement from the first output.
-    fn span(&self) -> f64 {
-        let start = self.at(0).unwrap_or(&[]);
-        let outputs = self.points.chunks(self.each.max(1));
+    fn largest_displacement(&self) -> f64 {
+        let start = self.output_points(0).unwrap_or(&[]);
+        let outputs = self.points.chunks(self.points_per_output.max(1));
         outputs.fold(0.0, |most, points| {
             largest_distance(points, start).max(most)
         })
@@ -464,7 +472,8 @@ impl Trajectory {
 
     /// The largest distances so far from another run, at the outputs that both have.
     pub fn distances(&self, other: &Trajectory) -> Vec<f64> {
-        let outputs = (0..).map_while(|output| self.at(output).zip(other.at(output)));
+        let outputs =
+            (0..).map_while(|output| self.output_points(output).zip(other.output_points(output)));
         let mut most = 0.0_f64;
         let distances = outputs.map(|(own, other)| {
             most = larger(most, largest_distance(own, other));
@@ -481,7 +490,7 @@ fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
 /// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
 /// held.
 pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
-    let (first, weights) = weights(stations, 0.5, CUBIC);
+    let (first, weights) = interpolation_weights(stations, 0.5, CUBIC);
     let mut points = frame.tips(joined);
     for rod in 0..frame.rods {
         let near = frame.centerline(rod)[first..].iter().zip(&weights);
@@ -501,13 +510,13 @@ pub(super) struct Comparison {
     /// Bars on what that distance does not show, where both runs have the same steps.
     of_steps: Option<Vec<f64>>,
     /// The distance from which runs have parted.
-    parted: f64,
+    parting_distance: f64,
     rounding: f64,
     /// The points at the first output, and the largest displacement from there so far.
     start: Vec<DVec3>,
     displacement: f64,
     /// The bar at the last output; none from where runs have parted.
-    pub bar: Option<f64>,
+    pub error_bar: Option<f64>,
 }
 
 impl Comparison {
@@ -520,11 +529,12 @@ impl Comparison {
             factor: SAFETY * own / (its - own).abs(),
             segments: others,
             of_steps: None,
-            parted: (PARTED * other.span()).max(CLOSE * length),
+            parting_distance: (PARTED_DISPLACEMENT_FRACTION * other.largest_displacement())
+                .max(NEGLIGIBLE_RUN_DIFFERENCE * length),
             rounding: ROUNDING * length,
             start: Vec::new(),
             displacement: 0.0,
-            bar: Some(0.0),
+            error_bar: Some(0.0),
             other,
         }
     }
@@ -532,7 +542,7 @@ impl Comparison {
     /// With the distances of the other run from one like it in steps half as long.
     pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
         let distances = self.other.distances(halved);
-        let bar = |distance: f64| match distance <= self.parted {
+        let bar = |distance: f64| match distance <= self.parting_distance {
             true => 4.0 / 3.0 * SAFETY * distance,
             false => f64::INFINITY,
         };
@@ -551,20 +561,24 @@ impl Comparison {
         }
         let displacement = largest_distance(points, &self.start);
         self.displacement = larger(self.displacement, displacement);
-        let (others_start, start) = (self.other.at(0), &self.start);
-        let there = self.other.at(output).zip(others_start).zip(of_steps);
-        let there = there.zip(self.bar);
-        self.bar = there.and_then(|(((other, others_start), of_steps), before)| {
+        let (others_start, start) = (self.other.output_points(0), &self.start);
+        let there = self
+            .other
+            .output_points(output)
+            .zip(others_start)
+            .zip(of_steps);
+        let there = there.zip(self.error_bar);
+        self.error_bar = there.and_then(|(((other, others_start), of_steps), before)| {
             let distance = largest_distance(points, other);
             let moves = points.iter().zip(other).zip(start.iter().zip(others_start));
             let moves = moves.map(|((a, b), (a0, b0))| ((*a - *a0) - (*b - *b0)).length());
             let of_moves = largest(moves);
-            let factor = match of_moves <= PARTED * self.displacement {
+            let factor = match of_moves <= PARTED_DISPLACEMENT_FRACTION * self.displacement {
                 true => self.factor,
-                false => UNRESOLVED * self.factor,
+                false => UNRESOLVED_ERROR_FACTOR * self.factor,
             };
             let bar = factor * distance + of_steps + self.rounding;
-            (distance <= self.parted).then(|| bar.max(before))
+            (distance <= self.parting_distance).then(|| bar.max(before))
         });
     }
 }

@@ -9,8 +9,11 @@ use crate::relax::{
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use crate::shape::{Difference, serialize_tips};
-use crate::shooting::{Failure, Reason, Solution, Start};
-use crate::study::judge::{common, differences, fine_grid, index_at, timed, with_nodes_of};
+use crate::shooting::{ShootingFailure, ShootingFailureReason, ShootingSolution, ShootingStart};
+use crate::study::judge::{
+    common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near, rod_differences,
+    run_timed,
+};
 use crate::{relax, shooting, words};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
@@ -18,11 +21,11 @@ use serde::{Serialize, Serializer};
 /// Rotations may differ by this many times the tolerance (in radians) before
 /// the shapes count as different: they are less accurate than the positions, to which
 /// the tolerance applies, but a vein with another twist is another equilibrium.
-const ROTATION_PART: f64 = 100.0;
+const ROTATION_TOLERANCE_FACTOR: f64 = 100.0;
 
 /// Forces and moments may differ by this many times the tolerance, as a part of the largest in the
 /// leaf, beside what the boundary-value solution knows of them.
-const FORCE_PART: f64 = 100.0;
+const FORCE_TOLERANCE_FACTOR: f64 = 100.0;
 
 /// Options of a check.
 #[derive(Clone, Debug, Default)]
@@ -41,7 +44,7 @@ pub struct CheckOptions {
 /// Verdict of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum CheckVerdict {
     /// Both find the same shape within the tolerance and, where both know it, the same number of
     /// negative eigenvalues.
     Agree,
@@ -56,7 +59,7 @@ pub enum Verdict {
 
 words! {
     /// The quantities compared.
-    pub enum Quantity {
+    pub enum ComparedQuantity {
         /// Positions of the centerlines.
         Position = "position",
         /// Rotations of the directors.
@@ -68,21 +71,21 @@ words! {
     }
 }
 
-impl Quantity {
+impl ComparedQuantity {
     /// Its component of a difference.
-    pub fn of(self, difference: &Difference) -> f64 {
+    pub fn component(self, difference: &Difference) -> f64 {
         match self {
-            Quantity::Position => difference.position,
-            Quantity::Rotation => difference.rotation,
-            Quantity::Force => difference.force,
-            Quantity::Moment => difference.moment,
+            ComparedQuantity::Position => difference.position,
+            ComparedQuantity::Rotation => difference.rotation,
+            ComparedQuantity::Force => difference.force,
+            ComparedQuantity::Moment => difference.moment,
         }
     }
 }
 
 /// The place of the largest difference of two shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct DifferenceLocation {
     /// The rod, counted from 0.
     pub rod: usize,
     /// Fraction of its length.
@@ -96,7 +99,7 @@ pub struct Check {
     pub scenario: String,
     /// The verdict.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    pub verdict: CheckVerdict,
     /// Number of veins.
     pub rods: usize,
     /// Required accuracy, relative to the longest rod.
@@ -106,11 +109,11 @@ pub struct Check {
     /// Whether the positions differ by no more than the sum of both error estimates.
     pub within_estimates: Option<bool>,
     /// The relaxed leaf.
-    #[serde(rename = "relaxation", serialize_with = "relaxation")]
+    #[serde(rename = "relaxation", serialize_with = "serialize_relaxation")]
     pub relaxed: Equilibrium,
     /// The boundary-value problem solved from there; `None` if it is not at rest.
     #[serde(rename = "shooting")]
-    pub shot: Option<Shot>,
+    pub shot: Option<ShootingResult>,
     /// Stations of the relaxed leaf: fractions of the length.
     pub stations: Vec<f64>,
     /// Largest differences over all veins at each of them; empty without a solution.
@@ -120,10 +123,10 @@ pub struct Check {
 
 impl Check {
     /// From a relaxed leaf and the shooting solution started from it.
-    pub fn new(relaxed: Equilibrium, shot: Option<Shot>) -> Self {
+    pub fn new(relaxed: Equilibrium, shot: Option<ShootingResult>) -> Self {
         let mut check = Check {
             scenario: relaxed.scenario.clone(),
-            verdict: Verdict::Differ,
+            verdict: CheckVerdict::Differ,
             rods: relaxed.rod_count,
             tolerance: relaxed.accuracy.tolerance,
             difference: None,
@@ -133,12 +136,12 @@ impl Check {
             relaxed,
             shot,
         };
-        check.compare();
+        check.compute_differences();
         check
     }
 
-    fn compare(&mut self) {
-        let rods = self.differences();
+    fn compute_differences(&mut self) {
+        let rods = self.differences_by_rod();
         let stations = 0..rods.first().map_or(0, Vec::len);
         let largest = |i| {
             let rods = rods.iter().map(|along: &Vec<Difference>| along[i]);
@@ -147,7 +150,7 @@ impl Check {
         self.along = stations.map(largest).collect();
         self.difference = self.along.iter().copied().reduce(Difference::max);
         self.within_estimates = self.differs_within_estimates();
-        self.verdict = self.judge();
+        self.verdict = self.reach_verdict();
     }
 
     fn differs_within_estimates(&self) -> Option<bool> {
@@ -155,26 +158,29 @@ impl Check {
         Some(self.difference?.position <= estimate)
     }
 
-    fn judge(&self) -> Verdict {
+    fn reach_verdict(&self) -> CheckVerdict {
         let solution = match self.shot.as_ref().map(|shot| &shot.found) {
             None => {
                 let why = (self.relaxed.remark.as_ref()).map(|remark| format!(": {remark}"));
                 let why = why.unwrap_or_default();
-                return Verdict::NotCompared(format!("the relaxation did not come to rest{why}"));
+                return CheckVerdict::NotCompared(format!(
+                    "the relaxation did not come to rest{why}"
+                ));
             }
             Some(Err(failure)) => {
                 let why = failure.reason.to_string();
                 return match failure.reason {
-                    Reason::Rounding { .. } | Reason::Unbounded { fixed: false, .. } => {
-                        Verdict::NotIndependent(why)
+                    ShootingFailureReason::Rounding { .. }
+                    | ShootingFailureReason::Unbounded { fixed: false, .. } => {
+                        CheckVerdict::NotIndependent(why)
                     }
-                    _ => Verdict::NotCompared(why),
+                    _ => CheckVerdict::NotCompared(why),
                 };
             }
             Some(Ok(solution)) => solution,
         };
         if solution.error.position > self.allowed() {
-            return Verdict::NotCompared(format!(
+            return CheckVerdict::NotCompared(format!(
                 "the boundary-value solution is only known within {:.1e}: ask for a larger tolerance",
                 solution.error.position
             ));
@@ -190,8 +196,8 @@ impl Check {
             .indices()
             .is_some_and(|[relaxed, shot]| relaxed != shot);
         match self.difference.is_some_and(same) && !contradict {
-            true => Verdict::Agree,
-            false => Verdict::Differ,
+            true => CheckVerdict::Agree,
+            false => CheckVerdict::Differ,
         }
     }
 
@@ -203,30 +209,40 @@ impl Check {
     }
 
     /// The boundary-value solution, if there is one.
-    pub fn solution(&self) -> Option<&Solution> {
+    pub fn solution(&self) -> Option<&ShootingSolution> {
         self.shot.as_ref()?.found.as_ref().ok()
     }
 
     /// The place at which a quantity differs most.
-    pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
-        let rods = self.differences().into_iter().enumerate();
+    pub fn largest_difference_location(
+        &self,
+        quantity: ComparedQuantity,
+    ) -> Option<DifferenceLocation> {
+        let rods = self.differences_by_rod().into_iter().enumerate();
         let found = rods.flat_map(|(rod, along)| {
             let along = along.into_iter().zip(&self.stations);
-            along.map(move |(found, &sigma)| (quantity.of(&found), Place { rod, sigma }))
+            along.map(move |(found, &sigma)| {
+                (
+                    quantity.component(&found),
+                    DifferenceLocation { rod, sigma },
+                )
+            })
         });
-        let farther = |a: (f64, Place), b: (f64, Place)| if b.0 > a.0 { b } else { a };
+        let farther = |a: (f64, DifferenceLocation), b: (f64, DifferenceLocation)| {
+            if b.0 > a.0 { b } else { a }
+        };
         found.reduce(farther).map(|(_, place)| place)
     }
 
     /// Differences of each rod at each station of the relaxed leaf, which are among those of the
     /// solution: matched by station, since another grid with as many segments may divide the
     /// panels between knots differently. Empty without a solution.
-    fn differences(&self) -> Vec<Vec<Difference>> {
+    fn differences_by_rod(&self) -> Vec<Vec<Difference>> {
         let Some(solution) = self.solution() else {
             return Vec::new();
         };
-        let both = common(&self.stations, &solution.stations);
-        let rods = differences(&both, &self.relaxed.shape.rods, &solution.rods);
+        let both = common_stations(&self.stations, &solution.stations);
+        let rods = rod_differences(&both, &self.relaxed.shape.rods, &solution.rods);
         rods.map(Iterator::collect).collect()
     }
 
@@ -238,7 +254,7 @@ impl Check {
 
     /// Angle between directors up to which the shapes count as the same.
     pub fn allowed_rotation(&self) -> f64 {
-        ROTATION_PART * self.tolerance
+        ROTATION_TOLERANCE_FACTOR * self.tolerance
     }
 
     /// Differences of forces and of moments up to which the leaves count as the same, in units of
@@ -249,7 +265,7 @@ impl Check {
         let sizes = nodes.map(|node| larger(node.n.length(), node.m.length() / longest));
         // The energy of a leaf that is bent in itself is that of forces, too.
         let energy = self.relaxed.energy.unwrap_or(0.0).abs() / longest;
-        let force = FORCE_PART * self.tolerance * larger(largest(sizes), energy);
+        let force = FORCE_TOLERANCE_FACTOR * self.tolerance * larger(largest(sizes), energy);
         [force, force * longest]
     }
 }
@@ -275,45 +291,45 @@ pub fn check(
     // Forces are compared as well: not the shape alone.
     let (relaxed, _) = relax::relax_on_grids(scenario, &asked, false, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
-    let shot = (!lost).then(|| shoot(scenario, &relaxed, options, progress));
+    let shot = (!lost).then(|| solve_by_shooting(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))
 }
 
 /// Solves the boundary-value problem from a relaxed leaf, to the same accuracy.
-fn shoot(
+fn solve_by_shooting(
     scenario: &Scenario,
     relaxed: &Equilibrium,
     asked: &CheckOptions,
     progress: &mut dyn FnMut(&Progress),
-) -> Shot {
-    let grid = fine_grid(scenario, relaxed.shape.stations.len() - 1);
-    let start = Start::Leaf {
+) -> ShootingResult {
+    let grid = eigenvalue_grid(scenario, relaxed.shape.stations.len() - 1);
+    let start = ShootingStart::Leaf {
         stations: &relaxed.shape.stations,
         rods: &relaxed.shape.rods,
     };
-    let precision = shooting::Precision::Error(relaxed.accuracy.tolerance);
-    let stations = with_nodes_of(grid.sigma(), &relaxed.shape.stations);
-    let options = shooting::Options {
+    let precision = shooting::RequiredPrecision::EstimatedError(relaxed.accuracy.tolerance);
+    let stations = grid_nodes_and_others(grid.sigma(), &relaxed.shape.stations);
+    let options = shooting::ShootingOptions {
         intervals: asked.intervals,
         limit: asked.limit.clone(),
         gives_up: true,
-        ..shooting::Options::new(start, &stations, precision)
+        ..shooting::ShootingOptions::new(start, &stations, precision)
     };
-    let (found, wall_seconds) = timed(|| {
+    let (found, wall_seconds) = run_timed(|| {
         shooting::solve(scenario, &options, &mut |step| {
             progress(&Progress::Shooting(*step))
         })
     });
     let rods = found.as_ref().map_or(&[][..], |solution| &solution.rods);
     let ends = rods.iter().take(relaxed.tips.len());
-    Shot {
+    ShootingResult {
         tips: (ends.filter_map(|rod| rod.nodes.last()))
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
             Ok(solution) => {
                 let shape = (&solution.stations[..], &solution.rods[..]);
-                index_at(scenario, grid, shape, solution.error.position)
+                morse_index_near(scenario, grid, shape, solution.error.position)
             }
             Err(_) => None,
         },
@@ -324,9 +340,9 @@ fn shoot(
 
 /// The boundary-value solution with its verdict, or why there is none.
 #[derive(Clone, Debug)]
-pub struct Shot {
+pub struct ShootingResult {
     /// What the shooting found.
-    pub found: Result<Solution, Failure>,
+    pub found: Result<ShootingSolution, ShootingFailure>,
     /// The shared tip alone, or one tip per rod; empty without a solution.
     pub tips: Vec<DVec3>,
     /// Its Morse index, counted on the energy's Hessian at this shape.
@@ -336,7 +352,10 @@ pub struct Shot {
 }
 
 /// The part of `check.json` on the relaxed leaf.
-pub fn relaxation<S: Serializer>(leaf: &Equilibrium, serializer: S) -> Result<S::Ok, S::Error> {
+pub fn serialize_relaxation<S: Serializer>(
+    leaf: &Equilibrium,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Keys<'a> {
         outcome: &'static str,
@@ -367,7 +386,7 @@ pub fn relaxation<S: Serializer>(leaf: &Equilibrium, serializer: S) -> Result<S:
 }
 
 /// All keys; those of a solution are null if there is none.
-impl Serialize for Shot {
+impl Serialize for ShootingResult {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys<'a> {
@@ -383,7 +402,7 @@ impl Serialize for Shot {
             #[serde(flatten, serialize_with = "serialize_index")]
             index: Option<usize>,
             neutral: Option<NeutralKeys<'a>>,
-            work: shooting::Work,
+            work: shooting::ShootingCounts,
             wall_seconds: f64,
         }
         #[derive(Serialize)]
@@ -395,14 +414,14 @@ impl Serialize for Shot {
         let solution = self.found.as_ref().ok();
         let (outcome, neutral, work) = match &self.found {
             Ok(solution) => ("converged", solution.neutral.as_ref(), solution.work),
-            Err(Failure { reason, work, .. }) => match reason {
-                Reason::Singular(neutral) => ("singular", Some(neutral), *work),
-                Reason::NoConvergence { .. } => ("no-convergence", None, *work),
-                Reason::Rounding { .. } => ("rounding", None, *work),
-                Reason::Unbounded { .. } => ("unbounded", None, *work),
-                Reason::TooMuch(_) => ("too-much-memory", None, *work),
-                Reason::OutOfTime => ("out-of-time", None, *work),
-                Reason::Unmodelled(_) => ("not-modelled", None, *work),
+            Err(ShootingFailure { reason, work, .. }) => match reason {
+                ShootingFailureReason::Singular(neutral) => ("singular", Some(neutral), *work),
+                ShootingFailureReason::NoConvergence { .. } => ("no-convergence", None, *work),
+                ShootingFailureReason::Rounding { .. } => ("rounding", None, *work),
+                ShootingFailureReason::Unbounded { .. } => ("unbounded", None, *work),
+                ShootingFailureReason::TooMuchMemory(_) => ("too-much-memory", None, *work),
+                ShootingFailureReason::OutOfTime => ("out-of-time", None, *work),
+                ShootingFailureReason::Unmodelled(_) => ("not-modelled", None, *work),
             },
         };
         Keys {
@@ -445,45 +464,54 @@ mod tests {
     }
 
     /// The check with the boundary-value solution changed after the fact.
-    fn changed(mut check: Check, change: impl Fn(&mut Solution)) -> Check {
+    fn check_with_changed_solution(
+        mut check: Check,
+        change: impl Fn(&mut ShootingSolution),
+    ) -> Check {
         if let Some(Ok(solution)) = check.shot.as_mut().map(|shot| shot.found.as_mut()) {
             change(solution);
         }
-        check.compare();
+        check.compute_differences();
         check
     }
 
     #[test]
     fn a_vein_elsewhere_or_twisted_is_a_difference() {
-        let middle = |solution: &Solution| solution.stations.len() / 2;
-        let moved = changed(fan(), |solution| {
+        let middle = |solution: &ShootingSolution| solution.stations.len() / 2;
+        let moved = check_with_changed_solution(fan(), |solution| {
             let middle = middle(solution);
             solution.rods[1].nodes[middle].position += 3e-6 * DVec3::Z;
         });
-        assert_eq!(moved.verdict, Verdict::Differ);
+        assert_eq!(moved.verdict, CheckVerdict::Differ);
         assert_eq!(moved.within_estimates, Some(false));
-        let place = Place { rod: 1, sigma: 0.5 };
-        assert_eq!(moved.farthest(Quantity::Position), Some(place));
+        let place = DifferenceLocation { rod: 1, sigma: 0.5 };
+        assert_eq!(
+            moved.largest_difference_location(ComparedQuantity::Position),
+            Some(place)
+        );
 
-        let twisted = changed(fan(), |solution| {
+        let twisted = check_with_changed_solution(fan(), |solution| {
             let middle = middle(solution);
             let node = &mut solution.rods[2].nodes[middle];
             node.rotation *= DQuat::from_rotation_x(3e-4);
         });
-        assert_eq!(twisted.verdict, Verdict::Differ);
-        let place = Place { rod: 2, sigma: 0.5 };
-        assert_eq!(twisted.farthest(Quantity::Rotation), Some(place));
+        assert_eq!(twisted.verdict, CheckVerdict::Differ);
+        let place = DifferenceLocation { rod: 2, sigma: 0.5 };
+        assert_eq!(
+            twisted.largest_difference_location(ComparedQuantity::Rotation),
+            Some(place)
+        );
     }
 
     /// Forces of the relaxed leaf that are wrong by one in a thousand are seen, the shape being right.
     #[test]
     fn other_forces_are_a_difference() {
-        let weaker = changed(fan(), |solution| {
+        let weaker = check_with_changed_solution(fan(), |solution| {
             for node in solution.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
                 node.n *= 1.001;
             }
         });
-        assert_eq!(weaker.verdict, Verdict::Differ);
+        assert_eq!(weaker.verdict, CheckVerdict::Differ);
         assert_eq!(weaker.difference.map(|it| it.position < 1e-7), Some(true));
     }
 
@@ -497,16 +525,16 @@ mod tests {
             if let Some(shot) = &mut check.shot {
                 shot.negative_eigenvalues = index;
             }
-            check.compare();
+            check.compute_differences();
             check.verdict
         };
-        assert_eq!(with_index(Some(2)), Verdict::Differ);
-        assert_eq!(with_index(None), Verdict::Agree);
+        assert_eq!(with_index(Some(2)), CheckVerdict::Differ);
+        assert_eq!(with_index(None), CheckVerdict::Agree);
     }
 
     #[test]
     fn a_solution_that_is_not_known_well_enough_decides_nothing() {
-        let vague = changed(fan(), |solution| solution.error.position = 3e-6);
-        assert!(matches!(vague.verdict, Verdict::NotCompared(_)));
+        let vague = check_with_changed_solution(fan(), |solution| solution.error.position = 3e-6);
+        assert!(matches!(vague.verdict, CheckVerdict::NotCompared(_)));
     }
 }

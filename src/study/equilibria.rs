@@ -1,32 +1,32 @@
 //! Equilibria shapes of a leaf, as far as many starts find them.
 
-use crate::numbers::power_of_ten;
+use crate::numbers::format_error_bound;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
-use crate::study::judge::{common, differences};
+use crate::study::judge::{common_stations, rod_differences};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 /// Starts relaxed in parallel, before the next check for new equilibria.
-const BATCH: usize = 16;
+const PARALLEL_STARTS: usize = 16;
 
 /// The search ends after so many starts in a row without a new equilibrium, or after
 /// all starts.
-pub const IN_VAIN: usize = 32;
+pub const MOST_FRUITLESS_STARTS: usize = 32;
 
-const MOST: usize = 160;
+const MOST_STARTS: usize = 160;
 
 /// Equilibria closer to each other than this part of the longest rod, or than
 /// their error estimates, are the same.
-const SAME: f64 = 1e-3;
+const SAME_EQUILIBRIUM_DISTANCE: f64 = 1e-3;
 
 /// Energies that differ by less than this, relatively, are the same.
-const SAME_ENERGY: f64 = 1e-6;
+const SAME_ENERGY_DIFFERENCE: f64 = 1e-6;
 
 /// The equilibria of a leaf that many starts have found. As JSON it is
 /// `equilibria.json`.
@@ -40,7 +40,7 @@ pub struct Equilibria {
     pub failed: usize,
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
-    pub found: Vec<Found>,
+    pub found: Vec<FoundEquilibrium>,
     /// A remark if a stable one has less energy than the one in which a relaxation ends.
     pub remark: Option<String>,
     /// Total time, in seconds.
@@ -49,7 +49,7 @@ pub struct Equilibria {
 
 /// One of the equilibria.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FoundEquilibrium {
     /// The equilibrium.
     pub equilibrium: Equilibrium,
     /// Starts that ended in it.
@@ -59,7 +59,7 @@ pub struct Found {
 }
 
 /// Of the equilibrium only what identifies it, and its shape.
-impl Serialize for Found {
+impl Serialize for FoundEquilibrium {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys<'a> {
@@ -125,12 +125,12 @@ pub fn equilibria(
         keep_unstable: true,
         ..how
     })?;
-    all.take(plain, true);
-    all.take(any, false);
+    all.add_equilibrium(plain, true);
+    all.add_equilibrium(any, false);
     let mut in_vain = 0;
     let mut next = 0;
-    while next < MOST && in_vain < IN_VAIN && !limit.reached() {
-        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + BATCH)
+    while next < MOST_STARTS && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
+        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + PARALLEL_STARTS)
             .into_par_iter()
             .map(|number| {
                 find(SemiImplicit {
@@ -139,7 +139,7 @@ pub fn equilibria(
                 })
             })
             .collect();
-        next += BATCH;
+        next += PARALLEL_STARTS;
         for ended in batch {
             let before = all.found.len();
             let ended = ended?;
@@ -147,7 +147,7 @@ pub fn equilibria(
                 // Stopped on its way, which says nothing of its start.
                 continue;
             }
-            all.take(ended, false);
+            all.add_equilibrium(ended, false);
             in_vain = if all.found.len() > before {
                 0
             } else {
@@ -160,7 +160,7 @@ pub fn equilibria(
         let [a, b] = [a, b].map(|found| found.equilibrium.energy.unwrap_or(f64::NAN));
         a.total_cmp(&b)
     });
-    all.remark = all.lower();
+    all.remark = all.lower_energy_remark();
     if limit.reached() {
         let stopped = format!("the search was stopped after {} starts", all.starts);
         let both = all.remark.take().into_iter().chain([stopped]);
@@ -171,19 +171,19 @@ pub fn equilibria(
 }
 
 impl Equilibria {
-    fn take(&mut self, equilibrium: Equilibrium, plain: bool) {
+    fn add_equilibrium(&mut self, equilibrium: Equilibrium, plain: bool) {
         self.starts += 1;
         if !equilibrium.outcome.is_success() {
             self.failed += 1;
             return;
         }
         let mut known = self.found.iter_mut();
-        match known.find(|found| same(&found.equilibrium, &equilibrium)) {
+        match known.find(|found| is_same_equilibrium(&found.equilibrium, &equilibrium)) {
             Some(found) => {
                 found.starts += 1;
                 found.plain |= plain;
             }
-            None => self.found.push(Found {
+            None => self.found.push(FoundEquilibrium {
                 equilibrium,
                 starts: 1,
                 plain,
@@ -194,30 +194,30 @@ impl Equilibria {
 
 impl Equilibria {
     /// The stable equilibrium with less energy than that of the unperturbed start, if any.
-    fn lower(&self) -> Option<String> {
+    fn lower_energy_remark(&self) -> Option<String> {
         let plain = self.found.iter().position(|found| found.plain)?;
-        let stable = |found: &Found| found.equilibrium.stable() == Some(true);
+        let stable = |found: &FoundEquilibrium| found.equilibrium.stable() == Some(true);
         let lowest = self.found.iter().position(stable)?;
         let [least, energy] = [lowest, plain].map(|k| self.found[k].equilibrium.energy);
         let (least, energy) = (least?, energy?);
         // Mirror images differ by rounding only.
         let less = energy - least;
-        (less > SAME_ENERGY * energy.abs()).then(|| {
+        (less > SAME_ENERGY_DIFFERENCE * energy.abs()).then(|| {
             format!(
                 "a relaxation ends in equilibrium {}, but number {} is stable, too, and has less energy, by {}",
                 plain + 1,
                 lowest + 1,
-                power_of_ten(less)
+                format_error_bound(less)
             )
         })
     }
 }
 
-fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
+fn is_same_equilibrium(a: &Equilibrium, b: &Equilibrium) -> bool {
     let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
-    let within = (SAME * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
+    let within = (SAME_EQUILIBRIUM_DISTANCE * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at common stations.
-    let both = common(&a.shape.stations, &b.shape.stations);
-    let mut apart = differences(&both, &a.shape.rods, &b.shape.rods).flatten();
+    let both = common_stations(&a.shape.stations, &b.shape.stations);
+    let mut apart = rod_differences(&both, &a.shape.rods, &b.shape.rods).flatten();
     apart.all(|apart| apart.position < within)
 }

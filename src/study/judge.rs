@@ -7,24 +7,24 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::relax;
-use crate::relax::{Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
+use crate::relax::{Equilibrium, Method, Options, Outcome, RelaxError, SolverCounts, index_near};
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape, Undulation};
-use crate::shooting::{Solution, Start};
+use crate::shooting::{ShootingSolution, ShootingStart};
 
 /// Stations closer than this are the same.
-const SAME_STATION: f64 = 1e-9;
+const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Least number of segments of a grid on which negative eigenvalues are counted.
-pub const SEGMENTS: usize = 32;
+pub const LEAST_EIGENVALUE_SEGMENTS: usize = 32;
 
 /// Leaves farther apart than this, in lengths, are not the same leaf on two grids.
-pub const SAME_LEAF: f64 = 0.05;
+pub const SAME_LEAF_DISTANCE: f64 = 0.05;
 
 /// The answer of a method, in the units of the scenario.
 #[derive(Clone, Debug)]
-pub struct Answer {
+pub struct MethodSolution {
     /// How the run ended.
     pub outcome: Outcome,
     /// Why it did not succeed, or another remark of the method.
@@ -41,12 +41,12 @@ pub struct Answer {
     /// Waves and twist of the veins.
     pub undulation: Undulation,
     /// Work done.
-    pub work: Work,
+    pub work: SolverCounts,
 }
 
-impl From<Equilibrium> for Answer {
+impl From<Equilibrium> for MethodSolution {
     fn from(leaf: Equilibrium) -> Self {
-        Answer {
+        MethodSolution {
             outcome: leaf.outcome,
             remark: leaf.remark,
             stations: leaf.shape.stations,
@@ -60,17 +60,17 @@ impl From<Equilibrium> for Answer {
     }
 }
 
-impl Answer {
+impl MethodSolution {
     /// Relaxes a leaf.
-    pub fn relaxed(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
-        relax::relax(scenario, options, &mut |_| {}).map(Answer::from)
+    pub fn from_relaxation(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
+        relax::relax(scenario, options, &mut |_| {}).map(MethodSolution::from)
     }
 
     /// The answer given by a solution of the boundary-value problem with this `accuracy`,
     /// relative to the longest rod. Eigenvalues are not counted.
-    pub fn of_solution(scenario: &Scenario, solution: Solution, accuracy: f64) -> Self {
+    pub fn from_shooting(scenario: &Scenario, solution: ShootingSolution, accuracy: f64) -> Self {
         let error = solution.error.position;
-        Answer {
+        MethodSolution {
             outcome: match error > accuracy * longest(&scenario.rods) {
                 true => Outcome::ToleranceNotReached,
                 false => Outcome::Converged,
@@ -92,13 +92,13 @@ impl Answer {
     }
 
     /// Whether the leaf is at rest, whatever its stability and accuracy.
-    pub fn at_rest(&self) -> bool {
+    pub fn is_at_rest(&self) -> bool {
         self.outcome.is_success() || self.outcome == Outcome::ToleranceNotReached
     }
 
     /// The answer as the start of a boundary-value problem.
-    pub fn as_start(&self) -> Start<'_> {
-        Start::Leaf {
+    pub fn shooting_start(&self) -> ShootingStart<'_> {
+        ShootingStart::Leaf {
             stations: &self.stations,
             rods: &self.rods,
         }
@@ -107,39 +107,39 @@ impl Answer {
     /// Largest distance from another answer at the stations common to both;
     /// nothing is interpolated. `None` if the only common station is the clamped
     /// base. NaN counts as infinite.
-    pub fn distance(&self, other: &Answer) -> Option<f64> {
-        let common = common(&self.stations, &other.stations);
+    pub fn largest_distance(&self, other: &MethodSolution) -> Option<f64> {
+        let common = common_stations(&self.stations, &other.stations);
         if common.iter().all(|&(i, _)| self.stations[i] == 0.0) {
             return None;
         }
-        let pairs = differences(&common, &self.rods, &other.rods).flatten();
+        let pairs = rod_differences(&common, &self.rods, &other.rods).flatten();
         let largest = pairs.fold(Difference::default(), Difference::max);
         Some(largest.position)
     }
 
     /// Whether this distance is no more than the sum of both error estimates.
-    pub fn confirms(&self, other: &Answer, distance: f64) -> bool {
-        distance <= self.error() + other.error()
+    pub fn agrees_within_errors(&self, other: &MethodSolution, distance: f64) -> bool {
+        distance <= self.error_bound() + other.error_bound()
     }
 
     /// The bound on its error; infinite if there is none.
-    pub fn error(&self) -> f64 {
+    pub fn error_bound(&self) -> f64 {
         self.error_estimate.unwrap_or(f64::INFINITY)
     }
 }
 
 /// Returns the result of `run` and the seconds it took.
-pub fn timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
+pub fn run_timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
     let clock = Instant::now();
     let found = run();
     (found, clock.elapsed().as_secs_f64())
 }
 
 /// A grid of at least so many segments on which eigenvalues can be counted.
-pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
+pub fn eigenvalue_grid(scenario: &Scenario, segments: usize) -> Grid {
     let leaf = Leaf::new(scenario);
     let mut grid = Grid::new(segments.max(leaf.kinks().len() + 1), leaf.kinks());
-    while grid.segments() < SEGMENTS {
+    while grid.segments() < LEAST_EIGENVALUE_SEGMENTS {
         grid = grid.refined();
     }
     grid
@@ -147,13 +147,13 @@ pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
 
 /// Number of negative eigenvalues of the equilibrium near a shape given at the
 /// nodes of `grid` and possibly at other stations, within `error`.
-pub fn index_at(
+pub fn morse_index_near(
     scenario: &Scenario,
     grid: Grid,
     (stations, rods): (&[f64], &[RodShape]),
     error: f64,
 ) -> Option<usize> {
-    let kept: Vec<usize> = (common(stations, grid.sigma()).into_iter())
+    let kept: Vec<usize> = (common_stations(stations, grid.sigma()).into_iter())
         .map(|(i, _)| i)
         .collect();
     let at_nodes = |rod: &RodShape| RodShape {
@@ -167,7 +167,7 @@ pub fn index_at(
 /// Error estimate of a leaf on one grid, in units of length: from the
 /// distance to the leaf on a grid twice as fine, which is three quarters of the error
 /// in the asymptotic range. `None` if one of them is not at rest within the tolerance.
-pub fn grid_error(
+pub fn single_grid_error(
     scenario: &Scenario,
     segments: usize,
     tolerance: f64,
@@ -181,19 +181,19 @@ pub fn grid_error(
             limit: limit.clone(),
             ..Options::default()
         };
-        let leaf = Answer::relaxed(scenario, &options).ok()?;
+        let leaf = MethodSolution::from_relaxation(scenario, &options).ok()?;
         leaf.outcome.is_success().then_some(leaf)
     };
-    let apart = on(segments)?.distance(&on(2 * segments)?)?;
-    Some((SAFETY * apart).min(SAME_LEAF * longest(&scenario.rods)))
+    let apart = on(segments)?.largest_distance(&on(2 * segments)?)?;
+    Some((SAFETY * apart).min(SAME_LEAF_DISTANCE * longest(&scenario.rods)))
 }
 
 /// Index pairs of the stations that are in both ascending lists.
-pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
+pub fn common_stations(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
     let (mut i, mut j) = (0, 0);
     let mut common = Vec::new();
     while i < a.len() && j < b.len() {
-        if (a[i] - b[j]).abs() <= SAME_STATION {
+        if (a[i] - b[j]).abs() <= SAME_STATION_DISTANCE {
             common.push((i, j));
             (i, j) = (i + 1, j + 1);
         } else if a[i] < b[j] {
@@ -206,7 +206,7 @@ pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
 }
 
 /// Differences of each rod at these pairs of stations.
-pub fn differences<'a>(
+pub fn rod_differences<'a>(
     common: &'a [(usize, usize)],
     a: &'a [RodShape],
     b: &'a [RodShape],
@@ -218,8 +218,11 @@ pub fn differences<'a>(
 }
 
 /// The nodes of a grid and those of `others` that are not among them.
-pub fn with_nodes_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
-    let shared: Vec<usize> = common(others, grid).into_iter().map(|(i, _)| i).collect();
+pub fn grid_nodes_and_others(grid: &[f64], others: &[f64]) -> Vec<f64> {
+    let shared: Vec<usize> = common_stations(others, grid)
+        .into_iter()
+        .map(|(i, _)| i)
+        .collect();
     let own = (0..others.len()).filter(|i| shared.binary_search(i).is_err());
     let mut all: Vec<f64> = grid.iter().copied().chain(own.map(|i| others[i])).collect();
     all.sort_by(f64::total_cmp);
@@ -227,9 +230,9 @@ pub fn with_nodes_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
 }
 
 /// All stations in one ascending list without duplicates.
-pub fn union(mut stations: Vec<f64>) -> Vec<f64> {
+pub fn union_of_stations(mut stations: Vec<f64>) -> Vec<f64> {
     stations.sort_by(f64::total_cmp);
-    stations.dedup_by(|b, a| *b - *a <= SAME_STATION);
+    stations.dedup_by(|b, a| *b - *a <= SAME_STATION_DISTANCE);
     stations
 }
 
@@ -241,7 +244,7 @@ pub(super) mod tests {
     use crate::shape::NodeState;
 
     /// One rod with its nodes here and without rotation.
-    pub fn rod(stations: &[f64], length: f64, position: impl Fn(f64) -> DVec3) -> Answer {
+    pub fn rod(stations: &[f64], length: f64, position: impl Fn(f64) -> DVec3) -> MethodSolution {
         let node = |&sigma: &f64| NodeState {
             position: position(sigma),
             rotation: DQuat::IDENTITY,
@@ -250,7 +253,7 @@ pub(super) mod tests {
             n: DVec3::ZERO,
             m: DVec3::ZERO,
         };
-        Answer {
+        MethodSolution {
             outcome: Outcome::Converged,
             remark: None,
             stations: stations.to_vec(),
@@ -262,38 +265,48 @@ pub(super) mod tests {
             index: None,
             error_estimate: Some(0.06),
             undulation: Undulation::default(),
-            work: Work::default(),
+            work: SolverCounts::default(),
         }
     }
 
-    fn answer(stations: &[f64], x: impl Fn(f64) -> f64) -> Answer {
+    fn straight_rod_solution(stations: &[f64], x: impl Fn(f64) -> f64) -> MethodSolution {
         rod(stations, 1.0, |sigma| x(sigma) * DVec3::X)
     }
 
     #[test]
     fn answers_are_compared_where_both_are_known() {
-        let coarse = answer(&[0.0, 0.5, 1.0], |sigma| sigma);
-        let fine = answer(&[0.0, 0.25, 0.5, 0.75, 1.0], |sigma| {
+        let coarse = straight_rod_solution(&[0.0, 0.5, 1.0], |sigma| sigma);
+        let fine = straight_rod_solution(&[0.0, 0.25, 0.5, 0.75, 1.0], |sigma| {
             if sigma == 0.25 { 9.0 } else { 1.1 * sigma }
         });
-        let distance = coarse.distance(&fine).unwrap();
+        let distance = coarse.largest_distance(&fine).unwrap();
         assert!((distance - 0.1).abs() < 1e-15);
-        assert_eq!(fine.distance(&coarse), Some(distance));
-        assert!(coarse.confirms(&fine, distance) && !coarse.confirms(&fine, 0.13));
+        assert_eq!(fine.largest_distance(&coarse), Some(distance));
+        assert!(
+            coarse.agrees_within_errors(&fine, distance)
+                && !coarse.agrees_within_errors(&fine, 0.13)
+        );
 
-        let third = answer(&[0.0, 1.0 / 3.0], |_| 0.0);
-        assert_eq!(coarse.distance(&third), None, "only the base is common");
-        let wild = answer(&[0.0, 1.0], |_| f64::NAN);
-        assert_eq!(coarse.distance(&wild), Some(f64::INFINITY));
+        let third = straight_rod_solution(&[0.0, 1.0 / 3.0], |_| 0.0);
+        assert_eq!(
+            coarse.largest_distance(&third),
+            None,
+            "only the base is common"
+        );
+        let wild = straight_rod_solution(&[0.0, 1.0], |_| f64::NAN);
+        assert_eq!(coarse.largest_distance(&wild), Some(f64::INFINITY));
     }
 
     #[test]
     fn stations_are_united() {
-        let stations = union(vec![0.0, 0.5, 1.0, 0.0, 0.3, 0.5 + 1e-16, 1.0]);
+        let stations = union_of_stations(vec![0.0, 0.5, 1.0, 0.0, 0.3, 0.5 + 1e-16, 1.0]);
         assert_eq!(stations, [0.0, 0.3, 0.5, 1.0]);
-        assert_eq!(common(&stations, &[0.0, 0.5, 0.7]), [(0, 0), (2, 1)]);
+        assert_eq!(
+            common_stations(&stations, &[0.0, 0.5, 0.7]),
+            [(0, 0), (2, 1)]
+        );
         let others = [0.0, 0.2, 0.5 + 1e-16, 1.0];
-        let all = with_nodes_of(&stations, &others);
+        let all = grid_nodes_and_others(&stations, &others);
         assert_eq!(all, [0.0, 0.2, 0.3, 0.5, 1.0]);
     }
 }

@@ -12,35 +12,86 @@ mod sensitivity;
 mod trace;
 mod vary;
 
-pub use crate::branch::{Doubt, End as BranchEnd, Kind as CriticalKind, Stuck};
+pub use crate::branch::{BranchEnd, CorrectorFailure, CriticalKind, VerificationFailure};
 pub use crate::run::UnknownWord;
-pub use crate::shooting::{Neutral, Solution as ShootingSolution};
+pub use crate::shooting::{NeutralDirection, ShootingSolution};
 pub use crate::study::boundary::{
-    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
-    boundary,
+    BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
+    StabilityBoundary, trace_stability_boundary,
 };
 pub use crate::study::chart::{
-    Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, Reference, Row,
-    Scaling, ScalingRow, Setting, Spread, Turn, chart, scaling,
+    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRow,
+    FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution, ScalingRow, ScalingStudy,
+    SolverConfig, TimingSpread, chart, scaling,
 };
-pub use crate::study::check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
-pub use crate::study::equilibria::{Equilibria, Found, IN_VAIN, equilibria};
+pub use crate::study::check::{
+    Check, CheckOptions, CheckVerdict, ComparedQuantity, DifferenceLocation, ShootingResult, check,
+};
+pub use crate::study::equilibria::{
+    Equilibria, FoundEquilibrium, MOST_FRUITLESS_STARTS, equilibria,
+};
 pub use crate::study::fit::{
-    Comparison, Data, DataFile, Experiment, Fit, FitAlternative, FitBudget, FitCandidate, FitError,
-    FitExperiment, FitLeaf, FitOutcome, FitParameter, FitRequest, FitResidual, FitStep,
-    FitSystematic, FitWork, Free, FreeNumber, Measured, MeasuredColumn, MeasuredQuantity,
-    OffsetColumn, Origin, Reading, RowChoice, RowCondition, Traced, fit,
+    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, Fit,
+    FitAlternative, FitBudget, FitCandidate, FitError, FitExperiment, FitLeaf, FitOutcome,
+    FitParameter, FitRequest, FitResidual, FitStep, FitWork, FreeParameter, FreeParameterTarget,
+    MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn, RowCondition, RowFilter,
+    SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
-    CELL_SECONDS, Confidence, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
-    MapShow, map,
+    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
+    MapShow, ReferenceConfidence, map,
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
 pub use crate::study::sensitivity::{
-    SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of,
+    SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
 };
 pub use crate::study::trace::{
-    Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
-    TraceRequest, TraceShow, TraceUntil, trace, trace_through,
+    ForceDisplacementLine, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError,
+    TracePoint, TraceRequest, TraceShow, TraceUntil, trace, trace_through,
 };
-pub use crate::study::vary::{Base, Keys, Knob, Knobs, Number, Target, Varied, Vary, VaryError};
+pub use crate::study::vary::{
+    BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,
+    VariableTarget, VariedScenario, VaryError,
+};
+
+crate::renamed! {
+    Base => BaseScenario,
+    Boundary => StabilityBoundary,
+    Comparison => ComparisonOperator,
+    Confidence => ReferenceConfidence,
+    Contender => SolverConfig,
+    Decade => FastestByAccuracy,
+    Doubt => VerificationFailure,
+    Ending => ChartOutcome,
+    FitSystematic => SystematicResiduals,
+    Found => FoundEquilibrium,
+    Free => FreeParameter,
+    FreeNumber => FreeParameterTarget,
+    Keys => ParameterKeys,
+    Knob => SolverSetting,
+    Knobs => SolverSettings,
+    Law => ForceDisplacementLine,
+    Measured => MeasuredValue,
+    Neutral => NeutralDirection,
+    Number => ScenarioNumber,
+    Origin => DataOrigin,
+    Peer => PeerProgram,
+    PeerRow => PeerMeasurement,
+    Place => DifferenceLocation,
+    Quantity => ComparedQuantity,
+    Reading => DataReadingOptions,
+    Reference => ReferenceSolution,
+    Row => ChartRow,
+    RowChoice => RowFilter,
+    Scaling => ScalingStudy,
+    Setting => AccuracySetting,
+    Shot => ShootingResult,
+    Spread => TimingSpread,
+    Stuck => CorrectorFailure,
+    Target => VariableTarget,
+    Traced => TracedVeinPoint,
+    Turn => ChartProgress,
+    Varied => VariedScenario,
+    Vary => ParameterSweep,
+    Verdict => CheckVerdict,
+}

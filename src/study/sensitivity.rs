@@ -5,11 +5,11 @@
 
 use crate::numbers::largest;
 use crate::relax::{
-    Equilibrium, FewerVeins, Follower, Method, Options, Parameter, Progress, RelaxError,
+    Equilibrium, EquilibriumTracker, FewerVeins, Method, Options, Parameter, Progress, RelaxError,
     Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
-use crate::study::{Base, Keys, VaryError};
+use crate::study::{BaseScenario, ParameterKeys, VaryError};
 use glam::DVec3;
 
 /// Why there are no derivatives.
@@ -30,8 +30,8 @@ pub enum SensitivityError {
 /// eigenvalue with respect to these numbers of its scenario, as
 /// [`Equilibrium::sensitivities`]; none if the leaf is not at rest.
 pub fn relax_with_sensitivities(
-    base: &Base,
-    keys: &[Keys],
+    base: &BaseScenario,
+    keys: &[ParameterKeys],
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, SensitivityError> {
@@ -40,16 +40,17 @@ pub fn relax_with_sensitivities(
     }
     let scenario = base.scenario();
     without_wind(scenario, "a derivative")?;
-    let values = values(base, keys)?;
-    let numbers = numbers(base, &values);
+    let values = values_of_keys(base, keys)?;
+    let numbers = named_parameters(base, &values);
     let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
-    let turnings = bent_turnings(scenario);
-    let (none, known): (Vec<_>, Vec<_>) = (numbers.into_iter())
-        .partition(|(_, number)| at_rest && turns && decides_where_it_turns(number, turnings));
+    let turnings = count_zero_energy_rotations(scenario);
+    let (none, known): (Vec<_>, Vec<_>) = (numbers.into_iter()).partition(|(_, number)| {
+        at_rest && turns && decides_zero_energy_rotation(number, turnings)
+    });
     leaf.doubts
-        .extend(none.iter().map(|(key, _)| no_derivative(key)));
+        .extend(none.iter().map(|(key, _)| no_derivative_remark(key)));
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(
             &found.levels,
@@ -63,15 +64,15 @@ pub fn relax_with_sensitivities(
 }
 
 /// The same derivatives of a leaf that follows, and is where `base` has it.
-pub fn sensitivities_of(
-    follower: &Follower,
-    base: &Base,
-    keys: &[Keys],
+pub fn sensitivities_of_tracker(
+    follower: &EquilibriumTracker,
+    base: &BaseScenario,
+    keys: &[ParameterKeys],
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
     let scenario = base.scenario();
     without_wind(scenario, "a derivative")?;
-    let values = values(base, keys)?;
-    let numbers = numbers(base, &values);
+    let values = values_of_keys(base, keys)?;
+    let numbers = named_parameters(base, &values);
     Ok(sensitivities(
         follower.levels(),
         &numbers,
@@ -81,15 +82,21 @@ pub fn sensitivities_of(
 }
 
 /// Each of the keys with its number.
-fn values<'k>(base: &Base, keys: &'k [Keys]) -> Result<Vec<(&'k Keys, f64)>, VaryError> {
+fn values_of_keys<'k>(
+    base: &BaseScenario,
+    keys: &'k [ParameterKeys],
+) -> Result<Vec<(&'k ParameterKeys, f64)>, VaryError> {
     keys.iter()
-        .map(|keys| Ok((keys, base.value(keys)?)))
+        .map(|keys| Ok((keys, base.differentiable_value(keys)?)))
         .collect()
 }
 
 /// These numbers by their names.
-fn numbers<'v>(base: &'v Base, values: &'v [(&'v Keys, f64)]) -> Vec<(String, Parameter<'v>)> {
-    let unit = |keys: &Keys| keys.unit(base.scenario());
+fn named_parameters<'v>(
+    base: &'v BaseScenario,
+    values: &'v [(&'v ParameterKeys, f64)],
+) -> Vec<(String, Parameter<'v>)> {
+    let unit = |keys: &ParameterKeys| keys.reference_magnitude(base.scenario());
     let each = values.chunks(1);
     each.map(|own| (own[0].0.to_string(), base.parameter(own, 0, unit(own[0].0))))
         .collect()
@@ -97,17 +104,21 @@ fn numbers<'v>(base: &'v Base, values: &'v [(&'v Keys, f64)]) -> Vec<(String, Pa
 
 /// Whether of so many groups of veins that turn about their base without resistance fewer do after
 /// a change of this number: then the smallest change decides where they turn to.
-fn decides_where_it_turns(number: &Parameter, turnings: usize) -> bool {
+fn decides_zero_energy_rotation(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| bent_turnings(scenario) < turnings)
+        .any(|(_, scenario)| count_zero_energy_rotations(scenario) < turnings)
 }
 
-fn bent_turnings(scenario: &Scenario) -> usize {
-    scenario.turnings().iter().filter(|it| it.bent).count()
+fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
+    scenario
+        .zero_energy_rotations()
+        .iter()
+        .filter(|it| it.includes_bent_veins)
+        .count()
 }
 
-fn no_derivative(key: &str) -> String {
+fn no_derivative_remark(key: &str) -> String {
     format!(
         "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
          change of this number decides where it turns to"
@@ -115,10 +126,10 @@ fn no_derivative(key: &str) -> String {
 }
 
 /// Tolerance of the blades that a blade is compared with.
-const COMPARED: f64 = 1e-4;
+const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
 
 /// Stations nearer to each other than this are the same.
-const SAME_STATION: f64 = 1e-9;
+const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Relaxes the leaf of `base` and, if it is a blade that comes to rest in a stable equilibrium,
 /// compares it with others: [`Equilibrium::blade`] tells how far they are apart. Neither is
@@ -127,7 +138,7 @@ const SAME_STATION: f64 = 1e-9;
 /// # Errors
 /// If it cannot be relaxed; where the others cannot be, they are left out.
 pub fn relax_blade(
-    base: &Base,
+    base: &BaseScenario,
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
@@ -138,10 +149,10 @@ pub fn relax_blade(
     };
     let narrows = blade.least_width.is_some();
     let other = |key: &str, value: f64| -> Option<(Scenario, Equilibrium)> {
-        let keys: Keys = key.parse().ok()?;
-        let scenario = base.at(&[(&keys, value)]).ok()?.scenario;
+        let keys: ParameterKeys = key.parse().ok()?;
+        let scenario = base.scenario_with_values(&[(&keys, value)]).ok()?.scenario;
         let options = Options {
-            tolerance: Some(leaf.accuracy.tolerance.max(COMPARED)),
+            tolerance: Some(leaf.accuracy.tolerance.max(COMPARED_BLADE_TOLERANCE)),
             modes: 0,
             every_node: false,
             ..options.clone()
@@ -153,21 +164,21 @@ pub fn relax_blade(
         .scenario()
         .blade
         .as_ref()
-        .map(|blade| blade.least_part());
+        .map(|blade| blade.least_width_fraction());
     let narrower = least
         .filter(|_| narrows)
-        .and_then(|least| other(LEAST_WIDTH, 0.5 * least));
-    let effect =
-        narrower.map(|(_, found)| distance(base.scenario(), &leaf, base.scenario(), &found));
+        .and_then(|least| other(LEAST_WIDTH_KEY, 0.5 * least));
+    let effect = narrower
+        .map(|(_, found)| largest_blade_distance(base.scenario(), &leaf, base.scenario(), &found));
     let rods = leaf.rod_count.div_ceil(2);
     // Loads and holders of single veins are on others then.
     let alike = base.scenario().points.is_empty() && base.scenario().grips.is_empty();
     let fewer = (alike && leaf.rod_count > 2)
-        .then(|| other(RODS, rods as f64))
+        .then(|| other(RODS_KEY, rods as f64))
         .flatten();
     let half = fewer.map(|(scenario, found)| FewerVeins {
         rods,
-        difference: distance(base.scenario(), &leaf, &scenario, &found),
+        difference: largest_blade_distance(base.scenario(), &leaf, &scenario, &found),
     });
     if let Some(blade) = &mut leaf.blade {
         (blade.least_width_effect, blade.half_as_many) = (effect, half);
@@ -175,19 +186,26 @@ pub fn relax_blade(
     Ok(leaf)
 }
 
-const LEAST_WIDTH: &str = "blade.least_width";
+const LEAST_WIDTH_KEY: &str = "blade.least_width";
 
-const RODS: &str = "leaf.rods";
+const RODS_KEY: &str = "leaf.rods";
 
 /// The largest distance of the veins of one blade from the surface through those of another, at
 /// stations in common.
-fn distance(whole: &Scenario, leaf: &Equilibrium, other: &Scenario, fewer: &Equilibrium) -> f64 {
+fn largest_blade_distance(
+    whole: &Scenario,
+    leaf: &Equilibrium,
+    other: &Scenario,
+    fewer: &Equilibrium,
+) -> f64 {
     let (Some(blade), Some(fewer_blade)) = (&whole.blade, &other.blade) else {
         return f64::NAN;
     };
-    let etas: Vec<f64> = (0..leaf.rod_count).map(|j| blade.place(j)).collect();
+    let etas: Vec<f64> = (0..leaf.rod_count)
+        .map(|j| blade.vein_position(j))
+        .collect();
     let vein = |k: usize| {
-        let eta = fewer_blade.place(k);
+        let eta = fewer_blade.vein_position(k);
         let right = etas.partition_point(|of| *of < eta).min(etas.len() - 1);
         let left = right.saturating_sub(1);
         // A single vein is compared with a single one.
@@ -198,7 +216,7 @@ fn distance(whole: &Scenario, leaf: &Equilibrium, other: &Scenario, fewer: &Equi
         let shape = &fewer.shape;
         let stations = shape.stations.iter().zip(&shape.rods[k].nodes);
         let apart = stations.filter_map(|(sigma, node)| {
-            let same = |station: &f64| (station - sigma).abs() < SAME_STATION;
+            let same = |station: &f64| (station - sigma).abs() < SAME_STATION_DISTANCE;
             let at = leaf.shape.stations.iter().position(same)?;
             let [a, b]: [DVec3; 2] = [left, right].map(|j| leaf.shape.rods[j].nodes[at].position);
             Some(a.lerp(b, part).distance(node.position))

@@ -31,11 +31,13 @@
 #[cfg(test)]
 mod tests;
 
-use crate::branch::value_between;
+use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
-use crate::scenario::format::units::{Dimension, PURE, TIME};
-use crate::scenario::{Entries, Form, Key, Part, Scenario, ScenarioError, number_meant};
+use crate::scenario::format::units::{DIMENSIONLESS, Dimension, TIME};
+use crate::scenario::{
+    Entries, EntryPath, Key, Scenario, ScenarioError, ValueSchema, intended_number,
+};
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -43,62 +45,76 @@ use std::path::Path;
 use std::str::FromStr;
 
 /// Default number of values.
-const COUNT: usize = 11;
+const DEFAULT_VALUE_COUNT: usize = 11;
 
 /// Largest number of values along one axis.
-const MOST: usize = 10_000;
+const MOST_VALUES: usize = 10_000;
 
 /// Largest and smallest magnitude of a non-zero value: differences, products and quotients
 /// of two of them neither overflow nor underflow.
-const SIZES: RangeInclusive<f64> = 1e-100..=1e100;
+const ADMISSIBLE_MAGNITUDES: RangeInclusive<f64> = 1e-100..=1e100;
 
 /// Decimal digits to which intermediate values are rounded: 0.001, not
 /// 0.0010000000000000002.
-const DIGITS: usize = 12;
+const ROUNDING_DIGITS: usize = 12;
 
 /// A setting of a method, not of the leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knob {
+pub enum SolverSetting {
     /// `method.step`: the time step of explicit motion, in the scenario's unit.
     Step,
     /// `method.segments`: one fixed grid of so many segments per rod.
     Segments,
 }
 
-impl Knob {
-    const ALL: [Knob; 2] = [Knob::Step, Knob::Segments];
+impl SolverSetting {
+    const ALL: [SolverSetting; 2] = [SolverSetting::Step, SolverSetting::Segments];
 
     /// Its path.
     pub fn path(self) -> &'static str {
         match self {
-            Knob::Step => "method.step",
-            Knob::Segments => "method.segments",
+            SolverSetting::Step => "method.step",
+            SolverSetting::Segments => "method.segments",
         }
     }
 
-    fn from_path(path: &str) -> Option<Knob> {
-        Knob::ALL.into_iter().find(|knob| knob.path() == path)
+    fn from_path(path: &str) -> Option<SolverSetting> {
+        SolverSetting::ALL
+            .into_iter()
+            .find(|knob| knob.path() == path)
     }
 }
 
 /// The settings of methods; `None`: the default of the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Knobs {
+pub struct SolverSettings {
     /// `method.step`.
     pub step: Option<f64>,
     /// `method.segments`.
     pub segments: Option<usize>,
 }
 
-impl Knobs {
-    fn set(&mut self, knob: Knob, value: f64) -> Result<(), VaryError> {
+impl SolverSettings {
+    fn set(&mut self, knob: SolverSetting, value: f64) -> Result<(), VaryError> {
         match knob {
-            Knob::Step if value > 0.0 && value.is_finite() => self.step = Some(value),
-            Knob::Step => return Err(VaryError::knob(knob, value, "greater than 0")),
-            Knob::Segments if value >= 1.0 && value.fract() == 0.0 && value < 1e9 => {
+            SolverSetting::Step if value > 0.0 && value.is_finite() => self.step = Some(value),
+            SolverSetting::Step => {
+                return Err(VaryError::invalid_solver_setting(
+                    knob,
+                    value,
+                    "greater than 0",
+                ));
+            }
+            SolverSetting::Segments if value >= 1.0 && value.fract() == 0.0 && value < 1e9 => {
                 self.segments = Some(value as usize);
             }
-            Knob::Segments => return Err(VaryError::knob(knob, value, "a whole number from 1")),
+            SolverSetting::Segments => {
+                return Err(VaryError::invalid_solver_setting(
+                    knob,
+                    value,
+                    "a whole number from 1",
+                ));
+            }
         }
         Ok(())
     }
@@ -106,85 +122,85 @@ impl Knobs {
 
 /// A number that can be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
+pub enum VariableTarget {
     /// A number of the scenario.
-    Entry(Part),
+    Entry(EntryPath),
     /// A setting of a method.
-    Knob(Knob),
+    Knob(SolverSetting),
 }
 
-impl Target {
+impl VariableTarget {
     /// The key of the scenario, unless it is a setting of a method.
     pub(crate) fn key(self) -> Option<Key> {
         match self {
-            Target::Entry(part) => Some(part.key),
-            Target::Knob(_) => None,
+            VariableTarget::Entry(part) => Some(part.key),
+            VariableTarget::Knob(_) => None,
         }
     }
 
-    fn overlaps(self, other: Target) -> bool {
+    fn overlaps(self, other: VariableTarget) -> bool {
         match (self, other) {
-            (Target::Entry(one), Target::Entry(two)) => one.overlaps(&two),
+            (VariableTarget::Entry(one), VariableTarget::Entry(two)) => one.overlaps(&two),
             _ => self == other,
         }
     }
 
-    fn is_whole(self) -> bool {
+    fn is_whole_number(self) -> bool {
         match self {
-            Target::Entry(part) => part.key.form() == Form::Whole,
-            Target::Knob(knob) => knob == Knob::Segments,
+            VariableTarget::Entry(part) => part.key.form() == ValueSchema::Whole,
+            VariableTarget::Knob(knob) => knob == SolverSetting::Segments,
         }
     }
 
-    fn text(self, value: f64) -> String {
-        written(value, self.is_whole())
+    fn format_value(self, value: f64) -> String {
+        format_number(value, self.is_whole_number())
     }
 }
 
-impl FromStr for Target {
+impl FromStr for VariableTarget {
     type Err = VaryError;
 
     fn from_str(text: &str) -> Result<Self, VaryError> {
         let text = text.trim();
-        if let Some(knob) = Knob::from_path(text) {
-            return Ok(Target::Knob(knob));
+        if let Some(knob) = SolverSetting::from_path(text) {
+            return Ok(VariableTarget::Knob(knob));
         }
         let refuse = |why: String| VaryError::Key(format!("{text}: {why}"));
         if text.starts_with("method.") {
-            let all = Knob::ALL.map(Knob::path).join(" and ");
+            let all = SolverSetting::ALL.map(SolverSetting::path).join(" and ");
             return Err(refuse(format!("unknown key: methods have {all}")));
         }
-        let part = Part::parse(text).map_err(refuse)?;
+        let part = EntryPath::parse(text).map_err(refuse)?;
         part.is_number().map_err(refuse)?;
-        Ok(Target::Entry(part))
+        Ok(VariableTarget::Entry(part))
     }
 }
 
-impl fmt::Display for Target {
+impl fmt::Display for VariableTarget {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Target::Entry(part) => part.fmt(f),
-            Target::Knob(knob) => f.write_str(knob.path()),
+            VariableTarget::Entry(part) => part.fmt(f),
+            VariableTarget::Knob(knob) => f.write_str(knob.path()),
         }
     }
 }
 
 /// Numbers that take the same value.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Keys(Vec<Target>);
+pub struct ParameterKeys(Vec<VariableTarget>);
 
-impl Keys {
+impl ParameterKeys {
     /// All of them; at least one.
-    pub fn targets(&self) -> &[Target] {
+    pub fn targets(&self) -> &[VariableTarget] {
         &self.0
     }
 
     /// The reference magnitude of the number if it is zero, in a scenario's units.
-    pub(crate) fn unit(&self, scenario: &Scenario) -> f64 {
-        let unit = |target: &Target| match target {
-            Target::Entry(part) if part.scale => 1.0,
-            Target::Entry(part) => scenario.unit(part.key),
-            Target::Knob(_) => 0.0,
+    pub(crate) fn reference_magnitude(&self, scenario: &Scenario) -> f64 {
+        let unit = |target: &VariableTarget| match target {
+            VariableTarget::Entry(part) if part.scale => 1.0,
+            VariableTarget::Entry(part) => scenario.unit(part.key),
+            VariableTarget::Knob(_) => 0.0,
         };
         self.0.iter().map(unit).fold(0.0, f64::max)
     }
@@ -193,28 +209,28 @@ impl Keys {
     /// differ, and for factors.
     pub fn dimension(&self) -> Dimension {
         let mut all = self.0.iter().map(|target| match target {
-            Target::Entry(part) if part.scale => PURE,
-            Target::Entry(part) => part.key.dimension(),
-            Target::Knob(Knob::Step) => TIME,
-            Target::Knob(Knob::Segments) => PURE,
+            VariableTarget::Entry(part) if part.scale => DIMENSIONLESS,
+            VariableTarget::Entry(part) => part.key.dimension(),
+            VariableTarget::Knob(SolverSetting::Step) => TIME,
+            VariableTarget::Knob(SolverSetting::Segments) => DIMENSIONLESS,
         });
-        let first = all.next().unwrap_or(PURE);
+        let first = all.next().unwrap_or(DIMENSIONLESS);
         match all.all(|other| other == first) {
             true => first,
-            false => PURE,
+            false => DIMENSIONLESS,
         }
     }
 
     /// Whether all must be positive, or non-negative.
     pub(crate) fn is_positive(&self) -> bool {
         self.0.iter().all(|target| match target {
-            Target::Entry(part) => part.scale || part.key.is_positive(),
-            Target::Knob(_) => false,
+            VariableTarget::Entry(part) => part.scale || part.key.is_positive(),
+            VariableTarget::Knob(_) => false,
         })
     }
 
     /// Whether they have a number in common.
-    pub(crate) fn overlaps(&self, other: &Keys) -> bool {
+    pub(crate) fn overlaps(&self, other: &ParameterKeys) -> bool {
         self.0
             .iter()
             .any(|one| other.0.iter().any(|two| one.overlaps(*two)))
@@ -222,82 +238,82 @@ impl Keys {
 
     /// Whether a scenario is linear in the number. Several keys may enter as a
     /// product, as coupling and lengths do.
-    pub(crate) fn is_linear(&self) -> bool {
+    pub(crate) fn is_scenario_linear(&self) -> bool {
         let mut keys = self.0.iter().filter_map(|target| target.key());
         self.0.len() == 1 && keys.all(Key::is_linear)
     }
 
     /// Whether only whole numbers are allowed.
     pub fn is_whole(&self) -> bool {
-        self.0.iter().any(|target| target.is_whole())
+        self.0.iter().any(|target| target.is_whole_number())
     }
 
     /// Whether it contains this setting of a method.
-    pub fn sets(&self, knob: Knob) -> bool {
-        self.0.contains(&Target::Knob(knob))
+    pub fn contains_solver_setting(&self, knob: SolverSetting) -> bool {
+        self.0.contains(&VariableTarget::Knob(knob))
     }
 
     /// A value of these keys as it is written into the scenario and into tables.
     pub fn text(&self, value: f64) -> String {
-        written(value, self.is_whole())
+        format_number(value, self.is_whole())
     }
 }
 
-fn written(value: f64, whole: bool) -> String {
+fn format_number(value: f64, whole: bool) -> String {
     match whole {
         true => format!("{value:.0}"),
         false => format!("{value:?}"),
     }
 }
 
-impl FromStr for Keys {
+impl FromStr for ParameterKeys {
     type Err = VaryError;
 
     fn from_str(text: &str) -> Result<Self, VaryError> {
-        let targets = text.split('+').map(Target::from_str);
-        Ok(Keys(targets.collect::<Result<_, _>>()?))
+        let targets = text.split('+').map(VariableTarget::from_str);
+        Ok(ParameterKeys(targets.collect::<Result<_, _>>()?))
     }
 }
 
-impl Serialize for Keys {
+impl Serialize for ParameterKeys {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
 /// As written: `stiffness.axial+stiffness.shear_2`.
-impl fmt::Display for Keys {
+impl fmt::Display for ParameterKeys {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let paths: Vec<String> = self.0.iter().map(Target::to_string).collect();
+        let paths: Vec<String> = self.0.iter().map(VariableTarget::to_string).collect();
         f.write_str(&paths.join("+"))
     }
 }
 
 /// Keys and the values they take, one after the other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Vary {
+pub struct ParameterSweep {
     /// The keys.
-    pub keys: Keys,
+    pub keys: ParameterKeys,
     /// The values, from FROM to TO; at least one, without duplicates.
     pub values: Vec<f64>,
     /// Whether they are spaced logarithmically.
     pub log: bool,
 }
 
-impl Vary {
+impl ParameterSweep {
     /// FROM and TO.
     pub fn ends(&self) -> [f64; 2] {
         [self.values[0], self.values[self.values.len() - 1]]
     }
 }
 
-impl FromStr for Vary {
+impl FromStr for ParameterSweep {
     type Err = VaryError;
 
     fn from_str(given: &str) -> Result<Self, VaryError> {
-        let refuse = |why: &str| VaryError::Form(format!("{given}: {why}"));
+        let refuse = |why: &str| VaryError::Syntax(format!("{given}: {why}"));
         let (keys, range) = given.split_once('=').ok_or_else(|| refuse("has no ="))?;
-        let keys: Keys = keys.parse()?;
+        let keys: ParameterKeys = keys.parse()?;
         let range = range.trim();
         let (range, log) = match range.strip_suffix("log") {
             Some(rest) => (
@@ -309,19 +325,20 @@ impl FromStr for Vary {
         let (range, count) = match range.split_once(':') {
             Some((range, count)) => {
                 let count = count.trim().parse().ok();
-                let count = count.filter(|count| (1..=MOST).contains(count));
+                let count = count.filter(|count| (1..=MOST_VALUES).contains(count));
                 let why = "COUNT must be a whole number from 1 to 10000";
                 (range, count.ok_or_else(|| refuse(why))?)
             }
-            None => (range, COUNT),
+            None => (range, DEFAULT_VALUE_COUNT),
         };
         let (from, to) = (range.split_once("..")).ok_or_else(|| refuse("has no .."))?;
         let number = |text: &str| {
             let value: Option<f64> = text.trim().parse().ok();
-            let allowed = |value: &f64| *value == 0.0 || SIZES.contains(&value.abs());
+            let allowed =
+                |value: &f64| *value == 0.0 || ADMISSIBLE_MAGNITUDES.contains(&value.abs());
             value.filter(allowed).ok_or_else(|| {
                 let why = "FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100";
-                match (value, number_meant(text)) {
+                match (value, intended_number(text)) {
                     (None, Some(how)) => refuse(&how),
                     _ => refuse(why),
                 }
@@ -334,7 +351,7 @@ impl FromStr for Vary {
             ));
         }
         let mut values: Vec<f64> = (0..count)
-            .map(|i| between(from, to, i, count - 1, log))
+            .map(|i| spaced_value(from, to, i, count - 1, log))
             .collect();
         if keys.is_whole() {
             for value in &mut values {
@@ -342,17 +359,17 @@ impl FromStr for Vary {
             }
         }
         values.dedup();
-        Ok(Vary { keys, values, log })
+        Ok(ParameterSweep { keys, values, log })
     }
 }
 
 /// The `i`-th of `last` + 1 values; the ends exactly.
-fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
+fn spaced_value(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
     if i == 0 || i == last {
         return if i == 0 { from } else { to };
     }
-    let value = value_between([from, to], log, i as f64 / last as f64);
-    let rounded = format!("{value:.*e}", DIGITS - 1);
+    let value = value_at_fraction([from, to], log, i as f64 / last as f64);
+    let rounded = format!("{value:.*e}", ROUNDING_DIGITS - 1);
     rounded.parse().unwrap_or(value)
 }
 
@@ -361,7 +378,7 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
 pub enum VaryError {
     /// A syntax error.
     #[error("{0}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log")]
-    Form(String),
+    Syntax(String),
     /// A key that cannot vary.
     #[error("{0}")]
     Key(String),
@@ -382,39 +399,43 @@ impl VaryError {
         !matches!(self, VaryError::Key(_) | VaryError::Missing(_))
     }
 
-    fn knob(knob: Knob, found: impl fmt::Debug, needed: &str) -> VaryError {
+    fn invalid_solver_setting(
+        knob: SolverSetting,
+        found: impl fmt::Debug,
+        needed: &str,
+    ) -> VaryError {
         VaryError::Knob(format!("{} = {found:?}: must be {needed}", knob.path()))
     }
 }
 
 /// A scenario with some entries replaced, into which numbers are substituted.
 #[derive(Clone, Debug)]
-pub struct Base {
+pub struct BaseScenario {
     pub(super) entries: Entries,
     overrides: Vec<String>,
-    knobs: Knobs,
+    solver_settings: SolverSettings,
     scenario: Scenario,
 }
 
 /// A scenario and the settings of methods at one point.
 #[derive(Clone, Debug)]
-pub struct Varied {
+pub struct VariedScenario {
     /// The scenario.
     pub scenario: Scenario,
     /// The settings.
-    pub knobs: Knobs,
+    pub solver_settings: SolverSettings,
 }
 
-impl Base {
+impl BaseScenario {
     /// Reads the file at `path`, with the entries `overrides` replaced
     /// (`KEY=VALUE`, as in `--set`, or `method.segments=16`).
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, VaryError> {
-        Base::of_text(scenario::text(path)?, path.display().to_string(), overrides)
+        BaseScenario::from_text(scenario::text(path)?, path.display().to_string(), overrides)
     }
 
     /// The same from a text; messages call it `file`.
-    pub fn of_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
-        Base::new(&Entries::of_text(&text, &file)?, overrides, true)
+    pub fn from_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
+        BaseScenario::new(&Entries::from_text(&text, &file)?, overrides, true)
     }
 
     /// The same from entries; settings of methods are unknown keys unless they are allowed.
@@ -423,23 +444,23 @@ impl Base {
         overrides: &[String],
         of_methods: bool,
     ) -> Result<Self, VaryError> {
-        let mut knobs = Knobs::default();
+        let mut knobs = SolverSettings::default();
         let mut of_scenario = Vec::new();
         for given in overrides {
             match given.split_once('=') {
                 Some((path, value)) if of_methods && path.trim().starts_with("method.") => {
-                    let (knob, value) = setting(path.trim(), value.trim())?;
+                    let (knob, value) = parse_solver_setting(path.trim(), value.trim())?;
                     knobs.set(knob, value)?;
                 }
                 _ => of_scenario.push(given.clone()),
             }
         }
         let entries = entries.replaced(&of_scenario)?;
-        Ok(Base {
+        Ok(BaseScenario {
             scenario: entries.check()?,
             entries,
             overrides: of_scenario,
-            knobs,
+            solver_settings: knobs,
         })
     }
 
@@ -449,8 +470,8 @@ impl Base {
     }
 
     /// The settings of methods without variation.
-    pub fn knobs(&self) -> Knobs {
-        self.knobs
+    pub fn solver_settings(&self) -> SolverSettings {
+        self.solver_settings
     }
 
     /// The text of the scenario's file.
@@ -464,10 +485,10 @@ impl Base {
     }
 
     /// The number that the scenario has at these keys, if it is one and the same for all of them.
-    pub fn number(&self, keys: &Keys) -> Option<f64> {
+    pub fn number(&self, keys: &ParameterKeys) -> Option<f64> {
         let mut numbers = keys.targets().iter().map(|target| match target {
-            Target::Entry(part) => self.entries.number_at(*part),
-            Target::Knob(_) => None,
+            VariableTarget::Entry(part) => self.entries.number_at(*part),
+            VariableTarget::Knob(_) => None,
         });
         let first = numbers.next()??;
         numbers.all(|other| other == Some(first)).then_some(first)
@@ -477,13 +498,16 @@ impl Base {
     ///
     /// # Errors
     /// If the scenario is then invalid, or has no such entry.
-    pub fn with(&self, keys: &Keys, value: f64) -> Result<Base, VaryError> {
-        let Varied { scenario, knobs } = self.at(&[(keys, value)])?;
-        let given = overriding(&[(keys, value)]);
-        Ok(Base {
+    pub fn with_value(&self, keys: &ParameterKeys, value: f64) -> Result<BaseScenario, VaryError> {
+        let VariedScenario {
+            scenario,
+            solver_settings: knobs,
+        } = self.scenario_with_values(&[(keys, value)])?;
+        let given = overrides_for_values(&[(keys, value)]);
+        Ok(BaseScenario {
             entries: self.entries.replaced(&given)?,
             overrides: [&self.overrides[..], &given].concat(),
-            knobs,
+            solver_settings: knobs,
             scenario,
         })
     }
@@ -492,36 +516,39 @@ impl Base {
     ///
     /// # Errors
     /// If it is invalid, has no such entry, or does not change with these keys.
-    pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
-        let mut knobs = self.knobs;
+    pub fn scenario_with_values(
+        &self,
+        values: &[(&ParameterKeys, f64)],
+    ) -> Result<VariedScenario, VaryError> {
+        let mut knobs = self.solver_settings;
         for (keys, value) in values {
-            self.check_factor(keys)?;
+            self.refuse_ineffective_factor(keys)?;
             for &target in keys.targets() {
-                if let Target::Knob(knob) = target {
+                if let VariableTarget::Knob(knob) = target {
                     knobs.set(knob, *value)?;
                 }
             }
         }
         // An entry that does not exist does so at no value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
-        let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
+        let adds = |target: &VariableTarget| matches!(target, VariableTarget::Entry(part) if part.key == Key::Rods);
         let adds = targets.any(adds);
-        let entries = self.entries.replaced(&overriding(values));
+        let entries = self.entries.replaced(&overrides_for_values(values));
         let entries = entries.map_err(|error| match adds {
             true => VaryError::Scenario(error),
             false => VaryError::Missing(error),
         })?;
-        Ok(Varied {
+        Ok(VariedScenario {
             scenario: entries.check()?,
-            knobs,
+            solver_settings: knobs,
         })
     }
 
     /// Refuses factors with which nothing varies.
-    fn check_factor(&self, keys: &Keys) -> Result<(), VaryError> {
-        let fixed = |target: &Target| match target {
-            Target::Entry(part) => part.scale && !self.entries.is_scalable(*part),
-            Target::Knob(_) => false,
+    fn refuse_ineffective_factor(&self, keys: &ParameterKeys) -> Result<(), VaryError> {
+        let fixed = |target: &VariableTarget| match target {
+            VariableTarget::Entry(part) => part.scale && !self.entries.is_scalable(*part),
+            VariableTarget::Knob(_) => false,
         };
         match keys.targets().iter().all(fixed) {
             true => Err(VaryError::Key(format!(
@@ -536,17 +563,17 @@ impl Base {
     ///
     /// # Errors
     /// If it is a whole number, a setting of a method, not a single number, or left out.
-    pub fn value(&self, keys: &Keys) -> Result<f64, VaryError> {
+    pub fn differentiable_value(&self, keys: &ParameterKeys) -> Result<f64, VaryError> {
         let mut found = None;
         for &target in keys.targets() {
             let refuse = |why: &str| Err(VaryError::Key(format!("{target}: {why}")));
-            let Target::Entry(part) = target else {
+            let VariableTarget::Entry(part) = target else {
                 return refuse("is a setting of a method, not a number of the leaf");
             };
-            if part.key.form() == Form::Whole {
+            if part.key.form() == ValueSchema::Whole {
                 return refuse("is a whole number, and cannot change by a little");
             }
-            if part.is_place() {
+            if part.is_node_position() {
                 return refuse(
                     "where knots and points are cannot change by a little: the grids have nodes there",
                 );
@@ -572,7 +599,7 @@ impl Base {
     /// size of its steps where it is zero.
     pub(crate) fn parameter<'v>(
         &'v self,
-        values: &'v [(&'v Keys, f64)],
+        values: &'v [(&'v ParameterKeys, f64)],
         k: usize,
         unit: f64,
     ) -> Parameter<'v> {
@@ -581,42 +608,42 @@ impl Base {
             make: Box::new(move |value| {
                 let mut values = values.to_vec();
                 values[k].1 = value;
-                Some(self.at(&values).ok()?.scenario)
+                Some(self.scenario_with_values(&values).ok()?.scenario)
             }),
             value,
             unit,
             // The natural leaf depends on shapes at rest otherwise.
-            linear: keys.is_linear() && !self.scenario().depends_on_natural_leaf(),
+            linear: keys.is_scenario_linear() && !self.scenario().needs_stress_free_leaf(),
         }
     }
 
     /// The same keys, or one for each entry if they are a list or a profile.
-    pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
-        let [Target::Entry(part)] = keys.targets() else {
+    pub(crate) fn keys_by_entry(&self, keys: &ParameterKeys) -> Vec<ParameterKeys> {
+        let [VariableTarget::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
         };
         match self.entries.value_at(*part) {
             Some(value) => (part.numbers(value).into_iter())
-                .map(|part| Keys(vec![Target::Entry(part)]))
+                .map(|part| ParameterKeys(vec![VariableTarget::Entry(part)]))
                 .collect(),
             None => vec![keys.clone()],
         }
     }
 
     /// The scenario with these values, as TOML.
-    pub fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
-        let changed = self.entries.replaced(&overriding(values)).ok()?;
+    pub fn toml(&self, values: &[(&ParameterKeys, f64)]) -> Option<String> {
+        let changed = self.entries.replaced(&overrides_for_values(values)).ok()?;
         Some(changed.to_toml())
     }
 }
 
 /// The overrides that set these values.
-fn overriding(values: &[(&Keys, f64)]) -> Vec<String> {
+fn overrides_for_values(values: &[(&ParameterKeys, f64)]) -> Vec<String> {
     let mut overrides = Vec::new();
     for (keys, value) in values {
         for &target in keys.targets() {
-            if let Target::Entry(part) = target {
-                overrides.push(format!("{part}={}", target.text(*value)));
+            if let VariableTarget::Entry(part) = target {
+                overrides.push(format!("{part}={}", target.format_value(*value)));
             }
         }
     }
@@ -624,27 +651,29 @@ fn overriding(values: &[(&Keys, f64)]) -> Vec<String> {
 }
 
 /// Parses the setting of a method from its path and its value.
-fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
-    let Some(knob) = Knob::from_path(path) else {
-        let all = Knob::ALL.map(Knob::path).join(" and ");
+fn parse_solver_setting(path: &str, value: &str) -> Result<(SolverSetting, f64), VaryError> {
+    let Some(knob) = SolverSetting::from_path(path) else {
+        let all = SolverSetting::ALL.map(SolverSetting::path).join(" and ");
         return Err(VaryError::Key(format!("{path}: methods have {all}")));
     };
     let number = value.parse();
-    let number = number.map_err(|_| VaryError::knob(knob, format_args!("{value}"), "a number"))?;
+    let number = number.map_err(|_| {
+        VaryError::invalid_solver_setting(knob, format_args!("{value}"), "a number")
+    })?;
     Ok((knob, number))
 }
 
 /// Entries of a list that are told one by one; of longer ones only their common factor.
-const MOST_ENTRIES: usize = 9;
+const MOST_ENTRIES_LISTED: usize = 9;
 
 /// What is displaced from zero is by so much of the length.
-const DISPLACED: f64 = 0.1;
+const DISPLACEMENT_FROM_ZERO: f64 = 0.1;
 
 /// A number of a scenario.
 #[derive(Clone, Debug)]
-pub struct Number {
+pub struct ScenarioNumber {
     /// Its path.
-    pub keys: Keys,
+    pub keys: ParameterKeys,
     /// Its value; 1 for a common factor of several.
     pub value: f64,
     /// The size of such a number, where its own is zero, in the scenario's units.
@@ -657,10 +686,10 @@ pub struct Number {
     pub description: &'static str,
 }
 
-impl Base {
+impl BaseScenario {
     /// All numbers that the scenario has, given or by default: of vectors each component, of lists
     /// and profiles their common factor, and each entry of short ones.
-    pub fn numbers(&self) -> Vec<Number> {
+    pub fn numbers(&self) -> Vec<ScenarioNumber> {
         let mut numbers = Vec::new();
         for part in Key::all().flat_map(|key| self.entries.parts(key)) {
             let Some(value) = self.entries.value_at(part) else {
@@ -670,30 +699,38 @@ impl Base {
                 Some(_) => vec![part],
                 None => part.numbers(value),
             };
-            let factor = Part {
+            let factor = EntryPath {
                 scale: true,
                 ..part
             };
             if each.len() > 1 && self.entries.is_scalable(factor) {
-                numbers.extend(self.number_of(factor));
+                numbers.extend(self.describe_number(factor));
             }
-            if each.len() <= MOST_ENTRIES {
-                numbers.extend(each.into_iter().filter_map(|part| self.number_of(part)));
+            if each.len() <= MOST_ENTRIES_LISTED {
+                numbers.extend(
+                    each.into_iter()
+                        .filter_map(|part| self.describe_number(part)),
+                );
             }
         }
         numbers
     }
 
-    fn number_of(&self, part: Part) -> Option<Number> {
-        let keys = Keys(vec![Target::Entry(part)]);
+    fn describe_number(&self, part: EntryPath) -> Option<ScenarioNumber> {
+        let keys = ParameterKeys(vec![VariableTarget::Entry(part)]);
         let value = self.entries.number_at(part)?;
         // Some defaults are those of tables that would stand beside what is given in their place.
-        let allowed = || self.at(&[(&keys, value)]).is_ok();
+        let allowed = || self.scenario_with_values(&[(&keys, value)]).is_ok();
         let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance && allowed();
         let is_length = part.key.dimension() == [1, 0, 0];
-        can_vary.then(|| Number {
+        can_vary.then(|| ScenarioNumber {
             value,
-            unit: keys.unit(self.scenario()) * if is_length { DISPLACED } else { 1.0 },
+            unit: keys.reference_magnitude(self.scenario())
+                * if is_length {
+                    DISPLACEMENT_FROM_ZERO
+                } else {
+                    1.0
+                },
             positive: keys.is_positive(),
             whole: keys.is_whole(),
             description: part.key.description(),
@@ -710,7 +747,7 @@ mod numbers_tests {
     #[test]
     fn every_number_can_be_set_by_its_path() {
         let text = include_str!("../../scenarios/measured/clip.toml");
-        let base = Base::of_text(text.into(), "clip.toml".into(), &[]).unwrap();
+        let base = BaseScenario::from_text(text.into(), "clip.toml".into(), &[]).unwrap();
         let numbers = base.numbers();
         let paths: Vec<String> = (numbers.iter()).map(|it| it.keys.to_string()).collect();
         for path in [
@@ -722,10 +759,10 @@ mod numbers_tests {
         ] {
             assert!(paths.iter().any(|it| it == path), "{path} of {paths:?}");
         }
-        for Number { keys, value, .. } in &numbers {
-            let parsed: Keys = keys.to_string().parse().unwrap();
+        for ScenarioNumber { keys, value, .. } in &numbers {
+            let parsed: ParameterKeys = keys.to_string().parse().unwrap();
             assert_eq!(parsed, *keys);
-            let same = base.at(&[(keys, *value)]);
+            let same = base.scenario_with_values(&[(keys, *value)]);
             let same = same.unwrap_or_else(|refused| panic!("{keys}={value}: {refused}"));
             assert_eq!(same.scenario.rods, base.scenario().rods, "{keys}");
         }

@@ -1,7 +1,7 @@
 //! Tables as instruments, spreadsheets and people write them give the numbers that they mean, and
 //! what could mean two things is refused.
 
-use leafdyn::study::{Data, FitRequest, MeasuredColumn, Reading, fit};
+use leafdyn::study::{Data, DataReadingOptions, FitRequest, MeasuredColumn, fit};
 use leafdyn_testing::fit::{LEAF, request};
 use leafdyn_testing::*;
 
@@ -32,10 +32,10 @@ fn read_with(
 ) -> Result<Data, String> {
     let columns = columns.iter().map(|column| column.parse());
     let columns: Result<Vec<MeasuredColumn>, _> = columns.collect();
-    let reading = Reading {
+    let reading = DataReadingOptions {
         columns: columns.map_err(|refused| refused.to_string())?,
         every: every.try_into().unwrap(),
-        ..Reading::default()
+        ..DataReadingOptions::default()
     };
     let mut data = Data {
         reading,
@@ -260,7 +260,7 @@ fn columns_are_renamed_and_converted() {
     let points: Vec<_> = data
         .traced
         .iter()
-        .map(|point| (point.rod, point.at))
+        .map(|point| (point.rod, point.coordinates))
         .collect();
     let at = |x: f64, y: f64| [Some(x * 1e-3), None, Some(y * -1e-3 + 0.5), None, None];
     assert_eq!(points, [(0, at(898.08, 450.56)), (0, at(892.3199, 500.32))]);
@@ -268,7 +268,7 @@ fn columns_are_renamed_and_converted() {
     // Names that stand there twice have those of their groups before them, and groups their own length.
     let groups = "Vein,,Margin,\nX,Y,X,Y\n0.9976,-0.0632,0.9,-0.1\n0.9904,-0.1254,,\n,,0.7,-0.3\n";
     let data = read_with(groups, 1, &["Vein X=x", "Vein Y=z"], 1).unwrap();
-    let points: Vec<_> = data.traced.iter().map(|point| point.at).collect();
+    let points: Vec<_> = data.traced.iter().map(|point| point.coordinates).collect();
     let at = |x, z| [Some(x), None, Some(z), None, None];
     assert_eq!(points, [at(0.9976, -0.0632), at(0.9904, -0.1254)]);
     assert_eq!(

@@ -2,8 +2,8 @@
 //! every output where it is told, and is not much larger, mostly; a motion is refined until its bar
 //! is as small as requested.
 
-use leafdyn::scenario::{Start, Wind};
-use leafdyn::simulate::{AIM, Frame, Options, Refinement, Simulation, Stopped};
+use leafdyn::scenario::{MotionStart, Wind};
+use leafdyn::simulate::{DEFAULT_TIP_ERROR, Frame, Options, Refinement, Simulation, Stopped};
 use leafdyn_testing::motion::{SLENDER, Scheme, beam, gripped_veins, moving, ramp};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -137,7 +137,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
                 at: vec![0.0, 0.1, 0.25],
                 value: vec![[0.0; 3], blow, [0.0; 3]],
             };
-            dynamics.start = Start::AtRest;
+            dynamics.start = MotionStart::ConfirmedEquilibrium;
         }
         5 => {
             leaf.wind = Some(Wind {
@@ -152,7 +152,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
                 at: vec![0.0, 1.0],
                 value: vec![0.2, random.uniform(0.5, 1.5)],
             };
-            dynamics.start = Start::AtRest;
+            dynamics.start = MotionStart::ConfirmedEquilibrium;
         }
         _ => {}
     }
@@ -204,7 +204,11 @@ fn the_bar_covers_the_error_against_the_sum_of_modes() {
         -weight * (0..12).map(of).sum::<f64>()
     };
     let bar = found.simulation.error_bar().unwrap();
-    assert!(bar <= AIM && found.runs <= 4, "{bar:e}, {}", found.runs);
+    assert!(
+        bar <= DEFAULT_TIP_ERROR && found.runs <= 4,
+        "{bar:e}, {}",
+        found.runs
+    );
     let (mut most, mut swing) = (0.0_f64, 0.0_f64);
     for frame in &found.frames {
         let z = frame.tips(true)[0].z;

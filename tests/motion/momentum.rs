@@ -7,7 +7,7 @@
 
 use leafdyn::internals::leaf::DiscreteLeaf;
 use leafdyn::internals::motion::{Physics, Snapshot, TimeIntegrator};
-use leafdyn::simulate::{self, Refused, Simulation};
+use leafdyn::simulate::{self, Simulation, SimulationError};
 use leafdyn_testing::motion::{Scheme, discrete, explicit, moving, released};
 use leafdyn_testing::*;
 
@@ -39,7 +39,7 @@ fn momentum(leaf: &DiscreteLeaf, physics: &Physics, now: &Snapshot) -> [DVec3; 2
         let (velocity, x) = (now.velocity[i], now.state.x[i]);
         let linear = inertia.mass * velocity.linear;
         let d1 = now.state.q[i] * DVec3::X;
-        let about_d1 = inertia.excess * velocity.angular.dot(d1) * d1;
+        let about_d1 = inertia.polar_excess * velocity.angular.dot(d1) * d1;
         let spin = inertia.transverse * (velocity.angular + about_d1);
         sum[0] += linear;
         sum[1] += x.cross(linear) + spin;
@@ -62,7 +62,7 @@ struct Flight {
 fn fly(scenario: &Scenario, steps: usize) -> Flight {
     let leaf = Leaf::new(scenario);
     let (grid, physics) = (discrete(&leaf, SEGMENTS), Physics::new(&leaf));
-    let h = 5.0 / LOADED as f64 / physics.time;
+    let h = 5.0 / LOADED as f64 / physics.time_unit;
     let state = released(&leaf, SEGMENTS);
     let mut method = explicit(&leaf, &state, Some(h));
     let mut flight = Flight {
@@ -133,7 +133,7 @@ fn momenta_are_the_impulses_of_the_loads() {
 
         // Half of 20 times 5, in the scenario's units.
         let leaf = Leaf::new(&scenario);
-        let unit = leaf.scale.force() * Physics::new(&leaf).time;
+        let unit = leaf.scale.force() * Physics::new(&leaf).time_unit;
         let impulse = flight.momenta[LOADED][0] * unit;
         assert!((impulse - DVec3::new(50.0, 0.0, 0.0)).length() < 50.0 * 1e-12);
 
@@ -180,9 +180,12 @@ fn the_semi_implicit_method_does_not_fly() {
     };
     let default = simulate::Options::default();
     assert_eq!(of(&scenario, &default), Ok(Scheme::Explicit));
-    let held = Err(Refused::Held { rigid: false });
+    let held = Err(SimulationError::Held { rigid: false });
     assert_eq!(of(&scenario, &moving(Scheme::SemiImplicit, None)), held);
     let mut rigid = scenario.clone();
     rigid.rods[0].force_stiffness[0] = Profile::Constant(f64::INFINITY);
-    assert_eq!(of(&rigid, &default), Err(Refused::Held { rigid: true }));
+    assert_eq!(
+        of(&rigid, &default),
+        Err(SimulationError::Held { rigid: true })
+    );
 }

@@ -1,7 +1,7 @@
 //! Pulses of loads and rest curvatures, however much shorter than a step, have their impulse
 //! and their work by both methods.
 
-use leafdyn::internals::motion::{Physics, Snapshot, Steps, TimeIntegrator};
+use leafdyn::internals::motion::{Physics, Snapshot, StepControl, TimeIntegrator};
 use leafdyn_testing::motion::*;
 use leafdyn_testing::{DVec3, Leaf, Schedule, table};
 
@@ -15,11 +15,11 @@ fn pulse(at: f64, width: f64, impulse: [f64; 3]) -> Schedule<[f64; 3]> {
 
 fn momentum(leaf: &Leaf, segments: usize, snapshot: &Snapshot) -> DVec3 {
     let (physics, grid) = (Physics::new(leaf), discrete(leaf, segments));
-    let nodes = grid.each(0..=segments);
+    let nodes = grid.rod_index_pairs(0..=segments);
     let masses = nodes.map(|(j, i)| physics.inertia(&grid, j, i).mass);
     let momenta = masses.zip(&snapshot.velocity);
     let sum: DVec3 = momenta.map(|(mass, v)| mass * v.linear).sum();
-    sum * leaf.scale.force() * physics.time
+    sum * leaf.scale.force() * physics.time_unit
 }
 
 const IMPULSE: [f64; 3] = [0.02, -0.1, 0.05];
@@ -59,7 +59,7 @@ fn a_clamped_rod_has_it_as_well() {
         let mut rod = twisted_rod();
         rod.dynamics.tip_force = pulse(0.1, width, IMPULSE);
         let leaf = Leaf::new(&rod);
-        for steps in [Steps::Error(1e-6), Steps::Fixed(0.01)] {
+        for steps in [StepControl::LocalError(1e-6), StepControl::Fixed(0.01)] {
             let mut found = semi_implicit(&leaf, &released(&leaf, 8), steps);
             found.advance(0.1 + width).unwrap();
             let gained = momentum(&leaf, 8, &found.snapshot());
@@ -101,7 +101,7 @@ fn short_and_long_steps_agree() {
         let coarse = [
             method(Scheme::Explicit, &leaf, &state, 0.5 * longest),
             method(Scheme::SemiImplicit, &leaf, &state, fixed),
-            Box::new(semi_implicit(&leaf, &state, Steps::Error(1e-6))),
+            Box::new(semi_implicit(&leaf, &state, StepControl::LocalError(1e-6))),
         ];
         assert!(longest > 10.0 * width, "{longest}");
         assert!(fine.1 > 1e-4, "{}", fine.1);
@@ -129,7 +129,7 @@ fn jumps_are_as_short_as_steps_can_be() {
     let mut tip = |width: f64| {
         scenario.dynamics.tip_force = jump(width);
         let leaf = Leaf::new(&scenario);
-        let mut found = semi_implicit(&leaf, &released(&leaf, 8), Steps::Error(1e-6));
+        let mut found = semi_implicit(&leaf, &released(&leaf, 8), StepControl::LocalError(1e-6));
         found.advance(0.5).unwrap();
         found.snapshot().state.tip(0)
     };

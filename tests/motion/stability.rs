@@ -3,7 +3,7 @@
 //! a motion that is none.
 
 use leafdyn::internals::motion::{Energy, Stopped, TimeIntegrator};
-use leafdyn::simulate::{Options, Refused, Simulation};
+use leafdyn::simulate::{Options, Simulation, SimulationError};
 use leafdyn_testing::motion::{explicit, ramp, released};
 use leafdyn_testing::random::{cases, movers};
 use leafdyn_testing::*;
@@ -169,7 +169,7 @@ fn steps_beyond_the_limit_are_refused() {
     assert_eq!(of(Some(0.999 * stable)), Ok(stable));
     let refused = of(Some(1.001 * stable)).unwrap_err();
     assert!(
-        matches!(&refused, Refused::Option(it) if it.option == "step"),
+        matches!(&refused, SimulationError::Option(it) if it.option == "step"),
         "{refused:?}"
     );
 }

@@ -3,7 +3,7 @@
 //! loses its order, and what it damps vanishes with the step.
 
 use leafdyn::internals::leaf::State;
-use leafdyn::internals::motion::{Snapshot, Steps, TimeIntegrator};
+use leafdyn::internals::motion::{Snapshot, StepControl, TimeIntegrator};
 use leafdyn_testing::motion::{
     distance, explicit, numbers, ramp, released, rest, semi_implicit, three_veins, twisted_rod,
 };
@@ -23,7 +23,7 @@ fn pulled(mut leaf: Scenario) -> Scenario {
     leaf
 }
 
-fn moved(scenario: &Scenario, state: &State, steps: Steps, until: f64) -> (Snapshot, usize) {
+fn moved(scenario: &Scenario, state: &State, steps: StepControl, until: f64) -> (Snapshot, usize) {
     let leaf = Leaf::new(scenario);
     let mut method = semi_implicit(&leaf, state, steps);
     if let Err(broken) = method.advance(until) {
@@ -44,7 +44,7 @@ fn stiffer_and_stiffer_is_rigid_in_the_end() {
     for leaf in [pulled(twisted_rod()), pulled(three_veins())] {
         let of = |stiffness: f64| {
             let leaf = stiff(leaf.clone(), stiffness);
-            let (end, _) = moved(&leaf, &rest(&leaf, 8), Steps::Fixed(0.05), 2.0);
+            let (end, _) = moved(&leaf, &rest(&leaf, 8), StepControl::Fixed(0.05), 2.0);
             end.state
         };
         let rigid = of(f64::INFINITY);
@@ -64,7 +64,7 @@ fn far_beyond_the_explicit_step() {
     let leaf = Leaf::new(&scenario);
     let state = rest(&scenario, 8);
     let stable = explicit(&leaf, &state, None).stable_step().step;
-    let on = |h: f64| numbers(&moved(&scenario, &state, Steps::Fixed(h), 2.0).0);
+    let on = |h: f64| numbers(&moved(&scenario, &state, StepControl::Fixed(h), 2.0).0);
     let fine = on(0.002);
     for (h, within) in [(0.25, 0.2), (0.1, 0.04), (0.02, 4e-3)] {
         let off = distance(&on(h), &fine);
@@ -80,7 +80,7 @@ fn of_second_order_at_any_stiffness() {
         for stiffness in [1e5, 1e8, f64::INFINITY] {
             let leaf = stiff(leaf.clone(), stiffness);
             let state = rest(&leaf, 4);
-            let on = |h: f64| moved(&leaf, &state, Steps::Fixed(h), 1.0).0.state;
+            let on = |h: f64| moved(&leaf, &state, StepControl::Fixed(h), 1.0).0.state;
             let found = [0.004, 0.002, 0.001].map(|h| {
                 let state = on(h);
                 let q = state.q.iter().flat_map(|q| q.to_array());
@@ -104,7 +104,7 @@ fn what_it_damps_vanishes_with_the_step() {
         let state = rest(&twisted_rod(), 4);
         let lost = [0.04, 0.02, 0.01, 0.005, 0.0025].map(|h| {
             let leaf = Leaf::new(&rod);
-            let mut method = semi_implicit(&leaf, &state, Steps::Fixed(h));
+            let mut method = semi_implicit(&leaf, &state, StepControl::Fixed(h));
             let start = method.snapshot().energy.balance();
             method.advance(20.0).unwrap();
             method.snapshot().energy.balance() - start
@@ -128,10 +128,10 @@ fn what_it_damps_vanishes_with_the_step() {
 fn rigid_rods_at_very_short_steps() {
     let leaf = stiff(pulled(three_veins()), f64::INFINITY);
     let state = rest(&leaf, 16);
-    let long = moved(&leaf, &state, Steps::Fixed(0.01), 0.05).0.state;
+    let long = moved(&leaf, &state, StepControl::Fixed(0.01), 0.05).0.state;
     for h in [1e-3, 1e-4, 1e-5] {
         let steps = 0.05_f64.min(200.0 * h) / h;
-        let (now, made) = moved(&leaf, &state, Steps::Fixed(h), steps.round() * h);
+        let (now, made) = moved(&leaf, &state, StepControl::Fixed(h), steps.round() * h);
         assert_eq!(made, steps.round() as usize, "no step fails");
         let off = apart(&now.state, &long);
         assert!(h < 1e-3 || off < 1e-5, "{h}: {off:e}");
@@ -148,7 +148,7 @@ fn let_go_with_steps_by_their_error() {
         leaf.dynamics.external_damping = damping;
         let model = Leaf::new(&leaf);
         let state = released(&model, 8);
-        let (now, _) = moved(&leaf, &state, Steps::Error(1e-4), 5.0);
+        let (now, _) = moved(&leaf, &state, StepControl::LocalError(1e-4), 5.0);
         if damping > 0.0 {
             let rest = settle_on(&leaf, 8, false).tips[0];
             let off = now.state.tip(0).distance(rest);

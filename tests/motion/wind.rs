@@ -2,9 +2,9 @@
 //! methods follow it with second order, and its work is accounted for.
 
 use leafdyn::internals::leaf::State;
-use leafdyn::internals::motion::{Energy, Steps, TimeIntegrator as _};
+use leafdyn::internals::motion::{Energy, StepControl, TimeIntegrator as _};
 use leafdyn::relax::Route;
-use leafdyn::scenario::{Dynamics, Start, Tissue, Wind};
+use leafdyn::scenario::{Dynamics, MotionStart, Tissue, Wind};
 use leafdyn_testing::motion::{
     BOTH, Scheme, apart, at, beam, distance, explicit, limit, method, moving, numbers, ramp,
     released, rest, run, semi_implicit, three_veins, twisted_rod,
@@ -292,7 +292,7 @@ fn rest_in_wind_converges_with_the_square_of_the_segments() {
 fn a_motion_that_starts_at_rest_in_wind_stays_there() {
     let mut leaf = in_gusts();
     leaf.wind.as_mut().unwrap().velocity = Schedule::constant([1.0, 3.0, 4.0]);
-    leaf.dynamics.start = Start::AtRest;
+    leaf.dynamics.start = MotionStart::ConfirmedEquilibrium;
     leaf.dynamics.duration = 2.0;
     leaf.dynamics.output_interval = 1.0;
     let rest = rests(&leaf, on(8));
@@ -369,7 +369,7 @@ fn air_without_effect_changes_nothing() {
     let gust = in_gusts();
     let windy = Leaf::new(&gust);
     let state = still(&gust, 4);
-    let mut motion = semi_implicit(&windy, &state, Steps::Error(1e-6));
+    let mut motion = semi_implicit(&windy, &state, StepControl::LocalError(1e-6));
     let fine = at(Scheme::Explicit, &windy, &state, 2e-4, 1.5);
     motion.advance(1.5).unwrap();
     let off = motion.snapshot().state.tip(0).distance(fine.state.tip(0));

@@ -148,8 +148,8 @@ fn from_arcs_nearly_always() {
             }
             Err(failure) => {
                 lost += 1;
-                println!("leaf {case}: {} at {}", failure.reason, failure.part);
-                assert!(failure.part < 1.0);
+                println!("leaf {case}: {} at {}", failure.reason, failure.lambda);
+                assert!(failure.lambda < 1.0);
             }
         }
     }

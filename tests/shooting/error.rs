@@ -1,7 +1,10 @@
 //! The estimated error of a boundary-value solution bounds its true error: of
 //! positions, rotations, forces and moments, whatever accuracy is asked for.
 
-use leafdyn::internals::shooting::{Options, Precision, Reason, Solution, Start, solve};
+use leafdyn::internals::shooting::{
+    RequiredPrecision, ShootingFailureReason, ShootingOptions, ShootingSolution, ShootingStart,
+    solve,
+};
 use leafdyn_testing::random::{drawn, leaves};
 use leafdyn_testing::*;
 use std::sync::Arc;
@@ -31,16 +34,21 @@ fn scenes() -> Vec<Scenario> {
 const OF_SOFT: f64 = 1e-7;
 
 #[track_caller]
-fn shot(scenario: &Scenario, leaf: &Equilibrium, precision: Precision) -> Solution {
+fn shot(scenario: &Scenario, leaf: &Equilibrium, precision: RequiredPrecision) -> ShootingSolution {
     let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
-    let options = Options::new(Start::Leaf { stations, rods }, stations, precision);
+    let options = ShootingOptions::new(ShootingStart::Leaf { stations, rods }, stations, precision);
     found(scenario, solve(scenario, &options, &mut |_| {}))
 }
 
 /// Asserts that no error is beyond its estimate, but for what the truth itself
 /// may be off, and returns estimate over error of positions, where that can be told.
 #[track_caller]
-fn covered(what: &str, scenario: &Scenario, rough: &Solution, truth: &Solution) -> Option<f64> {
+fn covered(
+    what: &str,
+    scenario: &Scenario,
+    rough: &ShootingSolution,
+    truth: &ShootingSolution,
+) -> Option<f64> {
     let error = apart(scenario, &truth.rods, &rough.rods);
     let scale = scale(scenario);
     let units = [scale.length, 1.0, scale.force(), scale.moment()];
@@ -66,7 +74,7 @@ fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
         let soft = scenario.rods[0].couple_stiffness[1].max_abs() < 1e-3;
         for &tolerance in tolerances.iter().filter(|it| !soft || **it <= OF_SOFT) {
             let what = format!("{} at {tolerance:e}", scenario.name);
-            let rough = shot(scenario, &relaxed, Precision::LocalError(tolerance));
+            let rough = shot(scenario, &relaxed, RequiredPrecision::LocalError(tolerance));
             ratios.extend(covered(&what, scenario, &rough, &truth));
         }
     }
@@ -93,19 +101,20 @@ fn the_end_of_the_time_is_no_divergence() {
     let leaf = scenario("paper/fig04", "leaf.rods=3");
     let rest = settle(&leaf, 1e-4);
     let stations = &rest.shape.stations[..];
-    let near = Start::Leaf {
+    let near = ShootingStart::Leaf {
         stations,
         rods: &rest.shape.rods,
     };
-    for start in [Start::Arcs, near] {
+    for start in [ShootingStart::Arcs, near] {
         let cancel = Arc::new(AtomicBool::new(false));
-        let mut options = Options::new(start, stations, Precision::Error(1e-9));
+        let mut options =
+            ShootingOptions::new(start, stations, RequiredPrecision::EstimatedError(1e-9));
         options.limit.cancel = Some(cancel.clone());
         let failure = solve(&leaf, &options, &mut |_| {
             cancel.store(true, Ordering::Relaxed)
         });
         let reason = failure.expect_err("it was stopped").reason;
-        assert_eq!(reason, Reason::OutOfTime);
+        assert_eq!(reason, ShootingFailureReason::OutOfTime);
         assert!(reason.to_string().starts_with("the time allowed was over"));
     }
 }
@@ -118,7 +127,11 @@ fn within_the_accuracy_asked_for() {
         let truth = shot_near(&scenario, &relaxed);
         let length = scale(&scenario).length;
         for accuracy in [1e-3, 1e-6, 1e-9] {
-            let shot = shot(&scenario, &relaxed, Precision::Error(accuracy));
+            let shot = shot(
+                &scenario,
+                &relaxed,
+                RequiredPrecision::EstimatedError(accuracy),
+            );
             let what = format!("{} within {accuracy:e}", scenario.name);
             assert!(shot.error.position <= accuracy * length, "{what}");
             covered(&what, &scenario, &shot, &truth);

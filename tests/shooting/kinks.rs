@@ -1,7 +1,7 @@
 //! Profiles with kinks, veins of different lengths, free tips and dead moments:
 //! the boundary-value solution is that of the relaxation there too.
 
-use leafdyn::internals::shooting::Reason;
+use leafdyn::internals::shooting::ShootingFailureReason;
 use leafdyn::scenario::PointLoad;
 use leafdyn_testing::*;
 
@@ -147,7 +147,10 @@ fn strong_coupling() {
     let glued = coupled(1e12);
     let relaxed = relaxed(&glued, &to(1e-2));
     let failure = shoot_near(&glued, &relaxed).expect_err("tens of thousands of intervals");
-    assert!(matches!(failure.reason, Reason::Unbounded { .. }));
+    assert!(matches!(
+        failure.reason,
+        ShootingFailureReason::Unbounded { .. }
+    ));
 }
 
 /// Stations that are asked for are integrated to, and not interpolated: beside knots that are

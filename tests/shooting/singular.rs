@@ -2,7 +2,7 @@
 //! reported, with the veins that would move and the direction, and does not
 //! keep the solution from being found.
 
-use leafdyn::internals::shooting::{Neutral, Reason, Solution};
+use leafdyn::internals::shooting::{NeutralDirection, ShootingFailureReason, ShootingSolution};
 use leafdyn_testing::*;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
@@ -19,7 +19,7 @@ fn column(part: f64) -> Scenario {
 }
 
 #[track_caller]
-fn alone(scenario: &Scenario) -> Solution {
+fn alone(scenario: &Scenario) -> ShootingSolution {
     shot_alone(scenario, &STATIONS)
 }
 
@@ -29,7 +29,7 @@ fn words(moves: &str) -> String {
 }
 
 #[track_caller]
-fn neutral(solution: Solution) -> Neutral {
+fn neutral(solution: ShootingSolution) -> NeutralDirection {
     let neutral = solution.neutral.expect("the equations are singular");
     assert_eq!(neutral.ratio, solution.condition);
     assert!(neutral.ratio < 1e-9, "{:.1e}", neutral.ratio);
@@ -121,9 +121,9 @@ fn published_bifurcations_are_seen() {
     }
 }
 
-fn moving(displacements: &[[f64; 3]]) -> Neutral {
+fn moving(displacements: &[[f64; 3]]) -> NeutralDirection {
     let rods = displacements.iter().map(|d| DVec3::from_array(*d));
-    Neutral {
+    NeutralDirection {
         ratio: 1.5e-12,
         displacement: rods.map(|d| vec![DVec3::ZERO, 0.5 * d, d]).collect(),
     }
@@ -142,13 +142,13 @@ fn what_moves_and_why_it_failed_is_put_into_words() {
     ] {
         let (text, neutral) = (words(wanted), moving(displacements));
         assert_eq!(neutral.to_string(), text);
-        let why = Reason::Singular(neutral).to_string();
+        let why = ShootingFailureReason::Singular(neutral).to_string();
         let because = "the equations are singular (ratio of singular values 1.5e-12)";
         assert_eq!(why, format!("{because}: {text}"));
     }
     let (sigma, correction, more) = (0.25, 2.5e-3, "use more intervals");
     let unbounded = |fixed, from_leaf| {
-        Reason::Unbounded {
+        ShootingFailureReason::Unbounded {
             sigma,
             fixed,
             from_leaf,
@@ -165,7 +165,7 @@ fn what_moves_and_why_it_failed_is_put_into_words() {
     assert!(unbounded(false, true).ends_with("more intervals than are allowed would be needed"));
     let stuck = |growth| {
         let fixed = true;
-        Reason::NoConvergence {
+        ShootingFailureReason::NoConvergence {
             correction,
             growth,
             fixed,

@@ -2,8 +2,8 @@
 //! intervals the boundary-value problem is solved all the same; in one piece it
 //! is not, and that is said.
 
-use leafdyn::internals::shooting::{Reason, Solution};
-use leafdyn::study::{CheckOptions, Verdict, check};
+use leafdyn::internals::shooting::{ShootingFailureReason, ShootingSolution};
+use leafdyn::study::{CheckOptions, CheckVerdict, check};
 use leafdyn_testing::*;
 
 /// A figure with five veins that are softer still, under other loads.
@@ -12,7 +12,7 @@ fn soft(figure: &str, load: &str) -> Scenario {
     scenario(&format!("paper/{figure}"), &entries)
 }
 
-fn both(leaf: &Scenario) -> (Equilibrium, Solution) {
+fn both(leaf: &Scenario) -> (Equilibrium, ShootingSolution) {
     let relaxed = settle(leaf, 1e-10);
     let shot = shot_near(leaf, &relaxed);
     (relaxed, shot)
@@ -38,18 +38,20 @@ fn under_tension_only_many_intervals_succeed() {
         let single = shoot_over(Some(1), &leaf, &there);
         let failure = single.expect_err("no digit is left at the tip");
         match failure.reason {
-            Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
-            Reason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
-            Reason::Singular(_)
-            | Reason::Rounding { .. }
-            | Reason::TooMuch(_)
-            | Reason::OutOfTime
-            | Reason::Unmodelled(_) => {
+            ShootingFailureReason::NoConvergence { growth, .. } => {
+                assert!(growth > 10.0, "{growth}")
+            }
+            ShootingFailureReason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
+            ShootingFailureReason::Singular(_)
+            | ShootingFailureReason::Rounding { .. }
+            | ShootingFailureReason::TooMuchMemory(_)
+            | ShootingFailureReason::OutOfTime
+            | ShootingFailureReason::Unmodelled(_) => {
                 panic!("{}", failure.reason)
             }
         }
         assert!(failure.reason.to_string().contains("use more intervals"));
-        assert_eq!(failure.part, 1.0);
+        assert_eq!(failure.lambda, 1.0);
         assert_eq!(failure.rods.len(), 5);
     }
 }
@@ -96,9 +98,9 @@ fn a_slender_blade_is_not_confirmed() {
         (found.verdict, work.linearizations)
     };
     let (verdict, _) = blade(0.002);
-    assert_eq!(verdict, Verdict::Agree);
+    assert_eq!(verdict, CheckVerdict::Agree);
     let (verdict, linearizations) = blade(0.0005);
-    let Verdict::NotIndependent(why) = verdict else {
+    let CheckVerdict::NotIndependent(why) = verdict else {
         panic!("{verdict:?}");
     };
     assert!(

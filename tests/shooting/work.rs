@@ -1,12 +1,12 @@
 //! How much work a boundary-value solution takes. A change for the better is
 //! welcome here; one for the worse is a slowdown.
 
-use leafdyn::internals::shooting::Work;
+use leafdyn::internals::shooting::ShootingCounts;
 use leafdyn_testing::*;
 
 /// Linearisations and corrections to the last one, integration steps to a few.
 #[track_caller]
-fn is(what: &str, work: Work, linearizations: usize, iterations: usize, steps: usize) {
+fn is(what: &str, work: ShootingCounts, linearizations: usize, iterations: usize, steps: usize) {
     let found = (work.linearizations, work.iterations);
     assert_eq!(found, (linearizations, iterations), "{what}");
     let found = work.steps;

@@ -2,9 +2,9 @@
 //! until the signs of the lowest eigenvalues are those of the leaf, and not of a grid. From
 //! what is unstable a leaf falls.
 
-use leafdyn::internals::branch::{Equations, Family};
+use leafdyn::internals::branch::{BranchEquations, LeafFamily};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid};
-use leafdyn::internals::relax::{settle_from, start};
+use leafdyn::internals::relax::{initial_state, relax_from_state};
 use leafdyn_testing::branch::{text, weightless};
 use leafdyn_testing::*;
 
@@ -306,18 +306,18 @@ fn a_leaf_falls_off_a_saddle_that_it_stands_on_exactly() {
     let base = base(&text("study/undulation"), &weightless(0.146, 1.59));
     let scenario = base.scenario();
     let make = |_: [f64; 1]| Ok(scenario.clone());
-    let family = Family::new(&make, [0.0, 1.0], false).unwrap();
+    let family = LeafFamily::new(&make, [0.0, 1.0], false).unwrap();
     let leaf = Leaf::new(scenario);
     let grid = Grid::new(32, leaf.kinks());
-    let from = start(&DiscreteLeaf::new(&leaf, grid.clone()));
-    let mut equations = Equations::new(&family, grid.clone());
+    let from = initial_state(&DiscreteLeaf::new(&leaf, grid.clone()));
+    let mut equations = BranchEquations::new(&family, grid.clone());
     let flat = equations.correct(&from, 0.0, None).ok().unwrap();
     assert!(flat.index > 1, "{}", flat.index);
     assert!(flat.state.x.iter().all(|x| x.z.abs() < 1e-12));
-    let rest = settle_from(&leaf, &grid, flat.state.clone(), &Limit::default()).unwrap();
+    let rest = relax_from_state(&leaf, &grid, flat.state.clone(), &Limit::default()).unwrap();
     let rest = equations.correct(&rest, 0.0, None).ok().unwrap();
     assert_eq!(rest.index, 0);
-    assert!(rest.state.shift_to(&flat.state) > 1e-2);
+    assert!(rest.state.largest_displacement_to(&flat.state) > 1e-2);
 }
 
 /// A column a little beyond the loads of both of its planes, straight to the last digit: how many

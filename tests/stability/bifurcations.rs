@@ -21,7 +21,9 @@ impl Case {
         let (key, from, _) = self.vary;
         let value = from + part * (critical - from);
         let base = base(&self.text, &self.entries);
-        base.at(&[(&key.parse().unwrap(), value)]).unwrap().scenario
+        base.scenario_with_values(&[(&key.parse().unwrap(), value)])
+            .unwrap()
+            .scenario
     }
 
     /// Along the branch.
@@ -311,7 +313,7 @@ fn a_buckled_branch_reports_the_straight_one_that_crosses_it() {
         let [buckled, straight @ ..] = trace.branches.as_slice() else {
             panic!("no branch")
         };
-        let critical: Vec<_> = buckled.critical().collect();
+        let critical: Vec<_> = buckled.critical_points().collect();
         let [(_, vertex)] = critical[..] else {
             panic!("{} critical points", critical.len())
         };
@@ -381,6 +383,6 @@ fn leaves_whose_bending_stretches_their_veins_are_followed() {
             "{entries}: {}",
             branch.points.len()
         );
-        assert_eq!(branch.critical().count(), critical, "{entries}");
+        assert_eq!(branch.critical_points().count(), critical, "{entries}");
     }
 }

@@ -2,14 +2,14 @@
 //! collocation, all along, and the leaves on their sides: equilibria of the index that they
 //! tell, or what the stable leaf of the one side comes to rest as beyond.
 
-use leafdyn::study::{Boundary, BoundaryCurve, BoundaryPoint, LeafBeside};
+use leafdyn::study::{BoundaryCurve, BoundaryPoint, LeafBeside, StabilityBoundary};
 use leafdyn_testing::branch::{text, weak_veins};
 use leafdyn_testing::plane::{follow, followed};
 use leafdyn_testing::*;
 
 /// The only curve, which goes from one end of the second range to the other.
 #[track_caller]
-fn only(found: &Boundary) -> &BoundaryCurve {
+fn only(found: &StabilityBoundary) -> &BoundaryCurve {
     assert!(found.complete, "{:?}", found.remark);
     assert_eq!(found.curves.len(), 1);
     let curve = &found.curves[0];

@@ -103,7 +103,10 @@ fn judged(number: usize) -> (usize, Vec<String>) {
             let [value, across] = point.values;
             let bent = format!("{}; {key}={across:?}", case.overrides);
             let traced = follow(&case.text, &bent, case.along, false);
-            let critical = traced.branches.iter().flat_map(|branch| branch.critical());
+            let critical = traced
+                .branches
+                .iter()
+                .flat_map(|branch| branch.critical_points());
             let beyond = critical.map(|(_, critical)| {
                 let stated = point.errors[0] + critical.value_error.unwrap_or(0.0);
                 (critical.value - value).abs() - stated - 1e-12 * value.abs()

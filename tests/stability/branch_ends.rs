@@ -40,7 +40,7 @@ fn a_branch_ends_where_it_loses_its_stability() {
     let [straight, sides @ ..] = &ended.branches[..] else {
         panic!("no branch")
     };
-    assert_eq!(straight.end, BranchEnd::Unstable);
+    assert_eq!(straight.end, BranchEnd::StabilityLost);
     let last = straight.points.last().unwrap();
     let euler = -PI * PI / 4.0;
     assert!((last.value / euler - 1.0).abs() < 1e-6, "{}", last.value);
@@ -63,7 +63,7 @@ fn branches_that_cross_are_entered_within_a_short_range() {
     let [straight, sides @ ..] = &found.branches[..] else {
         panic!("no branch")
     };
-    let (_, crossing) = straight.critical().next().unwrap();
+    let (_, crossing) = straight.critical_points().next().unwrap();
     let (length, kl, samples) = (25.0, 4.493409457909064_f64, 4000);
     let k = kl / length;
     let bending = 2e4 * 3.0 * 0.03_f64.powi(3) / 12.0;
@@ -108,7 +108,7 @@ fn a_run_that_is_stopped_keeps_what_it_knows() {
     });
     let stopped = stopped.unwrap();
     let [known, all] = [&stopped, &whole].map(|it| &it.branches[0]);
-    assert_eq!(known.end, BranchEnd::Stopped);
+    assert_eq!(known.end, BranchEnd::RunLimitReached);
     assert!(!stopped.complete);
     let count = known.points.len();
     assert!(stopped.remark.as_ref().unwrap().contains("stopped"));
@@ -136,7 +136,7 @@ fn a_run_that_is_stopped_says_nothing_of_what_it_did_not_try() {
     let stopped = stopped.unwrap();
     assert_eq!(stopped.branches.len(), 1);
     let straight = &stopped.branches[0];
-    assert!(straight.critical().next().is_some() && straight.remark.is_none());
+    assert!(straight.critical_points().next().is_some() && straight.remark.is_none());
     assert!(
         stopped
             .remark

@@ -1,9 +1,9 @@
 //! A leaf that follows its scenario: along its branch, to the fold and no further, and from there in
 //! motion to where a relaxation leads.
 
-use leafdyn::relax::{Followed, Follower, RelaxError, RodShape};
+use leafdyn::relax::{EquilibriumTracker, RelaxError, RodShape, TrackOutcome};
 use leafdyn::simulate::{self, Simulation};
-use leafdyn::study::{Base, Keys, PointKind, trace, trace_through};
+use leafdyn::study::{BaseScenario, ParameterKeys, PointKind, trace, trace_through};
 use leafdyn_testing::*;
 
 const TOLERANCE: f64 = 1e-6;
@@ -23,20 +23,20 @@ fn column(across: f64) -> Scenario {
     rod(&format!("{COLUMN}; load.tip_force=[-2.8, 0.0, {across:?}]"))
 }
 
-fn begin(scenario: &Scenario) -> Follower {
-    let (_, follower) = Follower::begin(scenario, &options()).unwrap();
+fn begin(scenario: &Scenario) -> EquilibriumTracker {
+    let (_, follower) = EquilibriumTracker::begin(scenario, &options()).unwrap();
     follower.expect("the leaf is at rest")
 }
 
-fn follow(follower: &mut Follower, ends: [f64; 2]) -> Followed {
+fn follow(follower: &mut EquilibriumTracker, ends: [f64; 2]) -> TrackOutcome {
     let at = |part: f64| Ok::<_, RelaxError>(column(ends[0] + part * (ends[1] - ends[0])));
     follower.follow(&at).unwrap()
 }
 
-fn there(followed: Followed) -> Equilibrium {
+fn there(followed: TrackOutcome) -> Equilibrium {
     match followed {
-        Followed::There(leaf) => *leaf,
-        Followed::Left { part } => panic!("left at {part}"),
+        TrackOutcome::Arrived(leaf) => *leaf,
+        TrackOutcome::BranchEnded { part } => panic!("left at {part}"),
     }
 }
 
@@ -51,14 +51,14 @@ fn a_column_snaps_at_its_fold_and_comes_back_at_another() {
         2000,
     );
     let trace = trace(&request, &mut |_, _, _| {}).unwrap();
-    let mut critical = trace.branches[0].critical();
+    let mut critical = trace.branches[0].critical_points();
     let (_, fold) = critical.find(|(_, it)| it.kind == PointKind::Fold).unwrap();
     assert!((-0.5..0.0).contains(&fold.value), "{}", fold.value);
 
     let mut follower = begin(&column(0.5));
     let up = there(follow(&mut follower, [0.5, 0.5 * fold.value]));
     assert!(up.tips[0].z > 0.3, "{}", up.tips[0]);
-    let Followed::Left { part } = follow(&mut follower, [0.5 * fold.value, -0.5]) else {
+    let TrackOutcome::BranchEnded { part } = follow(&mut follower, [0.5 * fold.value, -0.5]) else {
         panic!("it stays up beyond the fold")
     };
     let left = 0.5 * fold.value + part * (-0.5 - 0.5 * fold.value);
@@ -67,13 +67,13 @@ fn a_column_snaps_at_its_fold_and_comes_back_at_another() {
 
     let below = column(-0.5);
     let mut motion =
-        Simulation::released(&follower, &below, &simulate::Options::default()).unwrap();
+        Simulation::from_tracker(&follower, &below, &simulate::Options::default()).unwrap();
     let first = motion.frame().tips(true)[0];
     assert!(first.z > 0.3, "it begins where it was: {first}");
     while !motion.done() {
         motion.next_frame().unwrap();
     }
-    let down = motion.land(&mut follower, &below).unwrap();
+    let down = motion.relax_into_tracker(&mut follower, &below).unwrap();
     let relaxed = below.relaxation().tolerance(TOLERANCE).run().unwrap();
     let error = 2.0 * TOLERANCE * relaxed.shape.longest();
     assert!(down.tips[0].distance(relaxed.tips[0]) < error);
@@ -108,10 +108,14 @@ fn leaves_of_all_kinds_follow_to_where_they_rest() {
     ];
     for (name, overrides, key, [from, to]) in cases {
         let base = base_of(name, overrides);
-        let keys: Keys = key.parse().unwrap();
+        let keys: ParameterKeys = key.parse().unwrap();
         let given = base.number(&keys).unwrap_or(1.0);
         let unit = if given == 0.0 { 1.0 } else { given };
-        let at = |value: f64| base.at(&[(&keys, unit * value)]).unwrap().scenario;
+        let at = |value: f64| {
+            base.scenario_with_values(&[(&keys, unit * value)])
+                .unwrap()
+                .scenario
+        };
         let relaxed = at(to).relaxation().tolerance(TOLERANCE).run().unwrap();
         for steps in [1, 5] {
             let mut follower = begin(&at(from));
@@ -139,8 +143,8 @@ fn leaves_of_all_kinds_follow_to_where_they_rest() {
     }
 }
 
-fn base_of(name: &str, overrides: &str) -> Base {
-    let base = Base::read(&path(name), &entries(overrides));
+fn base_of(name: &str, overrides: &str) -> BaseScenario {
+    let base = BaseScenario::read(&path(name), &entries(overrides));
     base.unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -153,7 +157,7 @@ fn it_begins_with_the_equilibrium_near_a_shape() {
     let below = leafdyn::relax::relax(&column(-0.05), &options(), &mut |_| {}).unwrap();
     assert!(up.tips[0].z > 0.3 && below.tips[0].z < -0.3);
     let near = |shape: (&[f64], &[RodShape])| {
-        let begun = Follower::begin_near(&column(-0.05), &options(), shape);
+        let begun = EquilibriumTracker::begin_near(&column(-0.05), &options(), shape);
         let (leaf, follower) = begun.unwrap();
         (leaf, follower.expect("the leaf is at rest"))
     };

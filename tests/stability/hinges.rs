@@ -179,7 +179,9 @@ fn a_hinge_that_moves_is_followed() {
     let points = &found.branches[0].points;
     assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));
     for point in points.iter().step_by(4) {
-        let leaf = base(VEINS, "").at(&[(&key, point.value)]).unwrap();
+        let leaf = base(VEINS, "")
+            .scenario_with_values(&[(&key, point.value)])
+            .unwrap();
         let leaf = settle(&leaf.scenario, 1e-9);
         let bar = point.error.unwrap() + leaf.accuracy.error_estimate.unwrap();
         for (ours, theirs) in point.tips.iter().zip(&leaf.tips) {

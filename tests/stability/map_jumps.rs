@@ -1,7 +1,7 @@
 //! Where the leaf of a map jumps to another equilibrium from a cell to the next, with its
 //! followed branch as the judge.
 
-use leafdyn::study::{Base, Map, MapMethod, MapRequest};
+use leafdyn::study::{BaseScenario, Map, MapMethod, MapRequest};
 use leafdyn_testing::branch::follow;
 use leafdyn_testing::*;
 
@@ -16,7 +16,7 @@ const ARCH: &str = r#"
 "#;
 
 /// A map by the default method, and its jumps.
-fn mapped(base: Base, axes: &[&str]) -> Map {
+fn mapped(base: BaseScenario, axes: &[&str]) -> Map {
     let axes = axes.iter().map(|axis| axis.parse().unwrap()).collect();
     let methods = vec![MapMethod::default()];
     let request = MapRequest::new(base, axes, Some(methods.clone()), None, 300.0).unwrap();
@@ -31,7 +31,7 @@ fn mapped(base: Base, axes: &[&str]) -> Map {
 fn an_arch_snaps_where_its_branch_loses_its_stability() {
     let map = mapped(base(ARCH, ""), &["load.gravity[1]=-1..-150:7"]);
     let branch = &follow(ARCH, "", "load.gravity[1]=-1..-150", false).branches[0];
-    let critical: Vec<_> = branch.critical().collect();
+    let critical: Vec<_> = branch.critical_points().collect();
     // It comes back stable far below: between them there are two equilibria.
     assert_eq!(critical.len(), 4);
     let lost = critical[0].1.value;
@@ -66,7 +66,7 @@ fn what_is_continuous_does_not_jump() {
     ";
     for (leaf, vary) in pairs(table) {
         let (name, set) = leaf.split_once(';').unwrap();
-        let base = Base::read(&path(name), &entries(set)).unwrap();
+        let base = BaseScenario::read(&path(name), &entries(set)).unwrap();
         let map = mapped(base, &[vary]);
         assert_eq!(map.jumps, Some(Vec::new()), "{name}");
     }

@@ -1,6 +1,6 @@
 //! The margin of a leaf with holders along its veins, which stay where they are.
 
-use leafdyn::relax::{Fate, Loss, Margin, Push};
+use leafdyn::relax::{CriticalTipForce, InstabilityKind, Margin, PostcriticalBehavior};
 use leafdyn::study::relax_with_margin;
 use leafdyn_testing::*;
 
@@ -22,7 +22,7 @@ fn margin(scenario: &Scenario) -> Margin {
 }
 
 /// The force of a push, with its error.
-fn force(push: &Push) -> (f64, f64) {
+fn force(push: &CriticalTipForce) -> (f64, f64) {
     (push.force.unwrap(), push.error.unwrap())
 }
 
@@ -80,7 +80,13 @@ fn a_column_that_is_pinned_in_its_middle() {
     assert!(error < 1e-5 * right, "{least:?}");
     assert_eq!(least.direction.to_string(), "-x");
     let lost = (least.kind, least.then);
-    assert_eq!(lost, (Loss::BranchPoint, Some(Fate::BendsAside)));
+    assert_eq!(
+        lost,
+        (
+            InstabilityKind::BranchPoint,
+            Some(PostcriticalBehavior::BendsAside)
+        )
+    );
 }
 
 /// Where grips hold all tips no push is tried; the pass of a buckled strip between them is found.

@@ -1,8 +1,8 @@
 //! Random leaves are stable up to the force that unseats them, and not beyond.
 
-use leafdyn::internals::branch::{Equations, Family};
+use leafdyn::internals::branch::{BranchEquations, LeafFamily};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, State};
-use leafdyn::internals::relax::{project, settle_from};
+use leafdyn::internals::relax::{relax_from_state, state_from_rod_shapes};
 use leafdyn::study::relax_with_margin;
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -37,13 +37,13 @@ fn soft(draw: &mut Draw, more: impl Fn(&mut Draw, usize) -> String) -> Scenario 
 /// A stable leaf followed from a fraction of its push to another by Newton's method, in
 /// halves where that does not get there at once or goes far.
 fn advanced(
-    equations: &mut Equations,
+    equations: &mut BranchEquations,
     state: &State,
     way: [f64; 2],
     halvings: usize,
 ) -> Option<State> {
     if let Ok(point) = equations.correct(state, way[1].max(0.0), None)
-        && state.shift_to(&point.state) < 0.05
+        && state.largest_displacement_to(&point.state) < 0.05
         && point.index == 0
     {
         return Some(point.state);
@@ -93,7 +93,7 @@ fn stay_below_and_leave_above(
             pushed.tip_force[push.direction.axis] += push.direction.sign() * part * force;
             Ok(pushed)
         };
-        let family = Family::new(&make, [0.0, 2.0], false).unwrap();
+        let family = LeafFamily::new(&make, [0.0, 2.0], false).unwrap();
         let leaf = Leaf::new(&scenario);
         // On one grid, fine enough for its folds.
         let mut options = on(64);
@@ -104,20 +104,22 @@ fn stay_below_and_leave_above(
         }
         let grid = Grid::new(alone.shape.stations.len() - 1, leaf.kinks());
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
-        let mut state = project(&leaf, &discrete, &alone.shape.rods);
-        let mut equations = Equations::new(&family, grid.clone());
+        let mut state = state_from_rod_shapes(&leaf, &discrete, &alone.shape.rods);
+        let mut equations = BranchEquations::new(&family, grid.clone());
         let mut last = 0.0;
         for step in 0..=196 {
             let part = 0.005 * f64::from(step);
             let way = [0.5 * (part - 0.005), 0.5 * part];
             let next = advanced(&mut equations, &state, way, 14);
             let next = next.unwrap_or_else(|| panic!("{push:?} at {part}"));
-            last = state.shift_to(&next);
+            last = state.largest_displacement_to(&next);
             state = next;
         }
         let pushed = Leaf::new(&make([1.02]).unwrap());
-        let beyond = settle_from(&pushed, &grid, state.clone(), &Limit::default());
-        let jump = beyond.map_or(f64::INFINITY, |beyond| state.shift_to(&beyond));
+        let beyond = relax_from_state(&pushed, &grid, state.clone(), &Limit::default());
+        let jump = beyond.map_or(f64::INFINITY, |beyond| {
+            state.largest_displacement_to(&beyond)
+        });
         // As far as eight more such steps would lead at most, if it only bends aside.
         assert!(jump > 8.0 * last, "{push:?}: {last} {jump}");
         unseated += 1;

@@ -211,7 +211,7 @@ fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
     assert_eq!(found.len(), options.modes.min(known.len()), "{name}");
     let size = known[known.len() - 1].abs();
     for (k, (found, known)) in found.iter().zip(&known).enumerate() {
-        let found = found * physics.time.powi(2);
+        let found = found * physics.time_unit.powi(2);
         // A dense method's error is a part of the largest eigenvalue.
         let error = (found - known).abs() / (1e-9 * known.abs() + 1e-14 * size);
         assert!(error < 1.0, "{name}, {k}: {found} for {known}");

@@ -2,9 +2,11 @@
 //! by the work of the load that varies, every change of the index is one of so
 //! many modes, and at a fold the branch turns round.
 
-use leafdyn::internals::branch::{Equations, Family, Kind, Point, Walk, walk};
+use leafdyn::internals::branch::{
+    BranchEquations, ContinuationOptions, CriticalKind, EquilibriumPoint, LeafFamily, follow_branch,
+};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, State};
-use leafdyn::internals::relax::project;
+use leafdyn::internals::relax::state_from_rod_shapes;
 use leafdyn_testing::random::{drawn, leaves};
 use leafdyn_testing::*;
 
@@ -19,20 +21,20 @@ fn loaded(leaf: &Scenario, part: f64) -> Scenario {
     leaf
 }
 
-fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
+fn begin(scenario: &Scenario, equations: &mut BranchEquations) -> Option<EquilibriumPoint> {
     let rest = relaxed(scenario, &to(1e-7));
     let leaf = Leaf::new(scenario);
     let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
-    let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
+    let state = state_from_rod_shapes(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
     let mut point = equations.correct(&state, 0.0, None).ok()?;
-    point.tangent = point.tangent.growing();
+    point.tangent = point.tangent.towards_larger_parameter();
     Some(point)
 }
 
 /// Energy of a state under the loads at a fraction of their range.
-fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
-    let mut equations = Equations::new(family, grid.clone());
-    let energy = (equations.leaves.at([fraction])).map(|leaf| leaf.energy(state));
+fn energy(family: &LeafFamily, grid: &Grid, state: &State, fraction: f64) -> f64 {
+    let mut equations = BranchEquations::new(family, grid.clone());
+    let energy = (equations.leaves.leaf_at([fraction])).map(|leaf| leaf.energy(state));
     energy.unwrap()
 }
 
@@ -41,22 +43,22 @@ fn random_branches() {
     let (mut points, mut folds, mut crossings, mut missed, mut lost) = (0, 0, 0, 0, 0);
     for (case, scenario) in drawn(leaves(), 60).into_iter().enumerate() {
         let make = |[part]: [f64; 1]| Ok(loaded(&scenario, part));
-        let family = Family::new(&make, [1.0, MOST], false).unwrap();
+        let family = LeafFamily::new(&make, [1.0, MOST], false).unwrap();
         let leaf = Leaf::new(&scenario);
         let grid = Grid::new(8.max(leaf.kinks().len() + 1), leaf.kinks());
-        let mut equations = Equations::new(&family, grid.clone());
+        let mut equations = BranchEquations::new(&family, grid.clone());
         let Some(first) = begin(&scenario, &mut equations) else {
             lost += 1;
             continue;
         };
-        let how = Walk::new(0.02, 120);
-        let branch = walk(&mut equations, first, &how, &mut |_, _| {});
+        let how = ContinuationOptions::new(0.02, 120);
+        let branch = follow_branch(&mut equations, first, &how, &mut |_, _| {});
         points += branch.points.len();
-        missed += branch.missed.len();
+        missed += branch.unlocated_index_changes.len();
 
         // By parts: the energy is stationary in the state, so that only the
         // load's own change remains.
-        let rate = |point: &Point| {
+        let rate = |point: &EquilibriumPoint| {
             let at = |step: f64| energy(&family, &grid, &point.state, point.fraction + step);
             (at(1e-4) - at(-1e-4)) / 2e-4
         };
@@ -76,20 +78,22 @@ fn random_branches() {
             let (a, b) = (&branch.points[*after], &branch.points[after + 1]);
             let all = branch.critical.iter().filter(|(other, _)| other == after);
             let modes: usize = all.map(|(_, other)| other.modes.len()).sum();
-            if !branch.missed.contains(after) {
+            if !branch.unlocated_index_changes.contains(after) {
                 assert_eq!(modes, a.index.abs_diff(b.index), "{case}");
             }
             match critical.kind {
-                Kind::Fold => folds += 1,
-                Kind::Branching => crossings += 1,
+                CriticalKind::Fold => folds += 1,
+                CriticalKind::Branching => crossings += 1,
             }
         }
         // It turns round as often as there are folds.
         for (k, pair) in branch.points.windows(2).enumerate() {
             let turned = pair[0].tangent.params[0] * pair[1].tangent.params[0] < 0.0;
             let here = branch.critical.iter().filter(|(after, _)| *after == k);
-            let found = here.filter(|(_, point)| point.kind == Kind::Fold).count();
-            if !branch.missed.contains(&k) {
+            let found = here
+                .filter(|(_, point)| point.kind == CriticalKind::Fold)
+                .count();
+            if !branch.unlocated_index_changes.contains(&k) {
                 assert_eq!(found % 2 == 1, turned, "{case}: {found} folds at {k}");
             }
         }

@@ -23,7 +23,7 @@ fn points_are_the_leaves_that_relax_there() {
     assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));
     for point in points.iter().step_by(3) {
         let scenario = base(ACROSS, "")
-            .at(&[(&key, point.value)])
+            .scenario_with_values(&[(&key, point.value)])
             .unwrap()
             .scenario;
         let leaf = settle(&scenario, 1e-9);

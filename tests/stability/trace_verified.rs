@@ -1,9 +1,11 @@
 //! Every point of a branch is an equilibrium within its stated error, every change
 //! of the index is at a critical point that is reported, and no branch is lost.
 
-use leafdyn::internals::branch::{End, Family, Followed, Walk, begin};
+use leafdyn::internals::branch::{
+    BranchEnd, ContinuationOptions, LeafFamily, VerifiedBranch, begin_branch,
+};
 use leafdyn::internals::relax::index_near;
-use leafdyn::internals::shooting::{self, Precision::LocalError, Start};
+use leafdyn::internals::shooting::{self, RequiredPrecision::LocalError, ShootingStart};
 use leafdyn_testing::random::{drawn, leaves};
 use leafdyn_testing::*;
 use rayon::prelude::*;
@@ -59,7 +61,7 @@ struct Found {
 
 fn follow(case: usize, leaf: &Scenario) -> Found {
     let make = |[part]: [f64; 1]| Ok(varied(leaf, case % 5, part));
-    let family = Family::new(&make, [0.0, 1.0], false).unwrap();
+    let family = LeafFamily::new(&make, [0.0, 1.0], false).unwrap();
     let options = to(TOLERANCE);
     let rest = relaxed(leaf, &options);
     let mut found = Found::default();
@@ -67,7 +69,7 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
         return found;
     }
     found.at_rest = 1;
-    let (mut grids, mut first) = match begin(&family, (&rest, 0.0), &options, None) {
+    let (mut grids, mut first) = match begin_branch(&family, (&rest, 0.0), &options, None) {
         Ok(begun) => begun,
         Err(stuck) => {
             println!("{case}: does not begin: {stuck}");
@@ -75,11 +77,14 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
             return found;
         }
     };
-    first.tangent = first.tangent.growing();
-    let how = Walk::new(0.1, 200);
+    first.tangent = first.tangent.towards_larger_parameter();
+    let how = ContinuationOptions::new(0.1, 200);
     let branch = grids.follow(first, &how, TOLERANCE, &mut |_, _| {});
     match &branch.end {
-        End::Reached | End::Returned | End::Closed | End::MostPoints => {}
+        BranchEnd::RangeEndReached
+        | BranchEnd::RangeStartReached
+        | BranchEnd::LoopClosed
+        | BranchEnd::PointLimitReached => {}
         end => {
             println!("{case}: {end:?} after {} points", branch.points.len());
             found.lost = 1;
@@ -105,12 +110,12 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
 
 /// That bounds are kept, and that critical points explain every change of the index:
 /// the indices of the points.
-fn index_is_explained(case: usize, branch: &Followed) -> Vec<usize> {
+fn index_is_explained(case: usize, branch: &VerifiedBranch) -> Vec<usize> {
     let (points, critical) = (&branch.branch.points, &branch.branch.critical);
     assert_eq!(points.len(), branch.points.len(), "{case}");
     assert_eq!(critical.len(), branch.critical.len(), "{case}");
     for refined in branch.points.iter().chain(&branch.critical) {
-        let (error, own) = (refined.error, refined.fraction_error);
+        let (error, own) = (refined.position_error, refined.fraction_error);
         assert!(error <= TOLERANCE && own < 1e-3, "{case}: {error} {own}");
     }
     for (i, pair) in points.windows(2).enumerate() {
@@ -126,21 +131,31 @@ fn index_is_explained(case: usize, branch: &Followed) -> Vec<usize> {
 
 /// That the boundary-value problem has a solution where a point says it has; returns its
 /// index. None if shooting finds none: next to a singular point it may not.
-fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize) -> Option<usize> {
+fn is_equilibrium(
+    what: &str,
+    family: &LeafFamily,
+    branch: &VerifiedBranch,
+    number: usize,
+) -> Option<usize> {
     let point = &branch.points[number];
     let scenario = family.scenario([point.fraction]).unwrap();
     let (stations, rods) = (point.grid.sigma(), &point.shapes(family).unwrap()[..]);
-    let start = Start::Leaf { stations, rods };
-    let options = shooting::Options::new(start, stations, LocalError(SHARP));
+    let start = ShootingStart::Leaf { stations, rods };
+    let options = shooting::ShootingOptions::new(start, stations, LocalError(SHARP));
     let shot = shooting::solve(&scenario, &options, &mut |_| {}).ok()?;
     let length = family.scale().length;
     for (rod, tip) in shot.rods.iter().zip(&point.tips) {
         let off = rod.nodes.last()?.position / length - *tip;
-        let allowed = point.error + shot.error.position / length + 1e-9;
+        let allowed = point.position_error + shot.error.position / length + 1e-9;
         let off = off.length();
         assert!(off <= allowed, "{what}: off by {off:.1e} of {allowed:.1e}");
     }
-    index_near(&scenario, point.grid.clone(), rods, point.error * length)
+    index_near(
+        &scenario,
+        point.grid.clone(),
+        rods,
+        point.position_error * length,
+    )
 }
 
 /// `LEAFDYN_TRACES=200 cargo test --release --test stability trace_verified:: -- --nocapture`.
@@ -212,7 +227,7 @@ fn points_of_veins_with_soft_ends_are_within_what_is_told() {
         let mut request = branch::request(base(text, ""), vary, TOLERANCE, 2000);
         request.keep_unstable = false;
         let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
-        assert!(trace.branches[0].end.complete());
+        assert!(trace.branches[0].end.is_complete());
         let points = &trace.branches[0].points;
         for point in points.iter().step_by(4) {
             let entry = format!("scale:load.gravity={}", point.value);
@@ -246,5 +261,5 @@ fn a_nearly_rigid_leaf_is_followed_to_the_end_of_its_range() {
     let mut request = branch::request(base(SEDGE, ""), vary, TOLERANCE, 2000);
     request.keep_unstable = false;
     let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
-    assert_eq!(trace.branches[0].end, End::Reached);
+    assert_eq!(trace.branches[0].end, BranchEnd::RangeEndReached);
 }

@@ -21,7 +21,7 @@ fn a_strip_out_of_its_plane_reports_the_plane_one_that_crosses_it() {
             "{stiffness}: {:?}",
             trace.branches[0].remark
         );
-        let critical: Vec<_> = trace.branches[0].critical().collect();
+        let critical: Vec<_> = trace.branches[0].critical_points().collect();
         let [(_, point)] = critical[..] else {
             panic!("{stiffness}: {} critical points", critical.len())
         };

@@ -96,7 +96,7 @@ fn critical_points_do_not_depend_on_the_tolerance_beyond_what_is_told() {
             found.branches[0].clone()
         };
         let [loose, tight] = [1e-6, tight].map(branch);
-        let [loose, tight] = [&loose, &tight].map(|it| it.critical().collect::<Vec<_>>());
+        let [loose, tight] = [&loose, &tight].map(|it| it.critical_points().collect::<Vec<_>>());
         assert_eq!(loose.len(), count, "{alpha} {axial}");
         for ((_, loose), (_, tight)) in loose.iter().zip(&tight) {
             assert_eq!(loose.index, tight.index);
@@ -201,7 +201,7 @@ fn folds_of_stiff_arches_are_within_what_is_told() {
         let found = follow(&text, "", "load.gravity[1]=0..-60", false);
         assert!(found.complete, "{axial}: {:?}", found.remark);
         let compliance = axial.parse::<f64>().unwrap().recip();
-        let critical: Vec<_> = found.branches[0].critical().collect();
+        let critical: Vec<_> = found.branches[0].critical_points().collect();
         assert_eq!(critical.len(), NEAR.len(), "{axial}");
         for ((_, point), near) in critical.iter().zip(NEAR) {
             let wanted = extrapolated_fold(compliance, &mut near.clone());

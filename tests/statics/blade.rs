@@ -2,7 +2,7 @@
 //! many veins they need.
 
 use leafdyn::relax::Method;
-use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+use leafdyn::study::{BaseScenario, ParameterKeys, relax_with_sensitivities};
 use leafdyn_testing::*;
 
 /// A blade of constant width, straight, whose tip is free. Small loads.
@@ -259,8 +259,8 @@ fn derivatives_by_the_outline_and_the_material() {
         ("leaf.elevation", 0.4),
     ];
     let given = entries(&format!("{WEIGHT}; leaf.rods=5; leaf.elevation=0.4"));
-    let base = Base::of_text(BLADE.into(), "blade".into(), &given).unwrap();
-    let names: Vec<Keys> = keys.iter().map(|(key, _)| key.parse().unwrap()).collect();
+    let base = BaseScenario::from_text(BLADE.into(), "blade".into(), &given).unwrap();
+    let names: Vec<ParameterKeys> = keys.iter().map(|(key, _)| key.parse().unwrap()).collect();
     let leaf = relax_with_sensitivities(&base, &names, &to(1e-7), &mut |_| {}).unwrap();
     let found = leaf.sensitivities.unwrap();
     assert_eq!(found.len(), keys.len());

@@ -2,7 +2,7 @@
 //! differentiation, applied to the element's functional written out again.
 
 use glam::{DMat3, DQuat};
-use leafdyn::internals::rod::{Ends, Section, Segment};
+use leafdyn::internals::rod::{NodePair, Section, Segment};
 use leafdyn::internals::rotation;
 use leafdyn_testing::*;
 use nalgebra::{SMatrix, SVector};
@@ -41,7 +41,7 @@ fn to_directors<D: Number>(q: Quaternion<D>, a: [D; 3]) -> [D; 3] {
 fn functional<D: Number>(
     z: SVector<D, 15>,
     section: &Section,
-    ends: &Ends,
+    ends: &NodePair,
     x: &[DVec3; 2],
     n0: DVec3,
 ) -> D {
@@ -94,7 +94,7 @@ prop_compose! {
         angle in prop_oneof![1e-6..0.3_f64, 0.1..3.0_f64, 3.1..std::f64::consts::PI - 9e-5],
         n in vector(5.0),
         flip in any::<bool>(),
-    ) -> (Section, Ends, DVec3) {
+    ) -> (Section, NodePair, DVec3) {
         let section = Section {
             ds,
             couple_stiffness: DVec3::from_array(stiffness),
@@ -106,7 +106,7 @@ prop_compose! {
         };
         let q0 = rotation::exp(start);
         let q1 = q0 * rotation::exp(angle * (axis + DVec3::splat(1e-3)).normalize());
-        (section, Ends { x: [x0, x0 + dx], q: [q0, if flip { -q1 } else { q1 }] }, n)
+        (section, NodePair { x: [x0, x0 + dx], q: [q0, if flip { -q1 } else { q1 }] }, n)
     }
 }
 

@@ -219,6 +219,6 @@ fn slips_are_named_of_motions_traces_and_boundaries() {
         across: "section.young=1e9..2e9".parse().unwrap(),
         map: None,
     };
-    let bound = leafdyn::study::boundary(&request, &mut |_, _, _| {}).unwrap();
+    let bound = leafdyn::study::trace_stability_boundary(&request, &mut |_, _, _| {}).unwrap();
     doubted("boundary", &bound.doubts);
 }

@@ -69,7 +69,10 @@ fn so_it_does_along_the_branches_that_leave_the_straight_one() {
         }
         let sum = ends[0].tips[0].y + ends[1].tips[0].y;
         assert!(sum.abs() < 1e-8, "mirror images");
-        let kinds: Vec<PointKind> = found.branches[0].critical().map(|(_, p)| p.kind).collect();
+        let kinds: Vec<PointKind> = found.branches[0]
+            .critical_points()
+            .map(|(_, p)| p.kind)
+            .collect();
         assert_eq!(kinds, [PointKind::Branching(1)]);
     }
 }

@@ -1,6 +1,6 @@
 //! Holders along veins.
 
-use leafdyn::relax::{Happening, Path, Stage};
+use leafdyn::relax::{Path, StabilityLoss, Stage};
 use leafdyn_testing::*;
 
 const ROD: &str = r#"
@@ -133,7 +133,7 @@ fn a_strut_turns_aside_on_the_way_of_its_pin() {
     let pressed = to(0.9);
     let event = *only(on_the_way(&pressed));
     assert_eq!(event.stage, Stage::Moving);
-    assert!(matches!(event.happening, Happening::Branched { .. }));
+    assert!(matches!(event.happening, StabilityLoss::Branched { .. }));
     close("part", event.part, 0.0202 / 0.1, 2.0 / 32.0);
     assert_eq!(on_the_way(&to(1.01)), []);
 }

@@ -2,7 +2,7 @@
 
 use leafdyn::relax::Method;
 use leafdyn::scenario::PointLoad;
-use leafdyn::study::{CheckOptions, Verdict, check};
+use leafdyn::study::{CheckOptions, CheckVerdict, check};
 use leafdyn_testing::*;
 
 /// Three different veins from hinges that are not in line, joined, loaded across.
@@ -98,7 +98,7 @@ fn shooting_finds_the_same_leaves() {
         };
         let found = check(&leaf, &options, &mut |_| {}).unwrap();
         let what = format!("{}: {:?}, {:?}", leaf.name, found.verdict, found.difference);
-        assert_eq!(found.verdict, Verdict::Agree, "{what}");
+        assert_eq!(found.verdict, CheckVerdict::Agree, "{what}");
         let difference = found.difference.unwrap();
         assert!(
             difference.position < 1e-9 && difference.moment < 1e-8,

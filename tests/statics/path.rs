@@ -3,7 +3,7 @@
 //! numbered; where the path loses its stability is where theory says. `LEAVES` is how many real
 //! leaves are tried, `SEED` the first.
 
-use leafdyn::relax::{Event, Happening, Path, Route, Stage, relax};
+use leafdyn::relax::{Event, Path, Route, StabilityLoss, Stage, relax};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::real;
 use leafdyn_testing::*;
@@ -129,8 +129,11 @@ fn a_column_turns_aside_at_its_critical_load() {
     ));
     let found = column.relax().unwrap();
     let event = only(events(&found));
-    assert_eq!(event.stage, Stage::Loading);
-    assert_eq!(event.happening, Happening::Branched { equally_open: true });
+    assert_eq!(event.stage, Stage::LoadedLeaf);
+    assert_eq!(
+        event.happening,
+        StabilityLoss::Branched { equally_open: true }
+    );
     close("part", event.part, 7.83734744 / weight, 1.0 / 512.0);
     assert!(tip(&found).z < -0.1, "{}", tip(&found));
     assert_eq!(found.stability.negative_eigenvalues, Some(0));
@@ -139,7 +142,9 @@ fn a_column_turns_aside_at_its_critical_load() {
 
 /// Parts of the loading at which something happened.
 fn parts_of_loading(leaf: &Equilibrium) -> Vec<f64> {
-    let loading = events(leaf).iter().filter(|it| it.stage == Stage::Loading);
+    let loading = events(leaf)
+        .iter()
+        .filter(|it| it.stage == Stage::LoadedLeaf);
     loading.map(|it| it.part).collect()
 }
 

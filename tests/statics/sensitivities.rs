@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use leafdyn::relax::{GripReaction, Mode, Path, Reaction, Sensitivity};
-use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+use leafdyn::study::{BaseScenario, ParameterKeys, relax_with_sensitivities};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
 
@@ -198,12 +198,12 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
     (text, keys.collect())
 }
 
-pub fn keys(keys: &[&str]) -> Vec<Keys> {
+pub fn keys(keys: &[&str]) -> Vec<ParameterKeys> {
     keys.iter().map(|key| key.parse().unwrap()).collect()
 }
 
 pub fn derivatives(
-    base: &Base,
+    base: &BaseScenario,
     wanted: &[&str],
     options: &Options,
 ) -> (Equilibrium, Vec<Sensitivity>) {
@@ -248,13 +248,16 @@ pub fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
 
 /// The same derivatives from eight relaxations, and how far those of four are off: much
 /// where modes come close to each other. Empty if one of them comes to rest by another path.
-pub fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
-    let value = base.value(key).unwrap();
+pub fn differenced(base: &BaseScenario, key: &ParameterKeys, options: &Options) -> Vec<(f64, f64)> {
+    let value = base.differentiable_value(key).unwrap();
     let size = if value == 0.0 { 1.0 } else { value.abs() };
     let word = |leaf: &Equilibrium| leaf.path.as_ref().map(Path::word);
     let here = word(&leafdyn_testing::relaxed(base.scenario(), options));
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
-        let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
+        let scenario = base
+            .scenario_with_values(&[(key, value + steps * step)])
+            .ok()?
+            .scenario;
         let there = leafdyn_testing::relaxed(&scenario, options);
         let same = here.is_none() || [here, None].contains(&word(&there));
         Some(if same { results(&there).0 } else { Vec::new() })
@@ -311,7 +314,7 @@ fn they_are_those_of_whole_relaxations() {
         let (leaf, found) = derivatives(&base, &wanted, &options);
         assert_eq!(found.len(), wanted.len());
         for (key, found) in keys(&wanted).iter().zip(&found) {
-            let value = base.value(key).unwrap().abs();
+            let value = base.differentiable_value(key).unwrap().abs();
             let size = if value == 0.0 { 1.0 } else { value };
             let (ours, mut theirs) = (of(found), differenced(&base, key, &options));
             let (units, count) = results(&leaf);

@@ -290,7 +290,7 @@ impl Table {
         let limit = Duration::from_secs(3);
         let rest = |tolerance: f64, modes: usize| {
             let mut options = with_modes(modes, to(tolerance));
-            options.limit = Limit::at(Instant::now() + limit);
+            options.limit = Limit::with_deadline(Instant::now() + limit);
             if scenario.wind.is_some() {
                 options.route = Route::Release;
             }

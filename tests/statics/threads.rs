@@ -1,8 +1,8 @@
 //! Results do not depend on the number of threads, to the last bit: neither of
 //! relaxation, nor of shooting, nor of motion; nor on whether a motion is looked at on its way.
 
-use leafdyn::internals::motion::{Snapshot, Steps, TimeIntegrator};
-use leafdyn::internals::shooting::{self, Start};
+use leafdyn::internals::motion::{Snapshot, StepControl, TimeIntegrator};
+use leafdyn::internals::shooting::{self, ShootingStart};
 use leafdyn_testing::motion::{explicit, released, semi_implicit};
 use leafdyn_testing::*;
 
@@ -45,13 +45,15 @@ fn shooting_finds_equal_bits_on_one_two_and_five_threads() {
     let starts = [relaxed(&many), relaxed(&soft), None];
     for (leaf, start) in [many, soft, bent].iter().zip(&starts) {
         let on = |threads| {
-            let start = start.as_ref().map_or(Start::Arcs, |leaf| Start::Leaf {
-                stations: &leaf.shape.stations,
-                rods: &leaf.shape.rods,
-            });
+            let start = start
+                .as_ref()
+                .map_or(ShootingStart::Arcs, |leaf| ShootingStart::Leaf {
+                    stations: &leaf.shape.stations,
+                    rods: &leaf.shape.rods,
+                });
             let stations: Vec<f64> = (0..=16).map(|i| i as f64 / 16.0).collect();
-            let precision = shooting::Precision::LocalError(1e-11);
-            let options = shooting::Options::new(start, &stations, precision);
+            let precision = shooting::RequiredPrecision::LocalError(1e-11);
+            let options = shooting::ShootingOptions::new(start, &stations, precision);
             let shot =
                 on_threads(threads, || shooting::solve(leaf, &options, &mut |_| {})).unwrap();
             let errors = [shot.error.position, shot.error.force, shot.defect];
@@ -99,7 +101,7 @@ fn bits_of_snapshot(now: &Snapshot) -> Vec<u64> {
 
 fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn TimeIntegrator>; 2] {
     let state = released(leaf, segments);
-    let implicit = semi_implicit(leaf, &state, Steps::Error(1e-4));
+    let implicit = semi_implicit(leaf, &state, StepControl::LocalError(1e-4));
     [Box::new(explicit(leaf, &state, None)), Box::new(implicit)]
 }
 

@@ -6,7 +6,9 @@ use std::f64::consts::{PI, TAU};
 use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::motion::Physics;
 use leafdyn::relax::SemiImplicit;
-use leafdyn::study::{CheckOptions, Verdict, check, equilibria, relax_with_sensitivities, trace};
+use leafdyn::study::{
+    CheckOptions, CheckVerdict, check, equilibria, relax_with_sensitivities, trace,
+};
 use leafdyn_testing::branch::{changes_at, request};
 use leafdyn_testing::motion::{discrete, state_of};
 use leafdyn_testing::random::Draw;
@@ -95,7 +97,7 @@ fn both_methods_tell_the_same_member() {
         let entries = random(&mut draw);
         let scenario = rod(&entries);
         let found = check(&scenario, &CheckOptions::default(), &mut |_| {}).unwrap();
-        assert_eq!(found.verdict, Verdict::Agree, "{entries}");
+        assert_eq!(found.verdict, CheckVerdict::Agree, "{entries}");
         assert_eq!(found.relaxed.stability.neutral_directions, 1, "{entries}");
     }
 }
@@ -237,7 +239,7 @@ fn untied_veins_turn_each_for_itself() {
         assert_eq!(zero, turning, "{stiffness}");
         assert!(modes[turning].eigenvalue > 1.0, "{stiffness}");
         let found = check(scenario.scenario(), &CheckOptions::default(), &mut |_| {}).unwrap();
-        assert_eq!(found.verdict, Verdict::Agree, "{stiffness}");
+        assert_eq!(found.verdict, CheckVerdict::Agree, "{stiffness}");
     }
 }
 

@@ -2,7 +2,7 @@
 //! paper's leaves.
 
 use glam::{DMat3, DQuat};
-use leafdyn::shape::{Hand, Undulation, Vein};
+use leafdyn::shape::{Handedness, Undulation, VeinUndulation};
 use leafdyn_testing::*;
 
 const SEGMENTS: usize = 64;
@@ -59,9 +59,9 @@ fn waves_of_a_sine_are_counted_and_measured() {
                 let length = vein.wavelength.unwrap() * waves;
                 assert!((0.95..1.3).contains(&length), "{waves}, {height}: {length}");
             }
-            let still = Vein {
+            let still = VeinUndulation {
                 half_waves: 0,
-                ..Vein::default()
+                ..VeinUndulation::default()
             };
             assert_eq!(found.veins[2], still);
         }
@@ -152,7 +152,11 @@ fn the_papers_smooth_leaves_do_not_wave() {
 /// A rod at rest is twisted by u0 L, and seen from the base turns as told.
 #[test]
 fn the_twist_of_a_rod_is_that_of_its_section() {
-    for (twist, hand) in [(2.0, Hand::Right), (-1.5, Hand::Left), (0.0, Hand::None)] {
+    for (twist, hand) in [
+        (2.0, Handedness::Right),
+        (-1.5, Handedness::Left),
+        (0.0, Handedness::None),
+    ] {
         let twisted = format!("leaf.length=2.0; leaf.fan=[0.4]; rest.twist={twist:?}");
         let leaf = settle(&rod(&twisted), 1e-9);
         assert!((leaf.undulation.twist() - 2.0 * twist).abs() < 1e-9);
@@ -171,8 +175,11 @@ fn mirror_images_turn_the_other_way() {
     let (one, other, none) = (leaf(0.7), leaf(-0.7), leaf(0.0));
     assert!((one.twist() + other.twist()).abs() < 1e-6);
     assert!(one.twist() > 0.1, "{}", one.twist());
-    assert_eq!((one.hand(), other.hand()), (Hand::Right, Hand::Left));
-    assert_eq!(none.hand(), Hand::None);
+    assert_eq!(
+        (one.hand(), other.hand()),
+        (Handedness::Right, Handedness::Left)
+    );
+    assert_eq!(none.hand(), Handedness::None);
     let [first, last] = none.margins().unwrap().map(|vein| vein.twist);
     assert!((first + last).abs() < 1e-6 && first.abs() > 0.1, "{first}");
 }

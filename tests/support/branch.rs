@@ -1,7 +1,7 @@
 //! Branches of equilibria, and the critical values along them.
 
 use leafdyn::relax::Limit;
-use leafdyn::study::{Base, Trace, TraceRequest, trace};
+use leafdyn::study::{BaseScenario, Trace, TraceRequest, trace};
 
 use crate::{base, path};
 
@@ -27,7 +27,7 @@ pub fn weightless(bending: f64, torsion: f64) -> String {
 }
 
 /// To follow the equilibria of a leaf, unstable ones too.
-pub fn request(base: Base, vary: &str, tolerance: f64, most_points: usize) -> TraceRequest {
+pub fn request(base: BaseScenario, vary: &str, tolerance: f64, most_points: usize) -> TraceRequest {
     TraceRequest {
         base,
         vary: vary.parse().unwrap(),
@@ -55,7 +55,7 @@ pub fn changes_at(what: &str, trace: &Trace, wanted: &[(f64, i64)], within: f64)
     let branch = &trace.branches[0];
     let mut before = branch.points[0].index as i64;
     let mut found = Vec::new();
-    for (_, point) in branch.critical() {
+    for (_, point) in branch.critical_points() {
         found.push((point.value, point.index as i64 - before));
         before = point.index as i64;
         assert!(point.value_error.is_some(), "{what}: a bound is told");

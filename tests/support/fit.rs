@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use leafdyn::relax::Equilibrium;
-use leafdyn::study::{Base, Data, Fit, FitOutcome, FitRequest, fit};
+use leafdyn::study::{BaseScenario, Data, Fit, FitOutcome, FitRequest, fit};
 
 use crate::random::Draw;
 use crate::{base, settle};
@@ -33,7 +33,7 @@ pub const THREE: [&str; 3] = [
 ];
 
 /// A fit of free numbers to these tables.
-pub fn request(base: Base, data: &[&str], free: &[&str]) -> FitRequest {
+pub fn request(base: BaseScenario, data: &[&str], free: &[&str]) -> FitRequest {
     let rods = base.scenario().rods.len();
     let mut all = Data::default();
     for (k, text) in data.iter().enumerate() {

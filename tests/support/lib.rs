@@ -23,10 +23,10 @@ pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
 pub use leafdyn::relax::{Equilibrium, Limit, Method, NodeState, Options, Outcome, RodShape};
-use leafdyn::scenario::{Dynamics, Hold, Radii, Rod, Units};
+use leafdyn::scenario::{Dynamics, Radii, Rod, SupportKind, Units};
 pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
-use leafdyn::study::Base;
+use leafdyn::study::BaseScenario;
 pub use motion::TIMOSHENKO;
 pub use pairs::pairs;
 pub use relaxing::*;
@@ -104,8 +104,8 @@ pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 
 /// The scenario of a text with [`entries`] replaced, to be varied.
 #[track_caller]
-pub fn base(text: &str, overrides: &str) -> Base {
-    let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
+pub fn base(text: &str, overrides: &str) -> BaseScenario {
+    let base = BaseScenario::from_text(text.into(), "test.toml".into(), &entries(overrides));
     base.unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
@@ -281,7 +281,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
         radii: Radii::default(),
-        base_held: Hold::Clamped,
+        base_held: SupportKind::Clamped,
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
         tissue: None,

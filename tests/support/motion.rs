@@ -3,11 +3,11 @@
 use glam::DVec3;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::motion::{
-    Explicit, Physics, SemiImplicit, Snapshot, Steps, TimeIntegrator,
+    Explicit, Physics, SemiImplicit, Snapshot, StepControl, TimeIntegrator,
 };
-use leafdyn::internals::relax::start;
+use leafdyn::internals::relax::initial_state;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Grip, Hold, PointLoad, Profile, Scenario, Schedule, Tissue};
+use leafdyn::scenario::{Grip, PointLoad, Profile, Scenario, Schedule, SupportKind, Tissue};
 use leafdyn::simulate::{self, Frame, Simulation};
 
 pub use leafdyn::simulate::Scheme;
@@ -85,15 +85,15 @@ pub fn gripped_veins() -> Scenario {
         };
         2
     ]);
-    let grip = |vein: usize, at: [f64; 2], held: Hold, displacement: [f64; 3]| Grip {
+    let grip = |vein: usize, at: [f64; 2], held: SupportKind, displacement: [f64; 3]| Grip {
         vein,
         at,
         held,
         displacement,
     };
     leaf.grips = vec![
-        grip(0, [0.25, 0.5], Hold::Pinned, [0.02, -0.03, 0.04]),
-        grip(2, [0.75; 2], Hold::Clamped, [0.0, 0.05, 0.0]),
+        grip(0, [0.25, 0.5], SupportKind::Pinned, [0.02, -0.03, 0.04]),
+        grip(2, [0.75; 2], SupportKind::Clamped, [0.0, 0.05, 0.0]),
     ];
     leaf
 }
@@ -208,7 +208,7 @@ pub fn off_cosine(
 
 /// The shape from which a leaf is released.
 pub fn released(leaf: &Leaf, segments: usize) -> State {
-    start(&discrete(leaf, segments))
+    initial_state(&discrete(leaf, segments))
 }
 
 /// Explicit motion of a leaf on the state's grid, with steps of `h` or the longest.
@@ -218,7 +218,7 @@ pub fn explicit(leaf: &Leaf, state: &State, h: Option<f64>) -> Explicit {
 }
 
 /// Semi-implicit motion of a leaf on the state's grid.
-pub fn semi_implicit(leaf: &Leaf, state: &State, steps: Steps) -> SemiImplicit {
+pub fn semi_implicit(leaf: &Leaf, state: &State, steps: StepControl) -> SemiImplicit {
     let grid = discrete(leaf, state.segments());
     SemiImplicit::new(grid, Physics::new(leaf), state, steps)
 }
@@ -246,7 +246,7 @@ pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn TimeIntegrator> {
     match scheme {
         Scheme::Explicit => Box::new(explicit(leaf, state, Some(h))),
-        Scheme::SemiImplicit => Box::new(semi_implicit(leaf, state, Steps::Fixed(h))),
+        Scheme::SemiImplicit => Box::new(semi_implicit(leaf, state, StepControl::Fixed(h))),
     }
 }
 

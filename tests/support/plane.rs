@@ -1,13 +1,13 @@
 //! Boundaries of stability in the plane of two numbers.
 
-use leafdyn::study::{Boundary, BoundaryRequest, boundary};
+use leafdyn::study::{BoundaryRequest, StabilityBoundary, trace_stability_boundary};
 
 use super::base;
 use super::branch::request;
 
 /// The boundary of the scenario of a text with entries replaced, along the first number
 /// and across it.
-pub fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
+pub fn follow(text: &str, overrides: &str, along: &str, across: &str) -> StabilityBoundary {
     followed(1e-7, text, overrides, [along, across]).unwrap()
 }
 
@@ -17,11 +17,11 @@ pub fn followed(
     text: &str,
     overrides: &str,
     [along, across]: [&str; 2],
-) -> Result<Boundary, String> {
+) -> Result<StabilityBoundary, String> {
     let request = BoundaryRequest {
         trace: request(base(text, overrides), along, tolerance, 200),
         across: across.parse().unwrap(),
         map: None,
     };
-    boundary(&request, &mut |_, _, _| {}).map_err(|error| error.to_string())
+    trace_stability_boundary(&request, &mut |_, _, _| {}).map_err(|error| error.to_string())
 }

@@ -1,7 +1,9 @@
 //! Leaves by shooting, alone and beside the relaxed ones.
 
 use glam::DVec3;
-use leafdyn::internals::shooting::{self, Failure, Precision::LocalError, Solution, Start};
+use leafdyn::internals::shooting::{
+    self, RequiredPrecision::LocalError, ShootingFailure, ShootingSolution, ShootingStart,
+};
 use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::Scenario;
 
@@ -12,7 +14,10 @@ use crate::{TIGHT, apart, largest, scale, scenario, settle, tip_is, tip_node};
 pub const SHARP: f64 = 1e-13;
 
 /// Solves the boundary-value problem, starting from a relaxed leaf.
-pub fn shoot_near(scenario: &Scenario, leaf: &Equilibrium) -> Result<Solution, Failure> {
+pub fn shoot_near(
+    scenario: &Scenario,
+    leaf: &Equilibrium,
+) -> Result<ShootingSolution, ShootingFailure> {
     shoot_over(None, scenario, leaf)
 }
 
@@ -21,38 +26,48 @@ pub fn shoot_over(
     intervals: Option<usize>,
     scenario: &Scenario,
     leaf: &Equilibrium,
-) -> Result<Solution, Failure> {
+) -> Result<ShootingSolution, ShootingFailure> {
     let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
-    let start = Start::Leaf { stations, rods };
-    let mut options = shooting::Options::new(start, stations, LocalError(SHARP));
+    let start = ShootingStart::Leaf { stations, rods };
+    let mut options = shooting::ShootingOptions::new(start, stations, LocalError(SHARP));
     options.intervals = intervals;
     shooting::solve(scenario, &options, &mut |_| {})
 }
 
 /// Solves the boundary-value problem without any start.
-pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
-    let options = shooting::Options::new(Start::Arcs, stations, LocalError(SHARP));
+pub fn shoot_alone(
+    scenario: &Scenario,
+    stations: &[f64],
+) -> Result<ShootingSolution, ShootingFailure> {
+    let options = shooting::ShootingOptions::new(ShootingStart::Arcs, stations, LocalError(SHARP));
     shooting::solve(scenario, &options, &mut |_| {})
 }
 
 /// What shooting has found; the reason where it has not.
 #[track_caller]
-pub fn found(scenario: &Scenario, shot: Result<Solution, Failure>) -> Solution {
+pub fn found(
+    scenario: &Scenario,
+    shot: Result<ShootingSolution, ShootingFailure>,
+) -> ShootingSolution {
     let (name, rods) = (&scenario.name, scenario.rods.len());
-    shot.unwrap_or_else(|Failure { reason, part, .. }| {
-        panic!("{name}, {rods} veins: {reason}, at {part} of the load")
-    })
+    shot.unwrap_or_else(
+        |ShootingFailure {
+             reason,
+             lambda: part,
+             ..
+         }| { panic!("{name}, {rods} veins: {reason}, at {part} of the load") },
+    )
 }
 
 /// The boundary-value solution near a relaxed leaf, which must exist.
 #[track_caller]
-pub fn shot_near(scenario: &Scenario, leaf: &Equilibrium) -> Solution {
+pub fn shot_near(scenario: &Scenario, leaf: &Equilibrium) -> ShootingSolution {
     found(scenario, shoot_near(scenario, leaf))
 }
 
 /// The boundary-value solution without any start, which must exist.
 #[track_caller]
-pub fn shot_alone(scenario: &Scenario, stations: &[f64]) -> Solution {
+pub fn shot_alone(scenario: &Scenario, stations: &[f64]) -> ShootingSolution {
     let solution = found(scenario, shoot_alone(scenario, stations));
     let defect = solution.defect;
     assert!(defect < 1e-11, "{}: {defect:.1e}", scenario.name);
@@ -62,7 +77,7 @@ pub fn shot_alone(scenario: &Scenario, stations: &[f64]) -> Solution {
 /// A leaf at rest by relaxation, and by shooting that knows nothing of it.
 pub struct Both {
     pub relaxed: Equilibrium,
-    pub shot: Solution,
+    pub shot: ShootingSolution,
 }
 
 impl Both {
@@ -97,7 +112,13 @@ impl Both {
 /// Asserts that a relaxed leaf and its boundary-value solution are the same to
 /// `position`, and to ten times that in rotation, force, moment, and energy.
 #[track_caller]
-pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solution, position: f64) {
+pub fn agree(
+    what: &str,
+    scenario: &Scenario,
+    leaf: &Equilibrium,
+    shot: &ShootingSolution,
+    position: f64,
+) {
     let found = apart(scenario, &leaf.shape.rods, &shot.rods);
     let energy = (leaf.energy.unwrap() - shot.energy).abs() / scale(scenario).moment();
     let others = largest([found.rotation, found.force, found.moment, energy]);
@@ -108,7 +129,7 @@ pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solutio
 /// Asserts that a relaxed leaf agrees with the boundary-value solutions from there and from
 /// arcs; returns both.
 #[track_caller]
-pub fn all_agree(what: &str, leaf: &Scenario) -> (Equilibrium, Solution) {
+pub fn all_agree(what: &str, leaf: &Scenario) -> (Equilibrium, ShootingSolution) {
     let relaxed = settle(leaf, TIGHT);
     let near = shot_near(leaf, &relaxed);
     agree(what, leaf, &relaxed, &near, 1e-9);

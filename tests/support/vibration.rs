@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
-use leafdyn::internals::modes::{Eigenpair, Wanted, lowest};
+use leafdyn::internals::modes::{Eigenpair, ModeRequest, lowest};
 use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation::outer;
 use nalgebra::{DMatrix, DVector};
@@ -55,7 +55,7 @@ impl Linear {
 
     fn add_masses(&mut self, leaf: &DiscreteLeaf, physics: &Physics, state: &State) {
         let mut masses = vec![0.0; self.numbers.size()];
-        for (j, i) in leaf.each(leaf.moving_nodes()) {
+        for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
             let node = state.base(j) + i;
             let [turn, _, _, shift, ..] = self.numbers.unknowns(j, i);
             let inertia = physics.inertia(leaf, j, i);
@@ -99,11 +99,11 @@ pub fn modes(leaf: &Leaf, state: &State, count: usize, near: &[Vec<[f64; 6]>]) -
     let grid = discrete(leaf, state.segments());
     let mut state = state.clone();
     grid.strain_forces(&mut state);
-    let wanted = Wanted {
+    let wanted = ModeRequest {
         count,
-        above: None,
+        modes_below: None,
         accuracy: 1e-7,
-        near,
+        approximate_modes: near,
         time: &Limit::default(),
     };
     lowest(&grid, &Physics::new(leaf), &state, wanted).unwrap()
@@ -118,7 +118,7 @@ pub fn displaced(state: &State, mode: &Eigenpair, size: f64) -> State {
         .fold(0.0, |m: f64, x| m.max(x.abs()));
     let mut displaced = state.clone();
     for (node, increment) in mode.shape.iter().enumerate() {
-        displaced.advance(node, increment, size / largest);
+        displaced.advance_node(node, increment, size / largest);
     }
     displaced
 }

@@ -4,8 +4,8 @@ use crate::motion::Instant;
 use base64::prelude::{BASE64_STANDARD, Engine};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
-use leafdyn::study::{Number, PointKind, Trace, TraceBranch};
-use leafdyn_program::page::{self, View};
+use leafdyn::study::{PointKind, ScenarioNumber, Trace, TraceBranch};
+use leafdyn_program::page::{self, PageData};
 use serde::Serialize;
 
 /// An answer.
@@ -74,7 +74,7 @@ const CALM: &str = "blows when the leaf is let go: here it rests without wind";
 /// A leaf at rest: as the page of a result shows it, and in numbers.
 #[derive(Serialize)]
 pub struct Known {
-    pub view: View,
+    pub view: PageData,
     pub tips: Vec<[f64; 3]>,
     pub energy: Option<f64>,
     pub error: Option<f64>,
@@ -92,7 +92,7 @@ impl Known {
     /// Of a leaf.
     pub fn new(leaf: &Equilibrium, scenario: &Scenario) -> Known {
         let modes = leaf.stability.modes.iter().flatten();
-        let mut view = page::view(leaf, scenario);
+        let mut view = page::page_data(leaf, scenario);
         if scenario.wind.is_some() {
             view.summary.push(("wind", CALM.into()));
         }
@@ -128,8 +128,8 @@ const RANGE: f64 = 4.0;
 
 impl Slider {
     /// Of a number of a scenario.
-    pub fn new(number: Number) -> Slider {
-        let Number { value, .. } = number;
+    pub fn new(number: ScenarioNumber) -> Slider {
+        let ScenarioNumber { value, .. } = number;
         let log = number.positive && !number.whole && value > 0.0;
         let size = if value == 0.0 {
             number.unit

@@ -1,8 +1,8 @@
 //! The leaf in motion: let go, or on its way to another equilibrium.
 
-use leafdyn::relax::{Equilibrium, Follower, RelaxError};
+use leafdyn::relax::{Equilibrium, EquilibriumTracker, RelaxError};
 use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{Frame, Options, Refused, Simulation, Stopped};
+use leafdyn::simulate::{Frame, Options, Simulation, SimulationError, Stopped};
 use leafdyn_program::page;
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 1e-3;
 /// A motion, and how fast it was at most.
 pub struct Motion {
     simulation: Simulation,
-    page: page::View,
+    page: page::PageData,
     joined: bool,
     damped: bool,
     unit: f64,
@@ -29,7 +29,7 @@ pub struct Motion {
 /// The leaf at an instant.
 #[derive(Serialize)]
 pub struct Instant {
-    pub leaf: page::Leaf,
+    pub leaf: page::PageLeaf,
     pub time: f64,
     pub tip: [f64; 3],
     /// Time between two outputs, and the natural unit of time.
@@ -43,9 +43,9 @@ impl Motion {
     /// From where a leaf is, or from the arcs that it is released from.
     pub fn begin(
         scenario: &Scenario,
-        from: Option<&Follower>,
+        from: Option<&EquilibriumTracker>,
         damped: bool,
-    ) -> Result<Motion, Refused> {
+    ) -> Result<Motion, SimulationError> {
         let mut scenario = scenario.clone();
         let critical = scenario.dynamics.critical_damping(&scenario.rods);
         let unit = scenario.dynamics.natural_time(&scenario.rods);
@@ -60,12 +60,12 @@ impl Motion {
             ..Options::default()
         };
         let simulation = match from {
-            Some(follower) => Simulation::released(follower, &scenario, &options)?,
+            Some(follower) => Simulation::from_tracker(follower, &scenario, &options)?,
             None => Simulation::new(&scenario, &options)?,
         };
         Ok(Motion {
             simulation,
-            page: page::bare(&scenario),
+            page: page::page_data_without_result(&scenario),
             joined: scenario.joined,
             damped,
             unit,
@@ -95,10 +95,10 @@ impl Motion {
     /// At rest, from where it is now.
     pub fn land(
         &mut self,
-        follower: &mut Follower,
+        follower: &mut EquilibriumTracker,
         scenario: &Scenario,
     ) -> Result<Equilibrium, RelaxError> {
-        self.simulation.land(follower, scenario)
+        self.simulation.relax_into_tracker(follower, scenario)
     }
 
     /// Whether the leaf is as good as at rest, or the time is over.
@@ -111,7 +111,7 @@ impl Motion {
         let curves = frame.curves();
         let tip = frame.tips(self.joined)[0];
         Instant {
-            leaf: page::moving(self.simulation.stations(), &curves, &self.page),
+            leaf: page::moving_leaf(self.simulation.stations(), &curves, &self.page),
             time: frame.time,
             tip: tip.to_array(),
             step: self.unit / OUTPUTS,

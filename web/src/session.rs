@@ -5,14 +5,14 @@ use crate::motion::Motion;
 use crate::place;
 use crate::question::{Pull, Question, Values};
 use leafdyn::relax::{
-    Equilibrium, Followed, Follower, Limit, Options, RelaxError, SemiImplicit, relax,
+    Equilibrium, EquilibriumTracker, Limit, Options, RelaxError, SemiImplicit, TrackOutcome, relax,
 };
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{
-    Base, Keys, SensitivityError, TraceRequest, Vary, VaryError, equilibria, sensitivities_of,
-    trace_through,
+    BaseScenario, ParameterKeys, ParameterSweep, SensitivityError, TraceRequest, VaryError,
+    equilibria, sensitivities_of_tracker, trace_through,
 };
-use leafdyn_program::files::{self, Document};
+use leafdyn_program::files::{self, ResultDocument};
 use std::time::Duration;
 
 /// What a leaf on a screen needs.
@@ -48,13 +48,13 @@ fn refuse<T>(why: impl ToString) -> Result<T, Refusal> {
 
 /// The leaf that is open.
 struct Open {
-    base: Base,
-    values: Vec<(Keys, f64)>,
+    base: BaseScenario,
+    values: Vec<(ParameterKeys, f64)>,
     /// With these values, but without what pulls it, and with its wind.
     scenario: Scenario,
     leaf: Equilibrium,
     /// None where the leaf is not at rest, or has no energy.
-    follower: Option<Follower>,
+    follower: Option<EquilibriumTracker>,
 }
 
 /// What a page has open.
@@ -88,7 +88,7 @@ impl Session {
                 values,
                 at,
             } => {
-                let open = Open::new(Base::of_text(text, name, &[])?, values, at)?;
+                let open = Open::new(BaseScenario::from_text(text, name, &[])?, values, at)?;
                 let sliders = open.sliders();
                 let known = open.known();
                 (self.open, self.motion) = (Some(open), None);
@@ -165,7 +165,7 @@ fn calm(scenario: Scenario) -> Scenario {
 
 /// So many seconds from now.
 fn within(seconds: u64) -> Limit {
-    Limit::at(leafdyn::run::Instant::now() + Duration::from_secs(seconds))
+    Limit::with_deadline(leafdyn::run::Instant::now() + Duration::from_secs(seconds))
 }
 
 /// How leaves are relaxed.
@@ -179,22 +179,22 @@ fn options(scenario: &Scenario, modes: usize) -> Options {
     }
 }
 
-fn keyed(values: Values) -> Result<Vec<(Keys, f64)>, Refusal> {
+fn keyed(values: Values) -> Result<Vec<(ParameterKeys, f64)>, Refusal> {
     let each = values.into_iter();
     each.map(|(key, value)| Ok((key.parse()?, value))).collect()
 }
 
 impl Open {
-    fn new(base: Base, values: Values, at: Option<String>) -> Result<Self, Refusal> {
+    fn new(base: BaseScenario, values: Values, at: Option<String>) -> Result<Self, Refusal> {
         let values = keyed(values)?;
         let scenario = scenario_of(&base, &values)?;
         let (calm, how) = (calm(scenario.clone()), options(&scenario, 0));
         let (leaf, follower) = match at.as_deref().and_then(place::read) {
             // Without an energy there is no branch to be on.
             Some((stations, rods)) if !calm.has_moments() => {
-                Follower::begin_near(&calm, &how, (&stations, &rods))?
+                EquilibriumTracker::begin_near(&calm, &how, (&stations, &rods))?
             }
-            _ => Follower::begin(&calm, &how)?,
+            _ => EquilibriumTracker::begin(&calm, &how)?,
         };
         Ok(Open {
             base,
@@ -227,7 +227,8 @@ impl Open {
             // These have no energy, and no branch of stable equilibria.
             && !scenario.has_moments();
         let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
-            let (leaf, follower) = Follower::begin(&scenario, &options(&scenario, modes))?;
+            let (leaf, follower) =
+                EquilibriumTracker::begin(&scenario, &options(&scenario, modes))?;
             (self.leaf, self.follower) = (leaf, follower);
             (self.values, self.scenario) = (values, bare);
             return Ok(Answer::Found(self.known()));
@@ -240,11 +241,11 @@ impl Open {
         };
         let followed = follower.follow::<Refusal>(&along)?;
         let answer = match followed {
-            Followed::There(leaf) => {
+            TrackOutcome::Arrived(leaf) => {
                 self.leaf = *leaf;
                 Answer::Followed(Known::new(&self.leaf, &bare))
             }
-            Followed::Left { part } => Answer::Left {
+            TrackOutcome::BranchEnded { part } => Answer::Left {
                 values: told(&between(base, before, &values, part)),
             },
         };
@@ -264,7 +265,7 @@ impl Open {
             }
             (Some(follower), None) => self.leaf = follower.settle(scenario)?,
             (None, _) => {
-                let (leaf, follower) = Follower::begin(scenario, &options(scenario, 0))?;
+                let (leaf, follower) = EquilibriumTracker::begin(scenario, &options(scenario, 0))?;
                 (self.leaf, self.follower) = (leaf, follower);
             }
         }
@@ -274,7 +275,7 @@ impl Open {
     /// The branch of the leaf between two values of a number.
     fn trace(&self, key: &str, [from, to]: [f64; 2], log: bool) -> Result<Answer, Refusal> {
         let mark = if log { "log" } else { "" };
-        let vary: Vary = format!("{key}={from:?}..{to:?}{mark}").parse()?;
+        let vary: ParameterSweep = format!("{key}={from:?}..{to:?}{mark}").parse()?;
         let request = TraceRequest {
             base: self.fixed(Some(&vary.keys))?,
             vary,
@@ -301,11 +302,11 @@ impl Open {
     }
 
     /// The base with all present values but those of these keys.
-    fn fixed(&self, but: Option<&Keys>) -> Result<Base, Refusal> {
+    fn fixed(&self, but: Option<&ParameterKeys>) -> Result<BaseScenario, Refusal> {
         let others = self.values.iter().filter(|(keys, _)| Some(keys) != but);
         let mut base = self.base.clone();
         for (keys, value) in others {
-            base = base.with(keys, *value)?;
+            base = base.with_value(keys, *value)?;
         }
         Ok(base)
     }
@@ -330,9 +331,9 @@ impl Open {
             return refuse("the leaf is not at rest");
         };
         let keys = keys.iter().map(|key| key.parse());
-        let keys = keys.collect::<Result<Vec<Keys>, VaryError>>()?;
+        let keys = keys.collect::<Result<Vec<ParameterKeys>, VaryError>>()?;
         let base = self.fixed(None)?;
-        let found = sensitivities_of(follower, &base, &keys)?;
+        let found = sensitivities_of_tracker(follower, &base, &keys)?;
         let told = found.into_iter();
         let told = told.map(|it| Told {
             key: it.key,
@@ -349,15 +350,15 @@ impl Open {
     }
 
     fn write(&self, file: &str) -> Result<Answer, Refusal> {
-        let values: Vec<(&Keys, f64)> = self.values.iter().map(|(k, v)| (k, *v)).collect();
+        let values: Vec<(&ParameterKeys, f64)> = self.values.iter().map(|(k, v)| (k, *v)).collect();
         let content = match file {
             "scenario.toml" => match values.is_empty() {
                 true => Some(self.base.text().to_owned().into_bytes()),
                 false => self.base.toml(&values).map(String::into_bytes),
             },
             _ => {
-                let document = Document::new(&self.leaf, &self.scenario, None);
-                files::contents(&document, file)
+                let document = ResultDocument::new(&self.leaf, &self.scenario, None);
+                files::result_file_contents(&document, file)
             }
         };
         match content {
@@ -367,20 +368,25 @@ impl Open {
     }
 }
 
-fn scenario_of(base: &Base, values: &[(Keys, f64)]) -> Result<Scenario, Refusal> {
-    let values: Vec<(&Keys, f64)> = values.iter().map(|(k, v)| (k, *v)).collect();
-    Ok(base.at(&values)?.scenario)
+fn scenario_of(base: &BaseScenario, values: &[(ParameterKeys, f64)]) -> Result<Scenario, Refusal> {
+    let values: Vec<(&ParameterKeys, f64)> = values.iter().map(|(k, v)| (k, *v)).collect();
+    Ok(base.scenario_with_values(&values)?.scenario)
 }
 
-fn told(values: &[(Keys, f64)]) -> Values {
+fn told(values: &[(ParameterKeys, f64)]) -> Values {
     let each = values.iter();
     each.map(|(keys, value)| (keys.to_string(), *value))
         .collect()
 }
 
 /// Values on the way from some to others: one that is in neither is that of the scenario.
-fn between(base: &Base, from: &[(Keys, f64)], to: &[(Keys, f64)], part: f64) -> Vec<(Keys, f64)> {
-    let of = |values: &[(Keys, f64)], keys: &Keys| {
+fn between(
+    base: &BaseScenario,
+    from: &[(ParameterKeys, f64)],
+    to: &[(ParameterKeys, f64)],
+    part: f64,
+) -> Vec<(ParameterKeys, f64)> {
+    let of = |values: &[(ParameterKeys, f64)], keys: &ParameterKeys| {
         let given = values.iter().find(|(known, _)| known == keys);
         given.map(|(_, value)| *value).or_else(|| base.number(keys))
     };

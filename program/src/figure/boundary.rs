@@ -6,25 +6,27 @@
 //! The ground of a plane of two numbers on which the branch is stable, between the curves of a
 //! boundary.
 
-use crate::figure::drawing::axes::{Axes, Axis, round_step};
+use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
-    Cell, HEADER, Key, LEFT, Labels, MOST_NAMED, PANEL_AXIS, PANEL_TITLE, SmallPanels, TICK_SIZE,
-    clearest, label_size, new_page, title,
+    HEADER, LEFT, LabelPlacement, Legend, MOST_NAMED, PANEL_AXIS, PANEL_TITLE, PageRectangle,
+    SmallPanels, TICK_SIZE, clearest_label, draw_panel_title, label_size, new_page,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Anchor, BLUE, Color, Dash, Drawing, GREEN, INK, NOTE, PURPLE, SKY, SLATE, Stroke, VERMILION,
-    polygon,
+    BLUE, Color, DashPattern, Drawing, GREEN, INK, NOTE, PURPLE, SKY, SLATE, Stroke, TextAnchor,
+    VERMILION, polygon_path,
 };
-use crate::figure::leaf::{Veins, longest, tips};
+use crate::figure::leaf::{DrawnVeins, longest_curve, vein_tips};
 use crate::figure::map::{DARKEST_INDEX, PALE, fill_index};
-use crate::figure::scenario::{Quantity, Setting};
-use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
-use crate::report::{is_special, sides, stable_or_index};
+use crate::figure::scenario::{FigureSetting, QuantityLabel};
+use crate::report::numbers::{
+    count_in_words, format_error_bound, format_four_digits, vein_count_text,
+};
+use crate::report::{index_change_text, is_codimension_two, stability_phrase};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::{
-    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CriticalKind as Kind, LeafBeside,
+    BoundaryCurve, BoundaryMap, BoundaryPoint, CriticalKind, LeafBeside, StabilityBoundary,
 };
 use std::collections::{BTreeSet, HashMap};
 
@@ -42,51 +44,53 @@ const MOST_LEAVES: usize = 4;
 /// Colours of neighbouring curves; they also differ in their dashes.
 const COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
-pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
-    let setting = Setting::of(scenario);
-    let shown: Vec<DrawnLeaf> = (boundary.curves.iter())
-        .flat_map(|curve| (curve.beside.iter()).map(|leaf| DrawnLeaf::new(curve.kind, leaf)))
+pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
+    let setting = FigureSetting::from_scenario(scenario);
+    let shown: Vec<CaptionedLeaf> = (boundary.curves.iter())
+        .flat_map(|curve| (curve.beside.iter()).map(|leaf| CaptionedLeaf::new(curve.kind, leaf)))
         .take(MOST_LEAVES)
         .collect();
-    let longest = longest(shown.iter().flat_map(|it| &it.leaf.curves));
-    let shapes: Vec<Veins> = (shown.iter())
-        .map(|it| Veins::through(&it.curves, &it.tips, longest).held_as(scenario))
+    let longest = longest_curve(shown.iter().flat_map(|it| &it.leaf.curves));
+    let shapes: Vec<DrawnVeins> = (shown.iter())
+        .map(|it| DrawnVeins::from_curves(&it.curves, &it.tips, longest).with_supports(scenario))
         .collect();
-    let diagram = Cell::left_of_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
-    let below = diagram.end().y + PANEL_AXIS;
-    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
+    let diagram = PageRectangle::left_of_legend(HEADER + PANEL_TITLE, DIAGRAM, KEY);
+    let below = diagram.opposite_corner().y + PANEL_AXIS;
+    let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
-    let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
-    drawing.height = panels.end();
-    drawing.group("curves", |page| {
+    let mut drawing = new_page(LEFT, &name, &header_notes(boundary), None);
+    drawing.height = panels.bottom();
+    drawing.draw_group("curves", |page| {
         draw_curves(page, boundary, &scenario.units, &shown, diagram)
     });
-    drawing.group("leaves", |page| {
+    drawing.draw_group("leaves", |page| {
         for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
-            let [first, second] = shown.leaf.values.map(short);
+            let [first, second] = shown.leaf.values.map(format_four_digits);
             let text = format!("{}, ({first}, {second})", shown.caption);
-            panels.draw(page, number, veins, [&letter(number), &text]);
+            panels.draw_leaf(page, number, veins, [&leaf_letter(number), &text]);
         }
     });
     drawing
 }
 
 /// A leaf next to a curve, as it is drawn.
-struct DrawnLeaf<'b> {
+struct CaptionedLeaf<'b> {
     leaf: &'b LeafBeside,
     caption: String,
     curves: Vec<Vec<DVec3>>,
     tips: Vec<DVec3>,
 }
 
-impl<'b> DrawnLeaf<'b> {
-    fn new(kind: Kind, leaf: &'b LeafBeside) -> Self {
+impl<'b> CaptionedLeaf<'b> {
+    fn new(kind: CriticalKind, leaf: &'b LeafBeside) -> Self {
         let caption = match (&leaf.fallen_from, kind, leaf.index) {
-            (None, _, index) => stable_or_index(index),
-            (Some(_), Kind::Fold, _) => "snapped".into(),
-            (Some(from), Kind::Branching, _) => return DrawnLeaf::buckled(leaf, from),
+            (None, _, index) => stability_phrase(index),
+            (Some(_), CriticalKind::Fold, _) => "snapped".into(),
+            (Some(from), CriticalKind::Branching, _) => {
+                return CaptionedLeaf::with_magnified_displacements(leaf, from);
+            }
         };
-        DrawnLeaf {
+        CaptionedLeaf {
             leaf,
             caption,
             curves: leaf.curves.clone(),
@@ -96,21 +100,21 @@ impl<'b> DrawnLeaf<'b> {
 
     /// Next to a crossing of branches a leaf buckles only little: its displacements are
     /// magnified until they are visible.
-    fn buckled(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
+    fn with_magnified_displacements(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
         let mut curves = leaf.curves.clone();
         let largest = curves.iter().flatten().zip(from.iter().flatten());
         let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
-        let visible = VISIBLE * longest(&curves);
+        let visible = VISIBLE * longest_curve(&curves);
         let mut caption = "buckled".to_string();
         if 0.0 < largest && largest < visible {
             let factor = round_step(visible / largest);
             for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
                 *x = *from + factor * (*x - *from);
             }
-            caption += &format!(" ×{}", short(factor));
+            caption += &format!(" ×{}", format_four_digits(factor));
         }
-        let tips = tips(&curves, leaf.tips.len() == 1);
-        DrawnLeaf {
+        let tips = vein_tips(&curves, leaf.tips.len() == 1);
+        CaptionedLeaf {
             leaf,
             caption,
             curves,
@@ -120,95 +124,104 @@ impl<'b> DrawnLeaf<'b> {
 }
 
 /// The letter of a leaf in the diagram.
-fn letter(number: usize) -> String {
+fn leaf_letter(number: usize) -> String {
     char::from(b'a' + number as u8).into()
 }
 
-fn notes(boundary: &Boundary) -> Vec<String> {
+fn header_notes(boundary: &StabilityBoundary) -> Vec<String> {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
-    let curves = counted(boundary.curves.len(), "curve", "curves");
+    let curves = count_in_words(boundary.curves.len(), "curve", "curves");
     let points_on = format!("{} points on {curves}", points().count());
-    let mut notes = vec![number_of_veins(boundary.rods), points_on];
+    let mut notes = vec![vein_count_text(boundary.rods), points_on];
     let worst = points().map(|point| point.error).fold(0.0, f64::max);
     if worst > 0.0 {
-        notes.push(format!("tips within {}", power_of_ten(worst)));
+        notes.push(format!("tips within {}", format_error_bound(worst)));
     }
-    let [first, second] = boundary.ranges.map(|ends| ends.map(short).join(" to "));
+    let [first, second] = boundary
+        .ranges
+        .map(|ends| ends.map(format_four_digits).join(" to "));
     notes.push(format!("looked for in {first} and {second}"));
     notes
 }
 
 fn draw_curves(
     page: &mut Drawing,
-    boundary: &Boundary,
+    boundary: &StabilityBoundary,
     units: &Units,
-    shown: &[DrawnLeaf],
-    cell: Cell,
+    shown: &[CaptionedLeaf],
+    cell: PageRectangle,
 ) {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
-    let axes = Axes {
+    let axes = PanelAxes {
         cell,
-        across: axis(boundary, units, 0),
-        up: axis(boundary, units, 1),
+        across: parameter_axis(boundary, units, 0),
+        up: parameter_axis(boundary, units, 1),
     };
-    title(page, cell.corner, "", "curves, and the index on both sides");
-    let lines: Vec<Line> = (boundary.curves.iter())
-        .map(|curve| Line::of(&axes, boundary, curve))
+    draw_panel_title(page, cell.corner, "", "curves, and the index on both sides");
+    let lines: Vec<BoundaryLine> = (boundary.curves.iter())
+        .map(|curve| BoundaryLine::from_curve(&axes, boundary, curve))
         .collect();
     let shaded = match &boundary.map {
         Some(map) => {
-            draw_cells(page, &axes, boundary, map);
+            draw_index_cells(page, &axes, boundary, map);
             false
         }
-        None => shade(page, looked_at(boundary, &axes), &lines),
+        None => shade_stable_region(page, searched_rectangle(boundary, &axes), &lines),
     };
     axes.draw(page);
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
-    let mut labels = Labels::within(cell);
+    let mut labels = LabelPlacement::in_rectangle(cell);
     for (c, (curve, line)) in boundary.curves.iter().zip(&lines).enumerate() {
-        for ends in connected(line.segments()) {
-            axes.line(page, &ends, stroke(c, line));
+        for ends in join_segments(line.segments()) {
+            axes.draw_clipped_line(page, &ends, curve_stroke(c, line));
         }
-        labels.avoid(&axes, &curve.points.iter().map(at).collect::<Vec<_>>());
+        labels.avoid_curve(&axes, &curve.points.iter().map(at).collect::<Vec<_>>());
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
-        axes.markers(page, special.map(at), marker, INK);
+        axes.draw_markers(page, special.map(at), marker, INK);
     }
     let places = || (shown.iter()).map(|it| (it.leaf.values[0], it.leaf.values[1]));
-    axes.markers(page, places(), Marker::Dot, INK);
+    axes.draw_markers(page, places(), Marker::Dot, INK);
     for (number, place) in places().enumerate() {
-        if let Some(place) = axes.at(place) {
-            labels.add(place, &letter(number));
+        if let Some(place) = axes.page_position(place) {
+            labels.request_label(place, &leaf_letter(number));
         }
     }
-    labels.draw(page);
-    write_indices(page, &lines, &mut labels);
-    draw_key(page, boundary, (&lines, shaded), cell);
+    labels.draw_requested(page);
+    draw_index_labels(page, &lines, &mut labels);
+    draw_legend(page, boundary, (&lines, shaded), cell);
 }
 
 /// The part of the panel in which curves were looked for.
-fn looked_at(boundary: &Boundary, axes: &Axes) -> Cell {
+fn searched_rectangle(boundary: &StabilityBoundary, axes: &PanelAxes) -> PageRectangle {
     let [first, second] = boundary.ranges;
-    let ends = [0, 1].map(|k| axes.at((first[k], second[k])).unwrap_or(axes.cell.corner));
-    let (low, high) = (axes.cell.corner, axes.cell.end());
+    let ends = [0, 1].map(|k| {
+        axes.page_position((first[k], second[k]))
+            .unwrap_or(axes.cell.corner)
+    });
+    let (low, high) = (axes.cell.corner, axes.cell.opposite_corner());
     let corner = ends[0].min(ends[1]).clamp(low, high);
-    Cell::new(corner, ends[0].max(ends[1]).clamp(low, high) - corner)
+    PageRectangle::new(corner, ends[0].max(ends[1]).clamp(low, high) - corner)
 }
 
 /// The stroke of a curve by its number, thicker if it bounds stable ground.
-fn stroke(number: usize, line: &Line) -> Stroke {
+fn curve_stroke(number: usize, line: &BoundaryLine) -> Stroke {
     Stroke {
-        dash: Dash::ALL[number % Dash::ALL.len()],
+        dash: DashPattern::ALL[number % DashPattern::ALL.len()],
         ..Stroke::new(
             COLORS[number % COLORS.len()],
-            if line.bounds_stable() { 2.0 } else { 1.4 },
+            if line.bounds_stable_region() {
+                2.0
+            } else {
+                1.4
+            },
         )
     }
 }
 
 /// Segments as lines, each as long as one begins where the one before ends.
-fn connected(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<DVec2>>> {
+fn join_segments(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<DVec2>>> {
     let mut lines: Vec<Vec<Option<DVec2>>> = Vec::new();
     for [from, to] in segments {
         match lines.last_mut() {
@@ -220,31 +233,39 @@ fn connected(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<DVec2
 }
 
 /// Draws the cells of the map, each in the colour of its index.
-fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &BoundaryMap) {
-    let x = boundary.edges(0, map.first.len());
-    let y = boundary.edges(1, map.second.len());
+fn draw_index_cells(
+    page: &mut Drawing,
+    axes: &PanelAxes,
+    boundary: &StabilityBoundary,
+    map: &BoundaryMap,
+) {
+    let x = boundary.cell_edges(0, map.first.len());
+    let y = boundary.cell_edges(1, map.second.len());
     for (r, row) in map.index.iter().enumerate() {
         for (c, index) in row.iter().enumerate() {
-            let corners = [axes.at((x[c], y[r])), axes.at((x[c + 1], y[r + 1]))];
+            let corners = [
+                axes.page_position((x[c], y[r])),
+                axes.page_position((x[c + 1], y[r + 1])),
+            ];
             let ([Some(a), Some(b)], Some(index)) = (corners, index) else {
                 continue;
             };
             let corner = a.min(b);
-            let cell = Cell::new(corner, a.max(b) - corner);
+            let cell = PageRectangle::new(corner, a.max(b) - corner);
             fill_index(page, cell, *index);
         }
     }
     for [c, r] in &map.disagreeing {
-        if let Some(at) = axes.at((map.first[c - 1], map.second[r - 1])) {
-            page.label(at, "×", TICK_SIZE, Anchor::Middle, INK);
+        if let Some(at) = axes.page_position((map.first[c - 1], map.second[r - 1])) {
+            page.draw_label(at, "×", TICK_SIZE, TextAnchor::Middle, INK);
         }
     }
 }
 
 /// An axis over the values, and the cells of the map if there is one; logarithmic if they are spaced
 /// logarithmically. Values increase along it.
-fn axis(boundary: &Boundary, units: &Units, which: usize) -> Axis {
-    let name = Quantity::of(&boundary.keys[which].to_string(), units).axis();
+fn parameter_axis(boundary: &StabilityBoundary, units: &Units, which: usize) -> Axis {
+    let name = QuantityLabel::from_keys(&boundary.keys[which].to_string(), units).axis_name();
     let curves = || boundary.curves.iter();
     let points = curves().flat_map(|curve| &curve.points);
     let points = points.map(|point| point.values[which]);
@@ -257,31 +278,41 @@ fn axis(boundary: &Boundary, units: &Units, which: usize) -> Axis {
         .chain(beside)
         .chain(ends.into_iter().filter(|_| whole));
     match boundary.log[which] {
-        false => Axis::holding(&name, values),
+        false => Axis::linear_covering(&name, values),
         true => {
             let sign = ends[0].signum();
             let decades = values.map(|value| (sign * value).log10());
             Axis {
                 sign: Some(sign),
                 emphasizes_zero: false,
-                ..Axis::holding(&name, decades)
+                ..Axis::linear_covering(&name, decades)
             }
         }
     }
 }
 
-fn draw_key(page: &mut Drawing, boundary: &Boundary, (lines, shaded): (&[Line], bool), cell: Cell) {
-    let mut key = Key::right_of(cell);
+fn draw_legend(
+    page: &mut Drawing,
+    boundary: &StabilityBoundary,
+    (lines, shaded): (&[BoundaryLine], bool),
+    cell: PageRectangle,
+) {
+    let mut key = Legend::right_of(cell);
     let more = lines.len().saturating_sub(MOST_NAMED);
     for (c, (curve, line)) in (boundary.curves.iter().zip(lines).enumerate()).take(MOST_NAMED) {
-        let what = sides(curve).unwrap_or_else(|| "not verified".into());
-        key.line(page, &format!("curve {}", c + 1), &what, stroke(c, line));
+        let what = index_change_text(curve).unwrap_or_else(|| "not verified".into());
+        key.add_line(
+            page,
+            &format!("curve {}", c + 1),
+            &what,
+            curve_stroke(c, line),
+        );
     }
     if more > 0 {
-        key.entry(page, "", &format!("and {more} more"), |_, _| ());
+        key.add_entry(page, "", &format!("and {more} more"), |_, _| ());
     }
     if shaded {
-        key.entry(page, "", &stable_or_index(0), |page, cell| {
+        key.add_entry(page, "", &stability_phrase(0), |page, cell| {
             fill_index(page, cell, 0)
         });
     }
@@ -294,14 +325,14 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, (lines, shaded): (&[Line], 
             } else {
                 ""
             };
-            let name = stable_or_index(index) + more;
-            key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));
+            let name = stability_phrase(index) + more;
+            key.add_entry(page, "", &name, |page, cell| fill_index(page, cell, index));
         }
     }
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         if points().any(|point| point.kind == kind) {
-            key.marker(page, kind, "", marker, INK);
+            key.add_marker(page, kind, "", marker, INK);
         }
     }
 }
@@ -326,20 +357,23 @@ const ACROSS: f64 = 0.15;
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
-pub fn write_indices(page: &mut Drawing, curves: &[Line], labels: &mut Labels) {
+pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
     let mut named = vec![false; curves.len()];
     for c in 0..curves.len() {
         if named[c] {
             continue;
         }
-        let places = curves[c].places().into_iter();
-        let best = clearest(places.map(|place| Sides::of(curves, c, place)), |sides| {
-            let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
-            room.fold(f64::INFINITY, f64::min)
-        });
+        let places = curves[c].label_places().into_iter();
+        let best = clearest_label(
+            places.map(|place| SideLabels::for_curves(curves, c, place)),
+            |sides| {
+                let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
+                room.fold(f64::INFINITY, f64::min)
+            },
+        );
         if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST) {
             for (cell, text) in sides.texts {
-                labels.write(page, cell, &text, NOTE);
+                labels.draw_label_at(page, cell, &text, NOTE);
             }
             sides.curves.iter().for_each(|&curve| named[curve] = true);
         }
@@ -347,41 +381,45 @@ pub fn write_indices(page: &mut Drawing, curves: &[Line], labels: &mut Labels) {
 }
 
 /// A place on a curve: the point, the normal to the right, and the indices on both sides.
-type Place = (DVec2, DVec2, [usize; 2]);
+type LabelPlace = (DVec2, DVec2, [usize; 2]);
 
 /// A curve on the page.
-pub struct Line {
+pub struct BoundaryLine {
     /// Segments: their ends, and the indices to the left and to the right.
     pieces: Vec<([DVec2; 2], [usize; 2])>,
     /// Whether two branches meet and vanish there, so that it has no sides.
-    fold: bool,
+    is_fold: bool,
     /// Of a fold, to which side there is a stable leaf, if that is known.
-    stable: Option<[bool; 2]>,
+    stable_sides: Option<[bool; 2]>,
 }
 
-impl Line {
+impl BoundaryLine {
     /// A line of these segments, along which branches cross, or where two meet.
     pub fn new(pieces: Vec<([DVec2; 2], [usize; 2])>, fold: bool) -> Self {
-        Line {
+        BoundaryLine {
             pieces,
-            fold,
-            stable: None,
+            is_fold: fold,
+            stable_sides: None,
         }
     }
 
-    pub fn of(axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) -> Self {
+    pub fn from_curve(
+        axes: &PanelAxes,
+        boundary: &StabilityBoundary,
+        curve: &BoundaryCurve,
+    ) -> Self {
         // Along the axis the first number may move towards the end of its range, or away.
         let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
         let points = curve.points.iter();
         let points: Vec<(f64, f64)> = points.map(|it| (it.values[0], it.values[1])).collect();
-        let drawn = axes.smooth(&points).into_iter();
+        let drawn = axes.smooth_curve(&points).into_iter();
         let pieces = curve
             .points
             .windows(2)
             .zip(drawn)
             .flat_map(|(pair, drawn)| {
                 // Where curves cross, the index counts other modes as well.
-                let point = match is_special(&pair[1]) {
+                let point = match is_codimension_two(&pair[1]) {
                     true => &pair[0],
                     false => &pair[1],
                 };
@@ -396,13 +434,14 @@ impl Line {
         let first = curve.points.first();
         let fold = curve.multiplicity == 1
             && first.is_some_and(|point| matches!(point.kind, "fold" | "cusp"));
-        let line = Line::new(pieces.collect(), fold);
+        let line = BoundaryLine::new(pieces.collect(), fold);
         let mut stable = curve.beside.iter();
         let stable = stable.find(|leaf| leaf.index == 0 && leaf.fallen_from.is_none());
-        let stable = stable.and_then(|leaf| axes.at((leaf.values[0], leaf.values[1])));
-        let to_left = stable.and_then(|at| Some(line.crossings(at, DVec2::X).next()?.0 > 0.0));
-        Line {
-            stable: to_left.map(|left| [left, !left]),
+        let stable = stable.and_then(|leaf| axes.page_position((leaf.values[0], leaf.values[1])));
+        let to_left =
+            stable.and_then(|at| Some(line.index_crossings(at, DVec2::X).next()?.0 > 0.0));
+        BoundaryLine {
+            stable_sides: to_left.map(|left| [left, !left]),
             ..line
         }
     }
@@ -413,20 +452,20 @@ impl Line {
     }
 
     /// Whether ground on one of its sides is stable.
-    pub fn bounds_stable(&self) -> bool {
+    pub fn bounds_stable_region(&self) -> bool {
         self.pieces.iter().any(|(_, sides)| sides.contains(&0))
     }
 
     /// Its crossings with a line: how far along the line, and whether the ground on both sides is
     /// stable, unless that is not known.
-    pub fn stable_beside(
+    pub fn stability_crossings(
         &self,
         at: DVec2,
         normal: DVec2,
     ) -> impl Iterator<Item = (f64, Option<[bool; 2]>)> {
-        self.crossings(at, normal).map(|(along, sides)| {
-            let stable = match self.fold {
-                true => self.stable.filter(|_| sides.contains(&0)),
+        self.index_crossings(at, normal).map(|(along, sides)| {
+            let stable = match self.is_fold {
+                true => self.stable_sides.filter(|_| sides.contains(&0)),
                 false => Some(sides.map(|index| index == 0)),
             };
             (along, stable)
@@ -434,7 +473,7 @@ impl Line {
     }
 
     /// Places on it, from the middle outwards.
-    fn places(&self) -> Vec<Place> {
+    fn label_places(&self) -> Vec<LabelPlace> {
         let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
         let whole: f64 = self.pieces.iter().map(|(ends, _)| length(ends)).sum();
         let spacing = STEP.max(whole / MOST_TRIED as f64);
@@ -458,7 +497,7 @@ impl Line {
     }
 
     /// Its crossings with a line: how far along the line, and the indices on both sides.
-    fn crossings(&self, at: DVec2, normal: DVec2) -> impl Iterator<Item = (f64, [usize; 2])> {
+    fn index_crossings(&self, at: DVec2, normal: DVec2) -> impl Iterator<Item = (f64, [usize; 2])> {
         self.pieces.iter().filter_map(move |([a, b], sides)| {
             let step = *b - *a;
             let across = normal.perp_dot(step);
@@ -470,24 +509,24 @@ impl Line {
 }
 
 /// Labels on the sides of a curve, or of several curves close to each other.
-struct Sides {
-    texts: Vec<(Cell, String)>,
+struct SideLabels {
+    texts: Vec<(PageRectangle, String)>,
     curves: Vec<usize>,
 }
 
-impl Sides {
-    fn of(curves: &[Line], c: usize, (at, normal, sides): Place) -> Self {
+impl SideLabels {
+    fn for_curves(curves: &[BoundaryLine], c: usize, (at, normal, sides): LabelPlace) -> Self {
         let label = |along: f64, sign: f64, text: String| {
             let size = label_size(&text);
             let reach = 0.5 * (size * normal.abs()).element_sum() + GAP;
             let middle = at + (along + sign * reach) * normal;
             let corner = middle - 0.5 * size;
-            (Cell { corner, size }, text)
+            (PageRectangle { corner, size }, text)
         };
-        if curves[c].fold {
+        if curves[c].is_fold {
             let (fewer, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
             let text = format!("{fewer} and {more} meet");
-            return Sides {
+            return SideLabels {
                 texts: vec![label(0.0, 1.0, text)],
                 curves: vec![c],
             };
@@ -495,10 +534,10 @@ impl Sides {
         let others = curves
             .iter()
             .enumerate()
-            .filter(|(k, it)| *k != c && !it.fold);
+            .filter(|(k, it)| *k != c && !it.is_fold);
         let mut others: Vec<(f64, [usize; 2], usize)> = others
             .flat_map(|(k, it)| {
-                it.crossings(at, normal)
+                it.index_crossings(at, normal)
                     .map(move |(at, sides)| (at, sides, k))
             })
             .collect();
@@ -516,7 +555,7 @@ impl Sides {
             label(along, sign, format!("index {index}"))
         };
         let texts = vec![outside(-1.0, 0), outside(1.0, 1)];
-        Sides {
+        SideLabels {
             texts,
             curves: named,
         }
@@ -532,10 +571,10 @@ const COLUMN: f64 = 4.0;
 const BESIDE: f64 = 0.5;
 
 /// A part of a row between two crossings with curves, or a crossing and an end of the row.
-struct Stretch {
+struct RowStretch {
     row: usize,
     /// The curves at both ends.
-    between: [Option<usize>; 2],
+    end_curves: [Option<usize>; 2],
     ends: [f64; 2],
     /// Whether the curves say that it is stable: one, both alike, or not all.
     stable: Option<bool>,
@@ -543,14 +582,18 @@ struct Stretch {
 
 /// Shades where the branch is stable in a part of the plane that curves leave only at its rim; whether
 /// there is such ground.
-pub fn shade(page: &mut Drawing, cell: Cell, curves: &[Line]) -> bool {
+pub fn shade_stable_region(
+    page: &mut Drawing,
+    cell: PageRectangle,
+    curves: &[BoundaryLine],
+) -> bool {
     let rows = (cell.size.y / ROW).floor().max(1.0) as usize;
     let height = cell.size.y / rows as f64;
     let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;
-    let stretches: Vec<Stretch> = (0..rows)
-        .flat_map(|row| stretches(cell, curves, (row, y(row))))
+    let stretches: Vec<RowStretch> = (0..rows)
+        .flat_map(|row| row_stretches(cell, curves, (row, y(row))))
         .collect();
-    let regions = regions(&stretches, cell, curves, y);
+    let regions = connected_regions(&stretches, cell, curves, y);
     // Of the stretches of a region those with curves must all say that it is stable.
     let stable = |place: usize| {
         let mut said = (stretches.iter().zip(&regions))
@@ -561,7 +604,7 @@ pub fn shade(page: &mut Drawing, cell: Cell, curves: &[Line]) -> bool {
     };
     let mut verdicts: HashMap<usize, bool> = HashMap::new();
     // One polygon for stretches between the same curves in one row after the other.
-    let mut polygons: Vec<(&Stretch, Vec<[DVec2; 2]>)> = Vec::new();
+    let mut polygons: Vec<(&RowStretch, Vec<[DVec2; 2]>)> = Vec::new();
     for (place, stretch) in stretches.iter().enumerate() {
         if !*(verdicts.entry(regions[place])).or_insert_with(|| stable(place)) {
             continue;
@@ -570,7 +613,7 @@ pub fn shade(page: &mut Drawing, cell: Cell, curves: &[Line]) -> bool {
         let above = polygons
             .iter_mut()
             .rev()
-            .find(|(last, _)| last.row + 1 == stretch.row && last.between == stretch.between);
+            .find(|(last, _)| last.row + 1 == stretch.row && last.end_curves == stretch.end_curves);
         match above {
             Some((last, ends_of)) => {
                 *last = stretch;
@@ -589,17 +632,21 @@ pub fn shade(page: &mut Drawing, cell: Cell, curves: &[Line]) -> bool {
         let left = ends.iter().map(|ends| ends[0]);
         let right = ends.iter().rev().map(|ends| ends[1]);
         let corners: Vec<DVec2> = left.chain(right).collect();
-        page.shape(polygon(&corners), PALE, None);
+        page.draw_shape(polygon_path(&corners), PALE, None);
     }
     any
 }
 
 /// The stretches of a row, from left to right.
-fn stretches(cell: Cell, curves: &[Line], (row, y): (usize, f64)) -> Vec<Stretch> {
+fn row_stretches(
+    cell: PageRectangle,
+    curves: &[BoundaryLine],
+    (row, y): (usize, f64),
+) -> Vec<RowStretch> {
     let from = cell.corner.with_y(y);
     let mut crossings: Vec<(f64, [bool; 2], usize)> = (curves.iter().enumerate())
         .flat_map(|(k, curve)| {
-            let found = curve.stable_beside(from, DVec2::X);
+            let found = curve.stability_crossings(from, DVec2::X);
             found.map(move |(x, sides)| (x, sides.unwrap_or_default(), k))
         })
         .filter(|(x, ..)| (0.0..=cell.size.x).contains(x))
@@ -610,9 +657,9 @@ fn stretches(cell: Cell, curves: &[Line], (row, y): (usize, f64)) -> Vec<Stretch
         .map(|k| {
             let (left, right) = (at(k.checked_sub(1)), at(Some(k)));
             let said = [left.map(|it| it.1[1]), right.map(|it| it.1[0])];
-            Stretch {
+            RowStretch {
                 row,
-                between: [left, right].map(|it| it.map(|it| it.2)),
+                end_curves: [left, right].map(|it| it.map(|it| it.2)),
                 ends: [
                     left.map_or(0.0, |it| it.0),
                     right.map_or(cell.size.x, |it| it.0),
@@ -626,10 +673,10 @@ fn stretches(cell: Cell, curves: &[Line], (row, y): (usize, f64)) -> Vec<Stretch
 
 /// The region of each stretch: those of neighbouring rows are one where a column leads from one to the
 /// other without a curve in between.
-fn regions(
-    stretches: &[Stretch],
-    cell: Cell,
-    curves: &[Line],
+fn connected_regions(
+    stretches: &[RowStretch],
+    cell: PageRectangle,
+    curves: &[BoundaryLine],
     y: impl Fn(usize) -> f64,
 ) -> Vec<usize> {
     let columns = (cell.size.x / COLUMN).ceil().max(1.0) as usize;
@@ -637,7 +684,9 @@ fn regions(
     let crossed: Vec<Vec<f64>> = (0..columns)
         .map(|k| {
             let top = DVec2::new(x(k), 0.0);
-            let found = curves.iter().flat_map(|it| it.stable_beside(top, DVec2::Y));
+            let found = curves
+                .iter()
+                .flat_map(|it| it.stability_crossings(top, DVec2::Y));
             found.map(|(y, _)| y).collect()
         })
         .collect();
@@ -684,28 +733,31 @@ fn regions(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
-    use crate::figure::drawing::{Mark, Step};
+    use crate::figure::drawing::formats::checked_svg_text;
+    use crate::figure::drawing::{DrawingElement, PathStep};
 
     /// A line through these points with the index on both sides.
-    fn line(points: &[[f64; 2]], sides: [usize; 2]) -> Line {
+    fn line(points: &[[f64; 2]], sides: [usize; 2]) -> BoundaryLine {
         let points: Vec<DVec2> = points.iter().map(|&it| DVec2::from_array(it)).collect();
         let pieces = points.windows(2).map(|ends| ([ends[0], ends[1]], sides));
-        Line::new(pieces.collect(), false)
+        BoundaryLine::new(pieces.collect(), false)
     }
 
     /// The area that is shaded of a panel of 100 x 100.
-    fn area(curves: &[Line]) -> f64 {
-        let cell = Cell::new(DVec2::ZERO, DVec2::splat(100.0));
+    fn area(curves: &[BoundaryLine]) -> f64 {
+        let cell = PageRectangle::new(DVec2::ZERO, DVec2::splat(100.0));
         let mut page = Drawing::new(100.0, "");
-        assert_eq!(shade(&mut page, cell, curves), !page.marks.is_empty());
-        text(&page);
-        let area = |mark: &Mark| {
-            let Mark::Shape { path, .. } = mark else {
+        assert_eq!(
+            shade_stable_region(&mut page, cell, curves),
+            !page.elements.is_empty()
+        );
+        checked_svg_text(&page);
+        let area = |mark: &DrawingElement| {
+            let DrawingElement::Shape { path, .. } = mark else {
                 return 0.0;
             };
             let at = path.iter().filter_map(|step| match step {
-                Step::Move(at) | Step::Line(at) => Some(*at),
+                PathStep::Move(at) | PathStep::Line(at) => Some(*at),
                 _ => None,
             });
             let at: Vec<DVec2> = at.collect();
@@ -717,10 +769,10 @@ mod tests {
                 .sum::<f64>()
                 .abs()
         };
-        page.marks.iter().map(area).sum()
+        page.elements.iter().map(area).sum()
     }
 
-    fn vertical(x: f64, sides: [usize; 2]) -> Line {
+    fn vertical(x: f64, sides: [usize; 2]) -> BoundaryLine {
         line(&[[x, -1.0], [x, 101.0]], sides)
     }
 

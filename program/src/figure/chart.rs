@@ -3,19 +3,21 @@
 //!
 //! The panel of a chart: one line per series, with failures in lanes above.
 
-use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{Cell, HEADER, Key, LEFT, PANEL_AXIS, TICK_SIZE, new_page};
+use crate::figure::drawing::labels::{
+    HEADER, LEFT, Legend, PANEL_AXIS, PageRectangle, TICK_SIZE, new_page,
+};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Anchor, BLUE, Color, Drawing, GREEN, INK, NOTE, ORANGE, PURPLE, SHADOW, SKY, SLATE, Stroke,
-    VERMILION, circle, rectangle,
+    BLUE, Color, Drawing, GREEN, INK, NOTE, ORANGE, PURPLE, SHADOW, SKY, SLATE, Stroke, TextAnchor,
+    VERMILION, circle_path, rectangle_path,
 };
-use crate::report::contender;
-use crate::report::numbers::power_of_ten;
+use crate::report::contender_name;
+use crate::report::numbers::format_error_bound;
 use glam::DVec2;
 use leafdyn::relax::Method;
-use leafdyn::study::{Chart, Contender, Peer, Row, Scaling};
+use leafdyn::study::{Chart, ChartRow, PeerProgram, ScalingStudy, SolverConfig};
 
 /// Fixed colours of the peers that come with this crate, the same in every chart;
 /// other peers take the rest in turn.
@@ -37,17 +39,17 @@ const SMALLEST: f64 = 1e-17;
 const FEWEST_DECADES: f64 = 1.0;
 
 pub fn draw_chart(chart: &Chart) -> Drawing {
-    let rows: Vec<(usize, &Row)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
-    let mut series = contenders(&rows, false);
-    series.extend(peers(&chart.peers));
+    let rows: Vec<(usize, &ChartRow)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
+    let mut series = contender_series(&rows, false);
+    series.extend(peer_series(&chart.peers));
     let floor = chart.reference.as_ref().map(|found| found.known_within);
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
-    let (across, up) = places(&series);
+    let (across, up) = point_coordinates(&series);
     let failed = series.iter().flat_map(|series| &series.failures);
     let across = across.into_iter();
     let up = up.into_iter().chain(floor);
     let panel = ChartPanel {
-        across: times(across.chain(failed.filter_map(|failure| failure.x))),
+        across: time_axis(across.chain(failed.filter_map(|failure| failure.x))),
         up: Axis::logarithmic("largest true error of positions / L", up, FEWEST_DECADES),
         series,
         floor,
@@ -59,7 +61,7 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
                 true => "reference confirmed by two methods, known within",
                 false => "the reference is NOT confirmed; taken to be within",
             };
-            format!("{what} {}", power_of_ten(found.known_within))
+            format!("{what} {}", format_error_bound(found.known_within))
         }
     };
     let notes = [
@@ -68,12 +70,12 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
         "left is faster, down is more accurate".into(),
     ];
     let title = format!("{}: speed against accuracy", chart.scenario);
-    page(&title, &notes, &panel)
+    chart_page(&title, &notes, &panel)
 }
 
-pub fn draw_scaling(scaling: &Scaling) -> Drawing {
+pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
     let rows = scaling.rows.iter().map(|found| (found.rods, &found.row));
-    let series = contenders(&rows.collect::<Vec<_>>(), true);
+    let series = contender_series(&rows.collect::<Vec<_>>(), true);
     let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
     rods.sort_unstable();
     rods.dedup();
@@ -81,10 +83,10 @@ pub fn draw_scaling(scaling: &Scaling) -> Drawing {
     let axis = Axis::logarithmic("number of veins N", rods.iter().copied(), FEWEST_DECADES);
     let panel = ChartPanel {
         across: Axis {
-            ticks: Ticks::At(rods),
+            ticks: TickPlacement::WholeNumbers(rods),
             ..axis
         },
-        up: times(places(&series).1.into_iter()),
+        up: time_axis(point_coordinates(&series).1.into_iter()),
         series,
         floor: None,
     };
@@ -95,32 +97,32 @@ pub fn draw_scaling(scaling: &Scaling) -> Drawing {
         notes.push(format!("the reference is NOT confirmed for N = {rods}"));
     }
     let title = format!("{}: time against the number of veins", scaling.scenario);
-    page(&title, &notes, &panel)
+    chart_page(&title, &notes, &panel)
 }
 
-fn times(values: impl Iterator<Item = f64>) -> Axis {
+fn time_axis(values: impl Iterator<Item = f64>) -> Axis {
     let name = "time on one thread: median, and quartiles as a thin line";
     Axis {
-        ticks: Ticks::Times,
+        ticks: TickPlacement::PowersInSeconds,
         ..Axis::logarithmic(name, values, FEWEST_DECADES)
     }
 }
 
-fn page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
+fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
     let mut drawing = new_page(LEFT, title, notes, None);
-    drawing.height = (HEADER + panel.height()).ceil();
-    drawing.group("chart", |page| panel.draw(page, HEADER));
+    drawing.height = (HEADER + panel.total_height()).ceil();
+    drawing.draw_group("chart", |page| panel.draw(page, HEADER));
     drawing
 }
 
 /// Coordinates of the points of all series, across and up.
-fn places(series: &[Series]) -> (Vec<f64>, Vec<f64>) {
+fn point_coordinates(series: &[ChartSeries]) -> (Vec<f64>, Vec<f64>) {
     let points = series.iter().flat_map(|series| &series.points);
-    points.map(|point| point.at).unzip()
+    points.map(|point| point.coordinates).unzip()
 }
 
 /// Colour and marker of a contender.
-fn style(who: Contender) -> (Color, Marker) {
+fn contender_style(who: SolverConfig) -> (Color, Marker) {
     match (who.method, who.one_grid) {
         (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
         (Method::SemiImplicit(_), true) => (SKY, Marker::Square),
@@ -134,26 +136,26 @@ fn style(who: Contender) -> (Color, Marker) {
 
 /// A series for each contender with results: seconds over veins, or errors over
 /// seconds. Each row comes with its number of veins.
-fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
-    let of = |who: Contender| {
-        let (color, marker) = style(who);
+fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartSeries> {
+    let of = |who: SolverConfig| {
+        let (color, marker) = contender_style(who);
         let default = if who.is_default() { " (default)" } else { "" };
-        let name = format!("{}{default}", contender(who));
-        let mut series = Series::new(name, color, marker, false);
+        let name = format!("{}{default}", contender_name(who));
+        let mut series = ChartSeries::new(name, color, marker, false);
         for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
                 true => (rods, seconds),
                 false => (seconds, error.max(SMALLEST)),
             };
-            match row.seconds.zip(row.point()) {
-                Some((seconds, (median, error))) => series.points.push(Point {
-                    at: place(median, error),
+            match row.seconds.zip(row.seconds_and_error()) {
+                Some((seconds, (median, error))) => series.points.push(ChartPoint {
+                    coordinates: place(median, error),
                     spread: [seconds.q1, seconds.q3].map(|time| place(time, error)),
-                    front: row.pareto == Some(true),
+                    is_on_front: row.pareto == Some(true),
                 }),
                 // Over veins a failure has a position even if it was not run.
-                None => series.failures.push(Failure {
+                None => series.failures.push(FailedRun {
                     x: match over_veins {
                         true => Some(rods),
                         false => row.seconds.map(|spread| spread.median),
@@ -164,7 +166,7 @@ fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
         }
         series
     };
-    let mut all: Vec<Series> = Contender::ALL.into_iter().map(of).collect();
+    let mut all: Vec<ChartSeries> = SolverConfig::ALL.into_iter().map(of).collect();
     all.retain(|series| !(series.points.is_empty() && series.failures.is_empty()));
     all
 }
@@ -175,29 +177,36 @@ fn peer_color(name: &str, others: usize) -> Color {
 }
 
 /// One dashed line for each peer, from large errors to small.
-fn peers(peers: &[Peer]) -> Vec<Series> {
-    let mut all: Vec<Series> = Vec::new();
+fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
+    let mut all: Vec<ChartSeries> = Vec::new();
     for peer in peers {
         let place = all.iter().position(|series| series.name == peer.name);
         let place = place.unwrap_or_else(|| {
             let color = peer_color(&peer.name, all.len());
-            all.push(Series::new(peer.name.clone(), color, Marker::Ring, true));
+            all.push(ChartSeries::new(
+                peer.name.clone(),
+                color,
+                Marker::Ring,
+                true,
+            ));
             all.len() - 1
         });
-        match peer.point().map(|(x, y)| (x, y.max(SMALLEST))) {
-            Some(at) => all[place].points.push(Point {
-                at,
+        match peer.seconds_and_error().map(|(x, y)| (x, y.max(SMALLEST))) {
+            Some(at) => all[place].points.push(ChartPoint {
+                coordinates: at,
                 spread: [peer.seconds.q1, peer.seconds.q3].map(|x| (x, at.1)),
-                front: peer.pareto,
+                is_on_front: peer.pareto,
             }),
-            None => all[place].failures.push(Failure {
+            None => all[place].failures.push(FailedRun {
                 x: Some(peer.seconds.median),
                 word: peer.outcome.clone(),
             }),
         }
     }
     for series in &mut all {
-        series.points.sort_by(|a, b| b.at.1.total_cmp(&a.at.1));
+        series
+            .points
+            .sort_by(|a, b| b.coordinates.1.total_cmp(&a.coordinates.1));
     }
     all
 }
@@ -221,34 +230,34 @@ const LANES: Color = Color(250, 240, 238);
 
 /// A point, in the units of the axes.
 #[derive(Clone, Copy, Debug)]
-pub struct Point {
-    pub at: (f64, f64),
+pub struct ChartPoint {
+    pub coordinates: (f64, f64),
     /// Ends of its spread in repeated measurements.
     pub spread: [(f64, f64); 2],
-    pub front: bool,
+    pub is_on_front: bool,
 }
 
 /// A run without a point.
 #[derive(Clone, Debug)]
-pub struct Failure {
+pub struct FailedRun {
     /// Where it is on the horizontal axis; `None`: not known.
     pub x: Option<f64>,
     pub word: String,
 }
 
-pub struct Series {
+pub struct ChartSeries {
     pub name: String,
     pub color: Color,
     pub dashed: bool,
     pub marker: Marker,
-    pub points: Vec<Point>,
-    pub failures: Vec<Failure>,
+    pub points: Vec<ChartPoint>,
+    pub failures: Vec<FailedRun>,
 }
 
-impl Series {
+impl ChartSeries {
     /// Without points so far.
     pub fn new(name: String, color: Color, marker: Marker, dashed: bool) -> Self {
-        Series {
+        ChartSeries {
             name,
             color,
             dashed,
@@ -259,16 +268,16 @@ impl Series {
     }
 
     fn stroke(&self) -> Stroke {
-        Stroke::new(self.color, 1.5).dashed(self.dashed)
+        Stroke::new(self.color, 1.5).with_dashes(self.dashed)
     }
 
-    fn places(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.points.iter().map(|point| point.at)
+    fn point_coordinates(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.points.iter().map(|point| point.coordinates)
     }
 }
 
 pub struct ChartPanel {
-    pub series: Vec<Series>,
+    pub series: Vec<ChartSeries>,
     pub across: Axis,
     pub up: Axis,
     pub floor: Option<f64>,
@@ -276,7 +285,7 @@ pub struct ChartPanel {
 
 impl ChartPanel {
     /// Names of the lanes, in the order in which they appear.
-    fn lanes(&self) -> Vec<&str> {
+    fn failure_lanes(&self) -> Vec<&str> {
         let mut lanes: Vec<&str> = Vec::new();
         for failure in self.series.iter().flat_map(|series| &series.failures) {
             if !lanes.contains(&failure.word.as_str()) {
@@ -287,74 +296,86 @@ impl ChartPanel {
     }
 
     fn lanes_height(&self) -> f64 {
-        match self.lanes().len() {
+        match self.failure_lanes().len() {
             0 => 0.0,
             lanes => lanes as f64 * LANE + LANE_GAP,
         }
     }
 
     /// Height of the panel with lanes and axis.
-    pub fn height(&self) -> f64 {
+    pub fn total_height(&self) -> f64 {
         self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
-        let axes = Axes {
-            cell: Cell::left_of_key(start + self.lanes_height(), FRAME_HEIGHT, KEY),
+        let axes = PanelAxes {
+            cell: PageRectangle::left_of_legend(start + self.lanes_height(), FRAME_HEIGHT, KEY),
             across: self.across.clone(),
             up: self.up.clone(),
         };
-        self.draw_floor(page, axes.cell);
+        self.draw_reference_accuracy(page, axes.cell);
         axes.draw(page);
-        self.draw_front(page, &axes);
+        self.draw_pareto_front(page, &axes);
         for series in &self.series {
-            let line: Vec<(f64, f64)> = series.places().collect();
-            axes.curve(page, &line, series.stroke());
+            let line: Vec<(f64, f64)> = series.point_coordinates().collect();
+            axes.draw_curve(page, &line, series.stroke());
         }
         for series in &self.series {
             for point in &series.points {
-                axes.curve(page, &point.spread, Stroke::new(series.color, 1.1));
+                axes.draw_curve(page, &point.spread, Stroke::new(series.color, 1.1));
             }
-            axes.markers(page, series.places(), series.marker, series.color);
+            axes.draw_markers(
+                page,
+                series.point_coordinates(),
+                series.marker,
+                series.color,
+            );
         }
-        for (lane, word) in self.lanes().into_iter().enumerate() {
-            self.draw_lane(page, axes.cell, start + lane as f64 * LANE, word);
+        for (lane, word) in self.failure_lanes().into_iter().enumerate() {
+            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LANE, word);
         }
-        self.draw_key(page, axes.cell);
+        self.draw_legend(page, axes.cell);
     }
 
-    fn draw_floor(&self, page: &mut Drawing, cell: Cell) {
+    fn draw_reference_accuracy(&self, page: &mut Drawing, cell: PageRectangle) {
         let Some(floor) = self.floor else { return };
         let height = cell.size.y * self.up.fraction(floor).clamp(0.0, 1.0);
-        let start = DVec2::new(cell.corner.x, cell.end().y - height);
+        let start = DVec2::new(cell.corner.x, cell.opposite_corner().y - height);
         let area = DVec2::new(cell.size.x, height);
-        page.shape(rectangle(start, area), FLOOR, None);
-        page.line(start, start.with_x(cell.end().x), Stroke::new(SHADOW, 1.0));
+        page.draw_shape(rectangle_path(start, area), FLOOR, None);
+        page.draw_line(
+            start,
+            start.with_x(cell.opposite_corner().x),
+            Stroke::new(SHADOW, 1.0),
+        );
     }
 
     /// A broad band under the lines that joins the points of the front.
-    fn draw_front(&self, page: &mut Drawing, axes: &Axes) {
+    fn draw_pareto_front(&self, page: &mut Drawing, axes: &PanelAxes) {
         let points = self.series.iter().flat_map(|series| &series.points);
-        let front = points.filter(|point| point.front);
-        let mut front: Vec<(f64, f64)> = front.map(|point| point.at).collect();
+        let front = points.filter(|point| point.is_on_front);
+        let mut front: Vec<(f64, f64)> = front.map(|point| point.coordinates).collect();
         front.sort_by(|a, b| a.0.total_cmp(&b.0));
-        axes.curve(page, &front, Stroke::new(FRONT, 8.0));
-        for place in front.into_iter().filter_map(|point| axes.at(point)) {
-            halo(page, place);
+        axes.draw_curve(page, &front, Stroke::new(FRONT, 8.0));
+        for place in front
+            .into_iter()
+            .filter_map(|point| axes.page_position(point))
+        {
+            draw_halo(page, place);
         }
     }
 
     /// Draws crosses for the runs that failed with this word, and the word.
-    fn draw_lane(&self, page: &mut Drawing, cell: Cell, top: f64, word: &str) {
+    fn draw_failure_lane(&self, page: &mut Drawing, cell: PageRectangle, top: f64, word: &str) {
         const SPACING: f64 = 11.0;
-        let (left, right) = (cell.corner.x, cell.end().x);
+        let (left, right) = (cell.corner.x, cell.opposite_corner().x);
         let middle = top + 0.5 * LANE;
         let area = DVec2::new(cell.size.x, LANE - 2.0);
         let start = DVec2::new(left, top + 1.0);
-        page.shape(rectangle(start, area), LANES, None);
-        let name = Font::embedded().shortened(word, TICK_SIZE, KEY - 14.0);
+        page.draw_shape(rectangle_path(start, area), LANES, None);
+        let name = Font::embedded().shorten_text(word, TICK_SIZE, KEY - 14.0);
         let at = DVec2::new(right + 10.0, middle);
-        page.centered_label(at, &name, TICK_SIZE, Anchor::Start, NOTE);
+        page.draw_centered_label(at, &name, TICK_SIZE, TextAnchor::Start, NOTE);
         let mut from_right = right;
         for series in &self.series {
             let failures = || series.failures.iter().filter(|it| it.word == word);
@@ -370,53 +391,53 @@ impl ChartPanel {
         }
     }
 
-    fn draw_key(&self, page: &mut Drawing, cell: Cell) {
-        let mut key = Key::right_of(cell);
+    fn draw_legend(&self, page: &mut Drawing, cell: PageRectangle) {
+        let mut key = Legend::right_of(cell);
         for series in &self.series {
-            key.entry(page, &series.name, "", |page, cell| {
-                cell.line(page, series.stroke());
+            key.add_entry(page, &series.name, "", |page, cell| {
+                cell.draw_midline(page, series.stroke());
                 series.marker.draw(page, cell.middle(), series.color);
             });
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
-        if points().any(|point| point.front) {
+        if points().any(|point| point.is_on_front) {
             let note = "nothing is both faster and more accurate";
-            key.entry(page, "Pareto front", note, |page, cell| {
-                cell.line(page, Stroke::new(FRONT, 8.0));
-                halo(page, cell.middle());
+            key.add_entry(page, "Pareto front", note, |page, cell| {
+                cell.draw_midline(page, Stroke::new(FRONT, 8.0));
+                draw_halo(page, cell.middle());
             });
         }
-        if !self.lanes().is_empty() {
+        if !self.failure_lanes().is_empty() {
             let note = "failed or not run: see above";
-            key.marker(page, "", note, Marker::Cross, NOTE);
+            key.add_marker(page, "", note, Marker::Cross, NOTE);
         }
         if self.floor.is_some() {
             let note = "below what is known of the reference itself";
-            key.entry(page, "", note, |page, cell| {
+            key.add_entry(page, "", note, |page, cell| {
                 let rim = Stroke::new(SHADOW, 1.0);
-                page.shape(rectangle(cell.corner, cell.size), FLOOR, Some(rim));
+                page.draw_shape(rectangle_path(cell.corner, cell.size), FLOOR, Some(rim));
             });
         }
     }
 }
 
-fn halo(page: &mut Drawing, at: DVec2) {
-    page.shape(circle(at, 7.5), FRONT, Some(Stroke::new(INK, 0.8)));
+fn draw_halo(page: &mut Drawing, at: DVec2) {
+    page.draw_shape(circle_path(at, 7.5), FRONT, Some(Stroke::new(INK, 0.8)));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
 
     fn svg(chart: &Chart) -> String {
-        text(&draw_chart(chart))
+        checked_svg_text(&draw_chart(chart))
     }
 
     #[test]
     fn every_series_and_every_kind_of_failure_is_named() {
-        let svg = svg(&sample::chart());
+        let svg = svg(&sample::sample_chart());
         let texts = "fan: speed against accuracy|N = 5|semi-implicit, extrapolated|\
             semi-implicit, single grids|single shooting|solve_bvp|not-at-rest|not-run|\
             not-converged max-nodes|Pareto front|1 ms|10⁻⁸|\
@@ -428,7 +449,7 @@ mod tests {
 
     #[test]
     fn an_unconfirmed_reference_is_reported() {
-        let mut chart = sample::chart();
+        let mut chart = sample::sample_chart();
         chart.reference.as_mut().unwrap().confirmed = false;
         assert!(svg(&chart).contains("NOT confirmed"));
         chart.reference = None;
@@ -438,31 +459,31 @@ mod tests {
 
     #[test]
     fn leaves_are_marked_by_their_veins() {
-        let mut scaling = sample::scaling();
-        let first = text(&draw_scaling(&scaling));
+        let mut scaling = sample::sample_scaling();
+        let first = checked_svg_text(&draw_scaling(&scaling));
         assert!(first.contains("to a tolerance of 1e-6"));
         for text in [">5<", ">15<", "number of veins N", "not-run"] {
             assert!(first.contains(text), "{text}");
         }
         scaling.unconfirmed = vec![15];
-        let second = text(&draw_scaling(&scaling));
+        let second = checked_svg_text(&draw_scaling(&scaling));
         assert!(second.contains("NOT confirmed for N = 15"));
     }
 
     #[test]
     fn times_are_spread_along_their_axis() {
-        let chart = sample::chart();
+        let chart = sample::sample_chart();
         let rows = [(5, &chart.rows[0])];
-        let spread = |over_veins| contenders(&rows, over_veins)[0].points[0].spread;
+        let spread = |over_veins| contender_series(&rows, over_veins)[0].points[0].spread;
         assert_eq!(spread(false), [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
         assert_eq!(spread(true), [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
     }
 
     #[test]
     fn a_peer_has_one_colour_in_every_chart() {
-        let mut chart = sample::chart();
+        let mut chart = sample::sample_chart();
         let of = |chart: &Chart| -> Vec<(String, Color)> {
-            let all = peers(&chart.peers).into_iter();
+            let all = peer_series(&chart.peers).into_iter();
             all.map(|peer| (peer.name, peer.color)).collect()
         };
         let alone = of(&chart)[0].clone();

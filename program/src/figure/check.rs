@@ -1,75 +1,81 @@
 //! The figure of a check: the relaxed leaf as lines, the boundary-value
 //! solution as dots, and their differences along the veins.
 
-use crate::figure::drawing::axes::{Axes, Axis, Curve, Ticks};
+use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH,
-    header, title,
+    HEADER, LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT,
+    TEXT_SIZE, WIDTH, draw_header, draw_panel_title,
 };
-use crate::figure::drawing::markers::{Marker, dot};
-use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
-use crate::figure::leaf::{Panels, Veins};
-use crate::figure::scenario::Setting;
-use crate::report::numbers::power_of_ten;
-use crate::report::{equilibrium_of_index, headline, verdict};
+use crate::figure::drawing::markers::{Marker, draw_second_solution_dot};
+use crate::figure::drawing::{CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, vein_color};
+use crate::figure::leaf::{DrawnVeins, LeafPanels};
+use crate::figure::scenario::FigureSetting;
+use crate::report::numbers::format_error_bound;
+use crate::report::{check_verdict_phrase, equilibrium_kind, relaxation_verdict};
 use glam::DVec2;
 use leafdyn::scenario::Scenario;
-use leafdyn::study::{Check, Quantity, Verdict};
+use leafdyn::study::{Check, CheckVerdict, ComparedQuantity};
 
 const LINE: f64 = 19.0;
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
-    let setting = Setting::of(scenario);
-    let mut veins = Veins::of(&check.relaxed, scenario);
+    let setting = FigureSetting::from_scenario(scenario);
+    let mut veins = DrawnVeins::from_equilibrium(&check.relaxed, scenario);
     if let Some(solution) = check.solution() {
-        veins.add_dots(&solution.rods);
+        veins.add_second_solution(&solution.rods);
     }
-    let title = format!("{}: {}", check.relaxed.scenario, headline(&check.verdict));
+    let title = format!(
+        "{}: {}",
+        check.relaxed.scenario,
+        check_verdict_phrase(&check.verdict)
+    );
     // Why the solutions could not be compared.
     let reason = match &check.verdict {
-        Verdict::NotCompared(why) | Verdict::NotIndependent(why) => {
-            Font::embedded().wrapped(why, TEXT_SIZE, WIDTH - LEFT - RIGHT)
+        CheckVerdict::NotCompared(why) | CheckVerdict::NotIndependent(why) => {
+            Font::embedded().wrap_text(why, TEXT_SIZE, WIDTH - LEFT - RIGHT)
         }
         _ => Vec::new(),
     };
     let key_line = NOTE_BASE + LINE * (reason.len() + 1) as f64;
-    let panels = Panels::below(HEADER - NOTE_BASE + key_line, &veins);
+    let panels = LeafPanels::placed_below(HEADER - NOTE_BASE + key_line, &veins);
     let compared = !check.along.is_empty();
     let below = if compared { HEIGHT } else { 0.0 };
     let mut drawing = Drawing::new(WIDTH, &title);
-    drawing.height = (panels.end() + below).ceil();
-    drawing.group("header", |page| {
-        let notes = notes(check, &veins, &setting);
-        header(page, LEFT, &title, &notes, Some(&veins));
+    drawing.height = (panels.bottom() + below).ceil();
+    drawing.draw_group("header", |page| {
+        let notes = header_notes(check, &veins, &setting);
+        draw_header(page, LEFT, &title, &notes, Some(&veins));
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
-            page.label(base, text, TEXT_SIZE, Anchor::Start, INK);
+            page.draw_label(base, text, TEXT_SIZE, TextAnchor::Start, INK);
         }
-        let mut key = KeyRows::at(LEFT, key_line, 26.0);
+        let mut key = LegendRows::starting_at(LEFT, key_line, 26.0);
         let stroke = Stroke::new(vein_color(0.3), veins.line_width());
-        key.entry(page, "relaxed", |page, cell| cell.line(page, stroke));
+        key.add_entry(page, "relaxed", |page, cell| {
+            cell.draw_midline(page, stroke)
+        });
         if check.solution().is_some() {
-            key.entry(page, "boundary-value solution by shooting", |page, cell| {
-                dot(page, cell.middle(), 2.0);
+            key.add_entry(page, "boundary-value solution by shooting", |page, cell| {
+                draw_second_solution_dot(page, cell.middle(), 2.0);
             });
         }
     });
     panels.draw(&mut drawing, &veins, &setting);
     if compared {
-        drawing.group("differences", |page| {
-            draw_differences(page, check, veins.unit, panels.end());
+        drawing.draw_group("differences", |page| {
+            draw_differences(page, check, veins.unit, panels.bottom());
         });
     }
     drawing
 }
 
-fn notes(check: &Check, veins: &Veins, setting: &Setting) -> Vec<String> {
+fn header_notes(check: &Check, veins: &DrawnVeins, setting: &FigureSetting) -> Vec<String> {
     let mut notes = vec![format!("N = {}", veins.count)];
-    let relaxed = verdict(&check.relaxed);
+    let relaxed = relaxation_verdict(&check.relaxed);
     match &check.shot {
         Some(shot) if shot.found.is_ok() => {
-            let shot = equilibrium_of_index(shot.negative_eigenvalues);
+            let shot = equilibrium_kind(shot.negative_eigenvalues);
             if shot == relaxed {
                 notes.push(format!("both: {shot}"));
             } else {
@@ -79,7 +85,7 @@ fn notes(check: &Check, veins: &Veins, setting: &Setting) -> Vec<String> {
         }
         _ => notes.push(format!("relaxed: {relaxed}")),
     }
-    notes.extend(veins.notes(setting));
+    notes.extend(veins.leaf_notes(setting));
     notes
 }
 
@@ -99,17 +105,27 @@ const MOST_MARKED: usize = 70;
 
 /// Differences of a quantity along the veins, and the largest one at which the
 /// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
-fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, Option<f64>) {
+fn difference_curve(
+    quantity: ComparedQuantity,
+    check: &Check,
+    unit: f64,
+    color: Color,
+) -> (NamedCurve, Option<f64>) {
     let (name, unit, allowed) = match quantity {
-        Quantity::Position => ("position, in lengths L", unit, Some(check.allowed() / unit)),
-        Quantity::Rotation => ("rotation, in radians", 1.0, Some(check.allowed_rotation())),
-        Quantity::Force => ("force, in the scenario's unit", 1.0, None),
-        Quantity::Moment => ("moment, in the scenario's unit", 1.0, None),
+        ComparedQuantity::Position => {
+            ("position, in lengths L", unit, Some(check.allowed() / unit))
+        }
+        ComparedQuantity::Rotation => ("rotation, in radians", 1.0, Some(check.allowed_rotation())),
+        ComparedQuantity::Force => ("force, in the scenario's unit", 1.0, None),
+        ComparedQuantity::Moment => ("moment, in the scenario's unit", 1.0, None),
     };
-    let values = check.along.iter().map(|found| quantity.of(found) / unit);
+    let values = check
+        .along
+        .iter()
+        .map(|found| quantity.component(found) / unit);
     let stations = check.relaxed.shape.stations.iter().copied();
     let points = stations.zip(values).collect();
-    let curve = Curve {
+    let curve = NamedCurve {
         name,
         color,
         points,
@@ -118,27 +134,27 @@ fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, 
 }
 
 fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
-    let quantities = Quantity::ALL.into_iter().zip(CURVES);
-    let (curves, allowed): (Vec<Curve>, Vec<Option<f64>>) = quantities
-        .map(|(quantity, color)| curve(quantity, check, unit, color))
+    let quantities = ComparedQuantity::ALL.into_iter().zip(CURVES);
+    let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
+        .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
         .unzip();
-    let mut cell = Cell::left_of_key(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
+    let mut cell = PageRectangle::left_of_legend(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
     let what = "largest difference of all veins at each station";
-    title(page, cell.corner, "(e)", what);
+    draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {
         tick_spacing: Some(50.0),
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
-    let mut values = curves.iter().flat_map(Curve::values);
+    let mut values = curves.iter().flat_map(NamedCurve::ordinates);
     if values.any(|value| value == 0.0) {
         cell.size.y -= ZERO_STRIP;
         across.labelled = false;
-        draw_zeros(page, &curves, cell, stations);
+        draw_zero_strip(page, &curves, cell, stations);
     }
-    let values = curves.iter().flat_map(Curve::values);
+    let values = curves.iter().flat_map(NamedCurve::ordinates);
     let values = values.chain(allowed.iter().flatten().copied());
-    let axes = Axes {
+    let axes = PanelAxes {
         cell,
         across,
         up: Axis::logarithmic("", values, FEWEST_DECADES),
@@ -146,30 +162,35 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     axes.draw(page);
     for (curve, allowed) in curves.iter().zip(allowed) {
         if let Some(allowed) = allowed {
-            let stroke = Stroke::new(curve.color, 1.0).dashed(true);
-            axes.curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
+            let stroke = Stroke::new(curve.color, 1.0).with_dashes(true);
+            axes.draw_curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
         }
     }
     for curve in &curves {
-        axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
         if curve.points.len() <= MOST_MARKED {
-            axes.markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
+            axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
         }
     }
-    draw_key(page, &curves, cell);
+    draw_legend(page, &curves, cell);
 }
 
 /// Draws differences of zero, which have no place on a logarithmic axis, in a strip
 /// below it.
-fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis) {
-    let strip = Axes {
-        cell: Cell::new(
-            DVec2::new(above.corner.x, above.end().y),
+fn draw_zero_strip(
+    page: &mut Drawing,
+    curves: &[NamedCurve],
+    above: PageRectangle,
+    stations: Axis,
+) {
+    let strip = PanelAxes {
+        cell: PageRectangle::new(
+            DVec2::new(above.corner.x, above.opposite_corner().y),
             DVec2::new(above.size.x, ZERO_STRIP),
         ),
         across: stations,
         up: Axis {
-            ticks: Ticks::At(vec![0.0]),
+            ticks: TickPlacement::WholeNumbers(vec![0.0]),
             ..Axis::linear("", 2.7, -2.7)
         },
     };
@@ -177,31 +198,31 @@ fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis)
     for (lane, curve) in curves.iter().enumerate() {
         let zeros = curve.points.iter().filter(|point| point.1 == 0.0);
         let places = zeros.map(|point| (point.0, lane as f64 - 1.5));
-        strip.markers(page, places, Marker::Dot, curve.color);
+        strip.draw_markers(page, places, Marker::Dot, curve.color);
     }
 }
 
-fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
-    let mut key = Key::right_of(cell);
+fn draw_legend(page: &mut Drawing, curves: &[NamedCurve], cell: PageRectangle) {
+    let mut key = Legend::right_of(cell);
     for curve in curves {
-        let largest = match curve.values().fold(0.0, f64::max) {
+        let largest = match curve.ordinates().fold(0.0, f64::max) {
             0.0 => "no difference".into(),
-            largest => format!("≤ {}", power_of_ten(largest)),
+            largest => format!("≤ {}", format_error_bound(largest)),
         };
-        key.marked_line(page, curve.name, &largest, curve.color);
+        key.add_marked_line(page, curve.name, &largest, curve.color);
     }
-    let dashed = Stroke::new(NOTE, 1.0).dashed(true);
-    key.line(page, "allowed difference", "", dashed);
+    let dashed = Stroke::new(NOTE, 1.0).with_dashes(true);
+    key.add_line(page, "allowed difference", "", dashed);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
 
     fn svg(check: &Check) -> String {
-        text(&draw(check, &sample::scenario("fan", 5)))
+        checked_svg_text(&draw(check, &sample::sample_scenario("fan", 5)))
     }
 
     #[test]
@@ -210,7 +231,7 @@ mod tests {
             (0.0, "fan: both methods agree"),
             (0.1, "fan: the methods differ"),
         ] {
-            let svg = svg(&sample::check(5, 8, angle));
+            let svg = svg(&sample::sample_check(5, 8, angle));
             assert!(svg.contains(&format!("<title>{title}</title>")), "{title}");
             assert!(svg.contains(&format!(">{title}</text>")), "{title}");
             for quantity in ["position", "rotation", "force", "moment"] {
@@ -221,12 +242,12 @@ mod tests {
 
     #[test]
     fn without_a_second_solution_the_reason_is_given() {
-        let mut check = sample::check(5, 8, 0.0);
+        let mut check = sample::sample_check(5, 8, 0.0);
         let reason = "the relaxation did not come to rest: ".repeat(6);
         check.shot = None;
         check.along.clear();
         check.difference = None;
-        check.verdict = Verdict::NotCompared(reason);
+        check.verdict = CheckVerdict::NotCompared(reason);
         let svg = svg(&check);
         assert!(svg.contains("could not be compared"));
         assert_eq!(svg.matches("rest:").count(), 6);

@@ -7,21 +7,24 @@
 //!
 //! The results of experiments as series along the column that varies.
 
-use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, letters, new_page,
+    HEADER, LEFT, Legend, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TICK_SIZE, WIDTH,
+    new_page, panel_letters,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Anchor, BLUE, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, color_of_vein, polygon,
-    rectangle,
+    BLUE, Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, color_of_vein,
+    polygon_path, rectangle_path,
 };
-use crate::figure::scenario::{Quantity, with_unit};
-use crate::report::numbers::{brief, counted, rounded_to, short};
+use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::report::numbers::{
+    count_in_words, format_five_digits, format_four_digits, round_to_error,
+};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::{Scenario, Units};
-use leafdyn::study::{Fit, FitLeaf, FitParameter, FitResidual, Keys, MeasuredQuantity};
+use leafdyn::study::{Fit, FitLeaf, FitParameter, FitResidual, MeasuredQuantity, ParameterKeys};
 use std::collections::HashMap;
 
 const BOTTOM: f64 = 4.0;
@@ -35,34 +38,34 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
     let units = &scenario.units;
     let name = format!("{}: fit", fit.scenario);
     let count = fit.residuals.len();
-    let free = counted(fit.parameters.len(), "free number", "free numbers");
+    let free = count_in_words(fit.parameters.len(), "free number", "free numbers");
     let mut notes = vec![format!("{count} data, {free}"), fit.outcome.word().into()];
     match fit.standard_deviation {
-        Some(sd) => notes.push(format!("residuals of {}", brief(sd))),
+        Some(sd) => notes.push(format!("residuals of {}", format_five_digits(sd))),
         None => notes.push(format!(
             "sum of squares {} for {} degrees of freedom",
-            brief(fit.chi_squared),
+            format_five_digits(fit.chi_squared),
             fit.degrees_of_freedom
         )),
     }
     let mut page = new_page(LEFT, &name, &notes, None);
-    let mut letters = letters();
+    let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut top = HEADER;
-    page.group("numbers", |page| {
-        top = draw_numbers(page, top, &letter(), &fit.parameters, units);
+    page.draw_group("numbers", |page| {
+        top = draw_fit_parameters(page, top, &letter(), &fit.parameters, units);
     });
-    for results in results(fit).iter().take(MOST_RESULTS) {
-        page.group("result", |page| {
+    for results in result_series_by_kind(fit).iter().take(MOST_RESULTS) {
+        page.draw_group("result", |page| {
             top = draw_results(page, top, &letter(), units, results);
         });
     }
     let traced = fit.leaves.iter().filter(|(_, it)| !it.traced.is_empty());
     for (name, leaf) in traced.take(MOST_LEAVES) {
-        page.group("veins", |page| {
+        page.draw_group("veins", |page| {
             let of = fit.residuals.iter();
             let of = of.filter(|it| it.rod.is_some() && it.number == leaf.number);
-            top = draw_veins(page, top, &letter(), (name, units), leaf, of.collect());
+            top = draw_measured_veins(page, top, &letter(), (name, units), leaf, of.collect());
         });
     }
     page.height = (top + BOTTOM).ceil();
@@ -82,7 +85,7 @@ const MOST_NUMBERS: usize = 30;
 const WIDEST: f64 = 1.0;
 
 /// Draws the free numbers with their intervals; returns where that ends.
-pub fn draw_numbers(
+pub fn draw_fit_parameters(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -95,7 +98,7 @@ pub fn draw_numbers(
         WIDTH - RIGHT - VALUES - corner.x,
         ROW * shown.len().max(1) as f64,
     );
-    let cell = Cell::new(corner, size);
+    let cell = PageRectangle::new(corner, size);
     // The ends of the intervals as parts of the values.
     let parts = |it: &FitParameter| {
         let part = |end: Option<f64>| end.map(|end| (end - it.value) / it.value.abs());
@@ -119,37 +122,40 @@ pub fn draw_numbers(
         ..Axis::linear("from the value / %", -end, end)
     };
     let up = Axis {
-        ticks: Ticks::At(Vec::new()),
+        ticks: TickPlacement::WholeNumbers(Vec::new()),
         labelled: false,
         ..Axis::linear("", 0.0, 1.0)
     };
-    let axes = Axes::titled(page, cell, [letter, "95 % intervals"], across, up);
+    let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
     for (k, it) in shown.iter().enumerate() {
         let middle = corner.y + ROW * (k as f64 + 0.5);
-        let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: Anchor| {
-            let text = Font::embedded().shortened(text, TICK_SIZE, room);
-            page.centered_label(DVec2::new(x, middle), &text, TICK_SIZE, anchor, INK);
+        let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
+            let text = Font::embedded().shorten_text(text, TICK_SIZE, room);
+            page.draw_centered_label(DVec2::new(x, middle), &text, TICK_SIZE, anchor, INK);
         };
-        let number = Quantity::of(&it.key, units);
+        let number = QuantityLabel::from_keys(&it.key, units);
         label(
             page,
             corner.x - 10.0,
             &number.words,
             WORDS + LEFT - 16.0,
-            Anchor::End,
+            TextAnchor::End,
         );
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
-        let text = interval(it) + &unit;
+        let text = value_with_interval(it) + &unit;
         label(
             page,
-            cell.end().x + 12.0,
+            cell.opposite_corner().x + 12.0,
             &text,
-            WIDTH - cell.end().x - 16.0,
-            Anchor::Start,
+            WIDTH - cell.opposite_corner().x - 16.0,
+            TextAnchor::Start,
         );
         // An open interval leaves the frame, dashed.
         let [low, high] = parts(it);
-        let place = |part: f64| axes.at((100.0 * part, 0.0)).map(|at| at.with_y(middle));
+        let place = |part: f64| {
+            axes.page_position((100.0 * part, 0.0))
+                .map(|at| at.with_y(middle))
+        };
         let ends = [(low, -1.0), (high, 1.0)].map(|(part, sign)| {
             let inside = part.filter(|part| part.abs() <= WIDEST);
             (
@@ -162,28 +168,28 @@ pub fn draw_numbers(
         };
         for (known, at) in ends {
             if let Some(at) = at {
-                page.line(value, at, Stroke::new(BLUE, 1.8).dashed(!known));
+                page.draw_line(value, at, Stroke::new(BLUE, 1.8).with_dashes(!known));
             }
             if let Some(at) = at.filter(|_| known) {
                 let half = DVec2::new(0.0, 4.5);
-                page.line(at - half, at + half, Stroke::new(BLUE, 1.8));
+                page.draw_line(at - half, at + half, Stroke::new(BLUE, 1.8));
             }
         }
         if it.determined {
             Marker::Circle.draw(page, value, BLUE);
         }
     }
-    cell.end().y + PANEL_AXIS
+    cell.opposite_corner().y + PANEL_AXIS
 }
 
 /// A fitted number with its interval, without digits below it.
-fn interval(it: &FitParameter) -> String {
+fn value_with_interval(it: &FitParameter) -> String {
     let error = match (it.low, it.high) {
         (Some(low), Some(high)) => 0.05 * (high - low),
         _ => 0.0,
     };
-    let [value, low, high] =
-        [Some(it.value), it.low, it.high].map(|it| it.map(|it| short(rounded_to(it, error))));
+    let [value, low, high] = [Some(it.value), it.low, it.high]
+        .map(|it| it.map(|it| format_four_digits(round_to_error(it, error))));
     let value = value.unwrap_or_default();
     match (it.determined, low, high) {
         (true, Some(low), Some(high)) => format!("{value} ({low} to {high})"),
@@ -232,7 +238,7 @@ const VIEWS: [(&str, [usize; 2]); 3] = [
 ];
 
 /// A result in words, with its unit.
-fn result(kind: &str, units: &Units) -> Quantity {
+fn result_label(kind: &str, units: &Units) -> QuantityLabel {
     let (words, unit) = match kind.parse() {
         Ok(MeasuredQuantity::Tip(axis)) => (format!("{} of the tip", AXES[axis]), &units.length),
         Ok(MeasuredQuantity::Reaction(axis)) => {
@@ -246,7 +252,7 @@ fn result(kind: &str, units: &Units) -> Quantity {
         Err(()) => (kind.into(), &None),
     };
     let unit = unit.clone();
-    Quantity { words, unit }
+    QuantityLabel { words, unit }
 }
 
 /// Draws results of one kind with the model along what varied, and their residuals along the same;
@@ -256,27 +262,30 @@ pub fn draw_results(
     top: f64,
     letter: &str,
     units: &Units,
-    results: &Results,
+    results: &ResultSeries,
 ) -> f64 {
-    let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
-    let quantity = result(results.kind, units);
-    let values = results.all().flat_map(|(_, r)| {
+    let cell = PageRectangle::left_of_legend(top + PANEL_TITLE, RESULT, KEY);
+    let quantity = result_label(results.kind, units);
+    let values = results.all_residuals().flat_map(|(_, r)| {
         let (band, sd) = (r.band, 2.0 * r.sd);
         [r.data - sd, r.data + sd, r.model - band, r.model + band]
     });
     let up = Axis {
         emphasizes_zero: false,
-        ..Axis::holding(&quantity.axis(), values)
+        ..Axis::linear_covering(&quantity.axis_name(), values)
     };
-    let places = || results.all().map(|(x, _)| x);
-    let across = match results.along {
-        Some(keys) => Axis::holding(&Quantity::of(&keys.to_string(), units).axis(), places()),
+    let places = || results.all_residuals().map(|(x, _)| x);
+    let across = match results.abscissa_keys {
+        Some(keys) => Axis::linear_covering(
+            &QuantityLabel::from_keys(&keys.to_string(), units).axis_name(),
+            places(),
+        ),
         None => {
             let mut numbers: Vec<f64> = places().collect();
             numbers.dedup();
             let ends = [numbers.first(), numbers.last()].map(|end| end.copied().unwrap_or(1.0));
             Axis {
-                ticks: Ticks::At(numbers),
+                ticks: TickPlacement::WholeNumbers(numbers),
                 ..Axis::linear("experiment", ends[0] - 0.5, ends[1] + 0.5)
             }
         }
@@ -285,72 +294,83 @@ pub fn draw_results(
         labelled: false,
         ..across.clone()
     };
-    let axes = Axes::titled(page, cell, [letter, &quantity.words], unlabelled, up);
+    let axes = PanelAxes::draw_titled(page, cell, [letter, &quantity.words], unlabelled, up);
     for series in &results.series {
-        match results.along {
-            Some(_) => draw_model(page, &axes, series),
-            None => draw_single(page, &axes, series),
+        match results.abscissa_keys {
+            Some(_) => draw_model_curve(page, &axes, series),
+            None => draw_single_experiments(page, &axes, series),
         }
     }
-    for (x, r) in results.all() {
+    for (x, r) in results.all_residuals() {
         let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
-        axes.curve(page, &bar, Stroke::new(DOT, 1.0));
+        axes.draw_curve(page, &bar, Stroke::new(DOT, 1.0));
     }
-    axes.markers(
+    axes.draw_markers(
         page,
-        results.all().map(|(x, r)| (x, r.data)),
+        results.all_residuals().map(|(x, r)| (x, r.data)),
         Marker::Dot,
         DOT,
     );
-    let mut key = Key::right_of(cell);
-    key.marker(
+    let mut key = Legend::right_of(cell);
+    key.add_marker(
         page,
         "data",
         "with two standard deviations",
         Marker::Dot,
         DOT,
     );
-    key.line(page, "model", "", MODEL);
-    key.entry(
+    key.add_line(page, "model", "", MODEL);
+    key.add_entry(
         page,
         "95 % band",
         "what the data leave open",
         |page, cell| {
-            page.shape(rectangle(cell.corner, cell.size), BAND, None);
+            page.draw_shape(rectangle_path(cell.corner, cell.size), BAND, None);
         },
     );
-    let points = results.all().map(|(x, r)| (x, r.residual, INK)).collect();
+    let points = results
+        .all_residuals()
+        .map(|(x, r)| (x, r.residual, INK))
+        .collect();
     draw_residuals(page, cell, across, points)
 }
 
 /// Draws the model through a series of experiments, with its band.
-fn draw_model(page: &mut Drawing, axes: &Axes, series: &[(f64, &FitResidual)]) {
+fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitResidual)]) {
     let mut once = series.to_vec();
     once.dedup_by_key(|(x, _)| *x);
     let line = |of: &dyn Fn(&FitResidual) -> f64| -> Vec<DVec2> {
         let points: Vec<(f64, f64)> = once.iter().map(|(x, r)| (*x, of(r))).collect();
-        axes.smooth(&points).into_iter().flatten().collect()
+        axes.smooth_curve(&points).into_iter().flatten().collect()
     };
     let mut band = line(&|r| r.model + r.band);
     band.extend(line(&|r| r.model - r.band).into_iter().rev());
     if !band.is_empty() {
-        page.shape(polygon(&band), BAND, None);
+        page.draw_shape(polygon_path(&band), BAND, None);
     }
     let model: Vec<Option<DVec2>> = line(&|r| r.model).into_iter().map(Some).collect();
-    axes.line(page, &model, MODEL);
+    axes.draw_clipped_line(page, &model, MODEL);
     if let [(x, r)] = once[..] {
-        draw_single(page, axes, &[(x, r)]);
+        draw_single_experiments(page, axes, &[(x, r)]);
     }
 }
 
 /// Draws the model of single experiments, each with its band.
-fn draw_single(page: &mut Drawing, axes: &Axes, experiments: &[(f64, &FitResidual)]) {
+fn draw_single_experiments(
+    page: &mut Drawing,
+    axes: &PanelAxes,
+    experiments: &[(f64, &FitResidual)],
+) {
     for (x, r) in experiments {
-        let ends = [r.model + r.band, r.model - r.band].map(|y| axes.at((*x, y)));
-        if let ([Some(top), Some(end)], Some(at)) = (ends, axes.at((*x, r.model))) {
+        let ends = [r.model + r.band, r.model - r.band].map(|y| axes.page_position((*x, y)));
+        if let ([Some(top), Some(end)], Some(at)) = (ends, axes.page_position((*x, r.model))) {
             let half = DVec2::new(SINGLE, 0.0);
-            page.shape(rectangle(top - half, end - top + 2.0 * half), BAND, None);
-            page.line(at - half, at + half, MODEL);
+            page.draw_shape(
+                rectangle_path(top - half, end - top + 2.0 * half),
+                BAND,
+                None,
+            );
+            page.draw_line(at - half, at + half, MODEL);
         }
     }
 }
@@ -358,12 +378,12 @@ fn draw_single(page: &mut Drawing, axes: &Axes, experiments: &[(f64, &FitResidua
 /// Draws residuals below a panel along the same axis; returns where they end.
 fn draw_residuals(
     page: &mut Drawing,
-    above: Cell,
+    above: PageRectangle,
     across: Axis,
     points: Vec<(f64, f64, Color)>,
 ) -> f64 {
-    let corner = DVec2::new(above.corner.x, above.end().y + GAP);
-    let cell = Cell::new(corner, DVec2::new(above.size.x, RESIDUALS));
+    let corner = DVec2::new(above.corner.x, above.opposite_corner().y + GAP);
+    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS));
     let sizes = points.iter().map(|(_, residual, _)| residual.abs());
     let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
@@ -371,26 +391,26 @@ fn draw_residuals(
         tick_spacing: Some(RESIDUAL_TICKS),
         ..Axis::linear("residual", -most, most)
     };
-    let axes = Axes { cell, across, up };
+    let axes = PanelAxes { cell, across, up };
     axes.draw(page);
-    let two = Stroke::new(NOTE, 1.0).dashed(true);
+    let two = Stroke::new(NOTE, 1.0).with_dashes(true);
     for bound in [-2.0, 2.0] {
         let fraction = 1.0 - axes.up.fraction(bound);
         let from = corner + DVec2::new(0.0, fraction * cell.size.y);
-        page.line(from, from.with_x(cell.end().x), two);
+        page.draw_line(from, from.with_x(cell.opposite_corner().x), two);
     }
     for (x, residual, color) in points {
-        axes.markers(page, [(x, residual)], Marker::Dot, color);
+        axes.draw_markers(page, [(x, residual)], Marker::Dot, color);
     }
-    let mut key = Key::right_of(cell);
+    let mut key = Legend::right_of(cell);
     let note = "in standard deviations";
-    key.marker(page, "data less model", note, Marker::Dot, INK);
-    cell.end().y + PANEL_AXIS
+    key.add_marker(page, "data less model", note, Marker::Dot, INK);
+    cell.opposite_corner().y + PANEL_AXIS
 }
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
-pub fn draw_veins(
+pub fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -425,9 +445,9 @@ pub fn draw_veins(
             let curves = curves.map(|curve| curve.iter().map(flat).collect());
             let curves: Vec<Vec<(f64, f64)>> = curves.collect();
             let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
-            let name = |k: usize| with_unit(AXES[axes[k]], units.length.as_deref());
-            let across = Axis::holding(&name(0), all().map(|p| p.0));
-            let up = Axis::holding(&name(1), all().map(|p| p.1));
+            let name = |k: usize| name_with_unit(AXES[axes[k]], units.length.as_deref());
+            let across = Axis::linear_covering(&name(0), all().map(|p| p.0));
+            let up = Axis::linear_covering(&name(1), all().map(|p| p.1));
             (across, up, curves, points)
         })
         .collect();
@@ -443,31 +463,31 @@ pub fn draw_veins(
         "as it is" => "traced veins".to_string(),
         name => format!("traced veins, experiment {name}"),
     };
-    let mut below = Cell::left_of_key(top + PANEL_TITLE, height, KEY);
+    let mut below = PageRectangle::left_of_legend(top + PANEL_TITLE, height, KEY);
     for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
         let corner = DVec2::new(LEFT + k as f64 * (width + VIEWS_GAP), top + PANEL_TITLE);
-        let cell = Cell::new(corner, DVec2::new(width, height));
+        let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
         let what = format!("{experiment}, {view}");
-        let (across, up) = equal_scales(across, up, cell.size);
-        let panel = Axes::titled(page, cell, [letter, &what], across, up);
+        let (across, up) = equalize_axis_scales(across, up, cell.size);
+        let panel = PanelAxes::draw_titled(page, cell, [letter, &what], across, up);
         for (rod, line) in curves.iter().enumerate() {
-            let drawn = panel.smooth(line).into_iter().flatten().map(Some);
+            let drawn = panel.smooth_curve(line).into_iter().flatten().map(Some);
             let stroke = Stroke::new(color_of_vein(rod, count), 1.4);
-            panel.line(page, &drawn.collect::<Vec<_>>(), stroke);
+            panel.draw_clipped_line(page, &drawn.collect::<Vec<_>>(), stroke);
         }
         for (rod, point) in points {
-            if let Some(at) = panel.at(point) {
+            if let Some(at) = panel.page_position(point) {
                 let rim = Stroke::new(color_of_vein(rod, count), 1.2);
-                page.shape(circle(at, 2.6), WHITE, Some(rim));
+                page.draw_shape(circle_path(at, 2.6), WHITE, Some(rim));
             }
         }
         if views.len() == 1 {
-            let mut key = Key::right_of(cell);
-            key.line(page, "model", "each vein in its colour", MODEL);
-            key.entry(page, "traced points", "", |page, cell| {
+            let mut key = Legend::right_of(cell);
+            key.add_line(page, "model", "each vein in its colour", MODEL);
+            key.add_entry(page, "traced points", "", |page, cell| {
                 let rim = Stroke::new(BLUE, 1.2);
-                page.shape(circle(cell.middle(), 2.6), WHITE, Some(rim));
+                page.draw_shape(circle_path(cell.middle(), 2.6), WHITE, Some(rim));
             });
         }
     }
@@ -481,7 +501,7 @@ pub fn draw_veins(
 }
 
 /// The axes, one widened so that both have the same number of pixels per length.
-fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
+fn equalize_axis_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
     let extents = [across.end - across.start, up.end - up.start];
     let unit = (extents[0] / size.x).max(extents[1] / size.y);
     for (axis, pixels) in [(&mut across, size.x), (&mut up, size.y)] {
@@ -499,29 +519,29 @@ const FEWEST: usize = 4;
 const IN_LINE: f64 = 1e-6;
 
 /// Results of one kind, drawn in one panel.
-pub struct Results<'f> {
+pub struct ResultSeries<'f> {
     /// As in the data: `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
     /// experiments.
-    pub along: Option<&'f Keys>,
+    pub abscissa_keys: Option<&'f ParameterKeys>,
     /// Series along it, each with its values in ascending order.
     pub series: Vec<Vec<(f64, &'f FitResidual)>>,
 }
 
-impl<'f> Results<'f> {
-    pub fn all(&self) -> impl Iterator<Item = (f64, &'f FitResidual)> {
+impl<'f> ResultSeries<'f> {
+    pub fn all_residuals(&self) -> impl Iterator<Item = (f64, &'f FitResidual)> {
         self.series.iter().flatten().copied()
     }
 }
 
-type Settings = [(Keys, f64)];
+type ExperimentSettings = [(ParameterKeys, f64)];
 
 /// The results of all experiments by their kinds. Those of experiments that differ along a line, as
 /// one column varies or several together, are a series; those of others keep their numbers.
-pub fn results(fit: &Fit) -> Vec<Results<'_>> {
+pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     let leaves = fit.leaves.iter();
-    let settings: HashMap<usize, &Settings> = leaves
+    let settings: HashMap<usize, &ExperimentSettings> = leaves
         .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))
         .collect();
     let mut kinds: Vec<(&str, Vec<&FitResidual>)> = Vec::new();
@@ -534,17 +554,17 @@ pub fn results(fit: &Fit) -> Vec<Results<'_>> {
     let mut all = Vec::new();
     for (kind, of) in kinds {
         let first = all.len();
-        let own: Vec<&Settings> = (of.iter())
+        let own: Vec<&ExperimentSettings> = (of.iter())
             .map(|it| settings.get(&it.number).copied().unwrap_or_default())
             .collect();
         let mut numbered = Vec::new();
         let mut from = 0;
         while from < of.len() {
-            let whole = (from == 0).then(|| varied(&own)).flatten();
+            let whole = (from == 0).then(|| most_varying_setting(&own)).flatten();
             let found = match whole {
                 Some(key) => Some((of.len(), key)),
                 None => (from + FEWEST..=of.len())
-                    .map_while(|to| Some((to, varied(&own[from..to])?)))
+                    .map_while(|to| Some((to, most_varying_setting(&own[from..to])?)))
                     .last(),
             };
             let Some((to, key)) = found else {
@@ -557,20 +577,20 @@ pub fn results(fit: &Fit) -> Vec<Results<'_>> {
             series.sort_by(|a, b| a.0.total_cmp(&b.0));
             let along = Some(keys);
             let mut of_kind = all[first..].iter_mut();
-            match of_kind.find(|it: &&mut Results| it.along == along) {
+            match of_kind.find(|it: &&mut ResultSeries| it.abscissa_keys == along) {
                 Some(same) => same.series.push(series),
-                None => all.push(Results {
+                None => all.push(ResultSeries {
                     kind,
-                    along,
+                    abscissa_keys: along,
                     series: vec![series],
                 }),
             }
             from = to;
         }
         if !numbered.is_empty() {
-            all.push(Results {
+            all.push(ResultSeries {
                 kind,
-                along: None,
+                abscissa_keys: None,
                 series: vec![numbered],
             });
         }
@@ -579,9 +599,9 @@ pub fn results(fit: &Fit) -> Vec<Results<'_>> {
 }
 
 /// Which of their numbers varies most, if the experiments differ along a line.
-fn varied(settings: &[&Settings]) -> Option<usize> {
+fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
     let first = settings.first()?;
-    let same = |it: &&Settings| {
+    let same = |it: &&ExperimentSettings| {
         it.iter()
             .map(|(keys, _)| keys)
             .eq(first.iter().map(|(keys, _)| keys))
@@ -596,7 +616,7 @@ fn varied(settings: &[&Settings]) -> Option<usize> {
                 .fold(0.0, |most: f64, it| most.max(it[k].1.abs()))
         })
         .collect();
-    let from_first = |it: &&Settings| -> Vec<f64> {
+    let from_first = |it: &&ExperimentSettings| -> Vec<f64> {
         let each = it.iter().zip(first.iter()).zip(&sizes);
         each.map(|((a, b), size)| if *size > 0.0 { (a.1 - b.1) / size } else { 0.0 })
             .collect()
@@ -634,7 +654,7 @@ fn varied(settings: &[&Settings]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn rows(keys: [&str; 2], values: &[[f64; 2]]) -> Vec<Vec<(Keys, f64)>> {
+    fn rows(keys: [&str; 2], values: &[[f64; 2]]) -> Vec<Vec<(ParameterKeys, f64)>> {
         let row = |values: &[f64; 2]| {
             let each = keys.iter().zip(values);
             each.map(|(key, value)| (key.parse().unwrap(), *value))
@@ -647,7 +667,7 @@ mod tests {
     fn experiments_in_line_vary_by_one_number() {
         let of = |values: &[[f64; 2]]| {
             let rows = rows(["load.tip_force[0]", "load.tip_force[2]"], values);
-            varied(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>())
+            most_varying_setting(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>())
         };
         assert_eq!(of(&[[0.0, 1.0], [0.0, 2.0], [0.0, 5.0]]), Some(1));
         // Two that vary together, one more than the other.

@@ -4,22 +4,24 @@
 //!
 //! One panel of a map: its cells in the colours of their outcomes.
 
-use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    Cell, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE,
-    WIDTH, header,
+    LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TEXT_SIZE,
+    TICK_SIZE, WIDTH, draw_header,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, WHITE, circle, rectangle, vein_color,
+    CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, rectangle_path,
+    vein_color,
 };
-use crate::figure::scenario::{Quantity, with_unit};
-use crate::report::map_shows;
+use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::report::map_title;
 use glam::DVec2;
 use leafdyn::scenario::Units;
 use leafdyn::study::{
-    Confidence, Knob, Map, MapMethod, MapOutcome, MapRequest, MapRow, MapShow, Vary,
+    Map, MapMethod, MapOutcome, MapRequest, MapRow, MapShow, ParameterSweep, ReferenceConfidence,
+    SolverSetting,
 };
 
 const SWATCH: f64 = 12.0;
@@ -61,22 +63,22 @@ const COUNT: f64 = 100.0;
 
 pub fn draw(map: &Map) -> Drawing {
     let name = &map.request.base.scenario().name;
-    let title = format!("{name}: {}", map_shows(map.show));
+    let title = format!("{name}: {}", map_title(map.show));
     let width = match (map.request.axes.len(), map.request.methods.len()) {
         (2, 1) => NARROW,
         _ => WIDTH,
     };
     let mut drawing = Drawing::new(width, &title);
     let mut end = 0.0;
-    drawing.group("header", |page| {
-        header(page, LEFT, &title, &notes(map), None);
-        end = draw_key(page, map, NOTE_BASE + 20.0);
+    drawing.draw_group("header", |page| {
+        draw_header(page, LEFT, &title, &header_notes(map), None);
+        end = draw_legend(page, map, NOTE_BASE + 20.0);
         if map.show == MapShow::Waves {
-            end = draw_meaning(page, end);
+            end = draw_waves_explanation(page, end);
         }
     });
-    let axes: Vec<Varied> = (map.request.axes.iter())
-        .map(|axis| Varied::of(axis, &map.request.base.scenario().units))
+    let axes: Vec<VariedAxis> = (map.request.axes.iter())
+        .map(|axis| VariedAxis::from_sweep(axis, &map.request.base.scenario().units))
         .collect();
     drawing.height = match axes.split_first() {
         Some((x, more)) => draw_panels(&mut drawing, map, x, more.first(), end),
@@ -85,9 +87,9 @@ pub fn draw(map: &Map) -> Drawing {
     drawing
 }
 
-fn notes(map: &Map) -> Vec<String> {
+fn header_notes(map: &Map) -> Vec<String> {
     let request = &map.request;
-    let (known, confirmed) = map.known_and_confirmed();
+    let (known, confirmed) = map.known_and_confirmed_cells();
     let mut axes = request.axes.iter();
     let mut notes = Vec::new();
     if !axes.any(|axis| axis.keys.to_string() == "leaf.rods") {
@@ -98,26 +100,30 @@ fn notes(map: &Map) -> Vec<String> {
         _ => format!("{known} cells"),
     });
     notes.push(format!("reference confirmed in {confirmed}"));
-    if let Some(segments) = request.base.knobs().segments {
+    if let Some(segments) = request.base.solver_settings().segments {
         notes.push(format!("{segments} segments a vein"));
     }
     notes
 }
 
 /// Draws the key of the outcomes and marks that occur; returns where it ends.
-fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
-    let mut key = KeyRows::at(LEFT, base, SWATCH);
+fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
+    let mut key = LegendRows::starting_at(LEFT, base, SWATCH);
     for outcome in MapOutcome::ALL {
-        let shown = |row: &MapRow| row.outcome == outcome && waves(map.show, row).is_none();
+        let shown =
+            |row: &MapRow| row.outcome == outcome && stable_waves_shown(map.show, row).is_none();
         if map.rows.iter().any(shown) {
             let name = match outcome {
                 MapOutcome::Saddle => "saddle, with its index".to_string(),
                 outcome => outcome.word().replace('-', " "),
             };
-            key.entry(page, &name, |page, cell| fill(page, cell, outcome));
+            key.add_entry(page, &name, |page, cell| fill_outcome(page, cell, outcome));
         }
     }
-    let counts = map.rows.iter().filter_map(|row| waves(map.show, row));
+    let counts = map
+        .rows
+        .iter()
+        .filter_map(|row| stable_waves_shown(map.show, row));
     let mut counts: Vec<f64> = counts.collect();
     counts.sort_by(f64::total_cmp);
     counts.dedup();
@@ -127,30 +133,32 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
             1.0 => "1 wave".into(),
             waves => format!("{waves} waves"),
         };
-        key.entry(page, &name, |page, cell| fill_waves(page, cell, waves));
+        key.add_entry(page, &name, |page, cell| fill_waves(page, cell, waves));
     }
     for (reference, name) in [
-        (Confidence::Unconfirmed, "reference unconfirmed"),
-        (Confidence::None, "no reference"),
+        (ReferenceConfidence::Unconfirmed, "reference unconfirmed"),
+        (ReferenceConfidence::None, "no reference"),
     ] {
         if map.rows.iter().any(|row| row.reference == reference) {
-            key.entry(page, name, |page, cell| mark(page, cell, reference));
+            key.add_entry(page, name, |page, cell| {
+                mark_unconfirmed_reference(page, cell, reference)
+            });
         }
     }
     if has_step_axis(map) {
-        key.entry(page, "longest step known to be stable", |page, cell| {
-            cell.line(page, BOUND);
+        key.add_entry(page, "longest step known to be stable", |page, cell| {
+            cell.draw_midline(page, BOUND);
         });
     }
-    key.end()
+    key.bottom()
 }
 
 /// Draws the explanation of a map of waves; returns where it ends.
-fn draw_meaning(page: &mut Drawing, mut top: f64) -> f64 {
+fn draw_waves_explanation(page: &mut Drawing, mut top: f64) -> f64 {
     let room = page.width - LEFT - RIGHT;
-    for line in Font::embedded().wrapped(MEANING, TICK_SIZE, room) {
+    for line in Font::embedded().wrap_text(MEANING, TICK_SIZE, room) {
         let base = DVec2::new(LEFT, top + TICK_SIZE);
-        page.label(base, &line, TICK_SIZE, Anchor::Start, NOTE);
+        page.draw_label(base, &line, TICK_SIZE, TextAnchor::Start, NOTE);
         top += 1.4 * TICK_SIZE;
     }
     top + 6.0
@@ -160,14 +168,14 @@ fn draw_meaning(page: &mut Drawing, mut top: f64) -> f64 {
 fn has_step_axis(map: &Map) -> bool {
     let mut axes = map.request.axes.iter();
     map.request.methods.contains(&MapMethod::ExplicitMotion)
-        && axes.any(|axis| axis.keys.sets(Knob::Step))
+        && axes.any(|axis| axis.keys.contains_solver_setting(SolverSetting::Step))
 }
 
-fn count(map: &Map, method: MapMethod) -> String {
+fn outcome_count_text(map: &Map, method: MapMethod) -> String {
     let waving = |row: &&MapRow| row.method == method && row.stable_waves() > Some(0.0);
     let (count, what) = match map.show {
         MapShow::Waves => (map.rows.iter().filter(waving).count(), "wave"),
-        MapShow::Outcomes => (map.count(method, MapOutcome::Right), "right"),
+        MapShow::Outcomes => (map.outcome_count(method, MapOutcome::Right), "right"),
     };
     format!("{count} of {} {what}", map.request.cells())
 }
@@ -177,8 +185,8 @@ fn count(map: &Map, method: MapMethod) -> String {
 fn draw_panels(
     drawing: &mut Drawing,
     map: &Map,
-    x: &Varied,
-    y: Option<&Varied>,
+    x: &VariedAxis,
+    y: Option<&VariedAxis>,
     start: f64,
 ) -> f64 {
     let methods = &map.request.methods;
@@ -199,50 +207,56 @@ fn draw_panels(
             (DVec2::new(left, start + 10.0), size, pitch)
         }
     };
-    let mut last = Cell { corner, size };
+    let mut last = PageRectangle { corner, size };
     for (i, &method) in methods.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        let cell = Cell::new(corner + place * pitch, size);
+        let cell = PageRectangle::new(corner + place * pitch, size);
         // A single strip has its axis below the curves.
         let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
-        drawing.group(method.word(), |page| {
-            draw_method(page, map, method, cell, y.is_some());
-            let panel = Panel::new(cell, x, y, labelled);
+        drawing.draw_group(method.word(), |page| {
+            draw_method_name(page, map, method, cell, y.is_some());
+            let panel = MapPanel::new(cell, x, y, labelled);
             let rows = map.rows.iter().filter(|row| row.method == method);
             panel.draw(page, map.show, rows);
             if method == MapMethod::ExplicitMotion && has_step_axis(map) {
-                panel.draw_bound(page, &map.request);
+                panel.draw_stable_step(page, &map.request);
             }
         });
         last = cell;
     }
     if let (None, [_]) = (y, methods.as_slice()) {
-        return draw_curves(drawing, map, x, last, last.end().y + CURVES_GAP);
+        return draw_curves(drawing, map, x, last, last.opposite_corner().y + CURVES_GAP);
     }
-    let end = last.end().y + TICKS;
+    let end = last.opposite_corner().y + TICKS;
     let across = columns as f64 * (size.x + GAP) - GAP;
     let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
-    drawing.label(below, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
+    drawing.draw_label(below, &x.axis.title(), TEXT_SIZE, TextAnchor::Middle, INK);
     if let Some(y) = y {
-        let middle = DVec2::new(24.0, 0.5 * (corner.y + last.end().y));
-        drawing.rotated_label(middle, &y.axis.title(), TEXT_SIZE, INK);
+        let middle = DVec2::new(24.0, 0.5 * (corner.y + last.opposite_corner().y));
+        drawing.draw_rotated_label(middle, &y.axis.title(), TEXT_SIZE, INK);
     }
     end + NAME
 }
 
 /// Draws a method's name and count, above a panel or to both sides of a strip.
-fn draw_method(page: &mut Drawing, map: &Map, method: MapMethod, cell: Cell, above: bool) {
-    let (name, count) = (method.word(), count(map, method));
+fn draw_method_name(
+    page: &mut Drawing,
+    map: &Map,
+    method: MapMethod,
+    cell: PageRectangle,
+    above: bool,
+) {
+    let (name, count) = (method.word(), outcome_count_text(map, method));
     if above {
         let base = cell.corner - DVec2::new(0.0, 8.0);
-        page.label(base, name, TEXT_SIZE, Anchor::Start, INK);
-        let base = base.with_x(cell.end().x);
-        return page.label(base, &count, TICK_SIZE, Anchor::End, NOTE);
+        page.draw_label(base, name, TEXT_SIZE, TextAnchor::Start, INK);
+        let base = base.with_x(cell.opposite_corner().x);
+        return page.draw_label(base, &count, TICK_SIZE, TextAnchor::End, NOTE);
     }
     let [left, right] = cell.midline();
     let gap = DVec2::new(10.0, 0.0);
-    page.centered_label(left - gap, name, TEXT_SIZE, Anchor::End, INK);
-    page.centered_label(right + gap, &count, TICK_SIZE, Anchor::Start, NOTE);
+    page.draw_centered_label(left - gap, name, TEXT_SIZE, TextAnchor::End, INK);
+    page.draw_centered_label(right + gap, &count, TICK_SIZE, TextAnchor::Start, NOTE);
 }
 
 /// Smaller variations are rounding.
@@ -256,14 +270,14 @@ const LOW: f64 = 150.0;
 type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
 
 /// The titles of the panels, the names of their axes, and their curves.
-fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
+fn curve_panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
     let units = &map.request.base.scenario().units;
     let length = units.length.as_deref();
     match map.show {
         MapShow::Outcomes => vec![
             (
                 "where the tip is",
-                with_unit("tip", length),
+                name_with_unit("tip", length),
                 vec![
                     ("x", CURVES[0], |row| row.tip_x),
                     ("y", CURVES[1], |row| row.tip_y),
@@ -272,7 +286,7 @@ fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
             ),
             (
                 "energy",
-                with_unit("energy", units.energy().as_deref()),
+                name_with_unit("energy", units.energy().as_deref()),
                 vec![("energy", CURVES[3], |row| row.energy)],
             ),
         ],
@@ -284,14 +298,14 @@ fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
             ),
             (
                 "their amplitude",
-                with_unit("amplitude", Some("L")),
+                name_with_unit("amplitude", Some("L")),
                 vec![("amplitude", CURVES[1], |row| {
                     row.stable_waves().and(row.margin_amplitude)
                 })],
             ),
             (
                 "mean twist of the veins",
-                with_unit("twist", Some("rad")),
+                name_with_unit("twist", Some("rad")),
                 vec![("twist", CURVES[3], |row| row.twist)],
             ),
         ],
@@ -299,12 +313,18 @@ fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
 }
 
 /// Draws the curves below `start`, as wide as the strip. Returns where they end.
-fn draw_curves(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) -> f64 {
+fn draw_curves(
+    page: &mut Drawing,
+    map: &Map,
+    x: &VariedAxis,
+    strip: PageRectangle,
+    start: f64,
+) -> f64 {
     let values = &map.request.axes[0].values;
     let mut top = start;
-    for (what, name, curves) in panels(map) {
+    for (what, name, curves) in curve_panels(map) {
         let height = if curves.len() > 1 { TALL } else { LOW };
-        let cell = Cell::new(
+        let cell = PageRectangle::new(
             DVec2::new(strip.corner.x, top + PANEL_TITLE),
             DVec2::new(strip.size.x, height),
         );
@@ -317,17 +337,18 @@ fn draw_curves(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f6
         });
         let lines: Vec<_> = lines.collect();
         let known = lines.iter().flatten().map(|point| point.1);
-        let up = Axis::holding(&name, known.filter(|value| value.is_finite())).at_least(ROUNDING);
-        page.group("curves", |page| {
-            let axes = Axes::titled(page, cell, ["", what], x.axis.clone(), up);
-            let mut key = Key::right_of(cell);
+        let up = Axis::linear_covering(&name, known.filter(|value| value.is_finite()))
+            .with_least_extent(ROUNDING);
+        page.draw_group("curves", |page| {
+            let axes = PanelAxes::draw_titled(page, cell, ["", what], x.axis.clone(), up);
+            let mut key = Legend::right_of(cell);
             for ((name, color, _), line) in curves.iter().zip(lines) {
-                axes.curve(page, &line, Stroke::new(*color, 1.6));
-                axes.markers(page, line, Marker::Dot, *color);
-                key.marked_line(page, name, "", *color);
+                axes.draw_curve(page, &line, Stroke::new(*color, 1.6));
+                axes.draw_markers(page, line, Marker::Dot, *color);
+                key.add_marked_line(page, name, "", *color);
             }
         });
-        top = cell.end().y + PANEL_AXIS;
+        top = cell.opposite_corner().y + PANEL_AXIS;
     }
     top
 }
@@ -348,7 +369,7 @@ const MOST_WAVES: f64 = 2.5;
 
 /// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
 /// light. Those that are alike without colours also differ in their marks.
-fn color(outcome: MapOutcome) -> Color {
+fn outcome_color(outcome: MapOutcome) -> Color {
     match outcome {
         MapOutcome::Right => Color(170, 214, 240),
         MapOutcome::OtherEquilibrium => Color(240, 228, 66),
@@ -362,18 +383,22 @@ fn color(outcome: MapOutcome) -> Color {
 }
 
 /// Waves along the margins, where these are shown and the leaf is stable.
-pub fn waves(show: MapShow, row: &MapRow) -> Option<f64> {
+pub fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
 /// Fills a cell, with the mark of its outcome if it has one and is large enough.
-pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
-    page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
+pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
+    page.draw_shape(
+        rectangle_path(cell.corner, cell.size),
+        outcome_color(outcome),
+        None,
+    );
     if cell.size.min_element() < SEPARATE {
         return;
     }
     let inset = 0.25 * cell.size;
-    let (low, high) = (cell.corner + inset, cell.end() - inset);
+    let (low, high) = (cell.corner + inset, cell.opposite_corner() - inset);
     let rising = (low.with_y(high.y), high.with_y(low.y));
     let level = (low.with_y(cell.middle().y), high.with_y(cell.middle().y));
     let (color, lines): (Color, &[(DVec2, DVec2)]) = match outcome {
@@ -384,23 +409,23 @@ pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
         _ => return,
     };
     for &(from, to) in lines {
-        page.line(from, to, Stroke::new(color, 1.0));
+        page.draw_line(from, to, Stroke::new(color, 1.0));
     }
 }
 
-pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
+pub fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
     let color = match waves {
         0.0 => PALE,
         waves => vein_color((waves - 1.0) / (MOST_WAVES - 1.0)),
     };
-    page.shape(rectangle(cell.corner, cell.size), color, None);
+    page.draw_shape(rectangle_path(cell.corner, cell.size), color, None);
 }
 
 /// Indices from this one on have the same colour.
 pub const DARKEST_INDEX: usize = 4;
 
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
-pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
+pub fn fill_index(page: &mut Drawing, cell: PageRectangle, index: usize) {
     let color = match index {
         0 => PALE,
         1 => Color(255, 240, 222),
@@ -408,34 +433,38 @@ pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
         3 => Color(246, 204, 168),
         _ => Color(236, 182, 144),
     };
-    page.shape(rectangle(cell.corner, cell.size), color, None);
+    page.draw_shape(rectangle_path(cell.corner, cell.size), color, None);
 }
 
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
 /// none.
-pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
+pub fn mark_unconfirmed_reference(
+    page: &mut Drawing,
+    cell: PageRectangle,
+    reference: ReferenceConfidence,
+) {
     let radius = (0.14 * cell.size.min_element()).clamp(1.0, 2.2);
-    let at = cell.corner.with_x(cell.end().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
+    let at = cell.corner.with_x(cell.opposite_corner().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
     let (color, rim) = match reference {
-        Confidence::Confirmed => return,
-        Confidence::Unconfirmed => (INK, Stroke::new(WHITE, 0.5)),
-        Confidence::None => (WHITE, Stroke::new(INK, 0.8)),
+        ReferenceConfidence::Confirmed => return,
+        ReferenceConfidence::Unconfirmed => (INK, Stroke::new(WHITE, 0.5)),
+        ReferenceConfidence::None => (WHITE, Stroke::new(INK, 0.8)),
     };
-    page.shape(circle(at, radius), color, Some(rim));
+    page.draw_shape(circle_path(at, radius), color, Some(rim));
 }
 
 /// Stroke of the longest stable step.
 pub const BOUND: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
-pub struct Varied {
+pub struct VariedAxis {
     pub axis: Axis,
     /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
 }
 
-impl Varied {
+impl VariedAxis {
     /// Cells in the order given, each around its value.
-    pub fn of(vary: &Vary, units: &Units) -> Self {
+    pub fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -450,33 +479,38 @@ impl Varied {
         };
         edges.insert(0, start);
         edges.push(end);
-        let name = Quantity::of(&vary.keys.to_string(), units).axis();
+        let name = QuantityLabel::from_keys(&vary.keys.to_string(), units).axis_name();
         let mut axis = Axis::linear(&name, start, end);
         axis.sign = sign;
         if vary.keys.is_whole() {
-            axis.ticks = Ticks::At(vary.values.clone());
+            axis.ticks = TickPlacement::WholeNumbers(vary.values.clone());
         }
         let part = |edge: f64| (edge - start) / (end - start);
-        Varied {
+        VariedAxis {
             axis,
             edges: edges.into_iter().map(part).collect(),
         }
     }
 
-    fn cells(&self) -> usize {
+    fn cell_count(&self) -> usize {
         self.edges.len() - 1
     }
 }
 
 /// A panel; with one axis it is a strip.
-pub struct Panel<'a> {
-    axes: Axes,
-    x: &'a Varied,
-    y: Option<&'a Varied>,
+pub struct MapPanel<'a> {
+    axes: PanelAxes,
+    x: &'a VariedAxis,
+    y: Option<&'a VariedAxis>,
 }
 
-impl<'a> Panel<'a> {
-    pub fn new(cell: Cell, x: &'a Varied, y: Option<&'a Varied>, labelled: bool) -> Self {
+impl<'a> MapPanel<'a> {
+    pub fn new(
+        cell: PageRectangle,
+        x: &'a VariedAxis,
+        y: Option<&'a VariedAxis>,
+        labelled: bool,
+    ) -> Self {
         // Panels share the names of their axes.
         let unnamed = |axis: &Axis| Axis {
             name: String::new(),
@@ -487,12 +521,12 @@ impl<'a> Panel<'a> {
             ..unnamed(&x.axis)
         };
         let strip = Axis {
-            ticks: Ticks::At(Vec::new()),
+            ticks: TickPlacement::WholeNumbers(Vec::new()),
             ..Axis::linear("", 0.0, 1.0)
         };
         let up = y.map_or(strip, |y| unnamed(&y.axis));
-        let axes = Axes { cell, across, up };
-        Panel { axes, x, y }
+        let axes = PanelAxes { cell, across, up };
+        MapPanel { axes, x, y }
     }
 
     /// Cells are counted along the last axis first.
@@ -503,31 +537,31 @@ impl<'a> Panel<'a> {
         rows: impl Iterator<Item = &'r MapRow>,
     ) {
         for row in rows {
-            self.draw_cell(page, row, waves(show, row));
+            self.draw_cell(page, row, stable_waves_shown(show, row));
         }
-        self.axes.draw_frame(page);
+        self.axes.draw_without_grid(page);
     }
 
-    fn place(&self, i: usize) -> (usize, usize) {
-        let along_y = self.y.map_or(1, Varied::cells);
+    fn cell_indices(&self, i: usize) -> (usize, usize) {
+        let along_y = self.y.map_or(1, VariedAxis::cell_count);
         (i / along_y, i % along_y)
     }
 
-    fn rectangle(&self, i: usize) -> Cell {
-        let Cell { corner, size } = self.axes.cell;
-        let (column, row) = self.place(i);
+    fn cell_rectangle(&self, i: usize) -> PageRectangle {
+        let PageRectangle { corner, size } = self.axes.cell;
+        let (column, row) = self.cell_indices(i);
         let (left, right) = (self.x.edges[column], self.x.edges[column + 1]);
         let (low, high) = self
             .y
             .map_or((0.0, 1.0), |y| (y.edges[row], y.edges[row + 1]));
-        Cell::new(
+        PageRectangle::new(
             corner + size * DVec2::new(left, 1.0 - high),
             size * DVec2::new(right - left, high - low),
         )
     }
 
     fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
-        let mut cell = self.rectangle(row.cell);
+        let mut cell = self.cell_rectangle(row.cell);
         let large = cell.size.min_element() >= SEPARATE;
         if large {
             let inset = DVec2::splat(0.4);
@@ -536,10 +570,10 @@ impl<'a> Panel<'a> {
         }
         match waves {
             Some(waves) => fill_waves(page, cell, waves),
-            None => fill(page, cell, row.outcome),
+            None => fill_outcome(page, cell, row.outcome),
         }
         if large {
-            mark(page, cell, row.reference);
+            mark_unconfirmed_reference(page, cell, row.reference);
         }
         let number = match (row.outcome, row.index, waves) {
             (MapOutcome::Saddle, Some(index), _) => index.to_string(),
@@ -547,32 +581,46 @@ impl<'a> Panel<'a> {
             _ => return,
         };
         if cell.size.min_element() >= NUMBERED {
-            page.centered_label(cell.middle(), &number, NUMBER_SIZE, Anchor::Middle, WHITE);
+            page.draw_centered_label(
+                cell.middle(),
+                &number,
+                NUMBER_SIZE,
+                TextAnchor::Middle,
+                WHITE,
+            );
         }
     }
 
     /// Draws the longest step known to be stable, across every row or column.
-    pub fn draw_bound(&self, page: &mut Drawing, request: &MapRequest) {
-        let along_x = request.axes[0].keys.sets(Knob::Step);
+    pub fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
+        let along_x = request.axes[0]
+            .keys
+            .contains_solver_setting(SolverSetting::Step);
         let inside = |fraction: &f64| (0.0..=1.0).contains(fraction);
         for i in 0..request.cells() {
-            let (column, row) = self.place(i);
+            let (column, row) = self.cell_indices(i);
             let (first, axis) = match along_x {
                 true => (column == 0, &self.axes.across),
                 false => (row == 0, &self.axes.up),
             };
-            let step = request.stable_step(i).filter(|_| first);
+            let step = request.longest_stable_step(i).filter(|_| first);
             let fraction = step.map(|step| axis.fraction(step));
             let Some(fraction) = fraction.filter(inside) else {
                 continue;
             };
-            let (tile, Cell { corner, size }) = (self.rectangle(i), self.axes.cell);
+            let (tile, PageRectangle { corner, size }) = (self.cell_rectangle(i), self.axes.cell);
             let place = corner + size * DVec2::new(fraction, 1.0 - fraction);
             let (from, to) = match along_x {
-                true => (tile.corner.with_x(place.x), tile.end().with_x(place.x)),
-                false => (tile.corner.with_y(place.y), tile.end().with_y(place.y)),
+                true => (
+                    tile.corner.with_x(place.x),
+                    tile.opposite_corner().with_x(place.x),
+                ),
+                false => (
+                    tile.corner.with_y(place.y),
+                    tile.opposite_corner().with_y(place.y),
+                ),
             };
-            page.line(from, to, BOUND);
+            page.draw_line(from, to, BOUND);
         }
     }
 }
@@ -580,16 +628,16 @@ impl<'a> Panel<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
 
     fn svg(map: &Map) -> String {
-        text(&draw(map))
+        checked_svg_text(&draw(map))
     }
 
     #[test]
     fn every_method_and_outcome_is_named() {
-        let map = sample::map();
+        let map = sample::sample_map();
         let svg = svg(&map);
         for method in MapMethod::ALL {
             assert!(svg.contains(&format!(">{method}</text>")), "{method}");
@@ -605,7 +653,7 @@ mod tests {
 
     #[test]
     fn waves_are_shown_in_place_of_outcomes() {
-        let mut map = sample::map();
+        let mut map = sample::sample_map();
         assert!(!svg(&map).contains("waves"));
         map.show = MapShow::Waves;
         let svg = svg(&map);
@@ -618,7 +666,7 @@ mod tests {
 
     #[test]
     fn one_method_along_one_axis_is_drawn_as_curves() {
-        let mut map = sample::map();
+        let mut map = sample::sample_map();
         map.request.axes.remove(0);
         map.request.methods.truncate(1);
         map.rows
@@ -634,7 +682,7 @@ mod tests {
         assert_eq!(curves(&svg), [6, 2]);
         assert!(svg.contains("where the tip is") && svg.contains(">energy<"));
         // Not of several methods, nor over two axes.
-        assert!(curves(&self::svg(&sample::map())).is_empty());
+        assert!(curves(&self::svg(&sample::sample_map())).is_empty());
         map.show = MapShow::Waves;
         let svg = self::svg(&map);
         assert_eq!(curves(&svg), [2, 2, 2]);
@@ -643,7 +691,7 @@ mod tests {
 
     #[test]
     fn one_axis_and_missing_cells_are_drawn() {
-        let mut map = sample::map();
+        let mut map = sample::sample_map();
         map.request.axes.remove(0);
         map.rows.retain(|row| row.cell < 3);
         let svg = svg(&map);
@@ -655,10 +703,10 @@ mod tests {
 #[cfg(test)]
 mod panel_tests {
     use super::*;
-    use crate::figure::drawing::axes::Direction;
+    use crate::figure::drawing::axes::AxisOrientation;
 
-    fn varied(given: &str) -> Varied {
-        Varied::of(&given.parse().unwrap(), &Units::default())
+    fn parse_varied_axis(given: &str) -> VariedAxis {
+        VariedAxis::from_sweep(&given.parse().unwrap(), &Units::default())
     }
 
     #[test]
@@ -670,7 +718,7 @@ mod panel_tests {
             "leaf.rods=1..40:6log",
             "rest.twist=3..4:1",
         ] {
-            let edges = varied(given).edges;
+            let edges = parse_varied_axis(given).edges;
             assert_eq!(edges[0], 0.0, "{given}");
             assert_eq!(edges[edges.len() - 1], 1.0, "{given}");
             assert!(edges.windows(2).all(|pair| pair[0] < pair[1]), "{given}");
@@ -680,7 +728,9 @@ mod panel_tests {
     #[test]
     fn ticks_are_readable() {
         let texts = |given: &str, length: f64| -> Vec<String> {
-            let ticks = varied(given).axis.ticks(length, Direction::Across);
+            let ticks = parse_varied_axis(given)
+                .axis
+                .ticks(length, AxisOrientation::Horizontal);
             ticks.into_iter().map(|tick| tick.text).collect()
         };
         let decades = texts("load.gravity[2]=-1e-3..-10:5log", 230.0);

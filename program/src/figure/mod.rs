@@ -26,15 +26,13 @@ pub use crate::figure::fit::draw as fit;
 pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria};
 pub use crate::figure::map::draw as map;
 pub use crate::figure::modes::draw as modes;
-pub use crate::figure::motion::{
-    draw_energies as energy, draw_filmstrip as filmstrip, write as film,
-};
+pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as filmstrip, write_film};
 pub use crate::figure::sensitivity::draw as sensitivity;
 pub use crate::figure::trace::draw as trace;
 use leafdyn::scenario::Scenario;
 
 /// Draws a result of a scenario.
-pub type Figure<R> = fn(&R, &Scenario) -> Drawing;
+pub type FigureFunction<R> = fn(&R, &Scenario) -> Drawing;
 
 #[cfg(test)]
 mod tests {
@@ -46,25 +44,25 @@ mod tests {
 
     use glam::DVec3;
     use leafdyn::relax::Mode;
-    use leafdyn::scenario::{Grip, Hold, PointLoad, Scenario, Schedule, Wind};
+    use leafdyn::scenario::{Grip, PointLoad, Scenario, Schedule, SupportKind, Wind};
     use leafdyn::simulate::{Record, Stopped};
 
     fn scenario() -> Scenario {
-        sample::scenario("fan", 5)
+        sample::sample_scenario("fan", 5)
     }
 
     #[test]
     fn every_picture_is_wide_enough_to_print() {
         for drawing in [
-            leaf(&sample::fan(21, 32), &scenario()),
-            check(&sample::check(21, 32, 0.1), &scenario()),
-            chart(&sample::chart()),
-            scaling(&sample::scaling()),
-            map(&sample::map()),
-            energy(&sample::record(5, 16), &scenario()),
-            filmstrip(&sample::record(5, 16), &scenario()),
+            leaf(&sample::sample_equilibrium(21, 32), &scenario()),
+            check(&sample::sample_check(21, 32, 0.1), &scenario()),
+            chart(&sample::sample_chart()),
+            scaling(&sample::sample_scaling()),
+            map(&sample::sample_map()),
+            energy(&sample::sample_record(5, 16), &scenario()),
+            filmstrip(&sample::sample_record(5, 16), &scenario()),
         ] {
-            formats::text(&drawing);
+            formats::checked_svg_text(&drawing);
             let mut bytes = Vec::new();
             formats::write_png(&drawing, &mut bytes).unwrap();
             let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
@@ -85,16 +83,16 @@ mod tests {
 
     #[test]
     fn axes_are_in_the_units_of_the_scenario() {
-        let fan = sample::fan(5, 8);
-        let record = sample::record(5, 8);
+        let fan = sample::sample_equilibrium(5, 8);
+        let record = sample::sample_record(5, 8);
         let drawn = |scenario: &Scenario| {
             [
                 leaf(&fan, scenario),
-                check(&sample::check(5, 8, 0.0), scenario),
+                check(&sample::sample_check(5, 8, 0.0), scenario),
                 filmstrip(&record, scenario),
                 energy(&record, scenario),
             ]
-            .map(|drawing| formats::text(&drawing))
+            .map(|drawing| formats::checked_svg_text(&drawing))
         };
         let [rest, checked, strip, energies] = drawn(&in_cm());
         for svg in [&rest, &checked] {
@@ -117,7 +115,7 @@ mod tests {
     #[test]
     fn values_on_axes_are_those_of_the_scenario() {
         // Ten times as long: the leaf is the same in lengths, its axes are not.
-        let mut fan = sample::fan(5, 8);
+        let mut fan = sample::sample_equilibrium(5, 8);
         let mut large = in_cm();
         for rod in &mut large.rods {
             rod.length *= 10.0;
@@ -128,16 +126,22 @@ mod tests {
         for point in fan.shape.curves.iter_mut().flatten().chain(&mut fan.tips) {
             *point *= 10.0;
         }
-        let svg = formats::text(&leaf(&fan, &large));
+        let svg = formats::checked_svg_text(&leaf(&fan, &large));
         assert!(svg.contains(">8</text>") && !svg.contains(">0.8</text>"));
     }
 
     #[test]
     fn gravity_is_drawn_where_there_is_any() {
-        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let (fan, record) = (
+            sample::sample_equilibrium(5, 8),
+            sample::sample_record(5, 8),
+        );
         let count = |scenario: &Scenario| {
-            [leaf(&fan, scenario), filmstrip(&record, scenario)]
-                .map(|drawing| formats::text(&drawing).matches(">gravity<").count())
+            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|drawing| {
+                formats::checked_svg_text(&drawing)
+                    .matches(">gravity<")
+                    .count()
+            })
         };
         assert_eq!(count(&scenario()), [4, 1]);
         let mut without = scenario();
@@ -153,7 +157,10 @@ mod tests {
 
     #[test]
     fn wind_is_drawn_as_it_blows() {
-        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let (fan, record) = (
+            sample::sample_equilibrium(5, 8),
+            sample::sample_record(5, 8),
+        );
         let count = |at: &[f64], velocity: &[[f64; 3]]| {
             let mut windy = scenario();
             windy.wind = Some(Wind {
@@ -165,8 +172,11 @@ mod tests {
                 drag: 2.0,
                 width: Vec::new(),
             });
-            [leaf(&fan, &windy), filmstrip(&record, &windy)]
-                .map(|drawing| formats::text(&drawing).matches(">wind<").count())
+            [leaf(&fan, &windy), filmstrip(&record, &windy)].map(|drawing| {
+                formats::checked_svg_text(&drawing)
+                    .matches(">wind<")
+                    .count()
+            })
         };
         assert_eq!(count(&[0.0], &[[1.0, 0.0, 0.0]]), [4, 1]);
         // One that changes in every picture, as soon as it blows.
@@ -181,21 +191,25 @@ mod tests {
 
     #[test]
     fn grips_are_drawn_where_they_hold() {
-        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let (fan, record) = (
+            sample::sample_equilibrium(5, 8),
+            sample::sample_record(5, 8),
+        );
         let mut held = scenario();
-        let grip = |vein: usize, at: [f64; 2], held: Hold| Grip {
+        let grip = |vein: usize, at: [f64; 2], held: SupportKind| Grip {
             vein,
             at,
             held,
             displacement: [0.0; 3],
         };
         let drawn = |scenario: &Scenario| {
-            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|it| formats::text(&it))
+            [leaf(&fan, scenario), filmstrip(&record, scenario)]
+                .map(|it| formats::checked_svg_text(&it))
         };
         let free = drawn(&held);
         held.grips = vec![
-            grip(0, [0.25, 0.5], Hold::Clamped),
-            grip(3, [0.6; 2], Hold::Pinned),
+            grip(0, [0.25, 0.5], SupportKind::Clamped),
+            grip(3, [0.6; 2], SupportKind::Pinned),
         ];
         for (svg, free) in drawn(&held).iter().zip(&free) {
             assert!(svg.contains(">pinned<") && !free.contains(">pinned<"));
@@ -210,12 +224,15 @@ mod tests {
 
     #[test]
     fn moments_are_drawn_on_a_rod_as_they_act() {
-        let (rod, record) = (sample::fan(1, 8), sample::record(1, 8));
+        let (rod, record) = (
+            sample::sample_equilibrium(1, 8),
+            sample::sample_record(1, 8),
+        );
         let drawn = |scenario: &Scenario| {
-            let paths = |drawing| formats::text(&drawing).matches("<path").count();
+            let paths = |drawing| formats::checked_svg_text(&drawing).matches("<path").count();
             [leaf(&rod, scenario), filmstrip(&record, scenario)].map(paths)
         };
-        let mut turned = sample::scenario("rod", 1);
+        let mut turned = sample::sample_scenario("rod", 1);
         let [rest, moving] = drawn(&turned);
         turned.points = vec![PointLoad {
             vein: 0,
@@ -234,20 +251,20 @@ mod tests {
 
     #[test]
     fn names_are_escaped() {
-        let mut fan = sample::fan(5, 8);
+        let mut fan = sample::sample_equilibrium(5, 8);
         fan.scenario = "a < b & \"c\"\u{1}".into();
-        let svg = formats::text(&leaf(&fan, &scenario()));
+        let svg = formats::checked_svg_text(&leaf(&fan, &scenario()));
         assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
     }
 
     fn motion(record: &Record) -> [String; 2] {
         [energy(record, &scenario()), filmstrip(record, &scenario())]
-            .map(|drawing| formats::text(&drawing))
+            .map(|drawing| formats::checked_svg_text(&drawing))
     }
 
     #[test]
     fn an_early_end_is_reported() {
-        let mut record = sample::record(5, 8);
+        let mut record = sample::sample_record(5, 8);
         record.stopped = Some(Stopped::Diverged {
             otherwise: "the semi-implicit method",
             time: 10.1,
@@ -270,7 +287,7 @@ mod tests {
     }
 
     fn draw_extreme_leaf(value: f64) {
-        let mut fan = sample::fan(3, 8);
+        let mut fan = sample::sample_equilibrium(3, 8);
         let shape = vec![vec![value * DVec3::Z; 9]; 3];
         fan.stability.modes = Some(vec![Mode {
             eigenvalue: value,
@@ -278,7 +295,7 @@ mod tests {
             displacement: shape.clone(),
             rotation: shape,
         }]);
-        formats::text(&modes(&fan, &scenario()));
+        formats::checked_svg_text(&modes(&fan, &scenario()));
         let curves = fan.shape.curves.iter_mut();
         curves.for_each(|curve| curve[4].z = value);
         fan.tips[0].x = value;
@@ -291,7 +308,7 @@ mod tests {
     }
 
     fn draw_extreme_check(value: f64) {
-        let mut found = sample::check(3, 8, 0.0);
+        let mut found = sample::sample_check(3, 8, 0.0);
         for difference in &mut found.along {
             difference.position = value;
             difference.moment = value;
@@ -300,25 +317,25 @@ mod tests {
         if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
             solution.rods[1].nodes[4].position = DVec3::splat(value);
         }
-        formats::text(&check(&found, &scenario()));
+        formats::checked_svg_text(&check(&found, &scenario()));
         let worst = found.along[0];
         found.along.fill(worst);
         found.tolerance = value;
-        formats::text(&check(&found, &scenario()));
+        formats::checked_svg_text(&check(&found, &scenario()));
     }
 
     fn draw_extreme_chart(value: f64) {
-        let mut found = sample::chart();
+        let mut found = sample::sample_chart();
         found.rows[0].true_error = Some(value);
         if let Some(spread) = &mut found.rows[1].seconds {
             spread.median = value;
         }
         found.reference.as_mut().unwrap().known_within = value;
-        formats::text(&chart(&found));
+        formats::checked_svg_text(&chart(&found));
     }
 
     fn draw_extreme_motion(value: f64) {
-        let mut record = sample::record(3, 8);
+        let mut record = sample::sample_record(3, 8);
         record.stills[3].curves[1][4].z = value;
         record.moments[70].energy.kinetic = value;
         record.moments[71].tip.x = value;
@@ -335,7 +352,7 @@ mod tests {
 
     #[test]
     fn one_output_only() {
-        let mut record = sample::record(3, 8);
+        let mut record = sample::sample_record(3, 8);
         record.moments.truncate(1);
         record.stills.truncate(1);
         motion(&record);
@@ -343,7 +360,7 @@ mod tests {
 
     #[test]
     fn a_long_record_makes_no_large_picture() {
-        let mut record = sample::record(3, 8);
+        let mut record = sample::sample_record(3, 8);
         record.moments = record.moments.repeat(2000);
         for (i, moment) in record.moments.iter_mut().enumerate() {
             moment.time = 1e-3 * i as f64;

@@ -1,12 +1,12 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
 use crate::figure::drawing::labels::{HEADER, SIDE, SmallPanels, THINNER, new_page};
-use crate::figure::drawing::space::{FRONT, OBLIQUE, View};
+use crate::figure::drawing::space::{FRONT, OBLIQUE, ViewAngles};
 use crate::figure::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
-use crate::figure::leaf::{Veins, tips};
-use crate::figure::scenario::Setting;
-use crate::report::numbers::short;
-use crate::report::verdict;
+use crate::figure::leaf::{DrawnVeins, vein_tips};
+use crate::figure::scenario::FigureSetting;
+use crate::report::numbers::format_four_digits;
+use crate::report::relaxation_verdict;
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Scenario;
@@ -14,41 +14,48 @@ use leafdyn::scenario::Scenario;
 const MOST: usize = 12;
 
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [View; 2] = [OBLIQUE, FRONT];
+const VIEWS: [ViewAngles; 2] = [OBLIQUE, FRONT];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
 pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
-    let setting = Setting::of(scenario);
+    let setting = FigureSetting::from_scenario(scenario);
     let name = format!("{}: modes", equilibrium.scenario);
-    let rest = Veins::of(equilibrium, scenario);
+    let rest = DrawnVeins::from_equilibrium(equilibrium, scenario);
     let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
     let drawn = &modes[..modes.len().min(MOST)];
-    let shapes = drawn.iter().map(|mode| displaced(equilibrium, &rest, mode));
-    let shapes: Vec<Veins> = shapes.collect();
+    let shapes = drawn
+        .iter()
+        .map(|mode| displaced_veins(equilibrium, &rest, mode));
+    let shapes: Vec<DrawnVeins> = shapes.collect();
     // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
-    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting, HEADER);
-    let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
+    let panels =
+        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, HEADER);
+    let mut notes = vec![
+        format!("N = {}", rest.count),
+        relaxation_verdict(equilibrium),
+    ];
     notes.push(match modes.len() {
         count if count > MOST => format!("the lowest {MOST} of {count}"),
         count => format!("the lowest {count}"),
     });
     notes.push("grey: at rest".into());
-    notes.extend(rest.notes(&setting));
+    notes.extend(rest.leaf_notes(&setting));
     let mut drawing = new_page(SIDE, &name, &notes, Some(&rest));
-    drawing.height = panels.end();
+    drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
-        drawing.group("mode", |page| {
-            let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
+        drawing.draw_group("mode", |page| {
+            let (number, (text, color)) = ((index + 1).to_string(), mode_caption(mode));
             let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let scene = panels.begin(page, (VIEWS.len() * index + k, 0.0), view, caption);
+                let scene =
+                    panels.draw_empty_panel(page, (VIEWS.len() * index + k, 0.0), view, caption);
                 let width = THINNER * veins.line_width();
                 for vein in &rest.veins {
-                    let path = vein.path(|point| scene.place(point));
-                    page.stroke(path, Stroke::new(FRAME, 0.6 * width));
+                    let path = vein.projected_path(|point| scene.project_point(point));
+                    page.draw_stroke(path, Stroke::new(FRAME, 0.6 * width));
                 }
                 scene.draw_leaf(page, veins, width);
             }
@@ -58,23 +65,26 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
 }
 
 /// The frequency of a mode or, if it is unstable, its growth rate in red.
-fn caption(mode: &Mode) -> (String, Color) {
+fn mode_caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
         (true, _) => ("neutral: ω = 0".into(), NOTE),
         (_, None) => {
-            let frequency = short(mode.frequency().unwrap_or_default());
+            let frequency = format_four_digits(mode.frequency().unwrap_or_default());
             (format!("ω = {frequency}"), NOTE)
         }
-        (_, Some(growth)) => (format!("unstable: grows at {}", short(growth)), DOT),
+        (_, Some(growth)) => (
+            format!("unstable: grows at {}", format_four_digits(growth)),
+            DOT,
+        ),
     }
 }
 
-fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
+fn displaced_veins(equilibrium: &Equilibrium, rest: &DrawnVeins, mode: &Mode) -> DrawnVeins {
     let most = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
     let largest = mode.displacement.iter().fold(0.0, |m, d| most(d).max(m));
     let size = match largest > 0.0 {
         // Never magnified: displacements are small in a mode of rotation alone.
-        true => (AMPLITUDE * rest.extent() * rest.unit / largest).min(1.0),
+        true => (AMPLITUDE * rest.largest_extent() * rest.unit / largest).min(1.0),
         false => 0.0,
     };
     let shape = &equilibrium.shape;
@@ -82,13 +92,13 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
     let curves: Vec<Vec<DVec3>> = moved
         .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
         .collect();
-    Veins::through(&curves, &tips(&curves, shape.joined), rest.unit)
+    DrawnVeins::from_curves(&curves, &vein_tips(&curves, shape.joined), rest.unit)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
 
     #[test]
@@ -98,7 +108,7 @@ mod tests {
             (-9.0, "unstable: grows at 3<"),
             (1e-10, "neutral"),
         ] {
-            let mut leaf = sample::fan(3, 8);
+            let mut leaf = sample::sample_equilibrium(3, 8);
             let shape = vec![vec![DVec3::Z; 9]; 3];
             let mode = Mode {
                 eigenvalue,
@@ -107,7 +117,7 @@ mod tests {
                 rotation: shape,
             };
             leaf.stability.modes = Some(vec![mode; 14]);
-            let svg = text(&draw(&leaf, &sample::scenario("fan", 3)));
+            let svg = checked_svg_text(&draw(&leaf, &sample::sample_scenario("fan", 3)));
             assert_eq!(svg.matches(caption).count(), MOST, "{caption}");
             assert!(svg.contains("the lowest 12 of 14"));
             // Every mode in a second view.

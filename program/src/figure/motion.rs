@@ -4,24 +4,24 @@
 //!
 //! A moving leaf at several instants.
 
-use crate::figure::drawing::axes::{Axes, Axis, Curve};
-use crate::figure::drawing::formats::paint;
+use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
+use crate::figure::drawing::formats::rasterize;
 use crate::figure::drawing::labels::{
-    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, SIDE, SmallPanels,
-    TEXT_SIZE, THINNER, letters, new_page,
+    HEADER, LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, SIDE,
+    SmallPanels, TEXT_SIZE, THINNER, new_page, panel_letters,
 };
-use crate::figure::drawing::space::{Margins, OBLIQUE, Scene, common_box};
+use crate::figure::drawing::space::{BoxMargins, OBLIQUE, SpacePanel, common_bounding_box};
 use crate::figure::drawing::{
-    Anchor, CURVES, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, is_drawable, polyline,
+    CURVES, Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, is_drawable, polyline_path,
     vein_color,
 };
-use crate::figure::leaf::Veins;
-use crate::figure::scenario::{Setting, with_unit};
-use crate::report::numbers::{in_unit, short};
+use crate::figure::leaf::DrawnVeins;
+use crate::figure::scenario::{FigureSetting, name_with_unit};
+use crate::report::numbers::{format_four_digits, number_in_unit};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::units::TIME;
 use leafdyn::scenario::{Scenario, Units};
-use leafdyn::simulate::{Energy, Record, Still};
+use leafdyn::simulate::{Energy, Record, ShapeSnapshot};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
@@ -42,7 +42,7 @@ const BOTTOM: f64 = 4.0;
 /// Right of the panels, for the key.
 const KEY: f64 = 200.0;
 
-pub fn notes(record: &Record) -> Vec<String> {
+pub fn header_notes(record: &Record) -> Vec<String> {
     let mut notes = vec![
         format!("N = {}", record.rods),
         format!("{} method", record.scheme),
@@ -58,52 +58,58 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
-    let mut drawing = new_page(LEFT, &name, &notes(record), None);
+    let mut drawing = new_page(LEFT, &name, &header_notes(record), None);
     let lowest = lower + BALANCE + BETWEEN + PANEL_TITLE;
     drawing.height = lowest + TIP + PANEL_AXIS + BOTTOM;
     let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
     };
-    let curves = curves(record);
+    let curves = energy_curves(record);
     let balance = &curves[curves.len() - 1];
-    let values = curves.iter().flat_map(Curve::values);
+    let values = curves.iter().flat_map(NamedCurve::ordinates);
     let unit = scenario.units.energy();
-    let energy = with_unit("energy", unit.as_deref());
+    let energy = name_with_unit("energy", unit.as_deref());
     let across = Axis::linear("", 0.0, end);
-    let up = Axis::holding(&energy, values.chain([0.0]));
-    let cell = Cell::left_of_key(upper, ENERGIES, KEY);
-    drawing.group("energies", |page| {
+    let up = Axis::linear_covering(&energy, values.chain([0.0]));
+    let cell = PageRectangle::left_of_legend(upper, ENERGIES, KEY);
+    drawing.draw_group("energies", |page| {
         let what = "where the energy is";
-        let axes = Axes::titled(page, cell, ["(a)", what], across.clone(), up);
+        let axes = PanelAxes::draw_titled(page, cell, ["(a)", what], across.clone(), up);
         // In reverse, so that the balance, which should be zero, is below all others.
         for curve in curves.iter().rev() {
-            axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+            axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
         }
-        let mut key = Key::right_of(cell);
+        let mut key = Legend::right_of(cell);
         for curve in &curves {
-            draw_key_line(page, &mut key, curve);
+            draw_legend_line(page, &mut key, curve);
         }
     });
-    let cell = Cell::left_of_key(lower, BALANCE, KEY);
-    let name = with_unit("balance", unit.as_deref());
-    let up = Axis::holding(&name, balance.values().chain([0.0]));
-    drawing.group("balance", |page| {
+    let cell = PageRectangle::left_of_legend(lower, BALANCE, KEY);
+    let name = name_with_unit("balance", unit.as_deref());
+    let up = Axis::linear_covering(&name, balance.ordinates().chain([0.0]));
+    drawing.draw_group("balance", |page| {
         let what =
             "its balance, which no motion changes, magnified: all energies less the work put in";
-        let axes = Axes::titled(page, cell, ["(b)", what], across, up);
-        axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
+        let axes = PanelAxes::draw_titled(page, cell, ["(b)", what], across, up);
+        axes.draw_curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
-    let cell = Cell::left_of_key(lowest, TIP, KEY);
-    drawing.group("tip", |page| {
-        draw_tip(page, record, &scenario.units, cell, end)
+    let cell = PageRectangle::left_of_legend(lowest, TIP, KEY);
+    drawing.draw_group("tip", |page| {
+        draw_tip_coordinates(page, record, &scenario.units, cell, end)
     });
     drawing
 }
 
 /// Draws the coordinates of the joint tip, or the means of free ones.
-fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end: f64) {
-    let coordinate = |axis: usize| Curve {
+fn draw_tip_coordinates(
+    page: &mut Drawing,
+    record: &Record,
+    units: &Units,
+    cell: PageRectangle,
+    end: f64,
+) {
+    let coordinate = |axis: usize| NamedCurve {
         name: ["x", "y", "z"][axis],
         color: CURVES[axis],
         points: (record.moments.iter())
@@ -113,35 +119,38 @@ fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end:
     let curves = [0, 1, 2].map(coordinate);
     let across = match units.time.as_deref() {
         None => "time, in the scenario's unit".into(),
-        unit => with_unit("time", unit),
+        unit => name_with_unit("time", unit),
     };
     let across = Axis::linear(&across, 0.0, end);
-    let name = with_unit("tip", units.length.as_deref());
-    let up = Axis::holding(&name, curves.iter().flat_map(Curve::values).chain([0.0]));
+    let name = name_with_unit("tip", units.length.as_deref());
+    let up = Axis::linear_covering(
+        &name,
+        curves.iter().flat_map(NamedCurve::ordinates).chain([0.0]),
+    );
     let what = match record.joined {
         true => "where the tip is",
         false => "where the tips are, in the mean",
     };
-    let axes = Axes::titled(page, cell, ["(c)", what], across, up);
-    let mut key = Key::right_of(cell);
+    let axes = PanelAxes::draw_titled(page, cell, ["(c)", what], across, up);
+    let mut key = Legend::right_of(cell);
     for curve in &curves {
-        axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        draw_key_line(page, &mut key, curve);
+        axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        draw_legend_line(page, &mut key, curve);
     }
 }
 
 /// Draws the line of a curve in the key, with its last value.
-fn draw_key_line(page: &mut Drawing, key: &mut Key, curve: &Curve) {
+fn draw_legend_line(page: &mut Drawing, key: &mut Legend, curve: &NamedCurve) {
     let last = curve.points.last().map_or(0.0, |point| point.1);
-    let note = format!("at the end {}", short(last));
-    key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+    let note = format!("at the end {}", format_four_digits(last));
+    key.add_line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
 }
 
 /// All energies except those that are always zero; their balance last.
-fn curves(record: &Record) -> Vec<Curve> {
+fn energy_curves(record: &Record) -> Vec<NamedCurve> {
     let first = record.moments.first().map(|moment| moment.energy);
     let first = first.unwrap_or_default();
-    let curve = |name, color, value: &dyn Fn(&Energy) -> f64| Curve {
+    let curve = |name, color, value: &dyn Fn(&Energy) -> f64| NamedCurve {
         name,
         color,
         points: (record.moments.iter())
@@ -159,7 +168,7 @@ fn curves(record: &Record) -> Vec<Curve> {
         curve("dissipated", CURVES[3], &|e| e.dissipated),
         curve("work put in", CURVES[4], &|e| e.work),
     ];
-    curves.retain(|curve| curve.values().any(|value| value != 0.0));
+    curves.retain(|curve| curve.ordinates().any(|value| value != 0.0));
     curves.push(curve("balance", INK, &|e| e.balance() - first.balance()));
     curves
 }
@@ -179,7 +188,7 @@ const SIZE: DVec2 = DVec2::new(320.0, 240.0);
 
 const TITLE: f64 = 26.0;
 
-const MARGINS: Margins = Margins {
+const MARGINS: BoxMargins = BoxMargins {
     left: 46.0,
     right: 42.0,
     below: 42.0,
@@ -189,31 +198,36 @@ const MARGINS: Margins = Margins {
 const SAME: u8 = 255;
 
 /// Writes the film; a single picture where no motion is recorded.
-pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
-    let setting = &Setting::of(scenario);
+pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
+    let setting = &FigureSetting::from_scenario(scenario);
     let film = match record.film.as_slice() {
         [] => &record.stills,
         film => film,
     };
-    let shown = sampled(film);
-    let shapes: Vec<Veins> = (shown.iter())
-        .map(|still| Veins::at_instant(record, still, scenario))
+    let shown = sampled_shapes(film);
+    let shapes: Vec<DrawnVeins> = (shown.iter())
+        .map(|still| DrawnVeins::from_motion(record, still, scenario))
         .collect();
-    let bounds = common_box(shapes.iter());
+    let bounds = common_bounding_box(shapes.iter());
     let times: Vec<f64> = (shown.iter())
         .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
         .collect();
     let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
-        .map_init(Palette::new, |palette, (veins, time)| {
-            let text = format!("{}, t = {}", record.scenario, short(*time));
-            palette.indices(&paint(&picture(veins, bounds, setting, (&text, *time))))
+        .map_init(ColorPalette::new, |palette, (veins, time)| {
+            let text = format!("{}, t = {}", record.scenario, format_four_digits(*time));
+            palette.nearest_color_indices(&rasterize(&draw_picture(
+                veins,
+                bounds,
+                setting,
+                (&text, *time),
+            )))
         })
         .collect();
-    encode(&pictures, &delays(&times), out).map_err(io::Error::other)
+    encode_gif(&pictures, &picture_delays(&times), out).map_err(io::Error::other)
 }
 
 /// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
-fn sampled(film: &[Still]) -> Vec<&Still> {
+fn sampled_shapes(film: &[ShapeSnapshot]) -> Vec<&ShapeSnapshot> {
     let count = film.len().min(MOST_PICTURES);
     let last = film.len().saturating_sub(1);
     let place = |k: usize| k * last / (count - 1).max(1);
@@ -222,7 +236,7 @@ fn sampled(film: &[Still]) -> Vec<&Still> {
 
 /// How long each picture is shown, in hundredths of a second: in proportion to the time
 /// until the next, the last as long as the average.
-fn delays(times: &[f64]) -> Vec<u16> {
+fn picture_delays(times: &[f64]) -> Vec<u16> {
     let [Some(from), Some(to)] = [times.first(), times.last()] else {
         return Vec::new();
     };
@@ -246,33 +260,33 @@ fn delays(times: &[f64]) -> Vec<u16> {
         .collect()
 }
 
-fn picture(
-    veins: &Veins,
+fn draw_picture(
+    veins: &DrawnVeins,
     bounds: [DVec3; 2],
-    setting: &Setting,
+    setting: &FigureSetting,
     (text, time): (&str, f64),
 ) -> Drawing {
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
-    let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
-    let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+    let cell = PageRectangle::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
+    let scene = SpacePanel::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_axes(&mut page, 36.0);
-    scene.draw_arrows(&mut page, true, time);
+    scene.draw_direction_arrows(&mut page, true, time);
     scene.draw_leaf(&mut page, veins, THINNER * veins.line_width());
     let corner = DVec2::new(10.0, 17.0);
-    page.label(corner, text, TEXT_SIZE, Anchor::Start, INK);
+    page.draw_label(corner, text, TEXT_SIZE, TextAnchor::Start, INK);
     page
 }
 
 /// Vein colours in several tints, greys, and the colours of markers.
-struct Palette {
+struct ColorPalette {
     colors: Vec<Color>,
     /// Indices found so far.
-    known: HashMap<[u8; 3], u8>,
+    indices_by_color: HashMap<[u8; 3], u8>,
 }
 
-impl Palette {
+impl ColorPalette {
     fn new() -> Self {
         let mut colors = vec![WHITE, INK, NOTE, DOT];
         let mix = |Color(r, g, b): Color, part: f64| {
@@ -287,18 +301,18 @@ impl Palette {
             colors.extend([1.0, 0.8, 0.6, 0.45, 0.3, 0.15].map(|part| mix(color, part)));
         }
         colors.truncate(usize::from(SAME));
-        Palette {
+        ColorPalette {
             colors,
-            known: HashMap::new(),
+            indices_by_color: HashMap::new(),
         }
     }
 
     /// The index of the nearest colour for every pixel.
-    fn indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
+    fn nearest_color_indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
         let rgb = pixels.data().chunks_exact(4);
         rgb.map(|rgba| {
             let rgb = [rgba[0], rgba[1], rgba[2]];
-            *self.known.entry(rgb).or_insert_with(|| {
+            *self.indices_by_color.entry(rgb).or_insert_with(|| {
                 let distance = |Color(r, g, b): &Color| {
                     let squared = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
                     squared(*r, rgb[0]) + squared(*g, rgb[1]) + squared(*b, rgb[2])
@@ -313,20 +327,20 @@ impl Palette {
 }
 
 /// Encodes of each picture only what differs from the one before.
-fn encode(
+fn encode_gif(
     pictures: &[Vec<u8>],
     delays: &[u16],
     out: &mut dyn Write,
 ) -> Result<(), gif::EncodingError> {
     let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
-    let colors = Palette::new().colors.into_iter();
+    let colors = ColorPalette::new().colors.into_iter();
     let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
     table.resize(3 * 256, 0);
     let mut encoder = gif::Encoder::new(out, width, height, &table)?;
     encoder.set_repeat(gif::Repeat::Infinite)?;
     let mut before: Option<&Vec<u8>> = None;
     for (picture, &delay) in pictures.iter().zip(delays) {
-        let (rows, pixels) = changed(before, picture, usize::from(width));
+        let (rows, pixels) = changed_rows(before, picture, usize::from(width));
         encoder.write_frame(&gif::Frame {
             delay,
             top: rows.start as u16,
@@ -344,7 +358,7 @@ fn encode(
 
 /// The rows in which a picture differs from the one before, at least one, and their
 /// pixels.
-fn changed(
+fn changed_rows(
     before: Option<&Vec<u8>>,
     picture: &[u8],
     width: usize,
@@ -373,49 +387,55 @@ const PALE: Color = Color(240, 190, 176);
 const MOST_PATH_POINTS: usize = 400;
 
 pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
-    let setting = Setting::of(scenario);
+    let setting = FigureSetting::from_scenario(scenario);
     let name = format!("{}: instants of the motion", record.scenario);
     let stills = record.stills.iter();
-    let shapes: Vec<Veins> = stills
-        .map(|it| Veins::at_instant(record, it, scenario))
+    let shapes: Vec<DrawnVeins> = stills
+        .map(|it| DrawnVeins::from_motion(record, it, scenario))
         .collect();
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
     let top = if has_path { HEADER + KEY_LINE } else { HEADER };
-    let panels = SmallPanels::holding(shapes.iter(), shapes.len(), &setting, top);
-    let mut notes = notes(record);
+    let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shapes.len(), &setting, top);
+    let mut notes = header_notes(record);
     let first = shapes.first();
-    notes.extend(first.map_or(Vec::new(), |veins| veins.notes(&setting)));
+    notes.extend(first.map_or(Vec::new(), |veins| veins.leaf_notes(&setting)));
     let width = panels.grid_width();
     notes.push(format!("a square of the grid is {width} wide"));
     let mut drawing = new_page(SIDE, &name, &notes, first);
-    drawing.height = panels.end();
+    drawing.height = panels.bottom();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     let strokes = [DOT, PALE].map(|color| Stroke::new(color, 1.0));
     if has_path {
-        drawing.group("key", |page| {
-            let mut key = KeyRows::at(SIDE, NOTE_BASE + KEY_LINE, 22.0);
+        drawing.draw_group("key", |page| {
+            let mut key = LegendRows::starting_at(SIDE, NOTE_BASE + KEY_LINE, 22.0);
             for (name, stroke) in ["the tip's way since the picture before", "and before that"]
                 .into_iter()
                 .zip(strokes)
             {
-                key.entry(page, name, |page, cell| cell.line(page, stroke));
+                key.add_entry(page, name, |page, cell| cell.draw_midline(page, stroke));
             }
         });
     }
     let instants = shapes.iter().zip(&record.stills).enumerate();
-    for ((index, (veins, still)), letter) in instants.zip(letters().cycle()) {
+    for ((index, (veins, still)), letter) in instants.zip(panel_letters().cycle()) {
         let paths = [(since, still.moment), (0, since)];
         let paths = paths.map(|(from, to)| tip_path(record, from, to));
         since = still.moment;
-        drawing.group("instant", |page| {
+        drawing.draw_group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let when = format!("t = {}", in_unit(short(time), &scenario.units, TIME));
+            let when = format!(
+                "t = {}",
+                number_in_unit(format_four_digits(time), &scenario.units, TIME)
+            );
             let caption = (letter.as_str(), when.as_str(), NOTE);
-            let scene = panels.begin(page, (index, time), OBLIQUE, caption);
+            let scene = panels.draw_empty_panel(page, (index, time), OBLIQUE, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
-                let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
+                let path: Vec<_> = path
+                    .iter()
+                    .map(|&point| scene.project_point(point))
+                    .collect();
                 if path.len() > 1 {
-                    page.stroke(polyline(&path), stroke);
+                    page.draw_stroke(polyline_path(&path), stroke);
                 }
             }
             scene.draw_leaf(page, veins, THINNER * veins.line_width());
@@ -445,9 +465,9 @@ mod tests {
 
     #[test]
     fn what_is_always_zero_is_not_drawn() {
-        let mut record = sample::record(3, 4);
+        let mut record = sample::sample_record(3, 4);
         let names = |record: &Record| -> Vec<&str> {
-            let curves = curves(record).into_iter();
+            let curves = energy_curves(record).into_iter();
             curves.map(|curve| curve.name).collect()
         };
         assert!(!names(&record).contains(&"work put in"));
@@ -494,17 +514,17 @@ mod film_tests {
 
     #[test]
     fn a_film_lasts_ten_seconds_loops_and_shows_the_leaf() {
-        let mut record = sample::record(5, 8);
-        let (_, frames) = sample::swing(5, 8);
-        let still = |(moment, frame): (usize, &leafdyn::simulate::Frame)| Still {
+        let mut record = sample::sample_record(5, 8);
+        let (_, frames) = sample::sample_motion(5, 8);
+        let still = |(moment, frame): (usize, &leafdyn::simulate::Frame)| ShapeSnapshot {
             moment,
             curves: (0..5).map(|rod| frame.centerline(rod).to_vec()).collect(),
         };
         record.film = frames.iter().enumerate().map(still).collect();
-        let scenario = sample::scenario("swing", 5);
-        let setting = Setting::of(&scenario);
+        let scenario = sample::sample_scenario("swing", 5);
+        let setting = FigureSetting::from_scenario(&scenario);
         let mut bytes = Vec::new();
-        write(&record, &scenario, &mut bytes).unwrap();
+        write_film(&record, &scenario, &mut bytes).unwrap();
         assert!(bytes.len() < 5_000_000, "{}", bytes.len());
         let (repeat, delays, pictures) = decoded(&bytes);
         assert_eq!(repeat, gif::Repeat::Infinite);
@@ -512,14 +532,14 @@ mod film_tests {
         assert_eq!(total(&delays), 1000);
         // Every picture shows its instant, in colours that are close enough.
         let stills = record.film.iter();
-        let shapes: Vec<Veins> = stills
-            .map(|it| Veins::at_instant(&record, it, &scenario))
+        let shapes: Vec<DrawnVeins> = stills
+            .map(|it| DrawnVeins::from_motion(&record, it, &scenario))
             .collect();
-        let bounds = common_box(shapes.iter());
+        let bounds = common_bounding_box(shapes.iter());
         for k in [0, 50, 100] {
             let time = record.moments[k].time;
-            let text = format!("{}, t = {}", record.scenario, short(time));
-            let painted = paint(&picture(&shapes[k], bounds, &setting, (&text, time)));
+            let text = format!("{}, t = {}", record.scenario, format_four_digits(time));
+            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, (&text, time)));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =
@@ -541,30 +561,33 @@ mod film_tests {
 
     #[test]
     fn delays_are_proportional_to_times() {
-        assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
+        assert_eq!(picture_delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
         let even: Vec<f64> = (0..140).map(f64::from).collect();
-        let delays = delays(&even);
+        let delays = picture_delays(&even);
         assert_eq!(total(&delays), 1000);
         assert!(delays.iter().all(|delay| (7..=8).contains(delay)));
-        assert_eq!(super::delays(&[0.0]), [100]);
-        assert!(super::delays(&[]).is_empty());
-        assert_eq!(super::delays(&[1.0, 1.0]), [2, 100]);
+        assert_eq!(super::picture_delays(&[0.0]), [100]);
+        assert!(super::picture_delays(&[]).is_empty());
+        assert_eq!(super::picture_delays(&[1.0, 1.0]), [2, 100]);
     }
 }
 
 #[cfg(test)]
 mod filmstrip_tests {
     use super::*;
-    use crate::figure::drawing::formats::{hex, text};
+    use crate::figure::drawing::formats::{checked_svg_text, hex_color};
     use crate::report::sample;
 
     #[test]
     fn the_path_of_the_tip_is_drawn() {
-        let scenario = sample::scenario("swing", 5);
-        let mut record = sample::record(5, 8);
+        let scenario = sample::sample_scenario("swing", 5);
+        let mut record = sample::sample_record(5, 8);
         let paths = |record: &Record| {
-            let svg = text(&draw_filmstrip(record, &scenario));
-            [DOT, PALE].map(|color| svg.matches(&format!("stroke=\"{}\"", hex(color))).count())
+            let svg = checked_svg_text(&draw_filmstrip(record, &scenario));
+            [DOT, PALE].map(|color| {
+                svg.matches(&format!("stroke=\"{}\"", hex_color(color)))
+                    .count()
+            })
         };
         // In all pictures but the first, or the first two, and in the key.
         assert_eq!(paths(&record), [8, 7]);

@@ -2,19 +2,23 @@
 //! its supports and its unloaded shape.
 
 use crate::figure::drawing::labels::{
-    Cell, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, new_page, title,
+    LEFT, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, WIDTH,
+    draw_panel_title, new_page,
 };
-use crate::figure::drawing::markers::{Force, forces, hold_marker, tip_marker, vein_markers};
-use crate::figure::drawing::space::{Margins, OBLIQUE, Scene, surrounding_box};
+use crate::figure::drawing::markers::{
+    ForceArrow, draw_support_marker, draw_tip_marker, draw_vein_markers, force_arrows,
+};
+use crate::figure::drawing::space::{BoxMargins, OBLIQUE, SpacePanel, padded_box};
 use crate::figure::drawing::{
-    Drawing, FRAME, INK, Path, Step, Stroke, is_drawable, polyline, stretch,
+    Drawing, DrawingPath, FRAME, INK, PathStep, Stroke, curve_between_fractions, is_drawable,
+    polyline_path,
 };
-use crate::figure::leaf::{Veins, flat};
-use crate::figure::scenario::Setting;
+use crate::figure::leaf::{DrawnVeins, draw_plane_panel};
+use crate::figure::scenario::FigureSetting;
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Hold, Scenario};
+use leafdyn::scenario::{Scenario, SupportKind};
 
 /// Heights of the view.
 const LOWEST: f64 = 240.0;
@@ -56,64 +60,66 @@ const PLANES: [(&str, [usize; 2]); 3] = [
     ("from the front", [1, 2]),
 ];
 
-const MARGINS: Margins = Margins {
+const MARGINS: BoxMargins = BoxMargins {
     left: 90.0,
     right: 60.0,
     below: 44.0,
 };
 
 /// What is drawn of a rod, in units of its length.
-struct Rod<'a> {
-    veins: &'a Veins,
+struct DrawnRod<'a> {
+    veins: &'a DrawnVeins,
     /// Its unloaded shape, if that looks different.
-    unloaded: Vec<DVec3>,
+    unloaded_shape: Vec<DVec3>,
     /// Whether its end is left out.
-    cut_off: bool,
-    forces: Vec<Force>,
+    is_cut_off: bool,
+    forces: Vec<ForceArrow>,
 }
 
 /// Draws a single rod with its name and notes.
 pub fn draw(
     leaf: &Equilibrium,
     scenario: &Scenario,
-    veins: &Veins,
-    setting: &Setting,
+    veins: &DrawnVeins,
+    setting: &FigureSetting,
     notes: &[String],
 ) -> Drawing {
-    let rod = Rod::of(leaf, scenario, veins);
+    let rod = DrawnRod::from_equilibrium(leaf, scenario, veins);
     let mut page = new_page(LEFT, &leaf.scenario, notes, None);
     let mut top = 0.0;
-    page.group("key", |page| top = rod.draw_key(page));
-    let (low, high) = rod.corners();
+    page.draw_group("key", |page| top = rod.draw_legend(page));
+    let (low, high) = rod.bounding_corners();
     let extent = high - low;
     let corner = DVec2::new(LEFT, top + PANEL_TITLE);
     let width = WIDTH - LEFT - RIGHT;
-    let height = match rod.plane() {
+    let height = match rod.viewing_plane() {
         Some((what, axes)) => {
             let [across, up] = axes.map(|axis| extent[axis]);
             let height = (width * up / across).clamp(LOWEST, HIGHEST);
-            let cell = Cell::new(corner, DVec2::new(width, height));
+            let cell = PageRectangle::new(corner, DVec2::new(width, height));
             let scale = (width / across).min(height / up);
-            page.group("rod", |page| {
-                title(page, corner, "", what);
-                let camera = flat(page, 0.5 * (low + high), setting, cell, scale, axes);
-                rod.draw(page, cell, |point| camera.place(point));
-                let taken = rod.taken().map(|point| camera.place(point));
-                camera.draw_arrows(page, &setting.arrows(true, 0.0), cell, taken);
+            page.draw_group("rod", |page| {
+                draw_panel_title(page, corner, "", what);
+                let camera = draw_plane_panel(page, 0.5 * (low + high), setting, cell, scale, axes);
+                rod.draw(page, cell, |point| camera.project_point(point));
+                let taken = rod
+                    .occupied_points()
+                    .map(|point| camera.project_point(point));
+                camera.draw_arrows(page, &setting.direction_arrows(true, 0.0), cell, taken);
             });
             height + PANEL_AXIS
         }
         None => {
-            let cell = Cell::new(corner, DVec2::new(width, HIGHEST));
-            let bounds = surrounding_box(low, high);
-            let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
-            page.group("rod", |page| {
-                title(page, corner, "", "in space, with its shadow on the floor");
+            let cell = PageRectangle::new(corner, DVec2::new(width, HIGHEST));
+            let bounds = padded_box(low, high);
+            let scene = SpacePanel::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+            page.draw_group("rod", |page| {
+                draw_panel_title(page, corner, "", "in space, with its shadow on the floor");
                 scene.draw_box(page);
                 scene.draw_axes(page, 38.0);
-                scene.draw_arrows(page, true, 0.0);
+                scene.draw_direction_arrows(page, true, 0.0);
                 scene.draw_shadows(page, veins, LINE);
-                rod.draw(page, cell, |point| scene.place(point));
+                rod.draw(page, cell, |point| scene.project_point(point));
             });
             HIGHEST
         }
@@ -122,22 +128,22 @@ pub fn draw(
     page
 }
 
-impl<'a> Rod<'a> {
-    fn of(leaf: &Equilibrium, scenario: &Scenario, veins: &'a Veins) -> Self {
+impl<'a> DrawnRod<'a> {
+    fn from_equilibrium(leaf: &Equilibrium, scenario: &Scenario, veins: &'a DrawnVeins) -> Self {
         let natural = Natural::new(scenario, true);
-        let at = |k: usize| natural.at(0, k as f64 / POINTS as f64).0 / veins.unit;
+        let at = |k: usize| natural.vein_pose(0, k as f64 / POINTS as f64).0 / veins.unit;
         let mut unloaded: Vec<DVec3> = (0..=POINTS).map(at).filter(|&it| is_drawable(it)).collect();
         let (stations, curve) = match leaf.shape.curves.first() {
             Some(curve) => (&leaf.shape.curve_stations[..], &curve[..]),
             None => Default::default(),
         };
         let point = |sigma: f64| {
-            let point = stretch(stations, curve, [sigma; 2]).pop()? / veins.unit;
+            let point = curve_between_fractions(stations, curve, [sigma; 2]).pop()? / veins.unit;
             is_drawable(point).then_some(point)
         };
         let differs = (0..=POINTS).zip(&unloaded).any(|(k, natural)| {
             let there = point(k as f64 / POINTS as f64);
-            there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.extent())
+            there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.largest_extent())
         });
         let extent = |(low, high): (DVec3, DVec3)| (high - low).max_element();
         let own = extent((veins.low, veins.high));
@@ -152,29 +158,29 @@ impl<'a> Rod<'a> {
             let count = unloaded.iter().take_while(near).count();
             unloaded.truncate(count);
         }
-        let forces = forces(scenario, veins.extent(), |sigma| {
+        let forces = force_arrows(scenario, veins.largest_extent(), |sigma| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
             Some((point(sigma)?, (there? - before?).normalize_or_zero()))
         });
-        Rod {
+        DrawnRod {
             veins,
-            unloaded: if differs { unloaded } else { Vec::new() },
-            cut_off,
+            unloaded_shape: if differs { unloaded } else { Vec::new() },
+            is_cut_off: cut_off,
             forces,
         }
     }
 
     /// Points that nothing else should cover.
-    fn taken(&self) -> impl Iterator<Item = DVec3> {
+    fn occupied_points(&self) -> impl Iterator<Item = DVec3> {
         let arrows = self.forces.iter().flat_map(|force| force.ends);
-        let unloaded = self.unloaded.iter().copied();
-        self.veins.points().chain(unloaded).chain(arrows)
+        let unloaded = self.unloaded_shape.iter().copied();
+        self.veins.piece_ends().chain(unloaded).chain(arrows)
     }
 
     /// Corners of a box around it.
-    fn corners(&self) -> (DVec3, DVec3) {
+    fn bounding_corners(&self) -> (DVec3, DVec3) {
         let (low, high) = self
-            .taken()
+            .occupied_points()
             .fold((self.veins.low, self.veins.high), |(low, high), it| {
                 (low.min(it), high.max(it))
             });
@@ -185,8 +191,8 @@ impl<'a> Rod<'a> {
     }
 
     /// The plane of two axes in which it is seen, unless it leaves every such plane.
-    fn plane(&self) -> Option<(&'static str, [usize; 2])> {
-        let (low, high) = self.corners();
+    fn viewing_plane(&self) -> Option<(&'static str, [usize; 2])> {
+        let (low, high) = self.bounding_corners();
         let extent = high - low - DVec3::splat(2.0 * PADDING * (high - low).max_element());
         let seen = |(_, [a, b]): &(&str, [usize; 2])| extent[*a].min(extent[*b]);
         let best = PLANES.into_iter().reduce(|one, other| {
@@ -201,100 +207,107 @@ impl<'a> Rod<'a> {
     }
 
     /// Draws the key; returns where it ends.
-    fn draw_key(&self, page: &mut Drawing) -> f64 {
-        let mut key = KeyRows::at(LEFT, NOTE_BASE + 22.0, 26.0);
+    fn draw_legend(&self, page: &mut Drawing) -> f64 {
+        let mut key = LegendRows::starting_at(LEFT, NOTE_BASE + 22.0, 26.0);
         let own = self.veins.veins.first().map_or(INK, |vein| vein.color);
-        key.entry(page, "at rest", |page, cell| {
-            cell.line(page, Stroke::new(own, LINE))
+        key.add_entry(page, "at rest", |page, cell| {
+            cell.draw_midline(page, Stroke::new(own, LINE))
         });
-        if !self.unloaded.is_empty() {
-            let name = match self.cut_off {
+        if !self.unloaded_shape.is_empty() {
+            let name = match self.is_cut_off {
                 true => "unloaded, cut off",
                 false => "unloaded",
             };
-            key.entry(page, name, |page, cell| {
-                cell.line(page, UNLOADED.dashed(true));
+            key.add_entry(page, name, |page, cell| {
+                cell.draw_midline(page, UNLOADED.with_dashes(true));
             });
         }
         let veins = self.veins;
-        for (how, name) in [(Hold::Clamped, "clamp"), (Hold::Pinned, "pinned")] {
+        for (how, name) in [
+            (SupportKind::Clamped, "clamp"),
+            (SupportKind::Pinned, "pinned"),
+        ] {
             let mut grips = veins.grips.iter();
-            let gripped = grips.any(|grip| grip.held == how);
-            let ends = veins.base_held == how || veins.tip_held == Some(how);
+            let gripped = grips.any(|grip| grip.support == how);
+            let ends = veins.base_support == how || veins.tip_support == Some(how);
             match how {
-                Hold::Clamped if ends => key.entry(page, name, |page, cell| {
+                SupportKind::Clamped if ends => key.add_entry(page, name, |page, cell| {
                     let [left, right] = cell.midline();
                     draw_wall(page, left.lerp(right, 0.6), DVec2::X, 0.6);
                 }),
-                _ if ends || gripped => key.entry(page, name, |page, cell| {
-                    hold_marker(page, cell.middle(), how);
+                _ if ends || gripped => key.add_entry(page, name, |page, cell| {
+                    draw_support_marker(page, cell.middle(), how);
                 }),
                 _ => (),
             }
         }
-        if veins.tip_held.is_none() {
-            key.entry(page, "free tip", |page, cell| {
-                tip_marker(page, cell.middle())
+        if veins.tip_support.is_none() {
+            key.add_entry(page, "free tip", |page, cell| {
+                draw_tip_marker(page, cell.middle())
             });
         }
-        key.end()
+        key.bottom()
     }
 
-    fn draw(&self, page: &mut Drawing, cell: Cell, place: impl Fn(DVec3) -> DVec2) {
-        let points: Vec<DVec2> = self.unloaded.iter().map(|&point| place(point)).collect();
+    fn draw(&self, page: &mut Drawing, cell: PageRectangle, place: impl Fn(DVec3) -> DVec2) {
+        let points: Vec<DVec2> = self
+            .unloaded_shape
+            .iter()
+            .map(|&point| place(point))
+            .collect();
         if !points.is_empty() {
-            page.stroke(polyline(&points), UNLOADED.dashed(true));
+            page.draw_stroke(polyline_path(&points), UNLOADED.with_dashes(true));
         }
         for vein in &self.veins.veins {
-            page.stroke(vein.path(&place), Stroke::new(vein.color, LINE));
+            page.draw_stroke(vein.projected_path(&place), Stroke::new(vein.color, LINE));
         }
         for force in &self.forces {
             force.draw(page, cell, &place);
         }
-        vein_markers(page, self.veins, &place);
+        draw_vein_markers(page, self.veins, &place);
         let Some(pieces) = self.veins.veins.first().map(|vein| &vein.pieces) else {
             return;
         };
         if let Some([base, next, ..]) = pieces.first() {
             let [base, next] = [*base, *next].map(&place);
-            draw_support(page, base, next - base, self.veins.base_held);
+            draw_support(page, base, next - base, self.veins.base_support);
         }
-        match (pieces.last(), self.veins.tip_held) {
+        match (pieces.last(), self.veins.tip_support) {
             (Some([.., before, tip]), Some(held)) => {
                 let [before, tip] = [*before, *tip].map(&place);
                 draw_support(page, tip, before - tip, held);
             }
-            (Some([.., tip]), None) => tip_marker(page, place(*tip)),
+            (Some([.., tip]), None) => draw_tip_marker(page, place(*tip)),
             (None, _) => (),
         }
     }
 }
 
 /// Draws what holds an end of a rod that goes on into this direction on the page.
-fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: Hold) {
+fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: SupportKind) {
     match (held, inward.try_normalize()) {
-        (Hold::Clamped, Some(inward)) => draw_wall(page, at, inward, 1.0),
-        _ => hold_marker(page, at, held),
+        (SupportKind::Clamped, Some(inward)) => draw_wall(page, at, inward, 1.0),
+        _ => draw_support_marker(page, at, held),
     }
 }
 
 /// Draws a wall across the end of a rod, hatched behind.
 fn draw_wall(page: &mut Drawing, at: DVec2, inward: DVec2, size: f64) {
     let along = size * WALL * inward.perp();
-    page.line(at - along, at + along, Stroke::new(INK, 2.0));
-    let mut path: Path = Vec::new();
+    page.draw_line(at - along, at + along, Stroke::new(INK, 2.0));
+    let mut path: DrawingPath = Vec::new();
     for k in -STROKES..=STROKES {
         let from = at + f64::from(k) / f64::from(STROKES) * along;
         let behind = size * DEPTH * (0.6 * inward.perp() - inward);
-        path.extend([Step::Move(from), Step::Line(from + behind)]);
+        path.extend([PathStep::Move(from), PathStep::Line(from + behind)]);
     }
-    page.stroke(path, Stroke::new(INK, 1.0));
+    page.draw_stroke(path, Stroke::new(INK, 1.0));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::figure::leaf;
     use crate::report::sample;
 
@@ -303,9 +316,9 @@ mod tests {
 
     /// The sample rod in a picture of this scenario.
     fn svg(change: impl FnOnce(&mut Scenario)) -> String {
-        let mut scenario = sample::scenario("rod", 1);
+        let mut scenario = sample::sample_scenario("rod", 1);
         change(&mut scenario);
-        text(&leaf(&sample::fan(1, 8), &scenario))
+        checked_svg_text(&leaf(&sample::sample_equilibrium(1, 8), &scenario))
     }
 
     /// How often one of its strokes is as thick as that of a wall: the key has one more.
@@ -360,11 +373,11 @@ mod tests {
 
     #[test]
     fn a_rod_that_leaves_every_plane_is_drawn_in_space() {
-        let mut rod = sample::fan(1, 8);
+        let mut rod = sample::sample_equilibrium(1, 8);
         for (k, point) in rod.shape.curves[0].iter_mut().enumerate() {
             *point += 0.02 * (k * k) as f64 * 0.25 * DVec3::Y;
         }
-        let drawn = text(&leaf(&rod, &sample::scenario("rod", 1)));
+        let drawn = checked_svg_text(&leaf(&rod, &sample::sample_scenario("rod", 1)));
         assert!(drawn.contains(">in space, with its shadow on the floor<"));
         assert!(!drawn.contains(">from the side<"));
     }
@@ -373,11 +386,11 @@ mod tests {
     fn the_unloaded_shape_is_drawn_where_it_differs() {
         let unloaded = |svg: &str| svg.contains(">unloaded");
         let straight = |scale: f64| {
-            let mut rod = sample::fan(1, 8);
+            let mut rod = sample::sample_equilibrium(1, 8);
             for (k, point) in rod.shape.curves[0].iter_mut().enumerate() {
                 *point = scale * k as f64 / 8.0 * DVec3::X;
             }
-            text(&leaf(&rod, &sample::scenario("rod", 1)))
+            checked_svg_text(&leaf(&rod, &sample::sample_scenario("rod", 1)))
         };
         assert!(!unloaded(&straight(1.0)) && unloaded(&straight(0.9)));
         // Of a coiled rod only the beginning.

@@ -5,10 +5,10 @@
 //!
 //! The numbers of a scenario in words, with their units: for pictures.
 
-use crate::report::numbers::short;
-use Entries::*;
+use crate::report::numbers::format_four_digits;
+use ListEntryOwner::*;
 use glam::DVec3;
-use leafdyn::scenario::{Hold, Key, Scenario, Schedule, Units};
+use leafdyn::scenario::{Key, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
 
 /// Length of the arrow of the largest force or moment, as a part of the leaf's largest extent, and the
@@ -25,7 +25,7 @@ const COUNT: usize = 9;
 /// What acts at a point of a vein.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Action {
+pub enum LoadKind {
     /// A dead force on a point or a tip.
     Force,
     /// A dead force per length.
@@ -37,7 +37,7 @@ pub enum Action {
 /// A dead load at a point of a vein, which is drawn as an arrow.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoadMark {
-    pub action: Action,
+    pub action: LoadKind,
     /// The number of the vein, from 1.
     pub vein: usize,
     /// Fraction of its length.
@@ -53,7 +53,7 @@ pub struct LoadMark {
 /// What is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Part {
+pub enum ParsedKey {
     Base,
     Tip,
     Grip,
@@ -61,20 +61,20 @@ pub enum Part {
 
 /// A point or a stretch of a vein that is held.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct HoldMark {
-    pub part: Part,
+pub struct SupportMark {
+    pub part: ParsedKey,
     /// The number of the vein, from 1.
     pub vein: usize,
     /// Fractions of its length.
     pub at: [f64; 2],
-    #[serde(serialize_with = "word")]
-    pub held: Hold,
+    #[serde(serialize_with = "serialize_support")]
+    pub held: SupportKind,
 }
 
-fn word<S: serde::Serializer>(held: &Hold, to: S) -> Result<S::Ok, S::Error> {
+fn serialize_support<S: serde::Serializer>(held: &SupportKind, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(match held {
-        Hold::Clamped => "clamped",
-        Hold::Pinned => "pinned",
+        SupportKind::Clamped => "clamped",
+        SupportKind::Pinned => "pinned",
     })
 }
 
@@ -109,9 +109,9 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
         })
         .collect();
     let kinds = [
-        (Action::Distributed, along, ALONG, 0.0),
-        (Action::Force, single, LONGEST, SHORTEST),
-        (Action::Moment, moments, LONGEST, SHORTEST),
+        (LoadKind::Distributed, along, ALONG, 0.0),
+        (LoadKind::Force, single, LONGEST, SHORTEST),
+        (LoadKind::Moment, moments, LONGEST, SHORTEST),
     ];
     let marks = kinds
         .into_iter()
@@ -133,31 +133,31 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
 }
 
 /// What holds a leaf: bases, of which those at one place are one, a tip, and grips.
-pub fn hold_marks(scenario: &Scenario) -> Vec<HoldMark> {
+pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
     let mut bases: Vec<[f64; 3]> = Vec::new();
     let mut marks = Vec::new();
     for (rod, vein) in scenario.rods.iter().zip(1..) {
         if !bases.contains(&rod.base) {
             bases.push(rod.base);
-            marks.push(HoldMark {
-                part: Part::Base,
+            marks.push(SupportMark {
+                part: ParsedKey::Base,
                 vein,
                 at: [0.0; 2],
                 held: scenario.base_held,
             });
         }
     }
-    marks.extend(scenario.held_tip.iter().map(|tip| HoldMark {
-        part: Part::Tip,
+    marks.extend(scenario.held_tip.iter().map(|tip| SupportMark {
+        part: ParsedKey::Tip,
         vein: 1,
         at: [1.0; 2],
         held: match tip.clamps {
-            Some(_) => Hold::Clamped,
-            None => Hold::Pinned,
+            Some(_) => SupportKind::Clamped,
+            None => SupportKind::Pinned,
         },
     }));
-    marks.extend(scenario.grips.iter().map(|grip| HoldMark {
-        part: Part::Grip,
+    marks.extend(scenario.grips.iter().map(|grip| SupportMark {
+        part: ParsedKey::Grip,
         vein: grip.vein + 1,
         at: grip.at,
         held: grip.held,
@@ -168,7 +168,7 @@ pub fn hold_marks(scenario: &Scenario) -> Vec<HoldMark> {
 /// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
 /// if it names one.
 #[derive(Clone, Debug)]
-pub struct Setting {
+pub struct FigureSetting {
     units: Units,
     /// The longest rod, in the scenario's unit.
     length: f64,
@@ -180,7 +180,7 @@ pub struct Setting {
 
 /// A direction that is drawn as an arrow with its name.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Arrow {
+pub struct DirectionArrow {
     pub name: &'static str,
     /// Of length one.
     pub direction: DVec3,
@@ -191,27 +191,30 @@ const FRACTIONS: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L"
 
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
 
-impl Setting {
-    pub fn of(scenario: &Scenario) -> Self {
-        Setting {
+impl FigureSetting {
+    pub fn from_scenario(scenario: &Scenario) -> Self {
+        FigureSetting {
             units: scenario.units.clone(),
             length: leafdyn::scenario::longest(&scenario.rods),
-            gravity: weight(scenario).try_normalize(),
+            gravity: weight_direction(scenario).try_normalize(),
             wind: scenario.wind.as_ref().map(|wind| wind.velocity.clone()),
         }
     }
 
     /// The arrows of the first panel, or of a later one, which shows what may differ from the first:
     /// the wind at this time.
-    pub fn arrows(&self, first: bool, time: f64) -> Vec<Arrow> {
-        let gravity = self.gravity.filter(|_| first).map(|direction| Arrow {
-            direction,
-            name: "gravity",
-        });
+    pub fn direction_arrows(&self, first: bool, time: f64) -> Vec<DirectionArrow> {
+        let gravity = self
+            .gravity
+            .filter(|_| first)
+            .map(|direction| DirectionArrow {
+                direction,
+                name: "gravity",
+            });
         let wind = self.wind.as_ref();
         let wind = wind.filter(|wind| first || !wind.is_constant());
         let direction = wind.and_then(|wind| DVec3::from_array(wind.at(time)).try_normalize());
-        let wind = direction.map(|direction| Arrow {
+        let wind = direction.map(|direction| DirectionArrow {
             direction,
             name: "wind",
         });
@@ -219,7 +222,7 @@ impl Setting {
     }
 
     /// The value shown for a drawn length of 1.
-    pub fn scale(&self) -> f64 {
+    pub fn value_per_length(&self) -> f64 {
         match self.units.length {
             Some(_) if self.length.is_normal() => self.length,
             _ => 1.0,
@@ -227,44 +230,44 @@ impl Setting {
     }
 
     /// The name of an axis whose values are shown.
-    pub fn axis(&self, axis: usize) -> String {
+    pub fn axis_name(&self, axis: usize) -> String {
         match (&self.units.length, FRACTIONS[axis]) {
-            (Some(unit), _) => with_unit(COORDINATES[axis], Some(unit)),
+            (Some(unit), _) => name_with_unit(COORDINATES[axis], Some(unit)),
             (None, (name, meaning)) => format!("{name} = {meaning}"),
         }
     }
 
     /// A shorter name, with the unit only if values are shown.
-    pub fn brief_axis(&self, axis: usize, values: bool) -> String {
+    pub fn brief_axis_name(&self, axis: usize, values: bool) -> String {
         match (&self.units.length, values) {
-            (Some(_), true) => self.axis(axis),
+            (Some(_), true) => self.axis_name(axis),
             (Some(_), false) => COORDINATES[axis].into(),
             (None, _) => FRACTIONS[axis].0.into(),
         }
     }
 
     /// The length of the longest rod, as text.
-    pub fn length(&self) -> String {
+    pub fn longest_rod_text(&self) -> String {
         match &self.units.length {
-            Some(unit) => format!("{} {unit}", short(self.length)),
-            None => short(self.length),
+            Some(unit) => format!("{} {unit}", format_four_digits(self.length)),
+            None => format_four_digits(self.length),
         }
     }
 
     /// A moment of this size, as text.
-    pub fn moment(&self, size: f64) -> String {
+    pub fn moment_text(&self, size: f64) -> String {
         let unit = self.units.energy();
-        short(size) + &unit.map_or(String::new(), |unit| format!(" {unit}"))
+        format_four_digits(size) + &unit.map_or(String::new(), |unit| format!(" {unit}"))
     }
 
     /// The unit of the values shown.
-    pub fn unit(&self) -> &str {
+    pub fn length_unit(&self) -> &str {
         self.units.length.as_deref().unwrap_or("L")
     }
 }
 
 /// The direction of the weight of all veins.
-fn weight(scenario: &Scenario) -> DVec3 {
+fn weight_direction(scenario: &Scenario) -> DVec3 {
     if scenario.g == [0.0; 3] && scenario.own_gravity.is_empty() {
         return DVec3::from_array(scenario.gravity);
     }
@@ -279,7 +282,7 @@ fn weight(scenario: &Scenario) -> DVec3 {
 }
 
 /// A name with its unit, if that is known.
-pub fn with_unit(name: &str, unit: Option<&str>) -> String {
+pub fn name_with_unit(name: &str, unit: Option<&str>) -> String {
     match unit {
         Some(unit) if unit.contains('/') => format!("{name} / ({unit})"),
         Some(unit) => format!("{name} / {unit}"),
@@ -289,7 +292,7 @@ pub fn with_unit(name: &str, unit: Option<&str>) -> String {
 
 /// What the entries of a list belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Entries {
+enum ListEntryOwner {
     /// Nothing that has a name.
     Plain,
     /// The three axes, along or about which the quantity is; before them, the veins.
@@ -301,7 +304,7 @@ enum Entries {
 }
 
 /// Keys with their words and what the entries of their lists belong to.
-const WORDS: &[(&str, &str, Entries)] = &[
+const WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("leaf.rods", "number of veins", Plain),
     ("leaf.length", "length", Veins),
     ("leaf.fan", "angle at the base", Veins),
@@ -378,17 +381,17 @@ const NAMED: usize = 3;
 
 /// A number of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Quantity {
+pub struct QuantityLabel {
     pub words: String,
     /// The unit, if the scenario names those of which it consists.
     pub unit: Option<String>,
 }
 
-impl Quantity {
+impl QuantityLabel {
     /// The number of these keys, which are joined by `+` where several have one value.
-    pub fn of(keys: &str, units: &Units) -> Quantity {
+    pub fn from_keys(keys: &str, units: &Units) -> QuantityLabel {
         let parts: Vec<KeyPart> = keys.split('+').map(KeyPart::parse).collect();
-        let words = match alike_veins(&parts) {
+        let words = match words_for_several_veins(&parts) {
             Some(words) => words,
             None => {
                 let words: Vec<String> = parts.iter().map(KeyPart::words).collect();
@@ -399,12 +402,12 @@ impl Quantity {
             }
         };
         let unit = parts.first().and_then(|part| part.unit(units));
-        Quantity { words, unit }
+        QuantityLabel { words, unit }
     }
 
     /// The same as the name of an axis.
-    pub fn axis(&self) -> String {
-        with_unit(&self.words, self.unit.as_deref())
+    pub fn axis_name(&self) -> String {
+        name_with_unit(&self.words, self.unit.as_deref())
     }
 }
 
@@ -416,7 +419,7 @@ struct KeyPart<'t> {
     row: Option<usize>,
     list: Option<&'t str>,
     indices: Vec<usize>,
-    named: Option<(&'static str, Entries)>,
+    named: Option<(&'static str, ListEntryOwner)>,
 }
 
 impl<'t> KeyPart<'t> {
@@ -500,12 +503,12 @@ impl<'t> KeyPart<'t> {
         if self.scale || self.list == Some("at") {
             return None;
         }
-        units.of(Key::from_path(&self.path)?.dimension())
+        units.unit_name(Key::from_path(&self.path)?.dimension())
     }
 }
 
 /// One number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
-fn alike_veins(parts: &[KeyPart]) -> Option<String> {
+fn words_for_several_veins(parts: &[KeyPart]) -> Option<String> {
     let first = parts.first().filter(|_| parts.len() > 1)?;
     let (words, entries) = first.named?;
     let alike = |part: &KeyPart| {
@@ -585,17 +588,24 @@ mod tests {
                 "dynamics.gravity.value[0][2] / (N/cm)",
             ),
         ] {
-            assert_eq!(Quantity::of(keys, &cm()).axis(), axis, "{keys}");
+            assert_eq!(
+                QuantityLabel::from_keys(keys, &cm()).axis_name(),
+                axis,
+                "{keys}"
+            );
         }
-        let without = Quantity::of("stiffness.bending_2", &Units::default());
-        assert_eq!(without.axis(), "bending stiffness A2");
+        let without = QuantityLabel::from_keys("stiffness.bending_2", &Units::default());
+        assert_eq!(without.axis_name(), "bending stiffness A2");
         // A density has a unit of time, which is not named.
-        assert_eq!(Quantity::of("dynamics.density", &cm()).unit, None);
+        assert_eq!(
+            QuantityLabel::from_keys("dynamics.density", &cm()).unit,
+            None
+        );
     }
 
     #[test]
     fn keys_with_one_value_share_their_words() {
-        let words = |keys: &str| Quantity::of(keys, &cm()).words;
+        let words = |keys: &str| QuantityLabel::from_keys(keys, &cm()).words;
         let veins = [0, 1, 2, 4, 6, 7].map(|vein| format!("stiffness.bending_2[{vein}]"));
         let told = "bending stiffness A2, veins 1–3, 5, 7, 8";
         assert_eq!(words(&veins.join("+")), told);

@@ -1,16 +1,16 @@
 //! What a change of each number does to the tip of a leaf or, if that is held, to the force on its
 //! holder: signed bars along each axis.
 
-use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page,
+    HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TICK_SIZE, WIDTH, new_page,
 };
 use crate::figure::drawing::{
-    Anchor, BLUE, Drawing, FRAME, INK, NOTE, Stroke, VERMILION, rectangle,
+    BLUE, Drawing, FRAME, INK, NOTE, Stroke, TextAnchor, VERMILION, rectangle_path,
 };
-use crate::figure::scenario::{Quantity, with_unit};
-use crate::report::numbers::{power_of_ten, rounded_to, short};
+use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::report::numbers::{format_error_bound, format_four_digits, round_to_error};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Sensitivity};
 use leafdyn::scenario::{Scenario, Units};
@@ -46,22 +46,22 @@ const PART: f64 = 0.01;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// What changes with a number.
-struct Row {
+struct SensitivityRow {
     words: String,
-    by: String,
+    change_text: String,
     change: DVec3,
     /// Bound on the error of each component.
     error: f64,
 }
 
-impl Row {
-    fn of(found: &Sensitivity, units: &Units) -> Self {
-        let number = Quantity::of(&found.key, units);
+impl SensitivityRow {
+    fn from_sensitivity(found: &Sensitivity, units: &Units) -> Self {
+        let number = QuantityLabel::from_keys(&found.key, units);
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
         let (factor, by) = match found.value {
-            0.0 => (PART, format!("0, by {}{unit}", short(PART))),
+            0.0 => (PART, format!("0, by {}{unit}", format_four_digits(PART))),
             value => {
-                let value = format!("{}{unit}", short(value));
+                let value = format!("{}{unit}", format_four_digits(value));
                 (PART * found.value, format!("by 1 % of {value}"))
             }
         };
@@ -74,21 +74,21 @@ impl Row {
                 (tip.unwrap_or_default(), found.tip_error)
             }
         };
-        Row {
+        SensitivityRow {
             words: number.words,
-            by,
+            change_text: by,
             change: factor * change,
             error: factor.abs() * error.unwrap_or(0.0),
         }
     }
 
     /// A component without the digits below its error: zero if it is no larger.
-    fn known(&self, axis: usize) -> f64 {
-        rounded_to(self.change[axis], self.error)
+    fn significant_component(&self, axis: usize) -> f64 {
+        round_to_error(self.change[axis], self.error)
     }
 
-    fn size(&self) -> f64 {
-        let known = [0, 1, 2].map(|axis| self.known(axis));
+    fn change_length(&self) -> f64 {
+        let known = [0, 1, 2].map(|axis| self.significant_component(axis));
         DVec3::from_array(known).length()
     }
 }
@@ -96,8 +96,11 @@ impl Row {
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let found = leaf.sensitivities.as_deref().unwrap_or_default();
     let units = &scenario.units;
-    let mut rows: Vec<Row> = found.iter().map(|it| Row::of(it, units)).collect();
-    rows.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    let mut rows: Vec<SensitivityRow> = found
+        .iter()
+        .map(|it| SensitivityRow::from_sensitivity(it, units))
+        .collect();
+    rows.sort_by(|a, b| b.change_length().total_cmp(&a.change_length()));
     rows.truncate(MOST_ROWS);
     let reaction = found.iter().any(|found| found.reaction.is_some());
     let (what, unit) = match reaction {
@@ -114,7 +117,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     if error > 0.0 {
         notes.push(format!(
             "no bar where the change is within its error, ≤ {}",
-            power_of_ten(error)
+            format_error_bound(error)
         ));
     }
     let mut page = new_page(LEFT, &name, &notes, None);
@@ -122,19 +125,20 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     page.height = HEADER + PANEL_TITLE + height + PANEL_AXIS + BOTTOM;
     let width = (WIDTH - LEFT - RIGHT - WORDS - 2.0 * GAP) / 3.0;
     let corner = DVec2::new(LEFT + WORDS, HEADER + PANEL_TITLE);
-    page.group("words", |page| {
+    page.draw_group("words", |page| {
         for (k, row) in rows.iter().enumerate() {
             let middle = corner + DVec2::new(-10.0, ROW * (k as f64 + 0.5));
             let room = WORDS + LEFT - 16.0;
-            for (text, up, color) in [(&row.words, -6.5, INK), (&row.by, 7.0, NOTE)] {
-                let text = Font::embedded().shortened(text, TICK_SIZE, room);
+            for (text, up, color) in [(&row.words, -6.5, INK), (&row.change_text, 7.0, NOTE)] {
+                let text = Font::embedded().shorten_text(text, TICK_SIZE, room);
                 let at = middle + DVec2::new(0.0, up);
-                page.centered_label(at, &text, TICK_SIZE, Anchor::End, color);
+                page.draw_centered_label(at, &text, TICK_SIZE, TextAnchor::End, color);
             }
         }
     });
     // One scale for all axes, with room for the values beside the bars.
-    let largest = (rows.iter()).flat_map(|row| [0, 1, 2].map(|axis| row.known(axis).abs()));
+    let largest =
+        (rows.iter()).flat_map(|row| [0, 1, 2].map(|axis| row.significant_component(axis).abs()));
     let largest = largest.filter(|it| it.is_finite()).fold(0.0, f64::max);
     let end = if largest > 0.0 {
         (1.0 + 2.0 * BESIDE) * largest
@@ -143,9 +147,9 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     };
     for (axis, of) in AXES.into_iter().enumerate() {
         let shift = DVec2::new(axis as f64 * (width + GAP), 0.0);
-        let cell = Cell::new(corner + shift, DVec2::new(width, height));
+        let cell = PageRectangle::new(corner + shift, DVec2::new(width, height));
         let name = if axis == 1 {
-            with_unit(what, unit)
+            name_with_unit(what, unit)
         } else {
             String::new()
         };
@@ -154,7 +158,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
             tick_spacing: Some(TICKS),
             ..Axis::linear(&name, -end, end)
         };
-        page.group("changes", |page| {
+        page.draw_group("changes", |page| {
             draw_bars(page, cell, (&format!("along {of}"), across), &rows, axis);
         });
     }
@@ -164,55 +168,59 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
 /// Draws the changes along an axis, each with its value.
 fn draw_bars(
     page: &mut Drawing,
-    cell: Cell,
+    cell: PageRectangle,
     (what, across): (&str, Axis),
-    rows: &[Row],
+    rows: &[SensitivityRow],
     axis: usize,
 ) {
     let up = Axis {
-        ticks: Ticks::At(Vec::new()),
+        ticks: TickPlacement::WholeNumbers(Vec::new()),
         labelled: false,
         ..Axis::linear("", 0.0, 1.0)
     };
-    let axes = Axes::titled(page, cell, ["", what], across, up);
+    let axes = PanelAxes::draw_titled(page, cell, ["", what], across, up);
     // Values are in the unit of the labels of the axis.
-    let unit = 10f64.powi(axes.across.power());
-    let Some(zero) = axes.at((0.0, 0.0)) else {
+    let unit = 10f64.powi(axes.across.label_power_of_ten());
+    let Some(zero) = axes.page_position((0.0, 0.0)) else {
         return;
     };
     for (k, row) in rows.iter().enumerate() {
         let middle = cell.corner.y + ROW * (k as f64 + 0.5);
-        let value = row.known(axis);
-        let Some(end) = axes.at((value, 0.0)).filter(|_| value != 0.0) else {
+        let value = row.significant_component(axis);
+        let Some(end) = axes.page_position((value, 0.0)).filter(|_| value != 0.0) else {
             continue;
         };
         let color = if value > 0.0 { BLUE } else { VERMILION };
         let corner = DVec2::new(zero.x.min(end.x), middle - 0.5 * BAR);
         let size = DVec2::new((end.x - zero.x).abs(), BAR);
-        page.shape(rectangle(corner, size), color, None);
+        page.draw_shape(rectangle_path(corner, size), color, None);
         let side = value.signum();
         let anchor = if value > 0.0 {
-            Anchor::Start
+            TextAnchor::Start
         } else {
-            Anchor::End
+            TextAnchor::End
         };
         let at = DVec2::new(end.x + side * VALUE, middle);
-        let shown = rounded_to(value, SHOWN * value.abs()) / unit;
-        page.centered_label(at, &short(shown), TICK_SIZE, anchor, NOTE);
+        let shown = round_to_error(value, SHOWN * value.abs()) / unit;
+        page.draw_centered_label(at, &format_four_digits(shown), TICK_SIZE, anchor, NOTE);
     }
     let line = zero.with_y(cell.corner.y);
-    page.line(line, line.with_y(cell.end().y), Stroke::new(FRAME, 0.8));
+    page.draw_line(
+        line,
+        line.with_y(cell.opposite_corner().y),
+        Stroke::new(FRAME, 0.8),
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
 
     /// The sample leaf with numbers that move its tip so far along the axes.
     fn svg(changes: &[(&str, f64, [f64; 3])]) -> String {
-        let mut leaf = sample::fan(3, 8);
+        let mut leaf = sample::sample_equilibrium(3, 8);
         let found = changes.iter().map(|(key, value, tip)| Sensitivity {
             key: (*key).into(),
             value: *value,
@@ -232,10 +240,10 @@ mod tests {
             positions_error: None,
         });
         leaf.sensitivities = Some(found.collect());
-        let mut scenario = sample::scenario("fan", 3);
+        let mut scenario = sample::sample_scenario("fan", 3);
         scenario.units.length = Some("cm".into());
         scenario.units.force = Some("N".into());
-        text(&draw(&leaf, &scenario))
+        checked_svg_text(&draw(&leaf, &scenario))
     }
 
     #[test]

@@ -1,19 +1,22 @@
 //! Branches of equilibria: a coordinate of the tip against the number that
 //! varies, and the leaf at some of the points.
 
-use crate::figure::drawing::axes::{Axes, Axis};
+use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::labels::{
-    Cell, HEADER, Key, LEFT, Labels, PANEL_AXIS, PANEL_TITLE, SmallPanels, letters, new_page,
+    HEADER, LEFT, LabelPlacement, Legend, PANEL_AXIS, PANEL_TITLE, PageRectangle, SmallPanels,
+    new_page, panel_letters,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
-use crate::figure::leaf::{Veins, longest};
-use crate::figure::scenario::{Quantity, Setting, with_unit};
-use crate::report::numbers::{number_of_veins, power_of_ten, short};
-use crate::report::{branch_end, error_location, passes_crossings, slope_unit, stable_or_index};
+use crate::figure::leaf::{DrawnVeins, longest_curve};
+use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
+use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
+use crate::report::{
+    branch_end_phrase, error_location_words, passes_crossings, slope_unit, stability_phrase,
+};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
-use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
+use leafdyn::study::{ForceDisplacementLine, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
 const DIAGRAM: f64 = 380.0;
 
@@ -40,57 +43,59 @@ const PARTS: usize = 8;
 const ROUNDING: f64 = 1e-7;
 
 pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
-    let setting = Setting::of(scenario);
-    let shown = shown(trace);
+    let setting = FigureSetting::from_scenario(scenario);
+    let shown = points_with_leaves(trace);
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
-    let longest = longest(shown.iter().map(point).flat_map(|point| &point.curves));
-    let shapes: Vec<Veins> = (shown.iter().map(point))
-        .map(|point| Veins::through(&point.curves, &point.tips, longest).held_as(scenario))
+    let longest = longest_curve(shown.iter().map(point).flat_map(|point| &point.curves));
+    let shapes: Vec<DrawnVeins> = (shown.iter().map(point))
+        .map(|point| {
+            DrawnVeins::from_curves(&point.curves, &point.tips, longest).with_supports(scenario)
+        })
         .collect();
-    let varied = Quantity::of(&trace.keys.to_string(), &trace.units);
+    let varied = QuantityLabel::from_keys(&trace.keys.to_string(), &trace.units);
     let quantities = match trace.show.as_slice() {
-        [] => vec![most_varying(trace)],
+        [] => vec![most_varying_quantity(trace)],
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
-    let mut drawing = new_page(LEFT, &name, &notes(trace), None);
-    let mut letters = letters();
+    let mut drawing = new_page(LEFT, &name, &header_notes(trace), None);
+    let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut below = HEADER;
     for (place, &quantity) in quantities.iter().enumerate() {
         let height = if place == 0 { DIAGRAM } else { MORE };
-        let cell = Cell::left_of_key(below + PANEL_TITLE, height, KEY);
-        drawing.group("branches", |page| {
-            let axis = across(trace, &varied);
+        let cell = PageRectangle::left_of_legend(below + PANEL_TITLE, height, KEY);
+        drawing.draw_group("branches", |page| {
+            let axis = varied_number_axis(trace, &varied);
             draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
             if place == 0 {
-                draw_key(page, trace, cell);
+                draw_legend(page, trace, cell);
             }
         });
-        below = cell.end().y + PANEL_AXIS;
+        below = cell.opposite_corner().y + PANEL_AXIS;
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
-        let cell = Cell::left_of_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
-        drawing.group("law", |page| {
-            draw_law(page, trace, law, branch, cell, &letter())
+        let cell = PageRectangle::left_of_legend(below + BETWEEN + PANEL_TITLE, LAW, KEY);
+        drawing.draw_group("law", |page| {
+            draw_force_displacement_line(page, trace, law, branch, cell, &letter())
         });
-        below = cell.end().y + PANEL_AXIS;
+        below = cell.opposite_corner().y + PANEL_AXIS;
     }
-    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
-    drawing.height = panels.end();
-    drawing.group("leaves", |page| {
+    let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
+    drawing.height = panels.bottom();
+    drawing.draw_group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let caption = caption(point(at), varied.unit.as_deref());
-            panels.draw(page, index, veins, [&(index + 1).to_string(), &caption]);
+            let caption = leaf_caption(point(at), varied.unit.as_deref());
+            panels.draw_leaf(page, index, veins, [&(index + 1).to_string(), &caption]);
         }
     });
     drawing
 }
 
-fn notes(trace: &Trace) -> Vec<String> {
+fn header_notes(trace: &Trace) -> Vec<String> {
     let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
     let mut notes = vec![
-        number_of_veins(trace.rods),
+        vein_count_text(trace.rods),
         match trace.branches.len() {
             1 => format!("{points} points"),
             branches => format!("{points} points on {branches} branches"),
@@ -100,7 +105,7 @@ fn notes(trace: &Trace) -> Vec<String> {
     let errors = trace.branches.iter().flat_map(|b| &b.points);
     let worst = errors.filter_map(|p| p.error).fold(0.0, f64::max);
     if worst > 0.0 {
-        let (what, worst) = (error_location(trace), power_of_ten(worst));
+        let (what, worst) = (error_location_words(trace), format_error_bound(worst));
         notes.push(format!("{what} within {worst}"));
     }
     notes
@@ -108,7 +113,7 @@ fn notes(trace: &Trace) -> Vec<String> {
 
 /// The points whose leaves are drawn: the ends of branches, points where the index
 /// changes, and the middles of branches; only the first of leaves that look the same.
-fn shown(trace: &Trace) -> Vec<[usize; 2]> {
+fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
     let mut wanted: Vec<(usize, [usize; 2])> = Vec::new();
     for (b, branch) in trace.branches.iter().enumerate() {
         let Some(last) = branch.points.len().checked_sub(1) else {
@@ -118,14 +123,14 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
             wanted.push((0, [b, 0]));
         }
         wanted.push((1 + b.min(1), [b, last]));
-        wanted.extend(branch.critical().map(|(p, _)| (3, [b, p])));
+        wanted.extend(branch.critical_points().map(|(p, _)| (3, [b, p])));
         wanted.push((4, [b, last / 2]));
     }
     wanted.sort_by_key(|&(rank, _)| rank);
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| difference(point(at), point(other)) <= VISIBLE;
+        let alike = |&other: &[usize; 2]| largest_leaf_distance(point(at), point(other)) <= VISIBLE;
         if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
             shown.push(at);
         }
@@ -135,7 +140,7 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
 }
 
 /// Largest distance between two leaves, in lengths; their grids may differ.
-fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
+fn largest_leaf_distance(one: &TracePoint, other: &TracePoint) -> f64 {
     let at = |curve: &[DVec3], part: usize| {
         let last = curve.len().saturating_sub(1);
         curve.get((part * last + PARTS / 2) / PARTS).copied()
@@ -143,30 +148,30 @@ fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
     let pairs = || one.curves.iter().zip(&other.curves);
     let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
     let distances = points.flatten().map(|(a, b)| a.distance(b));
-    let size = longest(one.curves.iter().chain(&other.curves));
+    let size = longest_curve(one.curves.iter().chain(&other.curves));
     distances.fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
 }
 
-fn caption(point: &TracePoint, unit: Option<&str>) -> String {
+fn leaf_caption(point: &TracePoint, unit: Option<&str>) -> String {
     let kind = match point.kind {
-        PointKind::Regular => stable_or_index(point.index),
+        PointKind::Regular => stability_phrase(point.index),
         kind => kind.word().replace('-', " "),
     };
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-    format!("at {}{unit}, {kind}", short(point.value))
+    format!("at {}{unit}, {kind}", format_four_digits(point.value))
 }
 
 /// The axis of the number that varies, whose values increase along it: logarithmic if they are
 /// spaced logarithmically.
-fn across(trace: &Trace, varied: &Quantity) -> Axis {
+fn varied_number_axis(trace: &Trace, varied: &QuantityLabel) -> Axis {
     let values = trace.branches.iter().flat_map(|branch| &branch.points);
     let sign = trace.log.then(|| trace.range[0].signum());
-    Axis::covering(&varied.axis(), values.map(|point| point.value), sign)
+    Axis::covering_values(&varied.axis_name(), values.map(|point| point.value), sign)
 }
 
 /// The coordinate of the tip that varies most; of a leaf that is held the component of a reaction
 /// that does.
-fn most_varying(trace: &Trace) -> TraceShow {
+fn most_varying_quantity(trace: &Trace) -> TraceShow {
     let axes = 0..3;
     let on_grips = |grip: usize| (0..3).map(move |axis| TraceShow::Grip { grip, axis });
     let shown: Vec<TraceShow> = match (trace.held, trace.grips) {
@@ -176,7 +181,9 @@ fn most_varying(trace: &Trace) -> TraceShow {
     };
     let change = |what: TraceShow| {
         let points = trace.branches.iter().flat_map(|branch| &branch.points);
-        let ends = points.map(|point| point.shown(what)).map(|it| (it, it));
+        let ends = points
+            .map(|point| point.figure_value(what))
+            .map(|it| (it, it));
         let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         ends.map_or(0.0, |(low, high)| high - low)
     };
@@ -187,31 +194,32 @@ fn most_varying(trace: &Trace) -> TraceShow {
 }
 
 /// The axis of a quantity with its unit, wide enough that rounding is invisible.
-fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
+fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
     let points = || trace.branches.iter().flat_map(|branch| &branch.points);
     let units = &trace.units;
     let (name, least) = match quantity {
-        TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
-        TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
+        TraceShow::Energy => (name_with_unit("energy", units.energy().as_deref()), 0.0),
+        TraceShow::Twist => (name_with_unit("mean twist", Some("rad")), ROUNDING),
         TraceShow::Reaction(axis) => {
             let force = format!("reaction along {}", TraceShow::Tip(axis));
-            (with_unit(&force, units.force.as_deref()), 0.0)
+            (name_with_unit(&force, units.force.as_deref()), 0.0)
         }
         TraceShow::Grip { grip, axis } => {
             let force = format!("force on grip {} along {}", grip + 1, TraceShow::Tip(axis));
-            (with_unit(&force, units.force.as_deref()), 0.0)
+            (name_with_unit(&force, units.force.as_deref()), 0.0)
         }
         tip => {
-            let longest = longest(points().take(1).flat_map(|point| &point.curves));
-            let name = with_unit(&format!("{tip} of the tip"), units.length.as_deref());
+            let longest = longest_curve(points().take(1).flat_map(|point| &point.curves));
+            let name = name_with_unit(&format!("{tip} of the tip"), units.length.as_deref());
             (name, ROUNDING * longest)
         }
     };
-    Axis::holding(&name, points().map(|point| point.shown(quantity))).at_least(least)
+    Axis::linear_covering(&name, points().map(|point| point.figure_value(quantity)))
+        .with_least_extent(least)
 }
 
-fn tip(point: &TracePoint, axis: usize) -> f64 {
-    point.shown(TraceShow::Tip(axis))
+fn tip_coordinate(point: &TracePoint, axis: usize) -> f64 {
+    point.figure_value(TraceShow::Tip(axis))
 }
 
 fn draw_branches(
@@ -219,10 +227,10 @@ fn draw_branches(
     trace: &Trace,
     (across, quantity): (Axis, TraceShow),
     shown: &[[usize; 2]],
-    cell: Cell,
+    cell: PageRectangle,
     letter: &str,
 ) {
-    let at = |point: &TracePoint| (point.value, point.shown(quantity));
+    let at = |point: &TracePoint| (point.value, point.figure_value(quantity));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
     // The title names only the kinds that occur.
     let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
@@ -231,17 +239,23 @@ fn draw_branches(
         [false, true] => "unstable equilibria",
         _ => "stable equilibria",
     };
-    let axes = Axes::titled(page, cell, [letter, what], across, axis_of(trace, quantity));
-    let mut labels = Labels::within(cell);
+    let axes = PanelAxes::draw_titled(
+        page,
+        cell,
+        [letter, what],
+        across,
+        quantity_axis(trace, quantity),
+    );
+    let mut labels = LabelPlacement::in_rectangle(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
         let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
         let points: Vec<&TracePoint> = origin.into_iter().chain(&branch.points).collect();
         let line: Vec<(f64, f64)> = points.iter().map(|point| at(point)).collect();
-        let drawn = axes.smooth(&line);
+        let drawn = axes.smooth_curve(&line);
         let mut begun = 0;
-        for (count, stable) in pieces(&points, origin.is_some()) {
+        for (count, stable) in stability_pieces(&points, origin.is_some()) {
             let width = if stable { 2.0 } else { 1.2 };
-            let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
+            let stroke = Stroke::new(CURVES[b % CURVES.len()], width).with_dashes(!stable);
             let piece: Vec<Option<DVec2>> = (drawn[begun..begun + count].iter())
                 .flat_map(|run| {
                     if run.is_empty() {
@@ -251,53 +265,53 @@ fn draw_branches(
                     }
                 })
                 .collect();
-            axes.line(page, &piece, stroke);
+            axes.draw_clipped_line(page, &piece, stroke);
             begun += count;
         }
-        labels.avoid(&axes, &line);
+        labels.avoid_curve(&axes, &line);
     }
     for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
-        let critical = trace.branches.iter().flat_map(TraceBranch::critical);
+        let critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
         let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
-        axes.markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
+        axes.draw_markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
     }
     for (index, &[b, p]) in shown.iter().enumerate() {
-        if let Some(place) = axes.at(at(&trace.branches[b].points[p])) {
-            labels.add(place, &(index + 1).to_string());
+        if let Some(place) = axes.page_position(at(&trace.branches[b].points[p])) {
+            labels.request_label(place, &(index + 1).to_string());
         }
     }
-    labels.draw(page);
+    labels.draw_requested(page);
 }
 
 /// Draws the key: the branches, and the kinds of points that occur.
-fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
-    let mut key = Key::right_of(cell);
+fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
+    let mut key = Legend::right_of(cell);
     let branches = trace.branches.iter().enumerate().map(|(b, branch)| {
         let name = match branch.from {
             None => "first branch".into(),
             Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
         };
-        (name, branch_end(&branch.end).into())
+        (name, branch_end_phrase(&branch.end).into())
     });
-    key.curves(page, branches);
+    key.add_curves(page, branches);
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
-    let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
+    let critical = || trace.branches.iter().flat_map(TraceBranch::critical_points);
     if critical().any(|point| !folds(point)) {
         let how = match passes_crossings(trace) {
             true => "--switch follows them",
             false => "",
         };
-        key.marker(page, "branches cross", how, Marker::Diamond, INK);
+        key.add_marker(page, "branches cross", how, Marker::Diamond, INK);
     }
     if critical().any(folds) {
-        key.marker(page, "fold", "", Marker::Ring, INK);
+        key.add_marker(page, "fold", "", Marker::Ring, INK);
     }
 }
 
 /// How many segments of a branch between these points are equally stable, one after the other, and
 /// whether they are stable. With an `origin` the first of the points is that where it leaves another
 /// branch.
-fn pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
+fn stability_pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
     let mut pieces: Vec<(usize, bool)> = Vec::new();
     for (k, pair) in points.windows(2).enumerate() {
         // The index of a critical point is the one after it, but that of the other branch.
@@ -312,22 +326,30 @@ fn pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
 }
 
 /// Draws force against displacement of the tip, and the fitted line.
-fn draw_law(
+fn draw_force_displacement_line(
     page: &mut Drawing,
     trace: &Trace,
-    law: &Law,
+    law: &ForceDisplacementLine,
     branch: &TraceBranch,
-    cell: Cell,
+    cell: PageRectangle,
     letter: &str,
 ) {
-    let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
+    let start = branch
+        .points
+        .first()
+        .map_or(0.0, |p| tip_coordinate(p, law.axis));
     let points: Vec<(f64, f64)> = (branch.points.iter())
-        .map(|point| (tip(point, law.axis) - start, point.force_on_tip(law.axis)))
+        .map(|point| {
+            (
+                tip_coordinate(point, law.axis) - start,
+                point.force_on_tip(law.axis),
+            )
+        })
         .collect();
     let units = &trace.units;
     let across = format!("displacement along {}", TraceShow::Tip(law.axis));
-    let across = with_unit(&across, units.length.as_deref());
-    let up = with_unit("force", units.force.as_deref());
+    let across = name_with_unit(&across, units.length.as_deref());
+    let up = name_with_unit("force", units.force.as_deref());
     let count = points.len() as f64;
     let x = points.iter().map(|p| p.0).sum::<f64>() / count;
     let y = points.iter().map(|p| p.1).sum::<f64>() / count;
@@ -337,18 +359,25 @@ fn draw_law(
     });
     // The line may leave the range of the points.
     let drawn = || points.iter().chain(&ends);
-    let across = Axis::holding(&across, drawn().map(|p| p.0));
-    let up = Axis::holding(&up, drawn().map(|p| p.1));
+    let across = Axis::linear_covering(&across, drawn().map(|p| p.0));
+    let up = Axis::linear_covering(&up, drawn().map(|p| p.1));
     let what = "force against displacement of the tip";
-    let axes = Axes::titled(page, cell, [letter, what], across, up);
+    let axes = PanelAxes::draw_titled(page, cell, [letter, what], across, up);
     let line = Stroke::new(CURVES[2], 1.4);
-    axes.curve(page, &ends, line);
-    axes.markers(page, points, Marker::Dot, CURVES[0]);
-    let mut key = Key::right_of(cell);
+    axes.draw_curve(page, &ends, line);
+    axes.draw_markers(page, points, Marker::Dot, CURVES[0]);
+    let mut key = Legend::right_of(cell);
     let which = "of the first branch";
-    key.marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
-    let slope = format!("slope {}{}", short(law.slope), slope_unit(units));
-    key.line(page, "line of least squares", &slope, line);
-    let off = format!("off by {} % at most", short(100.0 * law.deviation));
-    key.entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
+    key.add_marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
+    let slope = format!(
+        "slope {}{}",
+        format_four_digits(law.slope),
+        slope_unit(units)
+    );
+    key.add_line(page, "line of least squares", &slope, line);
+    let off = format!(
+        "off by {} % at most",
+        format_four_digits(100.0 * law.deviation)
+    );
+    key.add_entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
 }

@@ -13,17 +13,19 @@ use tempfile::{Builder, NamedTempFile};
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// Drafts that have not been renamed yet.
-static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+static UNFINISHED_DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+fn lock_unfinished_drafts() -> MutexGuard<'static, Vec<PathBuf>> {
     // A list of paths is valid even if the lock is poisoned.
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+    UNFINISHED_DRAFTS
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes all unfinished files, and blocks other threads that try to begin or finish one
 /// from now on: for a program about to exit.
-pub fn abandon_unfinished() {
-    let mut paths = unfinished();
+pub fn remove_unfinished_files() {
+    let mut paths = lock_unfinished_drafts();
     for path in paths.drain(..) {
         // A file that cannot be removed is left behind.
         let _ = fs::remove_file(path);
@@ -36,16 +38,16 @@ pub(super) fn write_file(
     file: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let (draft, created) = Draft::begin(file)?;
+    let (draft, created) = DraftFile::begin(file)?;
     let mut out = BufWriter::with_capacity(BUFFER_BYTES, created);
     fill(&mut out)?;
     out.flush()?;
     drop(out);
-    rename(draft.path(), file)
+    finish_draft(draft.path(), file)
 }
 
 /// Writes a file that does not exist yet; on an error it still does not.
-pub fn write_new(file: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn write_new_file(file: &Path, bytes: &[u8]) -> io::Result<()> {
     // Takes the name, so that a file of another process is not replaced.
     File::create_new(file)?;
     let written = write_file(file, |out| out.write_all(bytes));
@@ -57,15 +59,15 @@ pub fn write_new(file: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// The path of a file that is being written. A file that is not renamed is removed when this
 /// is dropped.
-pub(super) struct Draft(PathBuf);
+pub(super) struct DraftFile(PathBuf);
 
-impl Draft {
+impl DraftFile {
     /// Begins a file under another name.
     pub fn begin(file: &Path) -> io::Result<(Self, File)> {
-        let mut paths = unfinished();
+        let mut paths = lock_unfinished_drafts();
         let (created, path) = create_draft(file)?.keep().map_err(|kept| kept.error)?;
         paths.push(path.clone());
-        Ok((Draft(path), created))
+        Ok((DraftFile(path), created))
     }
 
     pub fn path(&self) -> &Path {
@@ -73,9 +75,9 @@ impl Draft {
     }
 }
 
-impl Drop for Draft {
+impl Drop for DraftFile {
     fn drop(&mut self) {
-        let mut paths = unfinished();
+        let mut paths = lock_unfinished_drafts();
         if let Some(at) = paths.iter().position(|path| *path == self.0) {
             // A file that cannot be removed is left behind.
             let _ = fs::remove_file(paths.swap_remove(at));
@@ -84,8 +86,8 @@ impl Drop for Draft {
 }
 
 /// Gives a draft its final name.
-pub(super) fn rename(draft: &Path, file: &Path) -> io::Result<()> {
-    let mut paths = unfinished();
+pub(super) fn finish_draft(draft: &Path, file: &Path) -> io::Result<()> {
+    let mut paths = lock_unfinished_drafts();
     fs::rename(draft, file)?;
     paths.retain(|path| path != draft);
     Ok(())
@@ -107,18 +109,18 @@ fn create_draft(file: &Path) -> io::Result<NamedTempFile> {
 /// Creates the output folder and its parents.
 pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
     let created = fs::create_dir_all(folder);
-    created.map_err(|reason| not_writable(folder, nearest_existing(folder), reason))
+    created.map_err(|reason| folder_not_writable(folder, nearest_existing_ancestor(folder), reason))
 }
 
 /// Checks that files can be written to `folder`, without leaving anything there, before
 /// a long computation.
 pub fn check_writable(folder: &Path) -> Result<(), FileError> {
-    let existing = nearest_existing(folder);
+    let existing = nearest_existing_ancestor(folder);
     let written = create_draft(&existing.join("probe")).and_then(NamedTempFile::close);
-    written.map_err(|reason| not_writable(folder, existing, reason))
+    written.map_err(|reason| folder_not_writable(folder, existing, reason))
 }
 
-fn not_writable(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
+fn folder_not_writable(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
     let (folder, obstacle) = (folder.display(), existing.display());
     FileError(match existing.is_dir() {
         true => format!(
@@ -131,7 +133,7 @@ fn not_writable(folder: &Path, existing: PathBuf, reason: io::Error) -> FileErro
 }
 
 /// `path`, or its nearest ancestor that exists.
-fn nearest_existing(path: &Path) -> PathBuf {
+fn nearest_existing_ancestor(path: &Path) -> PathBuf {
     path.ancestors()
         .find(|ancestor| ancestor.exists())
         .filter(|ancestor| !ancestor.as_os_str().is_empty())
@@ -155,8 +157,8 @@ mod tests {
     fn failed_write_leaves_the_old_file_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.json");
-        write_new(&file, b"old").unwrap();
-        let again = write_new(&file, b"new").unwrap_err();
+        write_new_file(&file, b"old").unwrap();
+        let again = write_new_file(&file, b"new").unwrap_err();
         assert_eq!(again.kind(), io::ErrorKind::AlreadyExists);
         let failed = write_file(&file, |out| {
             out.write_all(b"half of the n")?;
@@ -197,7 +199,7 @@ mod tests {
     #[test]
     fn names_of_drafts_are_not_predictable() {
         let folder = tempfile::tempdir().unwrap();
-        let begin = || Draft::begin(&folder.path().join("a.json")).unwrap().0;
+        let begin = || DraftFile::begin(&folder.path().join("a.json")).unwrap().0;
         let (first, second) = (begin(), begin());
         assert_ne!(first.path(), second.path());
     }

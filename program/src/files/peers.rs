@@ -1,71 +1,74 @@
 //! Tables of measurements of other programs, as `benches/peers` writes them.
 
 use crate::report::FileError;
-use leafdyn::study::PeerRow;
+use leafdyn::study::PeerMeasurement;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 /// Columns that a table must have, in any order.
-const COLUMNS: [&str; 7] = [
+const PEER_TABLE_COLUMNS: [&str; 7] = [
     "program", "scenario", "rods", "knob", "seconds", "error", "outcome",
 ];
 
 /// Most bytes of a table.
-const MOST_BYTES: u64 = 16 << 20;
+const MOST_TABLE_BYTES: u64 = 16 << 20;
 
 /// Most rows: a chart of more is unreadable.
-const MOST_ROWS: usize = 10_000;
+const MOST_TABLE_ROWS: usize = 10_000;
 
 /// Most programs in one chart, each a marker and a line of the key.
 const MOST_PROGRAMS: usize = 100;
 
 /// Most characters of a cell.
-const MOST_CHARACTERS: usize = 200;
+const MOST_CELL_CHARACTERS: usize = 200;
 
 /// Reads a table.
 ///
 /// # Errors
 /// If it is not one, with the line.
-pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, FileError> {
+pub fn read_peer_measurements(file: &Path) -> Result<Vec<PeerMeasurement>, FileError> {
     let refused = |what: String| FileError(format!("--peers: {what}"));
     let mut bytes = Vec::new();
     File::open(file)
-        .and_then(|open| open.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|reason| refused(FileError::read(file, reason).to_string()))?;
+        .and_then(|open| open.take(MOST_TABLE_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|reason| refused(FileError::cannot_read(file, reason).to_string()))?;
     let shown = file.display();
-    if bytes.len() as u64 > MOST_BYTES {
-        let most = MOST_BYTES >> 20;
+    if bytes.len() as u64 > MOST_TABLE_BYTES {
+        let most = MOST_TABLE_BYTES >> 20;
         let what = format!("{shown} is larger than {most} MB: it is no table of measurements");
         return Err(refused(what));
     }
-    parse(&bytes).map_err(|(line, problem)| refused(format!("{shown}:{line}: {problem}")))
+    parse_peer_table(&bytes)
+        .map_err(|(line, problem)| refused(format!("{shown}:{line}: {problem}")))
 }
 
 /// Parses the rows; an error has the line and the problem.
-fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
+fn parse_peer_table(bytes: &[u8]) -> Result<Vec<PeerMeasurement>, (u64, String)> {
     let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
-    let header = table.headers().map_err(|error| (1, message(&error)))?;
+    let header = table
+        .headers()
+        .map_err(|error| (1, csv_error_message(&error)))?;
     let header = header.clone();
-    let mut columns = [0; COLUMNS.len()];
-    for (column, name) in columns.iter_mut().zip(COLUMNS) {
+    let mut columns = [0; PEER_TABLE_COLUMNS.len()];
+    for (column, name) in columns.iter_mut().zip(PEER_TABLE_COLUMNS) {
         let mut places = (0..header.len()).filter(|&i| header[i].trim() == name);
         *column = match (places.next(), places.next()) {
             (Some(place), None) => place,
             _ => {
-                let wanted = COLUMNS.join(", ");
+                let wanted = PEER_TABLE_COLUMNS.join(", ");
                 let what = format!("the first line must name the columns {wanted}, each once");
                 return Err((1, what));
             }
         };
     }
-    let mut rows: Vec<PeerRow> = Vec::new();
+    let mut rows: Vec<PeerMeasurement> = Vec::new();
     let mut programs = BTreeSet::new();
     for record in table.records() {
         let record = record.map_err(|error| {
             let line = error.position().map_or(0, csv::Position::line);
-            (line, message(&error))
+            (line, csv_error_message(&error))
         })?;
         let line = record.position().map_or(0, csv::Position::line);
         if record.len() != header.len() {
@@ -74,16 +77,19 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
             return Err((line, what));
         }
         let cell = columns.map(|column| record[column].trim());
-        if rows.len() == MOST_ROWS {
-            return Err((line, format!("more than {MOST_ROWS} rows: take fewer")));
+        if rows.len() == MOST_TABLE_ROWS {
+            return Err((
+                line,
+                format!("more than {MOST_TABLE_ROWS} rows: take fewer"),
+            ));
         }
-        for (name, cell) in COLUMNS.into_iter().zip(cell) {
-            if cell.chars().count() > MOST_CHARACTERS {
-                let what = format!("{name}: more than {MOST_CHARACTERS} characters");
+        for (name, cell) in PEER_TABLE_COLUMNS.into_iter().zip(cell) {
+            if cell.chars().count() > MOST_CELL_CHARACTERS {
+                let what = format!("{name}: more than {MOST_CELL_CHARACTERS} characters");
                 return Err((line, what));
             }
         }
-        let row = row(cell).map_err(|problem| (line, problem))?;
+        let row = parse_peer_row(cell).map_err(|problem| (line, problem))?;
         let (_, settings) = row.knob.split_once(' ').unwrap_or_default();
         programs.insert(format!("{} {settings}", row.program));
         if programs.len() > MOST_PROGRAMS {
@@ -96,16 +102,16 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
 }
 
 /// The message of a CSV error, without its position.
-fn message(error: &csv::Error) -> String {
+fn csv_error_message(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Utf8 { .. } => "not UTF-8".into(),
         _ => error.to_string(),
     }
 }
 
-fn row(
+fn parse_peer_row(
     [program, scenario, rods, knob, seconds, error, outcome]: [&str; 7],
-) -> Result<PeerRow, String> {
+) -> Result<PeerMeasurement, String> {
     let named = |name: &str, cell: &str| match cell {
         "" => Err(format!("{name}: must not be empty")),
         cell => Ok(cell.to_string()),
@@ -115,7 +121,7 @@ fn row(
         let value = value.filter(|&value: &f64| value.is_finite() && good(value));
         value.ok_or_else(|| format!("{name} = {cell:?}: must be {allowed}"))
     };
-    Ok(PeerRow {
+    Ok(PeerMeasurement {
         program: named("program", program)?,
         scenario: named("scenario", scenario)?,
         rods: match rods.parse() {
@@ -147,7 +153,7 @@ mod tests {
 
     #[track_caller]
     fn refused(text: &[u8], line: u64, part: &str) {
-        let (at, problem) = parse(text).unwrap_err();
+        let (at, problem) = parse_peer_table(text).unwrap_err();
         assert_eq!(at, line, "{problem}");
         assert!(problem.contains(part), "{part} in {problem}");
     }
@@ -155,7 +161,7 @@ mod tests {
     #[test]
     fn columns_may_be_in_any_order_with_others_between() {
         let text = "outcome,date,error,seconds,knob,rods,scenario,program\nat-rest,today,,2,n=1,3,leaf,p\n";
-        let rows = parse(text.as_bytes()).unwrap();
+        let rows = parse_peer_table(text.as_bytes()).unwrap();
         assert_eq!((rows[0].rods, rows[0].error), (3, None));
     }
 

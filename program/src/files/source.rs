@@ -1,11 +1,11 @@
 //! The scenario whose results a folder holds: the JSON files in it name its file; and files that
 //! results must not replace.
 
-use crate::files::Written;
+use crate::files::WrittenResult;
 use crate::report::FileError;
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
-use leafdyn::study::{Boundary, Chart, Check, Equilibria, Fit, Map, Trace};
+use leafdyn::study::{Chart, Check, Equilibria, Fit, Map, StabilityBoundary, Trace};
 use std::ffi::OsStr;
 use std::fs;
 use std::fs::File;
@@ -13,25 +13,27 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Component, Path, PathBuf, absolute};
 
 /// The JSON files of all verbs.
-const FILES: [Option<&str>; 9] = [
+const RESULT_FILES: [Option<&str>; 9] = [
     Equilibrium::JSON,
     Equilibria::JSON,
     Check::JSON,
     Record::JSON,
     Trace::JSON,
-    Boundary::JSON,
+    StabilityBoundary::JSON,
     Map::JSON,
     Chart::JSON,
     Fit::JSON,
 ];
 
 /// Most scenarios that a message names.
-const MOST_NAMED: usize = 3;
+const MOST_SCENARIOS_NAMED: usize = 3;
 
 /// How a result in `folder` names the file of its scenario: by the relative path, so
 /// that both can be moved together.
-pub fn source(folder: &Path, file: &Path) -> String {
-    let [Ok(folder), Ok(file)] = [folder, file].map(|path| absolute(path).map(without_dots)) else {
+pub fn relative_source_path(folder: &Path, file: &Path) -> String {
+    let [Ok(folder), Ok(file)] =
+        [folder, file].map(|path| absolute(path).map(resolve_parent_components))
+    else {
         return file.display().to_string();
     };
     let [from, to] = [&folder, &file].map(|path| path.components().collect::<Vec<_>>());
@@ -44,7 +46,7 @@ pub fn source(folder: &Path, file: &Path) -> String {
 }
 
 /// The path without `..`.
-fn without_dots(path: PathBuf) -> PathBuf {
+fn resolve_parent_components(path: PathBuf) -> PathBuf {
     let mut plain = PathBuf::new();
     for component in path.components() {
         match component {
@@ -60,17 +62,20 @@ fn without_dots(path: PathBuf) -> PathBuf {
 pub fn check_source(folder: &Path, source: &str) -> Result<(), FileError> {
     let refuse = |file: &Path, why: &str| {
         let change = "name a folder with --out DIR, or give this scenario another name";
-        Err(FileError::unfit(file, &format!("{why}: {change}")))
+        Err(FileError::mismatched_file(
+            file,
+            &format!("{why}: {change}"),
+        ))
     };
-    for name in FILES.into_iter().flatten() {
+    for name in RESULT_FILES.into_iter().flatten() {
         let file = folder.join(name);
         if !file.exists() {
             continue;
         }
-        match source_in(&file).as_deref() {
+        match source_named_in_file(&file).as_deref() {
             None => return refuse(&file, "does not say of which scenario it is"),
             Some(other) if other == source => (),
-            Some(other) => return refuse(&file, &of_another(folder, other)),
+            Some(other) => return refuse(&file, &other_scenario_message(folder, other)),
         }
     }
     Ok(())
@@ -93,7 +98,7 @@ pub fn check_inputs<'p>(
         if let Some(file) = files.into_iter().find(same) {
             let why = "is read by this request, and its results would replace it: \
                        name another folder with --out DIR";
-            return Err(FileError::unfit(&file, why));
+            return Err(FileError::mismatched_file(&file, why));
         }
     }
     Ok(())
@@ -107,19 +112,19 @@ pub fn check_table(file: &Path, scenarios: &[PathBuf]) -> Result<(), FileError> 
     };
     let plain = |path: &Path| {
         let plain = path.canonicalize().or_else(|_| absolute(path));
-        plain.map_or_else(|_| path.into(), without_dots)
+        plain.map_or_else(|_| path.into(), resolve_parent_components)
     };
     let ours: Vec<PathBuf> = scenarios.iter().map(|path| plain(path)).collect();
     let Some(mut others) = scenarios_in(&bytes) else {
         let why = "is no table of results: name a folder with --out DIR, or remove it";
-        return Err(FileError::unfit(file, why));
+        return Err(FileError::mismatched_file(file, why));
     };
     others.retain(|other| !ours.contains(&plain(Path::new(other))));
     if others.is_empty() {
         return Ok(());
     }
-    let more = others.len().saturating_sub(MOST_NAMED);
-    others.truncate(MOST_NAMED);
+    let more = others.len().saturating_sub(MOST_SCENARIOS_NAMED);
+    others.truncate(MOST_SCENARIOS_NAMED);
     let mut names = others.join(", ");
     if more > 0 {
         names += &format!(" and {more} more");
@@ -128,7 +133,7 @@ pub fn check_table(file: &Path, scenarios: &[PathBuf]) -> Result<(), FileError> 
         "has results of {names}, which are not among these scenarios: name a folder with --out DIR, \
          or remove the table"
     );
-    Err(FileError::unfit(file, &why))
+    Err(FileError::mismatched_file(file, &why))
 }
 
 /// The files of the scenarios whose results a table has; `None` if it is no such table.
@@ -150,17 +155,17 @@ fn scenarios_in(table: &[u8]) -> Option<Vec<String>> {
     Some(found)
 }
 
-fn of_another(folder: &Path, source: &str) -> String {
+fn other_scenario_message(folder: &Path, source: &str) -> String {
     if source == "-" {
         return "is of another scenario, from standard input".into();
     }
     let other = folder.join(source);
-    let other = without_dots(absolute(&other).unwrap_or(other));
+    let other = resolve_parent_components(absolute(&other).unwrap_or(other));
     format!("is of another scenario, in {}", other.display())
 }
 
 /// The source that a JSON file names, if any.
-fn source_in(file: &Path) -> Option<String> {
+fn source_named_in_file(file: &Path) -> Option<String> {
     // It is among the first lines; later ones can be very long.
     let lines = BufReader::new(File::open(file).ok()?.take(1 << 12)).lines();
     let mut lines = lines.map_while(Result::ok);
@@ -181,7 +186,10 @@ mod tests {
             ("/", "/b.toml", "b.toml"),
             ("out", "s/a.toml", "../s/a.toml"),
         ] {
-            assert_eq!(source(Path::new(folder), Path::new(file)), relative);
+            assert_eq!(
+                relative_source_path(Path::new(folder), Path::new(file)),
+                relative
+            );
         }
     }
 }

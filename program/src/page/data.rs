@@ -1,19 +1,19 @@
 //! The data of the page: results, thinned to what is visible, with large arrays as
 //! base64 of little-endian numbers.
 
-use crate::figure::leaf::{node_stride, tamed};
-use crate::figure::scenario::{Arrow, HoldMark, LoadMark};
+use crate::figure::leaf::{node_stride, replace_undrawable_points};
+use crate::figure::scenario::{DirectionArrow, LoadMark, SupportMark};
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Shape};
 use serde::Serialize;
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
-const STATE: usize = 16;
+const STATE_NUMBERS_PER_NODE: usize = 16;
 
 /// Everything on a page.
 #[derive(Serialize)]
-pub struct View {
+pub struct PageData {
     /// `leaf`, `motion`, `trace` or `equilibria`.
     pub kind: &'static str,
     /// The name of the scenario.
@@ -27,12 +27,12 @@ pub struct View {
     /// Names of the units of length, force and time, if there are any.
     pub units: [Option<String>; 3],
     /// Directions of the weight of all veins and of the wind at time 0, as figures draw them.
-    pub directions: Vec<Arrow>,
+    pub directions: Vec<DirectionArrow>,
     /// The dead loads on its leaves that do not have some of their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<LoadMark>,
     /// What is held: bases, a tip, and what grips hold.
-    pub holds: Vec<HoldMark>,
+    pub holds: Vec<SupportMark>,
     /// The length of the longest vein.
     pub longest: f64,
     /// Whether the tips share one point.
@@ -46,16 +46,16 @@ pub struct View {
     /// Their colours.
     pub colors: Vec<String>,
     /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
-    pub leaves: Vec<Leaf>,
+    pub leaves: Vec<PageLeaf>,
     /// Its modes, if their shapes were requested.
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
-    pub chart: Option<Chart>,
+    pub chart: Option<PageChart>,
 }
 
 /// A shape of the leaf.
 #[derive(Default, Serialize)]
-pub struct Leaf {
+pub struct PageLeaf {
     /// A short description.
     pub label: String,
     /// The numbers of this leaf alone.
@@ -73,7 +73,7 @@ pub struct Leaf {
     /// Nodes per vein.
     pub nodes: usize,
     /// Positions, vein by vein.
-    pub points: Points,
+    pub points: EncodedPoints,
     /// Sixteen numbers per node: rotation w, x, y, z, then v, u, n, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,
@@ -85,14 +85,14 @@ pub struct Leaf {
 /// Positions: in full, or rounded to 65,536 steps over their bounding box.
 #[derive(Serialize)]
 #[serde(untagged)]
-pub enum Points {
+pub enum EncodedPoints {
     Full { f32: String },
     Coarse { u16: String, low: DVec3, size: f64 },
 }
 
-impl Default for Points {
+impl Default for EncodedPoints {
     fn default() -> Self {
-        Points::Full { f32: String::new() }
+        EncodedPoints::Full { f32: String::new() }
     }
 }
 
@@ -108,16 +108,16 @@ pub struct ModeShape {
 
 /// Curves of quantities, one of which is chosen.
 #[derive(Serialize)]
-pub struct Chart {
+pub struct PageChart {
     pub across: String,
     pub log: bool,
     /// Names of the quantities that can be drawn upwards.
     pub choices: Vec<String>,
-    pub curves: Vec<Curve>,
+    pub curves: Vec<PageCurve>,
 }
 
 #[derive(Default, Serialize)]
-pub struct Curve {
+pub struct PageCurve {
     /// Which of the choices it belongs to.
     pub choice: usize,
     pub name: String,
@@ -134,51 +134,54 @@ pub struct Curve {
     pub special: Vec<(usize, &'static str)>,
 }
 
-impl Leaf {
+impl PageLeaf {
     /// A leaf in full, with strains and forces.
-    pub fn full(label: String, leaf: &Equilibrium, view: &View) -> Self {
+    pub fn with_node_states(label: String, leaf: &Equilibrium, view: &PageData) -> Self {
         let Shape { stations, rods, .. } = &leaf.shape;
         let shown = || view.drawn.iter().map(|&number| &rods[number - 1].nodes);
         let stress = leaf.stress.as_ref().map(|of| {
             let shown = view.drawn.iter().flat_map(|&number| &of.rods[number - 1]);
-            floats(shown.map(|stress| stress.equivalent))
+            encode_floats(shown.map(|stress| stress.equivalent))
         });
         let points = shown().flat_map(|nodes| {
             let points = nodes.iter().map(|node| node.position);
-            tamed(points, view.longest)
+            replace_undrawable_points(points, view.longest)
         });
-        let mut state = Vec::with_capacity(STATE * stations.len() * view.drawn.len());
+        let mut state =
+            Vec::with_capacity(STATE_NUMBERS_PER_NODE * stations.len() * view.drawn.len());
         for node in shown().flatten() {
             let q = node.rotation;
             state.extend([q.w, q.x, q.y, q.z]);
             let vectors = [node.v, node.u, node.n, node.m].map(|v| v.to_array());
             state.extend(vectors.as_flattened());
         }
-        Leaf {
+        PageLeaf {
             label,
             nodes: stations.len(),
             stations: Some(stations.clone()),
-            points: Points::Full {
-                f32: vectors(points),
+            points: EncodedPoints::Full {
+                f32: encode_vectors(points),
             },
-            state: Some(floats(state)),
+            state: Some(encode_floats(state)),
             stress,
-            ..Leaf::default()
+            ..PageLeaf::default()
         }
     }
 
     /// A leaf as coarse centrelines, for one of many.
-    pub fn coarse(
+    pub fn from_centerlines(
         label: String,
         stations: &[f64],
         curves: &[Vec<DVec3>],
-        view: &View,
+        view: &PageData,
         most: usize,
     ) -> Self {
         let nodes = curves.first().map_or(0, Vec::len);
         let stride = node_stride(nodes, most);
         let curves = view.drawn.iter().map(|&number| &curves[number - 1]);
-        let shown = curves.flat_map(|it| tamed(it.iter().step_by(stride).copied(), view.longest));
+        let shown = curves.flat_map(|it| {
+            replace_undrawable_points(it.iter().step_by(stride).copied(), view.longest)
+        });
         let shown: Vec<DVec3> = shown.collect();
         let all = || shown.iter().copied();
         let low = all().reduce(DVec3::min).unwrap_or_default();
@@ -187,33 +190,34 @@ impl Leaf {
         let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
         let steps = all().flat_map(step);
         let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
-        Leaf {
+        PageLeaf {
             label,
             nodes: nodes.saturating_sub(1) / stride + 1,
-            stations: uneven(stations).then(|| stations.iter().step_by(stride).copied().collect()),
-            points: Points::Coarse {
+            stations: are_unequally_spaced(stations)
+                .then(|| stations.iter().step_by(stride).copied().collect()),
+            points: EncodedPoints::Coarse {
                 u16: STANDARD.encode(steps.collect::<Vec<u8>>()),
                 low,
                 size,
             },
-            ..Leaf::default()
+            ..PageLeaf::default()
         }
     }
 }
 
 /// Whether these are not equally spaced, which the page assumes by default.
-fn uneven(stations: &[f64]) -> bool {
+fn are_unequally_spaced(stations: &[f64]) -> bool {
     let last = stations.len().saturating_sub(1).max(1) as f64;
     let mut stations = stations.iter().enumerate();
     stations.any(|(k, station)| (station - k as f64 / last).abs() > 1e-9)
 }
 
 /// Vectors as 32-bit numbers.
-pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
-    floats(vectors.flat_map(|vector| vector.to_array()))
+pub fn encode_vectors(vectors: impl Iterator<Item = DVec3>) -> String {
+    encode_floats(vectors.flat_map(|vector| vector.to_array()))
 }
 
-fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
+fn encode_floats(numbers: impl IntoIterator<Item = f64>) -> String {
     let bytes = numbers.into_iter();
     let bytes = bytes.flat_map(|number| (number as f32).to_le_bytes());
     STANDARD.encode(bytes.collect::<Vec<u8>>())

@@ -4,7 +4,7 @@
 //! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
 
 use crate::figure::drawing::{Color, color_of_vein};
-use crate::figure::leaf::{node_stride, tamed};
+use crate::figure::leaf::{node_stride, replace_undrawable_points};
 use glam::{DVec3, Vec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
@@ -13,56 +13,56 @@ use std::io;
 use std::io::Write;
 
 /// Most shapes of a film: each has all vertices.
-const MOST_SHAPES: usize = 61;
+const MOST_FILM_SHAPES: usize = 61;
 
 /// Most segments of a vein.
-const MOST_SEGMENTS: usize = 32;
+const MOST_SEGMENTS_PER_VEIN: usize = 32;
 
 /// Length of a film in seconds, as the unit of time is not known.
-const SECONDS: f64 = 10.0;
+const FILM_SECONDS: f64 = 10.0;
 
 /// Radius of a vein, as a fraction of the longest.
-const RADIUS: f64 = 0.004;
+const RELATIVE_VEIN_RADIUS: f64 = 0.004;
 
-const FLOAT: u32 = 5126;
+const GLTF_FLOAT: u32 = 5126;
 
-const UNSIGNED_INT: u32 = 5125;
+const GLTF_UNSIGNED_INT: u32 = 5125;
 
-const UNSIGNED_BYTE: u32 = 5121;
+const GLTF_UNSIGNED_BYTE: u32 = 5121;
 
-const ARRAY: u32 = 34962;
+const GLTF_ARRAY_BUFFER: u32 = 34962;
 
-const ELEMENT_ARRAY: u32 = 34963;
+const GLTF_ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// A leaf at rest.
-pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let leaf = [(0.0, &shape.curves[..])];
-    write(&equilibrium.scenario, &leaf, shape.longest(), out)
+    write_shapes(&equilibrium.scenario, &leaf, shape.longest(), out)
 }
 
 /// A moving leaf.
-pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let film = &record.film;
     let last = film.len().saturating_sub(1);
-    let stride = last.div_ceil(MOST_SHAPES - 1).max(1);
+    let stride = last.div_ceil(MOST_FILM_SHAPES - 1).max(1);
     let kept = (0..film.len()).filter(|&k| k.is_multiple_of(stride) || k == last);
     let shape = |k: usize| (record.moments[film[k].moment].time, &film[k].curves[..]);
     let shapes: Vec<(f64, &[Vec<DVec3>])> = kept.map(shape).collect();
-    write(&record.scenario, &shapes, record.length, out)
+    write_shapes(&record.scenario, &shapes, record.length, out)
 }
 
 /// The buffer, with its views and accessors.
 #[derive(Default)]
-struct File {
+struct GltfBuffer {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
 }
 
-impl File {
+impl GltfBuffer {
     /// Adds an array, and returns the index of its accessor.
-    fn add(
+    fn add_array(
         &mut self,
         bytes: impl IntoIterator<Item = u8>,
         target: Option<u32>,
@@ -83,68 +83,68 @@ impl File {
     }
 
     /// Adds numbers one by one, or vectors for vertices, with their bounds.
-    fn floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> usize {
+    fn add_floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> usize {
         let bound = |of: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
             let along = |k: usize| numbers.iter().map(move |it| it[k]).fold(start, of);
             (0..N).map(along).collect()
         };
         let accessor = json!({
-            "componentType": FLOAT, "count": numbers.len(),
+            "componentType": GLTF_FLOAT, "count": numbers.len(),
             "type": if N == 3 { "VEC3" } else { "SCALAR" },
             "min": bound(f32::min, f32::MAX), "max": bound(f32::max, f32::MIN),
         });
         let bytes = numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes());
-        self.add(bytes, (N == 3).then_some(ARRAY), accessor)
+        self.add_array(bytes, (N == 3).then_some(GLTF_ARRAY_BUFFER), accessor)
     }
 
-    fn vectors(&mut self, vectors: impl Iterator<Item = Vec3>) -> usize {
-        self.floats(&vectors.map(Vec3::into).collect::<Vec<[f32; 3]>>())
+    fn add_vectors(&mut self, vectors: impl Iterator<Item = Vec3>) -> usize {
+        self.add_floats(&vectors.map(Vec3::into).collect::<Vec<[f32; 3]>>())
     }
 }
 
 /// Writes shapes at times; the first is the base of the morph targets.
-fn write(
+fn write_shapes(
     name: &str,
     shapes: &[(f64, &[Vec<DVec3>])],
     longest: f64,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let thin = |curve: &Vec<DVec3>| {
-        let stride = node_stride(curve.len(), MOST_SEGMENTS);
-        tamed(curve.iter().copied().step_by(stride), longest)
+        let stride = node_stride(curve.len(), MOST_SEGMENTS_PER_VEIN);
+        replace_undrawable_points(curve.iter().copied().step_by(stride), longest)
     };
     let thinned = shapes
         .iter()
         .map(|(_, curves)| curves.iter().map(thin).collect());
     let thinned: Vec<Vec<Vec<DVec3>>> = thinned.collect();
-    let radius = RADIUS * longest;
+    let radius = RELATIVE_VEIN_RADIUS * longest;
     let first = thinned.first();
     let Some(first) = first.filter(|curves| curves.iter().any(|curve| curve.len() > 1)) else {
-        return finish(name, &File::default(), json!([]), None, out);
+        return write_container(name, &GltfBuffer::default(), json!([]), None, out);
     };
     let (veins, points) = (first.len(), first[0].len());
-    let base = Tubes::around(first, radius);
-    let mut file = File::default();
-    let position = file.vectors(base.positions.iter().copied());
-    let normal = file.vectors(base.normals.iter().copied());
+    let base = TubeMesh::around_curves(first, radius);
+    let mut file = GltfBuffer::default();
+    let position = file.add_vectors(base.positions.iter().copied());
+    let normal = file.add_vectors(base.normals.iter().copied());
     let colors = (0..veins).flat_map(|vein| {
-        let color = linear(color_of_vein(vein, veins));
-        std::iter::repeat_n(color, Tubes::vertices(points)).flatten()
+        let color = linear_color(color_of_vein(vein, veins));
+        std::iter::repeat_n(color, TubeMesh::vertices_per_tube(points)).flatten()
     });
     let count = base.positions.len();
-    let accessor = json!({ "componentType": UNSIGNED_BYTE, "normalized": true, "count": count, "type": "VEC4" });
-    let color = file.add(colors, Some(ARRAY), accessor);
-    let corners = Tubes::triangles(veins, points);
+    let accessor = json!({ "componentType": GLTF_UNSIGNED_BYTE, "normalized": true, "count": count, "type": "VEC4" });
+    let color = file.add_array(colors, Some(GLTF_ARRAY_BUFFER), accessor);
+    let corners = TubeMesh::triangle_indices(veins, points);
     let accessor =
-        json!({ "componentType": UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
+        json!({ "componentType": GLTF_UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
     let corners = corners.into_iter().flat_map(u32::to_le_bytes);
-    let indices = file.add(corners, Some(ELEMENT_ARRAY), accessor);
+    let indices = file.add_array(corners, Some(GLTF_ELEMENT_ARRAY_BUFFER), accessor);
 
     let mut targets = Vec::new();
     for curves in &thinned[1..] {
-        let tubes = Tubes::around(curves, radius);
-        let mut moved = |of: fn(&Tubes) -> &Vec<Vec3>| {
-            file.vectors(of(&tubes).iter().zip(of(&base)).map(|(a, b)| a - b))
+        let tubes = TubeMesh::around_curves(curves, radius);
+        let mut moved = |of: fn(&TubeMesh) -> &Vec<Vec3>| {
+            file.add_vectors(of(&tubes).iter().zip(of(&base)).map(|(a, b)| a - b))
         };
         targets.push(json!({
             "POSITION": moved(|tubes| &tubes.positions), "NORMAL": moved(|tubes| &tubes.normals),
@@ -157,17 +157,17 @@ fn write(
     let mut animation = None;
     if !targets.is_empty() {
         mesh[0]["weights"] = json!(vec![0.0; targets.len()]);
-        animation = Some(animate(&mut file, shapes));
+        animation = Some(morph_animation(&mut file, shapes));
         mesh[0]["primitives"][0]["targets"] = Value::Array(targets);
     }
-    finish(name, &file, mesh, animation, out)
+    write_container(name, &file, mesh, animation, out)
 }
 
 /// The animation: at the time of a shape its weight is one and all others are zero.
-fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
+fn morph_animation(file: &mut GltfBuffer, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
     let (start, end) = (shapes[0].0, shapes[shapes.len() - 1].0);
     let rate = if end > start {
-        SECONDS / (end - start)
+        FILM_SECONDS / (end - start)
     } else {
         1.0
     };
@@ -181,15 +181,15 @@ fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
         weights[shape * (shapes.len() - 1) + shape - 1] = [1.0];
     }
     json!([{ "name": "motion",
-        "samplers": [{ "input": file.floats(&times), "output": file.floats(&weights), "interpolation": "LINEAR" }],
+        "samplers": [{ "input": file.add_floats(&times), "output": file.add_floats(&weights), "interpolation": "LINEAR" }],
         "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
     }])
 }
 
 /// Writes the header, the document and the buffer.
-fn finish(
+fn write_container(
     name: &str,
-    file: &File,
+    file: &GltfBuffer,
     meshes: Value,
     animations: Option<Value>,
     out: &mut dyn Write,
@@ -231,7 +231,7 @@ fn finish(
 }
 
 /// Converts a colour from sRGB to linear RGB, opaque.
-fn linear(Color(red, green, blue): Color) -> [u8; 4] {
+fn linear_color(Color(red, green, blue): Color) -> [u8; 4] {
     let of = |value: u8| {
         let value = f64::from(value) / 255.0;
         let linear = if value <= 0.04045 {
@@ -245,17 +245,17 @@ fn linear(Color(red, green, blue): Color) -> [u8; 4] {
 }
 
 /// Corners of a tube's section.
-const SIDES: usize = 8;
+const TUBE_SIDES: usize = 8;
 
 /// Surfaces of tubes around curves with equally many points.
-struct Tubes {
+struct TubeMesh {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
 }
 
-impl Tubes {
+impl TubeMesh {
     /// Tubes around `curves`, whose rings are transported along each curve without twist.
-    fn around(curves: &[Vec<DVec3>], radius: f64) -> Self {
+    fn around_curves(curves: &[Vec<DVec3>], radius: f64) -> Self {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         for curve in curves {
             let mut across = DVec3::Z;
@@ -269,27 +269,27 @@ impl Tubes {
                 }
                 across = across.normalize();
                 let binormal = tangent.cross(across);
-                for side in 0..SIDES {
-                    let angle = std::f64::consts::TAU * side as f64 / SIDES as f64;
+                for side in 0..TUBE_SIDES {
+                    let angle = std::f64::consts::TAU * side as f64 / TUBE_SIDES as f64;
                     let normal = angle.cos() * across + angle.sin() * binormal;
                     positions.push((point + radius * normal).as_vec3());
                     normals.push(normal.as_vec3().normalize_or(Vec3::X));
                 }
             }
         }
-        Tubes { positions, normals }
+        TubeMesh { positions, normals }
     }
 
     /// Corners of the triangles of `tubes` tubes around `points` points each, with open
     /// ends.
-    fn triangles(tubes: usize, points: usize) -> Vec<u32> {
-        let ring = |tube: usize, point: usize| (tube * points + point) * SIDES;
+    fn triangle_indices(tubes: usize, points: usize) -> Vec<u32> {
+        let ring = |tube: usize, point: usize| (tube * points + point) * TUBE_SIDES;
         let mut corners = Vec::new();
         for tube in 0..tubes {
             for point in 0..points.saturating_sub(1) {
                 let (here, next) = (ring(tube, point), ring(tube, point + 1));
-                for side in 0..SIDES {
-                    let other = (side + 1) % SIDES;
+                for side in 0..TUBE_SIDES {
+                    let other = (side + 1) % TUBE_SIDES;
                     let quad = [here + side, here + other, next + side, next + other];
                     let [a, b, c, d] = quad.map(|corner| corner as u32);
                     corners.extend([a, b, c, b, d, c]);
@@ -300,7 +300,7 @@ impl Tubes {
     }
 
     /// Vertices of a tube around `points` points.
-    fn vertices(points: usize) -> usize {
-        points * SIDES
+    fn vertices_per_tube(points: usize) -> usize {
+        points * TUBE_SIDES
     }
 }

@@ -1,4 +1,4 @@
-//! Leaves in space for browsers ([`page`]), ParaView ([`vtk`]) and Blender ([`glb`]).
+//! Leaves in space for browsers ([`html_page`]), ParaView ([`vtk`]) and Blender ([`glb`]).
 //!
 //! The page shows a leaf that can be rotated, played and inspected, as one self-contained
 //! HTML file.
@@ -23,14 +23,14 @@ pub mod glb;
 mod results;
 pub mod vtk;
 
-use crate::figure::Figure;
-use crate::figure::drawing::formats::hex;
+use crate::figure::FigureFunction;
+use crate::figure::drawing::formats::hex_color;
 use crate::figure::drawing::{Drawing, color_of_vein, formats};
-use crate::figure::leaf::is_drawn;
-use crate::figure::scenario::{LoadMark, Setting, hold_marks, load_marks};
-pub use crate::page::data::{Leaf, View};
+use crate::figure::leaf::is_vein_drawn;
+use crate::figure::scenario::{FigureSetting, LoadMark, load_marks, support_marks};
+pub use crate::page::data::{PageData, PageLeaf};
 use crate::report;
-use crate::report::Reported;
+use crate::report::ReportedResult;
 use glam::DVec3;
 use leafdyn::scenario;
 use leafdyn::scenario::{Scenario, Units};
@@ -39,13 +39,13 @@ use leafdyn::study::Trace;
 use std::io;
 use std::io::Write;
 
-const FRAME: &str = include_str!("page.html");
+const PAGE_HTML: &str = include_str!("page.html");
 
-const STYLE: &str = include_str!("page.css");
+const PAGE_CSS: &str = include_str!("page.css");
 
-const THREE: &str = include_str!("three/three.min.js");
+const THREE_JS: &str = include_str!("three/three.min.js");
 
-const SCRIPTS: [&str; 7] = [
+const PAGE_SCRIPTS: [&str; 7] = [
     include_str!("given.js"),
     include_str!("data.js"),
     include_str!("space.js"),
@@ -56,18 +56,18 @@ const SCRIPTS: [&str; 7] = [
 ];
 
 /// A result that has a page.
-pub trait Viewed: Reported {
+pub trait PageResult: ReportedResult {
     /// The figure that replaces it in a browser without 3D graphics.
     #[doc(hidden)]
-    const STILL: Figure<Self>;
+    const FALLBACK_FIGURE: FigureFunction<Self>;
 
     /// Fills in the data of the page.
     #[doc(hidden)]
-    fn fill(&self, view: &mut View, units: &Units);
+    fn fill_page_data(&self, view: &mut PageData, units: &Units);
 }
 
 /// One of several shapes.
-pub struct Shape<'r> {
+pub struct ShapeInSeries<'r> {
     /// Its time, or its number.
     pub time: f64,
     /// Fractions of the length at which its nodes are.
@@ -77,9 +77,9 @@ pub struct Shape<'r> {
 }
 
 /// The instants of a motion.
-pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
+pub(crate) fn shapes_of_motion(record: &Record) -> Vec<ShapeInSeries<'_>> {
     let film = record.film.iter();
-    film.map(|still| Shape {
+    film.map(|still| ShapeInSeries {
         time: record.moments[still.moment].time,
         stations: &record.stations,
         curves: &still.curves,
@@ -88,10 +88,10 @@ pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
 }
 
 /// All points of a trace, numbered branch after branch.
-pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
+pub(crate) fn shapes_of_trace(trace: &Trace) -> Vec<ShapeInSeries<'_>> {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
     (points.enumerate())
-        .map(|(number, point)| Shape {
+        .map(|(number, point)| ShapeInSeries {
             time: number as f64,
             stations: &point.stations,
             curves: &point.curves,
@@ -100,39 +100,44 @@ pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
 }
 
 /// Writes the page of a result.
-pub(crate) fn write<R: Viewed>(
+pub(crate) fn write_page<R: PageResult>(
     result: &R,
     input: &Scenario,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    out.write_all(page(result, input).as_bytes())
+    out.write_all(html_page(result, input).as_bytes())
 }
 
 /// The page of a result of this scenario: a self-contained HTML file.
-pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
-    assemble(&view(result, scenario), &R::STILL(result, scenario))
+pub fn html_page<R: PageResult>(result: &R, scenario: &Scenario) -> String {
+    assemble_html(
+        &page_data(result, scenario),
+        &R::FALLBACK_FIGURE(result, scenario),
+    )
 }
 
 /// The data of that page alone.
-pub fn view<R: Viewed>(result: &R, scenario: &Scenario) -> View {
-    let mut view = bare(scenario);
+pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
+    let mut view = page_data_without_result(scenario);
     view.summary = result.summary(&scenario.units);
-    result.fill(&mut view, &scenario.units);
+    result.fill_page_data(&mut view, &scenario.units);
     for leaf in &mut view.leaves {
-        let loads = leaf.time.map(|time| drawn_loads(scenario, Some(time)));
+        let loads = leaf
+            .time
+            .map(|time| loads_on_drawn_veins(scenario, Some(time)));
         leaf.loads = loads.filter(|loads| *loads != view.loads);
     }
     view
 }
 
 /// The same without any result.
-pub fn bare(scenario: &Scenario) -> View {
+pub fn page_data_without_result(scenario: &Scenario) -> PageData {
     let count = scenario.rods.len();
     let drawn: Vec<usize> = (1..=count)
-        .filter(|number| is_drawn(number - 1, count))
+        .filter(|number| is_vein_drawn(number - 1, count))
         .collect();
-    let color = |&number: &usize| hex(color_of_vein(number - 1, count));
-    View {
+    let color = |&number: &usize| hex_color(color_of_vein(number - 1, count));
+    PageData {
         kind: "leaf",
         title: scenario.name.clone(),
         verdict: String::new(),
@@ -144,10 +149,10 @@ pub fn bare(scenario: &Scenario) -> View {
             &scenario.units.time,
         ]
         .map(Clone::clone),
-        directions: Setting::of(scenario).arrows(true, 0.0),
-        loads: drawn_loads(scenario, None),
-        holds: (hold_marks(scenario).into_iter())
-            .filter(|mark| is_drawn(mark.vein - 1, count))
+        directions: FigureSetting::from_scenario(scenario).direction_arrows(true, 0.0),
+        loads: loads_on_drawn_veins(scenario, None),
+        holds: (support_marks(scenario).into_iter())
+            .filter(|mark| is_vein_drawn(mark.vein - 1, count))
             .collect(),
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
@@ -162,19 +167,19 @@ pub fn bare(scenario: &Scenario) -> View {
 }
 
 /// The loads on the veins that are drawn.
-fn drawn_loads(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
+fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let count = scenario.rods.len();
     let mut loads = load_marks(scenario, time);
-    loads.retain(|mark| is_drawn(mark.vein - 1, count));
+    loads.retain(|mark| is_vein_drawn(mark.vein - 1, count));
     loads
 }
 
 /// A leaf in motion, as centerlines with nodes at these stations, for the page of its scenario.
-pub fn moving(stations: &[f64], curves: &[Vec<DVec3>], page: &View) -> Leaf {
-    Leaf::coarse(String::new(), stations, curves, page, usize::MAX)
+pub fn moving_leaf(stations: &[f64], curves: &[Vec<DVec3>], page: &PageData) -> PageLeaf {
+    PageLeaf::from_centerlines(String::new(), stations, curves, page, usize::MAX)
 }
 
-fn assemble(view: &View, still: &Drawing) -> String {
+fn assemble_html(view: &PageData, still: &Drawing) -> String {
     let (mut data, mut figure) = (Vec::new(), Vec::new());
     // Writing to memory cannot fail.
     let _ = report::write_json(view, &mut data);
@@ -182,18 +187,18 @@ fn assemble(view: &View, still: &Drawing) -> String {
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     let figure = String::from_utf8_lossy(&figure).into_owned();
-    let scripts = SCRIPTS.concat();
+    let scripts = PAGE_SCRIPTS.concat();
     let parts = [
-        ("TITLE", formats::escaped(&view.title)),
-        ("STYLE", STYLE.into()),
+        ("TITLE", formats::escape_xml(&view.title)),
+        ("STYLE", PAGE_CSS.into()),
         ("FIGURE", figure),
         ("DATA", data),
-        ("THREE", THREE.into()),
+        ("THREE", THREE_JS.into()),
         ("SCRIPT", scripts),
     ];
     let size: usize = parts.iter().map(|(_, part)| part.len()).sum();
-    let mut page = String::with_capacity(FRAME.len() + size);
-    let mut rest = FRAME;
+    let mut page = String::with_capacity(PAGE_HTML.len() + size);
+    let mut rest = PAGE_HTML;
     // Inserted text is not searched for placeholders.
     while let Some((before, after)) = rest.split_once("{{") {
         let Some((name, after)) = after.split_once("}}") else {
@@ -215,7 +220,7 @@ mod tests {
     use serde_json::Value;
 
     fn scenario(rods: usize) -> Scenario {
-        let mut scenario = sample::scenario("page", rods);
+        let mut scenario = sample::sample_scenario("page", rods);
         scenario.name = "a < b </script>".into();
         scenario.units.length = Some("cm".into());
         scenario
@@ -230,21 +235,21 @@ mod tests {
     #[test]
     fn the_bundle_is_the_one_that_was_made() {
         let noted = include_str!("three/three.min.js.crc32");
-        let found = crc32fast::hash(THREE.as_bytes());
+        let found = crc32fast::hash(THREE_JS.as_bytes());
         assert_eq!(format!("{found:08x}"), noted.trim());
-        assert!(THREE.contains("SPDX-License-Identifier: MIT"));
-        assert!(!THREE.contains("</script") && !THREE.contains("<!--"));
+        assert!(THREE_JS.contains("SPDX-License-Identifier: MIT"));
+        assert!(!THREE_JS.contains("</script") && !THREE_JS.contains("<!--"));
     }
 
     #[test]
     fn a_page_is_whole_and_loads_nothing() {
-        let mut leaf = sample::fan(21, 32);
+        let mut leaf = sample::sample_equilibrium(21, 32);
         leaf.scenario = "a < b </script>".into();
-        let page = page(&leaf, &scenario(21));
+        let page = html_page(&leaf, &scenario(21));
         assert!(page.len() < 1_000_000, "{}", page.len());
         assert!(page.contains("<title>a &lt; b &lt;/script&gt;</title>"));
         assert!(!page.contains("{{"));
-        let outside = page.replace(THREE, "");
+        let outside = page.replace(THREE_JS, "");
         for load in ["src=", "href=\"", "@import", "url(", "import("] {
             assert!(!outside.contains(load), "{load}");
         }
@@ -258,7 +263,7 @@ mod tests {
     /// A list of unknown length is no list of arguments: of 130,000 numbers browsers refuse.
     #[test]
     fn no_function_is_called_with_as_many_arguments_as_there_are_numbers() {
-        let scripts = SCRIPTS.concat();
+        let scripts = PAGE_SCRIPTS.concat();
         for call in ["Math.max(...", "Math.min(...", "push(...", "fromCharCode("] {
             for (at, _) in scripts.match_indices(call) {
                 let arguments = &scripts[at + call.len()..];
@@ -270,9 +275,9 @@ mod tests {
 
     #[test]
     fn a_motion_has_its_instants_and_energies() {
-        let mut record = sample::record(5, 8);
+        let mut record = sample::sample_record(5, 8);
         record.film = record.stills.clone();
-        let data = data(&page(&record, &scenario(5)));
+        let data = data(&html_page(&record, &scenario(5)));
         assert_eq!(data["leaves"].as_array().unwrap().len(), record.film.len());
         let curves = data["chart"]["curves"].as_array().unwrap();
         let names: Vec<&str> = curves.iter().filter_map(|c| c["name"].as_str()).collect();
@@ -285,7 +290,10 @@ mod tests {
 
     #[test]
     fn of_a_wide_leaf_some_veins_are_drawn() {
-        let data = data(&page(&sample::fan(401, 4), &scenario(401)));
+        let data = data(&html_page(
+            &sample::sample_equilibrium(401, 4),
+            &scenario(401),
+        ));
         let drawn = data["drawn"].as_array().unwrap();
         assert!(drawn.len() <= 202 && drawn[0] == 1 && *drawn.last().unwrap() == 401);
     }
@@ -293,15 +301,15 @@ mod tests {
     #[test]
     fn extreme_numbers_make_a_page() {
         for value in [f64::NAN, f64::INFINITY, 1e300] {
-            let mut leaf = sample::fan(3, 8);
+            let mut leaf = sample::sample_equilibrium(3, 8);
             leaf.shape.rods[1].nodes[3].position.z = value;
             leaf.energy = Some(value);
-            data(&page(&leaf, &scenario(3)));
-            let mut record = sample::record(3, 8);
+            data(&html_page(&leaf, &scenario(3)));
+            let mut record = sample::sample_record(3, 8);
             record.moments[3].energy.kinetic = value;
             record.film = record.stills.clone();
             record.film[1].curves[0][2].x = value;
-            data(&page(&record, &scenario(3)));
+            data(&html_page(&record, &scenario(3)));
         }
     }
 }

@@ -2,40 +2,43 @@
 //! them.
 
 use crate::figure;
-use crate::figure::Figure;
-use crate::figure::scenario::with_unit;
-use crate::page::Viewed;
-use crate::page::data::{Chart, Curve, Leaf, ModeShape, View, vectors};
-use crate::report::numbers::{brief, counted, short, significant};
-use crate::report::{Reported, equilibrium_of_index, is_special, verdict};
+use crate::figure::FigureFunction;
+use crate::figure::scenario::name_with_unit;
+use crate::page::PageResult;
+use crate::page::data::{ModeShape, PageChart, PageCurve, PageData, PageLeaf, encode_vectors};
+use crate::report::numbers::{
+    count_in_words, format_five_digits, format_four_digits, format_ten_digits,
+};
+use crate::report::{ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict};
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Units;
-use leafdyn::simulate::{Moment, Record};
+use leafdyn::simulate::{OutputSample, Record};
 use leafdyn::study::{
-    Boundary, BoundaryPoint, Equilibria, Keys, PointKind, Target, Trace, TraceBranch, TracePoint,
-    TraceShow,
+    BoundaryPoint, Equilibria, ParameterKeys, PointKind, StabilityBoundary, Trace, TraceBranch,
+    TracePoint, TraceShow, VariableTarget,
 };
 use std::slice;
 
 /// Most segments of a vein that are drawn of each of many leaves, and of those of a motion.
-const MOST_NODES: usize = 32;
+const MOST_SEGMENTS_PER_VEIN: usize = 32;
 
-const MOST_MOVING_NODES: usize = 64;
+const MOST_MOTION_SEGMENTS: usize = 64;
 
 /// More equilibria could not be distinguished side by side.
-const MOST_EQUILIBRIA: usize = 24;
+const MOST_EQUILIBRIA_SHOWN: usize = 24;
 
 /// Most points of a curve over time.
-const MOST_POINTS: usize = 1000;
+const MOST_CURVE_POINTS: usize = 1000;
 
-impl Viewed for Equilibrium {
-    const STILL: Figure<Self> = figure::leaf;
+impl PageResult for Equilibrium {
+    const FALLBACK_FIGURE: FigureFunction<Self> = figure::leaf;
 
-    fn fill(&self, view: &mut View, _: &Units) {
-        view.verdict = verdict(self);
+    fn fill_page_data(&self, view: &mut PageData, _: &Units) {
+        view.verdict = relaxation_verdict(self);
         view.success = self.outcome.is_success();
-        view.leaves.push(Leaf::full("at rest".into(), self, view));
+        view.leaves
+            .push(PageLeaf::with_node_states("at rest".into(), self, view));
         if self.stability.mode_shapes {
             let modes = self.stability.modes.iter().flatten().enumerate();
             view.modes = modes
@@ -48,12 +51,15 @@ impl Viewed for Equilibrium {
 fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -> ModeShape {
     let what = match (mode.is_neutral(), mode.growth()) {
         (true, _) => "neutral".into(),
-        (_, Some(growth)) => format!("unstable, grows at {}", short(growth)),
-        (_, None) => format!("ω = {}", short(mode.frequency().unwrap_or_default())),
+        (_, Some(growth)) => format!("unstable, grows at {}", format_four_digits(growth)),
+        (_, None) => format!(
+            "ω = {}",
+            format_four_digits(mode.frequency().unwrap_or_default())
+        ),
     };
     let pick = |of: &[Vec<DVec3>]| {
         let chosen = drawn.iter().filter_map(|&number| of.get(number - 1));
-        vectors(chosen.flatten().copied())
+        encode_vectors(chosen.flatten().copied())
     };
     ModeShape {
         label: format!("mode {number}: {what}"),
@@ -63,69 +69,75 @@ fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -
     }
 }
 
-impl Viewed for Equilibria {
-    const STILL: Figure<Self> = figure::equilibria;
+impl PageResult for Equilibria {
+    const FALLBACK_FIGURE: FigureFunction<Self> = figure::equilibria;
 
     /// Equilibria side by side.
-    fn fill(&self, view: &mut View, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();
-        view.verdict = counted(count, "equilibrium", "equilibria");
-        if count > MOST_EQUILIBRIA {
-            view.verdict += &format!(", the first {MOST_EQUILIBRIA} shown");
+        view.verdict = count_in_words(count, "equilibrium", "equilibria");
+        if count > MOST_EQUILIBRIA_SHOWN {
+            view.verdict += &format!(", the first {MOST_EQUILIBRIA_SHOWN} shown");
         }
         view.success = count > 0;
-        for (k, found) in self.found.iter().take(MOST_EQUILIBRIA).enumerate() {
+        for (k, found) in self.found.iter().take(MOST_EQUILIBRIA_SHOWN).enumerate() {
             let leaf = &found.equilibrium;
-            let kind = equilibrium_of_index(leaf.stability.negative_eigenvalues);
-            let energy = short(leaf.energy.unwrap_or(f64::NAN));
+            let kind = equilibrium_kind(leaf.stability.negative_eigenvalues);
+            let energy = format_four_digits(leaf.energy.unwrap_or(f64::NAN));
             let label = format!("{}. {kind}, energy {energy}", k + 1);
-            view.leaves.push(Leaf {
+            view.leaves.push(PageLeaf {
                 summary: leaf.summary(units),
-                ..Leaf::full(label, leaf, view)
+                ..PageLeaf::with_node_states(label, leaf, view)
             });
         }
     }
 }
 
-impl Viewed for Record {
-    const STILL: Figure<Self> = figure::filmstrip;
+impl PageResult for Record {
+    const FALLBACK_FIGURE: FigureFunction<Self> = figure::filmstrip;
 
-    fn fill(&self, view: &mut View, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
         view.kind = "motion";
         view.verdict = match self.stopped {
-            None => format!("followed to t = {}", short(self.time)),
+            None => format!("followed to t = {}", format_four_digits(self.time)),
             Some(_) => {
-                let (time, outcome) = (short(self.time), self.outcome());
+                let (time, outcome) = (format_four_digits(self.time), self.outcome());
                 format!("ended early at t = {time}: {outcome}")
             }
         };
         view.success = self.stopped.is_none();
         let shapes = self.film.iter().map(|still| {
             let time = self.moments[still.moment].time;
-            let (label, curves) = (format!("t = {}", short(time)), &still.curves);
-            Leaf {
+            let (label, curves) = (format!("t = {}", format_four_digits(time)), &still.curves);
+            PageLeaf {
                 time: Some(time),
-                ..Leaf::coarse(label, &self.stations, curves, view, MOST_MOVING_NODES)
+                ..PageLeaf::from_centerlines(
+                    label,
+                    &self.stations,
+                    curves,
+                    view,
+                    MOST_MOTION_SEGMENTS,
+                )
             }
         });
         view.leaves = shapes.collect();
-        view.chart = Some(energies_and_tip(&self.moments, units));
+        view.chart = Some(motion_chart(&self.moments, units));
     }
 }
 
-fn energies_and_tip(moments: &[Moment], units: &Units) -> Chart {
-    let stride = moments.len().div_ceil(MOST_POINTS).max(1);
+fn motion_chart(moments: &[OutputSample], units: &Units) -> PageChart {
+    let stride = moments.len().div_ceil(MOST_CURVE_POINTS).max(1);
     let shown = || moments.iter().step_by(stride);
-    let curve = |choice, color, name: &str, of: &dyn Fn(&Moment) -> f64| Curve {
+    let curve = |choice, color, name: &str, of: &dyn Fn(&OutputSample) -> f64| PageCurve {
         choice,
         name: name.into(),
         color,
         x: shown().map(|moment| moment.time).collect(),
         y: shown().map(of).collect(),
-        ..Curve::default()
+        ..PageCurve::default()
     };
-    type Energy = fn(&Moment) -> f64;
+    type Energy = fn(&OutputSample) -> f64;
     let energies: [(&str, Energy); 7] = [
         ("kinetic", |m| m.energy.kinetic),
         ("elastic", |m| m.energy.elastic),
@@ -140,22 +152,22 @@ fn energies_and_tip(moments: &[Moment], units: &Units) -> Chart {
     // An energy that is always zero needs no curve.
     let energies = energies.filter(|curve| curve.y.iter().any(|&y| y != 0.0));
     let tip = ["tip x", "tip y", "tip z"].into_iter().enumerate();
-    let tip = tip.map(|(axis, name)| curve(1, axis, name, &|m: &Moment| m.tip[axis]));
-    Chart {
+    let tip = tip.map(|(axis, name)| curve(1, axis, name, &|m: &OutputSample| m.tip[axis]));
+    PageChart {
         across: "time".into(),
         log: false,
         choices: vec![
-            with_unit("energy", units.energy().as_deref()),
-            with_unit("tip", units.length.as_deref()),
+            name_with_unit("energy", units.energy().as_deref()),
+            name_with_unit("tip", units.length.as_deref()),
         ],
         curves: energies.chain(tip).collect(),
     }
 }
 
-impl Viewed for Trace {
-    const STILL: Figure<Self> = figure::trace;
+impl PageResult for Trace {
+    const FALLBACK_FIGURE: FigureFunction<Self> = figure::trace;
 
-    fn fill(&self, view: &mut View, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
         view.kind = "trace";
         drop_varied_loads(view, slice::from_ref(&self.keys));
         let count = self.branches.len();
@@ -169,27 +181,33 @@ impl Viewed for Trace {
         let leaf = |point: &TracePoint| {
             let label = match point.kind {
                 PointKind::Regular => {
-                    let kind = equilibrium_of_index(Some(point.index));
-                    format!("{}: {kind}", brief(point.value))
+                    let kind = equilibrium_kind(Some(point.index));
+                    format!("{}: {kind}", format_five_digits(point.value))
                 }
                 kind => {
                     let kind = kind.word().replace('-', " ");
                     format!("{}: {kind}", self.keys.text(point.value))
                 }
             };
-            Leaf {
-                summary: vec![("energy", significant(point.energy))],
-                ..Leaf::coarse(label, &point.stations, &point.curves, view, MOST_NODES)
+            PageLeaf {
+                summary: vec![("energy", format_ten_digits(point.energy))],
+                ..PageLeaf::from_centerlines(
+                    label,
+                    &point.stations,
+                    &point.curves,
+                    view,
+                    MOST_SEGMENTS_PER_VEIN,
+                )
             }
         };
         view.leaves = points.map(leaf).collect();
-        view.chart = Some(branches(self, units));
+        view.chart = Some(trace_chart(self, units));
     }
 }
 
 /// Coordinates of the tip, of free tips that of the first, and the energy against the varied
 /// number.
-fn branches(trace: &Trace, units: &Units) -> Chart {
+fn trace_chart(trace: &Trace, units: &Units) -> PageChart {
     let (length, energy) = (units.length.as_deref(), units.energy());
     let choices = [
         ("tip z", TraceShow::Tip(2), length),
@@ -201,36 +219,40 @@ fn branches(trace: &Trace, units: &Units) -> Chart {
         .iter()
         .enumerate()
         .flat_map(|(choice, (_, shown, _))| {
-            let curve = |branch: &TraceBranch| Curve {
+            let curve = |branch: &TraceBranch| PageCurve {
                 choice,
                 unstable: branch.points.iter().map(|point| point.index > 0).collect(),
-                special: (branch.critical())
+                special: (branch.critical_points())
                     .map(|(at, point)| (at, point.kind.word()))
                     .collect(),
-                ..along(&branch.points, |point| (point.value, point.shown(*shown)))
+                ..curve_with_leaves(&branch.points, |point| {
+                    (point.value, point.figure_value(*shown))
+                })
             };
-            numbered("branch", trace.branches.iter().map(curve).collect())
+            number_curves("branch", trace.branches.iter().map(curve).collect())
         });
-    Chart {
+    PageChart {
         across: trace.keys.to_string(),
         log: trace.log,
         curves: curves.collect(),
-        choices: choices.map(|(name, _, unit)| with_unit(name, unit)).into(),
+        choices: choices
+            .map(|(name, _, unit)| name_with_unit(name, unit))
+            .into(),
     }
 }
 
 /// A curve through points that have a leaf each.
-fn along<P>(points: &[P], place: impl Fn(&P) -> (f64, f64)) -> Curve {
+fn curve_with_leaves<P>(points: &[P], place: impl Fn(&P) -> (f64, f64)) -> PageCurve {
     let (x, y) = points.iter().map(place).unzip();
-    Curve {
+    PageCurve {
         x,
         y,
-        ..Curve::default()
+        ..PageCurve::default()
     }
 }
 
 /// Names and colours the curves by their numbers, and numbers the leaves of their points.
-fn numbered(what: &str, mut curves: Vec<Curve>) -> Vec<Curve> {
+fn number_curves(what: &str, mut curves: Vec<PageCurve>) -> Vec<PageCurve> {
     let mut first = 0;
     for (number, curve) in curves.iter_mut().enumerate() {
         curve.name = format!("{what} {}", number + 1);
@@ -241,13 +263,13 @@ fn numbered(what: &str, mut curves: Vec<Curve>) -> Vec<Curve> {
     curves
 }
 
-impl Viewed for Boundary {
-    const STILL: Figure<Self> = figure::boundary;
+impl PageResult for StabilityBoundary {
+    const FALLBACK_FIGURE: FigureFunction<Self> = figure::boundary;
 
-    fn fill(&self, view: &mut View, _: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, _: &Units) {
         view.kind = "trace";
         drop_varied_loads(view, &self.keys);
-        let count = counted(self.curves.len(), "curve", "curves");
+        let count = count_in_words(self.curves.len(), "curve", "curves");
         view.verdict = match self.complete {
             true => format!("{count}, followed to the ends"),
             false => format!("{count}, not all followed to their ends"),
@@ -255,28 +277,34 @@ impl Viewed for Boundary {
         view.success = self.complete;
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         let leaf = |point: &BoundaryPoint| {
-            let [first, second] = point.values.map(brief);
+            let [first, second] = point.values.map(format_five_digits);
             let label = format!("{first}, {second}: {}", point.kind.replace('-', " "));
-            Leaf::coarse(label, &point.stations, &point.curves, view, MOST_NODES)
+            PageLeaf::from_centerlines(
+                label,
+                &point.stations,
+                &point.curves,
+                view,
+                MOST_SEGMENTS_PER_VEIN,
+            )
         };
         view.leaves = points.map(leaf).collect();
-        view.chart = Some(plane(self));
+        view.chart = Some(boundary_chart(self));
     }
 }
 
 /// Loads that vary from leaf to leaf have no arrow of one size.
-fn drop_varied_loads(view: &mut View, keys: &[Keys]) {
-    let is_load = |target: &Target| match target {
-        Target::Entry(part) => part.key.path().starts_with("load."),
-        Target::Knob(_) => false,
+fn drop_varied_loads(view: &mut PageData, keys: &[ParameterKeys]) {
+    let is_load = |target: &VariableTarget| match target {
+        VariableTarget::Entry(part) => part.key.path().starts_with("load."),
+        VariableTarget::Knob(_) => false,
     };
-    if keys.iter().flat_map(Keys::targets).any(is_load) {
+    if keys.iter().flat_map(ParameterKeys::targets).any(is_load) {
         view.loads.clear();
     }
 }
 
 /// The plane of a boundary: the second number, or its logarithm, against the first.
-fn plane(boundary: &Boundary) -> Chart {
+fn boundary_chart(boundary: &StabilityBoundary) -> PageChart {
     let up = |value: f64| match boundary.log[1] {
         true => value.abs().log10(),
         false => value,
@@ -284,23 +312,23 @@ fn plane(boundary: &Boundary) -> Chart {
     let curves = boundary.curves.iter().map(|curve| {
         let points = &curve.points;
         let special = points.iter().enumerate();
-        let special = special.filter(|(_, point)| is_special(point));
-        Curve {
+        let special = special.filter(|(_, point)| is_codimension_two(point));
+        PageCurve {
             unstable: (points.iter())
                 .map(|point| point.index_before.min(point.index_behind) > 0)
                 .collect(),
             special: special.map(|(at, point)| (at, point.kind)).collect(),
-            ..along(points, |point| (point.values[0], up(point.values[1])))
+            ..curve_with_leaves(points, |point| (point.values[0], up(point.values[1])))
         }
     });
     let name = boundary.keys[1].to_string();
-    Chart {
+    PageChart {
         across: boundary.keys[0].to_string(),
         log: boundary.log[0],
         choices: vec![match boundary.log[1] {
             true => format!("log₁₀ of {name}"),
             false => name,
         }],
-        curves: numbered("curve", curves.collect()),
+        curves: number_curves("curve", curves.collect()),
     }
 }

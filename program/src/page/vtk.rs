@@ -3,8 +3,8 @@
 //!
 //! Source: "VTK XML formats", version 1.0, of the VTK documentation.
 
-use crate::figure::drawing::formats::escaped;
-use crate::page::Shape;
+use crate::figure::drawing::formats::escape_xml;
+use crate::page::ShapeInSeries;
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
 use leafdyn::relax::Equilibrium;
@@ -15,70 +15,74 @@ use std::io::Write;
 use std::path::Path;
 
 /// Values at all nodes, vein by vein: name, values per node, all values.
-struct Array<'a>(&'a str, usize, Vec<f64>);
+struct NodeArray<'a>(&'a str, usize, Vec<f64>);
 
 /// A leaf at rest: per node its vein, place along it, directors, strains, forces and
 /// moments, and the radius where sections are given.
-pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let nodes = || shape.rods.iter().flat_map(|rod| &rod.nodes);
-    let along = |of: &dyn Fn(&NodeState) -> DVec3| vectors(nodes().map(of));
+    let along = |of: &dyn Fn(&NodeState) -> DVec3| flatten_vectors(nodes().map(of));
     let lengths = shape.rods.iter().map(|rod| rod.length);
     let s = lengths.flat_map(|length| shape.stations.iter().map(move |sigma| sigma * length));
     let mut arrays = vec![
-        Array("s", 1, s.collect()),
-        Array("d1", 3, along(&|node| node.rotation * DVec3::X)),
-        Array("d2", 3, along(&|node| node.rotation * DVec3::Y)),
-        Array("d3", 3, along(&|node| node.rotation * DVec3::Z)),
-        Array("v", 3, along(&|node| node.v)),
-        Array("u", 3, along(&|node| node.u)),
-        Array("n", 3, along(&|node| node.n)),
-        Array("m", 3, along(&|node| node.m)),
+        NodeArray("s", 1, s.collect()),
+        NodeArray("d1", 3, along(&|node| node.rotation * DVec3::X)),
+        NodeArray("d2", 3, along(&|node| node.rotation * DVec3::Y)),
+        NodeArray("d3", 3, along(&|node| node.rotation * DVec3::Z)),
+        NodeArray("v", 3, along(&|node| node.v)),
+        NodeArray("u", 3, along(&|node| node.u)),
+        NodeArray("n", 3, along(&|node| node.n)),
+        NodeArray("m", 3, along(&|node| node.m)),
     ];
-    arrays.extend(radius(shape.rods.len(), &shape.stations, radii));
+    arrays.extend(radius_array(shape.rods.len(), &shape.stations, radii));
     arrays.extend(equilibrium.stress.as_ref().map(|of| {
         let stresses = of.rods.iter().flatten().map(|stress| stress.equivalent);
-        Array("equivalent_stress", 1, stresses.collect())
+        NodeArray("equivalent_stress", 1, stresses.collect())
     }));
     let points: Vec<Vec<DVec3>> = (shape.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
         .collect();
-    write(&points, &shape.stations, &arrays, out)
+    write_polydata(&points, &shape.stations, &arrays, out)
 }
 
 /// Centrelines alone, with the vein, the place along it and the radius where sections
 /// are given.
-pub fn curves(
+pub fn write_curves(
     curves: &[Vec<DVec3>],
     stations: &[f64],
     radii: &Radii,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let radius = radius(curves.len(), stations, radii);
-    write(curves, stations, radius.as_slice(), out)
+    let radius = radius_array(curves.len(), stations, radii);
+    write_polydata(curves, stations, radius.as_slice(), out)
 }
 
-fn radius(rods: usize, stations: &[f64], radii: &Radii) -> Option<Array<'static>> {
+fn radius_array(rods: usize, stations: &[f64], radii: &Radii) -> Option<NodeArray<'static>> {
     let nodes = (0..rods).flat_map(|rod| stations.iter().map(move |&sigma| (rod, sigma)));
     let radius: Option<Vec<f64>> = nodes.map(|(rod, sigma)| radii.at(rod, sigma)).collect();
-    radius.map(|radius| Array("radius", 1, radius))
+    radius.map(|radius| NodeArray("radius", 1, radius))
 }
 
 /// The file of a shape in the list of this name.
-pub(crate) fn part(list: &str, number: usize) -> String {
+pub(crate) fn shape_file_name(list: &str, number: usize) -> String {
     let stem = Path::new(list).file_stem().unwrap_or_default();
     format!("{}_vtp/{number:05}.vtp", stem.display())
 }
 
 /// The list of this name: shapes by time, or by a number that varies in its place.
-pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Result<()> {
+pub(crate) fn write_shape_list(
+    name: &str,
+    shapes: &[ShapeInSeries],
+    out: &mut dyn Write,
+) -> io::Result<()> {
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
         out,
         "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>"
     )?;
     for (k, shape) in shapes.iter().enumerate() {
-        let (time, file) = (shape.time, escaped(&part(name, k)));
+        let (time, file) = (shape.time, escape_xml(&shape_file_name(name, k)));
         writeln!(
             out,
             "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>"
@@ -87,14 +91,14 @@ pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Res
     writeln!(out, "</Collection>\n</VTKFile>")
 }
 
-fn vectors(vectors: impl Iterator<Item = DVec3>) -> Vec<f64> {
+fn flatten_vectors(vectors: impl Iterator<Item = DVec3>) -> Vec<f64> {
     vectors.flat_map(|vector| vector.to_array()).collect()
 }
 
-fn write(
+fn write_polydata(
     veins: &[Vec<DVec3>],
     stations: &[f64],
-    arrays: &[Array],
+    arrays: &[NodeArray],
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let (count, nodes) = (veins.len(), veins.iter().map(Vec::len).sum::<usize>());
@@ -105,45 +109,55 @@ fn write(
          <PolyData>\n<Piece NumberOfPoints=\"{nodes}\" NumberOfVerts=\"0\" NumberOfLines=\"{count}\" \
          NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<Points>"
     )?;
-    floats("Points", 3, &vectors(veins.iter().flatten().copied()), out)?;
+    write_float_array(
+        "Points",
+        3,
+        &flatten_vectors(veins.iter().flatten().copied()),
+        out,
+    )?;
     writeln!(out, "</Points>\n<Lines>")?;
-    integers("connectivity", 0..nodes, out)?;
+    write_integer_array("connectivity", 0..nodes, out)?;
     let ends = veins.iter().scan(0, |end, vein| {
         *end += vein.len();
         Some(*end)
     });
-    integers("offsets", ends, out)?;
+    write_integer_array("offsets", ends, out)?;
     writeln!(out, "</Lines>\n<PointData>")?;
     let rods = veins.iter().enumerate();
     let rods = rods.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1));
-    integers("rod", rods, out)?;
+    write_integer_array("rod", rods, out)?;
     let lengths = veins.iter().map(Vec::len);
     let sigma = lengths.flat_map(|nodes| stations.iter().copied().take(nodes));
-    floats("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
-    for Array(name, components, numbers) in arrays {
-        floats(name, *components, numbers, out)?;
+    write_float_array("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
+    for NodeArray(name, components, numbers) in arrays {
+        write_float_array(name, *components, numbers, out)?;
     }
     writeln!(out, "</PointData>\n<CellData>")?;
-    integers("rod", 1..count + 1, out)?;
+    write_integer_array("rod", 1..count + 1, out)?;
     writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")
 }
 
-fn floats(name: &str, components: usize, numbers: &[f64], out: &mut dyn Write) -> io::Result<()> {
+fn write_float_array(
+    name: &str,
+    components: usize,
+    numbers: &[f64],
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let bytes = numbers.iter().flat_map(|number| number.to_le_bytes());
-    array("Float64", name, components, bytes.collect(), out)
+    write_base64_array("Float64", name, components, bytes.collect(), out)
 }
 
-fn integers(
+fn write_integer_array(
     name: &str,
     numbers: impl Iterator<Item = usize>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let bytes = numbers.flat_map(|number| (number as i64).to_le_bytes());
-    array("Int64", name, 1, bytes.collect(), out)
+    write_base64_array("Int64", name, 1, bytes.collect(), out)
 }
 
 /// Writes the number of bytes and the bytes as one base64 text.
-fn array(
+fn write_base64_array(
     kind: &str,
     name: &str,
     components: usize,

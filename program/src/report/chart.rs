@@ -1,44 +1,48 @@
 //! A chart as text, and as rows of `chart.csv` and `chart_rods.csv`, one per measurement;
 //! `chart.json` has the same values under the same names.
 
-use crate::report::numbers::{power_of_ten, seconds, veins_of};
-use crate::report::table::{Lines, labelled, text_cell};
-use crate::report::{Reported, contender};
+use crate::report::numbers::{duration_text, format_error_bound, veins_text_for_count};
+use crate::report::table::{LabelledLines, label_first_line, text_cell};
+use crate::report::{ReportedResult, contender_name};
 use leafdyn::scenario::Units;
-use leafdyn::study::{Chart, Decade, Peer, Reference, Row, Scaling};
+use leafdyn::study::{
+    Chart, ChartRow, FastestByAccuracy, PeerProgram, ReferenceSolution, ScalingStudy,
+};
 use serde::Serialize;
 use serde_json::Value;
 use std::io;
 use std::io::Write;
 
 /// Names of the columns that both files have.
-const COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
+const CHART_COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
     factorizations,force_evaluations,true_error,error_estimate,outcome";
 
-impl Reported for Chart {
+impl ReportedResult for Chart {
     fn heading(&self) -> String {
-        let veins = veins_of(self.rods, self.joined);
+        let veins = veins_text_for_count(self.rods, self.joined);
         format!("{}: {veins}, speed against accuracy", self.scenario)
     }
 
-    fn lines(&self, _: &Units) -> Lines {
-        let mut lines = labelled("errors", reference(self.reference.as_ref()));
-        lines.push(("measured", measured(self)));
-        lines.extend(labelled("front", front(self)));
-        lines.extend(labelled("fastest", fastest(self)));
-        lines.extend(labelled("failed", failed(self)));
-        lines.extend(labelled("peers", peers(self)));
-        lines.extend((self.scaling.iter()).flat_map(|it| labelled("veins", veins(it))));
+    fn report_lines(&self, _: &Units) -> LabelledLines {
+        let mut lines = label_first_line("errors", reference_lines(self.reference.as_ref()));
+        lines.push(("measured", measurement_line(self)));
+        lines.extend(label_first_line("front", pareto_front_lines(self)));
+        lines.extend(label_first_line("fastest", fastest_by_accuracy_lines(self)));
+        lines.extend(label_first_line("failed", failure_lines(self)));
+        lines.extend(label_first_line("peers", peer_lines(self)));
+        lines.extend(
+            (self.scaling.iter()).flat_map(|it| label_first_line("veins", scaling_lines(it))),
+        );
         lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.clone())));
         lines
     }
 }
 
-fn reference(reference: Option<&Reference>) -> Vec<String> {
+fn reference_lines(reference: Option<&ReferenceSolution>) -> Vec<String> {
     let Some(found) = reference else {
         return vec!["not known: no equilibrium was found to measure them against".into()];
     };
-    let within = power_of_ten(found.known_within);
+    let within = format_error_bound(found.known_within);
     let accuracy = match found.confirmed {
         true => format!("against a solution known within {within} of the longest vein"),
         false => format!(
@@ -47,7 +51,7 @@ fn reference(reference: Option<&Reference>) -> Vec<String> {
     };
     let agreement = match found.difference {
         Some(difference) => {
-            let difference = power_of_ten(difference);
+            let difference = format_error_bound(difference);
             format!("{}; they differ by {difference}", found.told)
         }
         None => found.told.clone(),
@@ -55,7 +59,7 @@ fn reference(reference: Option<&Reference>) -> Vec<String> {
     vec![accuracy, agreement]
 }
 
-fn measured(chart: &Chart) -> String {
+fn measurement_line(chart: &Chart) -> String {
     let spreads = || chart.rows.iter().filter_map(|row| row.seconds);
     let runs: usize = spreads().map(|spread| spread.runs).sum();
     let (settings, rounds) = (spreads().count(), chart.rounds);
@@ -65,30 +69,30 @@ fn measured(chart: &Chart) -> String {
 }
 
 /// A line of a table: time, error, method and setting.
-fn entry((time, error): (f64, f64), method: &str, knob: &str) -> String {
-    let (time, error) = (seconds(time), power_of_ten(error));
+fn table_line((time, error): (f64, f64), method: &str, knob: &str) -> String {
+    let (time, error) = (duration_text(time), format_error_bound(error));
     format!("{time:>10}  {error:<9} {method}, {knob}")
 }
 
-fn front(chart: &Chart) -> Vec<String> {
+fn pareto_front_lines(chart: &Chart) -> Vec<String> {
     let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
-        let point = row.point()?;
-        let line = entry(point, contender(row.contender), &row.knob.to_string());
+        let point = row.seconds_and_error()?;
+        let line = table_line(point, contender_name(row.contender), &row.knob.to_string());
         Some((point, line))
     });
     let peers = chart.peers.iter().filter(|peer| peer.pareto);
     let peers = peers.filter_map(|peer| {
-        let point = peer.point()?;
-        Some((point, entry(point, &peer.name, &peer.knob)))
+        let point = peer.seconds_and_error()?;
+        Some((point, table_line(point, &peer.name, &peer.knob)))
     });
     let mut entries: Vec<_> = rows.chain(peers).collect();
     entries.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0));
     entries.into_iter().map(|(_, line)| line).collect()
 }
 
-fn fastest(chart: &Chart) -> Vec<String> {
-    let line = |decade: &Decade| -> Option<String> {
+fn fastest_by_accuracy_lines(chart: &Chart) -> Vec<String> {
+    let line = |decade: &FastestByAccuracy| -> Option<String> {
         let default = match (decade.factor, decade.default_knob) {
             (Some(1.0), _) => "the default".to_string(),
             (Some(factor), Some(knob)) => {
@@ -96,8 +100,11 @@ fn fastest(chart: &Chart) -> Vec<String> {
             }
             _ => "the default does not get there".to_string(),
         };
-        let (time, error) = (seconds(decade.seconds?), format!("{:e}", decade.error));
-        let (who, knob) = (contender(decade.contender?), decade.knob?);
+        let (time, error) = (
+            duration_text(decade.seconds?),
+            format!("{:e}", decade.error),
+        );
+        let (who, knob) = (contender_name(decade.contender?), decade.knob?);
         Some(format!(
             "{time:>10}  to {error:<7} {who}, {knob}; {default}"
         ))
@@ -106,26 +113,31 @@ fn fastest(chart: &Chart) -> Vec<String> {
 }
 
 /// Failures, one line for each contender and kind of failure.
-fn failed(chart: &Chart) -> Vec<String> {
-    let mut kinds: Vec<(&Row, Vec<String>)> = Vec::new();
+fn failure_lines(chart: &Chart) -> Vec<String> {
+    let mut kinds: Vec<(&ChartRow, Vec<String>)> = Vec::new();
     for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
-        let same = |other: &Row| other.contender == row.contender && other.ending == row.ending;
+        let same =
+            |other: &ChartRow| other.contender == row.contender && other.ending == row.ending;
         match kinds.iter_mut().find(|(other, _)| same(other)) {
             Some((_, knobs)) => knobs.push(row.knob.to_string()),
             None => kinds.push((row, vec![row.knob.to_string()])),
         }
     }
-    let line = |(row, knobs): (&Row, Vec<String>)| {
+    let line = |(row, knobs): (&ChartRow, Vec<String>)| {
         let why = row.remark.as_ref();
         let why = why.map_or(String::new(), |why| format!(": {why}"));
-        let (who, knobs, end) = (contender(row.contender), listed(&knobs), row.ending.word());
+        let (who, knobs, end) = (
+            contender_name(row.contender),
+            settings_text(&knobs),
+            row.ending.word(),
+        );
         format!("{who}, {knobs}, {end}{why}")
     };
     kinds.into_iter().map(line).collect()
 }
 
 /// Values of one setting, with its name only once.
-fn listed(knobs: &[String]) -> String {
+fn settings_text(knobs: &[String]) -> String {
     let values = knobs.iter().map(|knob| match knob.split_once('=') {
         Some((_, value)) => value,
         None => knob,
@@ -139,7 +151,7 @@ fn listed(knobs: &[String]) -> String {
 }
 
 /// How many times longer each peer takes, from its largest error to its smallest.
-fn peers(chart: &Chart) -> Vec<String> {
+fn peer_lines(chart: &Chart) -> Vec<String> {
     let mut names: Vec<&str> = Vec::new();
     for peer in &chart.peers {
         if !names.contains(&peer.name.as_str()) {
@@ -150,18 +162,18 @@ fn peers(chart: &Chart) -> Vec<String> {
     for name in names {
         let rows = || chart.peers.iter().filter(|peer| peer.name == name);
         let measured = rows().filter_map(|peer| Some((peer, peer.true_error?)));
-        let mut measured: Vec<(&Peer, f64)> = measured.collect();
+        let mut measured: Vec<(&PeerProgram, f64)> = measured.collect();
         measured.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (peer, error) in measured {
             let ratio = match peer.ratio {
-                Some(ratio) => format!("{} times the default's time", rounded(ratio)),
+                Some(ratio) => format!("{} times the default's time", format_ratio(ratio)),
                 None => "the default is nowhere as accurate".into(),
             };
-            let line = entry((peer.seconds.median, error), name, &peer.knob);
+            let line = table_line((peer.seconds.median, error), name, &peer.knob);
             lines.push(format!("{line}: {ratio}"));
         }
         for peer in rows().filter(|peer| peer.true_error.is_none()) {
-            let time = seconds(peer.seconds.median);
+            let time = duration_text(peer.seconds.median);
             let (knob, outcome) = (&peer.knob, &peer.outcome);
             lines.push(format!("{time:>10}  {name}, {knob}, {outcome}"));
         }
@@ -170,7 +182,7 @@ fn peers(chart: &Chart) -> Vec<String> {
 }
 
 /// Two digits, or all digits before the decimal point.
-fn rounded(ratio: f64) -> String {
+fn format_ratio(ratio: f64) -> String {
     match ratio {
         ratio if ratio >= 10.0 => format!("{ratio:.0}"),
         ratio => format!("{ratio:.1}"),
@@ -178,7 +190,7 @@ fn rounded(ratio: f64) -> String {
 }
 
 /// The time of each contender on each leaf.
-fn veins(scaling: &Scaling) -> Vec<String> {
+fn scaling_lines(scaling: &ScalingStudy) -> Vec<String> {
     let mut lines = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
     if !scaling.unconfirmed.is_empty() {
         let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
@@ -188,14 +200,14 @@ fn veins(scaling: &Scaling) -> Vec<String> {
     let mut last = None;
     for found in &scaling.rows {
         let row = &found.row;
-        let what = match (row.point(), row.seconds) {
-            (Some((time, _)), _) => seconds(time),
+        let what = match (row.seconds_and_error(), row.seconds) {
+            (Some((time, _)), _) => duration_text(time),
             (None, _) => row.ending.word().to_string(),
         };
         let cell = format!("N = {}: {what}", found.rods);
         match lines.last_mut().filter(|_| last == Some(row.contender)) {
             Some(line) => *line = format!("{line}, {cell}"),
-            None => lines.push(format!("{}, {cell}", contender(row.contender))),
+            None => lines.push(format!("{}, {cell}", contender_name(row.contender))),
         }
         last = Some(row.contender);
     }
@@ -203,23 +215,23 @@ fn veins(scaling: &Scaling) -> Vec<String> {
 }
 
 /// `chart.csv`: one row per contender and setting, then those of the peers.
-pub fn chart_table(chart: &Chart, out: &mut dyn Write) -> io::Result<()> {
-    let rows = chart.rows.iter().map(object);
+pub fn write_chart_table(chart: &Chart, out: &mut dyn Write) -> io::Result<()> {
+    let rows = chart.rows.iter().map(json_object);
     let peers = chart.peers.iter().map(|peer| {
-        let mut row = object(peer);
+        let mut row = json_object(peer);
         row["method"] = row["program"].take();
         row
     });
-    write_columns(&format!("{COLUMNS},pareto"), rows.chain(peers), out)
+    write_columns(&format!("{CHART_COLUMNS},pareto"), rows.chain(peers), out)
 }
 
 /// `chart_rods.csv`: one row per leaf and contender.
-pub fn scaling_table(scaling: &Scaling, out: &mut dyn Write) -> io::Result<()> {
-    let rows = scaling.rows.iter().map(object);
-    write_columns(&format!("rods,{COLUMNS}"), rows, out)
+pub fn write_scaling_table(scaling: &ScalingStudy, out: &mut dyn Write) -> io::Result<()> {
+    let rows = scaling.rows.iter().map(json_object);
+    write_columns(&format!("rods,{CHART_COLUMNS}"), rows, out)
 }
 
-fn object(row: &impl Serialize) -> Value {
+fn json_object(row: &impl Serialize) -> Value {
     serde_json::to_value(row).unwrap_or_default()
 }
 
@@ -252,18 +264,18 @@ fn write_columns(
 mod tests {
     use crate::report::sample;
 
-    use leafdyn::study::Ending;
+    use leafdyn::study::ChartOutcome;
 
     use super::*;
 
     #[test]
     fn unconfirmed_references_are_reported_and_failures_of_a_kind_are_one_line() {
-        let mut chart = sample::chart();
+        let mut chart = sample::sample_chart();
         if let Some(reference) = &mut chart.reference {
             reference.confirmed = false;
         }
         for row in chart.rows.iter_mut().take(2) {
-            row.ending = Ending::OtherEquilibrium;
+            row.ending = ChartOutcome::OtherEquilibrium;
         }
         let text = chart.report(&Units::default(), Vec::new(), false);
         assert!(text.contains("that is NOT CONFIRMED"), "{text}");

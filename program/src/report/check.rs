@@ -1,72 +1,77 @@
 //! The text report of a check.
 
 use crate::report::numbers::{
-    as_accurate, bound, bound_of_positions, decimals, eigenvalues, grids, in_unit, point,
-    power_of_ten, seconds, veins,
+    duration_text, format_as_accurate, format_error_bound, format_position, grids_text,
+    negative_eigenvalues_text, number_in_unit, position_decimals, position_error_text,
+    upper_bound_text, veins_text,
 };
-use crate::report::relax::found;
-use crate::report::table::{Lines, labelled};
-use crate::report::{Reported, equilibrium_of_index, headline, shooting};
+use crate::report::relax::equilibrium_phrase;
+use crate::report::table::{LabelledLines, label_first_line};
+use crate::report::{ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH};
-use leafdyn::study::{Check, Place, Quantity, ShootingSolution as Solution, Verdict};
+use leafdyn::study::{Check, CheckVerdict, ComparedQuantity, DifferenceLocation, ShootingSolution};
 
-impl Reported for Check {
+impl ReportedResult for Check {
     fn heading(&self) -> String {
-        let (name, veins) = (&self.relaxed.scenario, veins(&self.relaxed));
+        let (name, veins) = (&self.relaxed.scenario, veins_text(&self.relaxed));
         format!("{name}: {veins}, relaxed and by shooting")
     }
 
-    fn lines(&self, units: &Units) -> Lines {
-        let mut lines = vec![("verdict", judgement(self, units))];
-        lines.extend(results(self, units));
-        lines.extend(labelled("differ", differences(self, units)));
-        lines.extend(labelled("error", errors(self, units)));
-        lines.extend(self.solution().into_iter().flat_map(shooting_details));
+    fn report_lines(&self, units: &Units) -> LabelledLines {
+        let mut lines = vec![("verdict", verdict_sentence(self, units))];
+        lines.extend(method_lines(self, units));
+        lines.extend(label_first_line("differ", difference_lines(self, units)));
+        lines.extend(label_first_line("error", error_estimate_lines(self, units)));
+        lines.extend(self.solution().into_iter().flat_map(shooting_detail_lines));
         // Otherwise the verdict explains why the leaf is not at rest.
         if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
             lines.push(("remark", remark.clone()));
         }
-        lines.extend(labelled("doubtful", self.relaxed.doubts.clone()));
+        lines.extend(label_first_line("doubtful", self.relaxed.doubts.clone()));
         lines
     }
 }
 
-fn judgement(check: &Check, units: &Units) -> String {
-    let [position, rotation] = [check.allowed(), check.allowed_rotation()].map(power_of_ten);
-    let position = in_unit(position, units, LENGTH);
+fn verdict_sentence(check: &Check, units: &Units) -> String {
+    let [position, rotation] = [check.allowed(), check.allowed_rotation()].map(format_error_bound);
+    let position = number_in_unit(position, units, LENGTH);
     let allowed = format!("positions within {position}, rotations within {rotation} rad");
-    let headline = headline(&check.verdict);
+    let headline = check_verdict_phrase(&check.verdict);
     match &check.verdict {
-        Verdict::Agree => match check.indices() {
+        CheckVerdict::Agree => match check.indices() {
             Some(_) => format!("{headline}: {allowed}, the same index"),
             None => format!("{headline}: {allowed}; their indices are not compared"),
         },
-        Verdict::Differ => format!("{headline}: to agree, {allowed}, the same index"),
-        Verdict::NotCompared(reason) | Verdict::NotIndependent(reason) => {
+        CheckVerdict::Differ => format!("{headline}: to agree, {allowed}, the same index"),
+        CheckVerdict::NotCompared(reason) | CheckVerdict::NotIndependent(reason) => {
             format!("{headline}: {reason}")
         }
     }
 }
 
 /// The result and the time of each method.
-fn results(check: &Check, units: &Units) -> Lines {
+fn method_lines(check: &Check, units: &Units) -> LabelledLines {
     let relaxed = &check.relaxed;
-    let found = format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds));
+    let found = format!(
+        "{} in {}",
+        equilibrium_phrase(relaxed),
+        duration_text(relaxed.wall_seconds)
+    );
     let mut lines = vec![("relaxed", found)];
     let shot = check.shot.as_ref().map(|shot| {
         let index = shot.negative_eigenvalues;
         let found = match shot.found {
-            Ok(_) => equilibrium_of_index(index) + &eigenvalues(index),
+            Ok(_) => equilibrium_kind(index) + &negative_eigenvalues_text(index),
             Err(_) => "no solution".into(),
         };
-        format!("{found} in {}", seconds(shot.wall_seconds))
+        format!("{found} in {}", duration_text(shot.wall_seconds))
     });
     lines.push(("shooting", shot.unwrap_or_else(|| "not tried".into())));
     let place = |tip: &DVec3| {
-        let tip = point(tip.to_array(), decimals(relaxed));
-        in_unit(tip, units, LENGTH)
+        let tip = format_position(tip.to_array(), position_decimals(relaxed));
+        number_in_unit(tip, units, LENGTH)
     };
     if let [tip] = relaxed.tips.as_slice() {
         lines.push(("tip", format!("{} relaxed", place(tip))));
@@ -74,7 +79,8 @@ fn results(check: &Check, units: &Units) -> Lines {
             lines.push(("", format!("{} by shooting", place(tip))));
         }
     }
-    let digits = |energy: f64| in_unit(as_accurate(relaxed, energy, energy), units, ENERGY);
+    let digits =
+        |energy: f64| number_in_unit(format_as_accurate(relaxed, energy, energy), units, ENERGY);
     let mut energy = digits(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
     if let Some(solution) = check.solution() {
         energy += &format!(", {} by shooting", digits(solution.energy));
@@ -84,52 +90,52 @@ fn results(check: &Check, units: &Units) -> Lines {
 }
 
 /// The largest differences, and where they are.
-fn differences(check: &Check, units: &Units) -> Vec<String> {
+fn difference_lines(check: &Check, units: &Units) -> Vec<String> {
     let Some(difference) = &check.difference else {
         return Vec::new();
     };
-    let line = |quantity: Quantity| {
-        let (word, largest) = (quantity.word(), quantity.of(difference));
-        match check.farthest(quantity) {
-            Some(Place { rod, sigma }) if largest > 0.0 => {
+    let line = |quantity: ComparedQuantity| {
+        let (word, largest) = (quantity.word(), quantity.component(difference));
+        match check.largest_difference_location(quantity) {
+            Some(DifferenceLocation { rod, sigma }) if largest > 0.0 => {
                 let place = match check.relaxed.shape.rods.len() {
                     1 => format!("at {sigma:.3} of the length"),
                     _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
                 };
-                let largest = with_unit(power_of_ten(largest), quantity, units);
+                let largest = number_with_unit(format_error_bound(largest), quantity, units);
                 format!("{word}s by {largest} at most, {place}")
             }
             _ => format!("{word}s not at all"),
         }
     };
-    Quantity::ALL.into_iter().map(line).collect()
+    ComparedQuantity::ALL.into_iter().map(line).collect()
 }
 
 /// A number with the unit of its quantity.
-fn with_unit(number: String, quantity: Quantity, units: &Units) -> String {
+fn number_with_unit(number: String, quantity: ComparedQuantity, units: &Units) -> String {
     match quantity {
-        Quantity::Position => in_unit(number, units, LENGTH),
-        Quantity::Rotation => number + " rad",
-        Quantity::Force => in_unit(number, units, FORCE),
-        Quantity::Moment => in_unit(number, units, ENERGY),
+        ComparedQuantity::Position => number_in_unit(number, units, LENGTH),
+        ComparedQuantity::Rotation => number + " rad",
+        ComparedQuantity::Force => number_in_unit(number, units, FORCE),
+        ComparedQuantity::Moment => number_in_unit(number, units, ENERGY),
     }
 }
 
 /// The error estimates of both methods.
-fn errors(check: &Check, units: &Units) -> Vec<String> {
+fn error_estimate_lines(check: &Check, units: &Units) -> Vec<String> {
     let relaxed = &check.relaxed;
     let mut lines = vec![match relaxed.accuracy.error_estimate {
         Some(error) => {
-            let (error, grids) = (bound_of_positions(error, units), grids(relaxed));
+            let (error, grids) = (position_error_text(error, units), grids_text(relaxed));
             format!("relaxed: positions within {error}, from {grids}")
         }
         None => "relaxed: not known".into(),
     }];
-    if let Some(Solution { error, .. }) = check.solution() {
+    if let Some(ShootingSolution { error, .. }) = check.solution() {
         let [position, rotation, force, moment] =
-            Quantity::ALL.map(|quantity| match quantity.of(error) {
-                0.0 => bound(0.0),
-                error => with_unit(bound(error), quantity, units),
+            ComparedQuantity::ALL.map(|quantity| match quantity.component(error) {
+                0.0 => upper_bound_text(0.0),
+                error => number_with_unit(upper_bound_text(error), quantity, units),
             });
         lines.push(format!(
             "shooting: positions within {position}, rotations {rotation}, forces {force}, moments {moment}"
@@ -143,10 +149,13 @@ fn errors(check: &Check, units: &Units) -> Vec<String> {
 }
 
 /// Growth of perturbations, defect and conditioning of the shooting.
-fn shooting_details(solution: &Solution) -> Lines {
-    let (growth, method) = (solution.growth, shooting(solution.intervals.len() - 1));
+fn shooting_detail_lines(solution: &ShootingSolution) -> LabelledLines {
+    let (growth, method) = (
+        solution.growth,
+        shooting_method_name(solution.intervals.len() - 1),
+    );
     let growth = format!("perturbations grow 10^{growth:.1} times from base to tip: {method}");
-    let (defect, ratio) = (power_of_ten(solution.defect), solution.condition);
+    let (defect, ratio) = (format_error_bound(solution.defect), solution.condition);
     let defect = format!("{defect}, ratio of singular values {ratio:.1e}");
     let mut lines = vec![("growth", growth), ("defect", defect)];
     lines.extend((solution.neutral.iter()).map(|neutral| ("neutral", neutral.to_string())));
@@ -160,7 +169,7 @@ mod tests {
 
     #[test]
     fn another_equilibrium_is_called_unstable() {
-        let report = sample::check(1, 8, 0.1).report(&Units::default(), Vec::new(), false);
+        let report = sample::sample_check(1, 8, 0.1).report(&Units::default(), Vec::new(), false);
         for part in [
             "fan: 1 vein, relaxed and by shooting\n",
             "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad, the same index\n",

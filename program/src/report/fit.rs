@@ -1,8 +1,10 @@
 //! The text report of a fit, and its table.
 
-use crate::report::Reported;
-use crate::report::numbers::{brief, counted, in_unit_of_key, rounded_to, seconds};
-use crate::report::table::{Lines, labelled, text_cell};
+use crate::report::ReportedResult;
+use crate::report::numbers::{
+    count_in_words, duration_text, format_five_digits, number_in_key_unit, round_to_error,
+};
+use crate::report::table::{LabelledLines, label_first_line, text_cell};
 use leafdyn::scenario::Units;
 use leafdyn::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
 use std::io;
@@ -10,68 +12,79 @@ use std::io::Write;
 use std::path::Path;
 
 /// Most candidates that are listed.
-const CANDIDATES: usize = 5;
+const MOST_CANDIDATES_LISTED: usize = 5;
 
-impl Reported for Fit {
+impl ReportedResult for Fit {
     fn heading(&self) -> String {
         let (name, count) = (&self.scenario, self.residuals.len());
-        let numbers = counted(self.parameters.len(), "number", "numbers");
+        let numbers = count_in_words(self.parameters.len(), "number", "numbers");
         format!("{name}: fit of {numbers} to {count} data")
     }
 
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let found = match self.outcome {
             FitOutcome::Converged => "a minimum; the data determine every free number",
-            FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
+            FitOutcome::UnidentifiableCombination => {
+                "a minimum; the data do not determine every free number"
+            }
             FitOutcome::Systematic => {
                 "a minimum, at which the residuals are systematic: the model lacks something"
             }
             FitOutcome::Contradicted => "a minimum, at which the data contradict the model",
             FitOutcome::NotConverged => "no minimum",
         };
-        let mut lines: Lines = vec![("found", found.into())];
-        lines.extend(labelled(
+        let mut lines: LabelledLines = vec![("found", found.into())];
+        lines.extend(label_first_line(
             "numbers",
-            (self.parameters.iter()).map(|it| number(it, self.outcome, units)),
+            (self.parameters.iter()).map(|it| parameter_line(it, self.outcome, units)),
         ));
-        lines.extend(labelled("data say", self.says.clone()));
-        lines.extend(labelled("data", self.files.iter().map(read)));
+        lines.extend(label_first_line("data say", self.says.clone()));
+        lines.extend(label_first_line(
+            "data",
+            self.files.iter().map(data_file_line),
+        ));
         let (count, freedom) = (self.residuals.len(), self.degrees_of_freedom);
         let misfit = match self.standard_deviation {
-            Some(sd) => format!("standard deviation {}", brief(sd)),
-            None => format!("chi squared {}", brief(self.chi_squared)),
+            Some(sd) => format!("standard deviation {}", format_five_digits(sd)),
+            None => format!("chi squared {}", format_five_digits(self.chi_squared)),
         };
         let misfit = format!("{misfit} over {count} data, {freedom} degrees of freedom");
         lines.push(("misfit", misfit));
-        let candidates = self.candidates.iter().take(CANDIDATES).map(|candidate| {
-            let (bits, part) = (candidate.bits, candidate.shrinks);
-            let text = match &candidate.remark {
-                Some(remark) => remark.clone(),
-                None => format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it"),
-            };
-            format!("{}: {text}", candidate.experiment)
-        });
-        lines.extend(labelled("measure", candidates));
+        let candidates = self
+            .candidates
+            .iter()
+            .take(MOST_CANDIDATES_LISTED)
+            .map(|candidate| {
+                let (bits, part) = (candidate.bits, candidate.shrinks);
+                let text = match &candidate.remark {
+                    Some(remark) => remark.clone(),
+                    None => {
+                        format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it")
+                    }
+                };
+                format!("{}: {text}", candidate.experiment)
+            });
+        lines.extend(label_first_line("measure", candidates));
         lines
     }
 
-    fn work(&self) -> Option<String> {
-        let (evaluations, time) = (self.work.evaluations, seconds(self.wall_seconds));
+    fn work_line(&self) -> Option<String> {
+        let (evaluations, time) = (self.work.evaluations, duration_text(self.wall_seconds));
         Some(format!(
             "all leaves brought to rest {evaluations} times in {time}"
         ))
     }
 
-    fn remarks(&self) -> Lines {
-        labelled("remark", self.remarks.clone())
+    fn remarks(&self) -> LabelledLines {
+        label_first_line("remark", self.remarks.clone())
     }
 }
 
 /// One line on what a file was read as.
-fn read(file: &DataFile) -> String {
+fn data_file_line(file: &DataFile) -> String {
     let name = Path::new(&file.file).file_name();
     let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());
-    let rows = counted(file.rows, "row", "rows");
+    let rows = count_in_words(file.rows, "row", "rows");
     let left_out = match file.left_out.as_slice() {
         [] => None,
         left_out => Some(format!("left out: {}", left_out.join(", "))),
@@ -84,13 +97,13 @@ fn read(file: &DataFile) -> String {
     said.join("; ")
 }
 
-fn number(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> String {
+fn parameter_line(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> String {
     // The interval has two digits.
     let error = match (parameter.low, parameter.high) {
         (Some(low), Some(high)) => 0.05 * (high - low),
         _ => 0.0,
     };
-    let digits = |value: f64| brief(rounded_to(value, error));
+    let digits = |value: f64| format_five_digits(round_to_error(value, error));
     let key = &parameter.key;
     let percent = match outcome {
         FitOutcome::Systematic => "95 %, widened",
@@ -106,7 +119,7 @@ fn number(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> Strin
         outcome == FitOutcome::Systematic && parameter.low.is_some() && parameter.high.is_some();
     match parameter.determined || widened {
         true => {
-            let value = in_unit_of_key(digits(parameter.value), units, key);
+            let value = number_in_key_unit(digits(parameter.value), units, key);
             format!("{key} = {value} ({bounds})")
         }
         false => format!("{key} is not determined ({bounds})"),
@@ -114,7 +127,7 @@ fn number(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> Strin
 }
 
 /// `fit.csv`: one row per datum.
-pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_fit_table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
     let mut table = csv::Writer::from_writer(out);
     for residual in &fit.residuals {
         let experiment = text_cell(&residual.experiment).into();
@@ -127,6 +140,6 @@ pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// `fitted.toml`: the scenario with the fitted values.
-pub fn fitted(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_fitted_scenario(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(fit.fitted.as_bytes())
 }

@@ -16,17 +16,18 @@ mod simulate;
 pub(crate) mod table;
 mod trace;
 
-pub use crate::report::chart::{chart_table, scaling_table};
-pub use crate::report::fit::{fitted, table as fit_table};
-pub use crate::report::map::{MapWork, map_table};
-use crate::report::table::{Lines, labelled};
-pub use crate::report::table::{centerlines, modes_table, sensitivity_table};
+pub use crate::report::chart::{write_chart_table, write_scaling_table};
+pub use crate::report::fit::{write_fit_table, write_fitted_scenario};
+pub use crate::report::map::{ReportedMap, write_map_table};
+use crate::report::table::{LabelledLines, label_first_line};
+pub use crate::report::table::{write_centerlines, write_modes_table, write_sensitivity_table};
 pub use crate::report::trace::{
-    boundary_table, error_location, is_special, passes_crossings, sides, slope_unit, trace_table,
+    error_location_words, index_change_text, is_codimension_two, passes_crossings, slope_unit,
+    write_boundary_table, write_trace_table,
 };
 use leafdyn::relax::{Equilibrium, Method, Outcome};
 use leafdyn::scenario::{Scenario, Units, printable};
-use leafdyn::study::{BranchEnd as End, Contender, MapShow, Stuck, Verdict};
+use leafdyn::study::{BranchEnd, CheckVerdict, CorrectorFailure, MapShow, SolverConfig};
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io;
@@ -34,27 +35,27 @@ use std::io::Write;
 use std::path::Path;
 
 /// A result with a report: labelled lines under a heading.
-pub trait Reported {
+pub trait ReportedResult {
     fn heading(&self) -> String;
 
     /// What it is, in the units of the scenario.
-    fn lines(&self, units: &Units) -> Lines;
+    fn report_lines(&self, units: &Units) -> LabelledLines;
 
     /// What it took, for those who ask.
-    fn work(&self) -> Option<String> {
+    fn work_line(&self) -> Option<String> {
         None
     }
 
     /// What follows the list of the files that were written.
-    fn remarks(&self) -> Lines {
-        Lines::new()
+    fn remarks(&self) -> LabelledLines {
+        LabelledLines::new()
     }
 
     /// All lines but that list.
-    fn summary(&self, units: &Units) -> Lines {
+    fn summary(&self, units: &Units) -> LabelledLines {
         [
-            self.lines(units),
-            labelled("work", self.work()),
+            self.report_lines(units),
+            label_first_line("work", self.work_line()),
             self.remarks(),
         ]
         .concat()
@@ -62,11 +63,11 @@ pub trait Reported {
 
     /// The text for the console; the work only if it is `verbose`.
     fn report(&self, units: &Units, files: Vec<String>, verbose: bool) -> String {
-        let work = labelled("work", self.work().filter(|_| verbose));
+        let work = label_first_line("work", self.work_line().filter(|_| verbose));
         let parts = [
-            self.lines(units),
+            self.report_lines(units),
             work,
-            labelled("written", files),
+            label_first_line("written", files),
             self.remarks(),
         ];
         let lines = parts.iter().flatten();
@@ -78,7 +79,7 @@ pub trait Reported {
 /// A result with its input, as JSON: the content of a verb's file, and the output of
 /// `--json`.
 #[derive(Serialize)]
-pub struct Document<'a, R> {
+pub struct ResultDocument<'a, R> {
     /// Of the program.
     version: &'static str,
     /// The relative path from the output folder to the scenario's file, if known: it
@@ -92,31 +93,31 @@ pub struct Document<'a, R> {
     pub input: &'a Scenario,
     /// Why its files could not be written, with the exit status.
     #[serde(flatten)]
-    pub refused: Option<Refused>,
+    pub refused: Option<RefusalDocument>,
 }
 
 /// What `--json` prints of a refusal.
 #[derive(Clone, Debug, Serialize)]
-pub struct Refused {
+pub struct RefusalDocument {
     /// Why, and what to change.
     pub error: String,
     /// 2, or 130 after Ctrl-C.
     pub exit_status: i32,
 }
 
-impl Refused {
+impl RefusalDocument {
     pub fn new(error: &str, exit_status: i32) -> Self {
-        Refused {
+        RefusalDocument {
             error: printable(error).into(),
             exit_status,
         }
     }
 }
 
-impl<'a, R> Document<'a, R> {
+impl<'a, R> ResultDocument<'a, R> {
     /// A result of a scenario in the file `source`.
     pub fn new(result: &'a R, input: &'a Scenario, source: Option<&'a str>) -> Self {
-        Document {
+        ResultDocument {
             result,
             version: env!("CARGO_PKG_VERSION"),
             source,
@@ -133,7 +134,7 @@ pub struct FileError(pub String);
 
 impl FileError {
     /// A file cannot be written, for the system's reason. A previous file is unchanged.
-    pub fn write(file: &Path, reason: io::Error) -> Self {
+    pub fn cannot_write(file: &Path, reason: io::Error) -> Self {
         let file = file.display();
         FileError(format!(
             "cannot write {file}: {reason}; make room there or name another folder with --out DIR"
@@ -141,30 +142,30 @@ impl FileError {
     }
 
     /// A file cannot be read, for the system's reason.
-    pub fn read(file: &Path, reason: io::Error) -> Self {
+    pub fn cannot_read(file: &Path, reason: io::Error) -> Self {
         FileError(format!("cannot read {}: {reason}", file.display()))
     }
 
     /// A file belongs to another run or map, or is damaged.
-    pub fn unfit(file: &Path, why: &str) -> Self {
+    pub fn mismatched_file(file: &Path, why: &str) -> Self {
         FileError(format!("{} {why}", file.display()))
     }
 }
 
 /// Writes the whole file. Numbers that are not finite are null.
 pub fn write_json(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
-    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
+    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, JsonLayout::default());
     object.serialize(&mut serializer)?;
     out.write_all(b"\n")
 }
 
 /// Compact JSON with each key of the outermost object on its own line.
 #[derive(Default)]
-struct Layout {
+struct JsonLayout {
     depth: usize,
 }
 
-impl Formatter for Layout {
+impl Formatter for JsonLayout {
     fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
         self.depth += 1;
         out.write_all(b"{")
@@ -192,18 +193,18 @@ impl Formatter for Layout {
 }
 
 /// How the run ended and what was found, in one phrase.
-pub fn verdict(equilibrium: &Equilibrium) -> String {
+pub fn relaxation_verdict(equilibrium: &Equilibrium) -> String {
     match equilibrium.outcome {
-        Outcome::Converged => at_rest(equilibrium),
+        Outcome::Converged => rest_phrase(equilibrium),
         Outcome::ConvergedAfterSaddle => {
             let saddle = equilibrium.stability.saddle.as_ref();
             let index = saddle.map(|saddle| format!(" of index {}", saddle.negative_eigenvalues));
             let left = format!(", after leaving a saddle{}", index.unwrap_or_default());
-            at_rest(equilibrium) + &left
+            rest_phrase(equilibrium) + &left
         }
-        Outcome::Saddle => at_rest(equilibrium),
+        Outcome::Saddle => rest_phrase(equilibrium),
         Outcome::ToleranceNotReached => {
-            format!("{}, tolerance not reached", at_rest(equilibrium))
+            format!("{}, tolerance not reached", rest_phrase(equilibrium))
         }
         Outcome::NotAtRest if equilibrium.method.is_shooting() => "no equilibrium".into(),
         Outcome::NotAtRest => "not at rest".into(),
@@ -212,12 +213,12 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
     }
 }
 
-fn at_rest(equilibrium: &Equilibrium) -> String {
-    equilibrium_of_index(equilibrium.stability.negative_eigenvalues)
+fn rest_phrase(equilibrium: &Equilibrium) -> String {
+    equilibrium_kind(equilibrium.stability.negative_eigenvalues)
 }
 
 /// The title of what a map shows.
-pub fn map_shows(show: MapShow) -> &'static str {
+pub fn map_title(show: MapShow) -> &'static str {
     match show {
         MapShow::Outcomes => "where methods fail",
         MapShow::Waves => "waves along the margins",
@@ -225,7 +226,7 @@ pub fn map_shows(show: MapShow) -> &'static str {
 }
 
 /// The kind of equilibrium with this number of negative eigenvalues.
-pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
+pub fn equilibrium_kind(negative_eigenvalues: Option<usize>) -> String {
     match negative_eigenvalues {
         Some(0) => "stable equilibrium".into(),
         Some(index) => format!("unstable equilibrium of index {index}"),
@@ -234,14 +235,14 @@ pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
 }
 
 /// The same in a word or two, of a known index.
-pub fn stable_or_index(index: usize) -> String {
+pub fn stability_phrase(index: usize) -> String {
     match index {
         0 => "stable".into(),
         index => format!("index {index}"),
     }
 }
 
-pub fn shooting(intervals: usize) -> String {
+pub fn shooting_method_name(intervals: usize) -> String {
     match intervals {
         1 => "single shooting".into(),
         count => format!("multiple shooting over {count} intervals"),
@@ -249,17 +250,17 @@ pub fn shooting(intervals: usize) -> String {
 }
 
 /// The verdict of a check, in one phrase.
-pub fn headline(verdict: &Verdict) -> &'static str {
+pub fn check_verdict_phrase(verdict: &CheckVerdict) -> &'static str {
     match verdict {
-        Verdict::Agree => "both methods agree",
-        Verdict::Differ => "the methods differ",
-        Verdict::NotCompared(_) => "could not be compared",
-        Verdict::NotIndependent(_) => "not confirmed by an independent solution",
+        CheckVerdict::Agree => "both methods agree",
+        CheckVerdict::Differ => "the methods differ",
+        CheckVerdict::NotCompared(_) => "could not be compared",
+        CheckVerdict::NotIndependent(_) => "not confirmed by an independent solution",
     }
 }
 
 /// The name of a contender in a chart.
-pub fn contender(contender: Contender) -> &'static str {
+pub fn contender_name(contender: SolverConfig) -> &'static str {
     match (contender.method, contender.one_grid) {
         (Method::SemiImplicit(_), false) => "semi-implicit, extrapolated",
         (Method::SemiImplicit(_), true) => "semi-implicit, single grids",
@@ -272,19 +273,21 @@ pub fn contender(contender: Contender) -> &'static str {
 }
 
 /// How a branch ended, in a phrase.
-pub fn branch_end(end: &End) -> &'static str {
+pub fn branch_end_phrase(end: &BranchEnd) -> &'static str {
     match end {
-        End::Reached => "to the end of the range",
-        End::Returned => "back to the start of the range",
-        End::Closed => "closed",
-        End::Met => "met",
-        End::MostPoints | End::Enough => "goes on",
-        End::Unstable => "ends: loses its stability",
-        End::Stopped | End::Stuck(Stuck::Stopped) => "goes on: stopped",
-        End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
-        End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
-        End::Stuck(_) => "lost",
-        End::Unverified(_) => "ends: not verified further",
+        BranchEnd::RangeEndReached => "to the end of the range",
+        BranchEnd::RangeStartReached => "back to the start of the range",
+        BranchEnd::LoopClosed => "closed",
+        BranchEnd::KnownBoundaryMet => "met",
+        BranchEnd::PointLimitReached | BranchEnd::StopCriterionMet => "goes on",
+        BranchEnd::StabilityLost => "ends: loses its stability",
+        BranchEnd::RunLimitReached | BranchEnd::StepFailed(CorrectorFailure::Stopped) => {
+            "goes on: stopped"
+        }
+        BranchEnd::StepFailed(CorrectorFailure::OutOfRange(_)) => "ends where no leaf is",
+        BranchEnd::StepFailed(CorrectorFailure::Unresolved) => "ends: grid too coarse",
+        BranchEnd::StepFailed(_) => "lost",
+        BranchEnd::PointUnverified(_) => "ends: not verified further",
     }
 }
 
@@ -295,7 +298,7 @@ mod tests {
 
     #[test]
     fn numbers_keep_every_digit_or_are_null() {
-        let mut leaf = sample::fan(5, 8);
+        let mut leaf = sample::sample_equilibrium(5, 8);
         leaf.energy = Some(0.1 + 0.2);
         leaf.accuracy.residual = Some(f64::INFINITY);
         let mut bytes = Vec::new();

@@ -7,42 +7,48 @@
 //! The stability margin of a leaf, as text.
 
 use crate::report::numbers::{
-    ROUNDING, as_accurate, bound, bound_of_positions, brief, counted, decimals, decimals_within,
-    eigenvalues, grids, in_unit, in_unit_of_key, known, point, rounded_to, seconds, veins,
+    ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
+    format_five_digits, format_position, format_within_error, grids_text,
+    negative_eigenvalues_text, number_in_key_unit, number_in_unit, position_decimals,
+    position_error_text, round_to_error, upper_bound_text, veins_text,
 };
-use crate::report::table::{Lines, labelled};
-use crate::report::{Reported, shooting, stable_or_index, verdict};
+use crate::report::table::{LabelledLines, label_first_line};
+use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
-    Barrier, BladeReport, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Model, Outcome,
-    Path, Push, Sensitivity,
+    AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event, InstabilityKind,
+    Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
     COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
 };
 use leafdyn::scenario::{Stress, Units};
-use leafdyn::study::{Equilibria, Found};
+use leafdyn::study::{Equilibria, FoundEquilibrium};
 use std::f64::consts::TAU;
 
 /// Most modes that are listed.
-const MOST_MODES: usize = 6;
+const MOST_MODES_LISTED: usize = 6;
 
-impl Reported for Equilibrium {
+impl ReportedResult for Equilibrium {
     fn heading(&self) -> String {
-        let (name, veins) = (&self.scenario, veins(self));
+        let (name, veins) = (&self.scenario, veins_text(self));
         format!("{name}: {veins}, method {}", self.method)
     }
 
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let length = self.shape.longest();
-        let mut lines = vec![("found", found(self))];
-        lines.extend(self.path.as_ref().map(|path| ("path", way(path))));
+        let mut lines = vec![("found", equilibrium_phrase(self))];
+        lines.extend(
+            self.path
+                .as_ref()
+                .map(|path| ("path", path_to_equilibrium(path))),
+        );
         if let Some(saddle) = &self.stability.saddle {
             // It was seen on one grid.
             let index = saddle.negative_eigenvalues;
-            let energy = in_unit(brief(saddle.energy), units, ENERGY);
-            let tip = tip(saddle.tip, length, units);
+            let energy = number_in_unit(format_five_digits(saddle.energy), units, ENERGY);
+            let tip = tip_text(saddle.tip, length, units);
             let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
             lines.push(("left", left));
         }
@@ -50,69 +56,71 @@ impl Reported for Equilibrium {
         // its tip is meaningless.
         if let Some(energy) = self.energy.filter(|energy| energy.is_finite()) {
             if let [tip] = self.tips.as_slice() {
-                let tip = point(tip.to_array(), decimals(self));
-                lines.push(("tip", in_unit(tip, units, LENGTH)));
+                let tip = format_position(tip.to_array(), position_decimals(self));
+                lines.push(("tip", number_in_unit(tip, units, LENGTH)));
             }
-            let energy = as_accurate(self, energy, energy);
-            lines.push(("energy", in_unit(energy, units, ENERGY)));
+            let energy = format_as_accurate(self, energy, energy);
+            lines.push(("energy", number_in_unit(energy, units, ENERGY)));
         }
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
             let sizes = (reaction.force, moments(&reaction.moments));
-            let force = felt(self, sizes, reaction.error);
-            let force = in_unit(format!("({force})"), units, FORCE);
+            let force = reaction_text(self, sizes, reaction.error);
+            let force = number_in_unit(format!("({force})"), units, FORCE);
             lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
             let sizes = (grip.force, grip.moment.map_or(0.0, DVec3::length));
-            let force = felt(self, sizes, grip.error);
-            let force = in_unit(format!("({force})"), units, FORCE);
+            let force = reaction_text(self, sizes, grip.error);
+            let force = number_in_unit(format!("({force})"), units, FORCE);
             let grip = format!("{force} on the holder of grip {}", number + 1);
             lines.push(("grip", grip));
         }
-        lines.extend(stress(self, units).map(|stress| ("stress", stress)));
-        lines.extend(waves(self, units).map(|waves| ("waves", waves)));
-        lines.push(("error", error(self, units)));
-        lines.extend(modes(self, units).map(|modes| ("modes", modes)));
-        lines.extend(labelled("changes", changes(self, units)));
+        lines.extend(largest_stress_line(self, units).map(|stress| ("stress", stress)));
+        lines.extend(margin_waves_line(self, units).map(|waves| ("waves", waves)));
+        lines.push(("error", error_line(self, units)));
+        lines.extend(lowest_modes_line(self, units).map(|modes| ("modes", modes)));
+        lines.extend(label_first_line("changes", tip_change_lines(self, units)));
         let blade = self.blade.as_ref().map(|it| blade_lines(it, units));
-        lines.extend(labelled("blade", blade.unwrap_or_default()));
+        lines.extend(label_first_line("blade", blade.unwrap_or_default()));
         let margin = self.margin.as_ref();
         let margin = margin.map(|it| margin_lines(it, length, units));
-        lines.extend(labelled("margin", margin.unwrap_or_default()));
+        lines.extend(label_first_line("margin", margin.unwrap_or_default()));
         if !self.accuracy.segments.is_empty() {
-            lines.push(("model", model(&self.model, units)));
+            lines.push(("model", model_line(&self.model, units)));
         }
         lines
     }
 
-    fn work(&self) -> Option<String> {
-        Some(work(self))
+    fn work_line(&self) -> Option<String> {
+        Some(solver_work_line(self))
     }
 
-    fn remarks(&self) -> Lines {
-        let remark = labelled("remark", self.remark.clone());
-        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    fn remarks(&self) -> LabelledLines {
+        let remark = label_first_line("remark", self.remark.clone());
+        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
     }
 }
 
 /// The kind of equilibrium, or the residual.
-pub fn found(equilibrium: &Equilibrium) -> String {
-    let verdict = verdict(equilibrium);
+pub fn equilibrium_phrase(equilibrium: &Equilibrium) -> String {
+    let verdict = relaxation_verdict(equilibrium);
     let residual = equilibrium.accuracy.residual.filter(|it| it.is_finite());
     match (equilibrium.outcome, residual) {
         (Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular, Some(residual)) => {
             format!("{verdict} (residual {residual:.1e})")
         }
         _ => {
-            verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues) + &turns(equilibrium)
+            verdict
+                + &negative_eigenvalues_text(equilibrium.stability.negative_eigenvalues)
+                + &zero_energy_rotation_line(equilibrium)
         }
     }
 }
 
 /// That it is one of a circle of equilibria, if it is.
-fn turns(equilibrium: &Equilibrium) -> String {
+fn zero_energy_rotation_line(equilibrium: &Equilibrium) -> String {
     match (
         equilibrium.stability.neutral_directions,
         equilibrium.rod_count,
@@ -127,7 +135,7 @@ fn turns(equilibrium: &Equilibrium) -> String {
 }
 
 /// How the leaf came to its equilibrium.
-fn way(path: &Path) -> String {
+fn path_to_equilibrium(path: &Path) -> String {
     match path {
         Path::Released => "released from arcs under all loads".into(),
         Path::Loaded { events, .. } if events.is_empty() => {
@@ -144,36 +152,47 @@ fn way(path: &Path) -> String {
 }
 
 /// Error of positions, relative to the length, if none is estimated.
-const WITHOUT_ERROR: f64 = 1e-10;
+const DEFAULT_POSITION_ERROR: f64 = 1e-10;
 
 /// Errors of the force on a holder, relative to the forces within the leaf, are so many times those
 /// of positions relative to its length: of 48 leaves 14 times at most.
-const OF_FORCES: f64 = 20.0;
+const FORCE_ERROR_FACTOR: f64 = 20.0;
 
 /// The force on a holder, which may feel a moment as well, to its known digits. Where it is small, as
 /// on a ring that closes by itself, the forces that bend the leaf and those of clamps tell how
 /// accurate it is.
-fn felt(equilibrium: &Equilibrium, (force, moment): (DVec3, f64), error: Option<f64>) -> String {
+fn reaction_text(
+    equilibrium: &Equilibrium,
+    (force, moment): (DVec3, f64),
+    error: Option<f64>,
+) -> String {
     if let Some(error) = error {
-        let rounding = ROUNDING * force.length();
+        let rounding = ROUNDING_OF_LENGTHS * force.length();
         return force
             .to_array()
-            .map(|it| known(it, error.max(rounding)))
+            .map(|it| format_within_error(it, error.max(rounding)))
             .join(", ");
     }
     let longest = equilibrium.shape.longest();
     let energy = equilibrium.energy.unwrap_or_default().abs();
     let most = largest([force.length(), moment / longest, energy / longest]);
     let error = equilibrium.accuracy.error_estimate;
-    let relative = error.map_or(WITHOUT_ERROR, |error| error / longest);
-    let error = OF_FORCES * relative.max(ROUNDING) * most;
-    force.to_array().map(|it| known(it, error)).join(", ")
+    let relative = error.map_or(DEFAULT_POSITION_ERROR, |error| error / longest);
+    let error = FORCE_ERROR_FACTOR * relative.max(ROUNDING_OF_LENGTHS) * most;
+    force
+        .to_array()
+        .map(|it| format_within_error(it, error))
+        .join(", ")
 }
 
 /// What was solved for, and what of the rods' strains matters.
-fn model(model: &Model, units: &Units) -> String {
+fn model_line(model: &Model, units: &Units) -> String {
     let moves = |effect: Option<f64>, what: &str| {
-        let effect = in_unit(bound(effect.filter(|effect| *effect > 0.0)?), units, LENGTH);
+        let effect = number_in_unit(
+            upper_bound_text(effect.filter(|effect| *effect > 0.0)?),
+            units,
+            LENGTH,
+        );
         Some(format!("{what} moves it by {effect}"))
     };
     let effects = [
@@ -185,16 +204,16 @@ fn model(model: &Model, units: &Units) -> String {
     phrases.collect::<Vec<_>>().join("; ")
 }
 
-fn error(equilibrium: &Equilibrium, units: &Units) -> String {
+fn error_line(equilibrium: &Equilibrium, units: &Units) -> String {
     let source = match equilibrium.accuracy.intervals {
-        Some(count) => format!("by {}", shooting(count)),
-        None => format!("from {}", grids(equilibrium)),
+        Some(count) => format!("by {}", shooting_method_name(count)),
+        None => format!("from {}", grids_text(equilibrium)),
     };
     let wanted = equilibrium.accuracy.tolerance * equilibrium.shape.longest();
-    let wanted = bound_of_positions(wanted, units);
+    let wanted = position_error_text(wanted, units);
     match equilibrium.accuracy.error_estimate {
         Some(error) => {
-            let error = bound_of_positions(error, units);
+            let error = position_error_text(error, units);
             format!("positions within {error} (wanted {wanted}), {source}")
         }
         None => match equilibrium.accuracy.segments.as_slice() {
@@ -205,7 +224,7 @@ fn error(equilibrium: &Equilibrium, units: &Units) -> String {
 }
 
 /// The largest stress in the sections of a leaf at rest.
-fn stress(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
+fn largest_stress_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let of = (equilibrium.stress.as_ref()).filter(|_| equilibrium.outcome.is_at_rest())?;
     let Stress {
         normal,
@@ -215,12 +234,14 @@ fn stress(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let place = match of.sigma {
         0.0 => "at its base".into(),
         1.0 => "at its tip".into(),
-        sigma => format!("at {} of its length", brief(sigma)),
+        sigma => format!("at {} of its length", format_five_digits(sigma)),
     };
     let relative = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
-    let error = of.error.unwrap_or(OF_FORCES * relative * equivalent);
-    let [normal, shear, equivalent] =
-        [normal, shear, equivalent].map(|it| in_unit(brief(rounded_to(it, error)), units, STRESS));
+    let error = of
+        .error
+        .unwrap_or(FORCE_ERROR_FACTOR * relative * equivalent);
+    let [normal, shear, equivalent] = [normal, shear, equivalent]
+        .map(|it| number_in_unit(format_five_digits(round_to_error(it, error)), units, STRESS));
     Some(format!(
         "at most {equivalent} in vein {} {place}: normal {normal}, shear {shear}",
         of.vein
@@ -229,10 +250,10 @@ fn stress(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
 
 /// Part of the height and the length of waves to which these are told: they are measured at
 /// stations.
-const MEASURED: f64 = 5e-4;
+const WAVE_MEASUREMENT_PRECISION: f64 = 5e-4;
 
 /// The waves along the margins, if any vein has waves.
-fn waves(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
+fn margin_waves_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let undulation = &equilibrium.undulation;
     let margin = undulation.margin()?;
     if undulation.veins.iter().all(|vein| vein.waves() == 0.0) {
@@ -249,8 +270,8 @@ fn waves(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
         Some(long) => {
             let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0);
             let digits = |it: f64| {
-                let rounded = rounded_to(it, error.max(MEASURED * it));
-                in_unit(brief(rounded), units, LENGTH)
+                let rounded = round_to_error(it, error.max(WAVE_MEASUREMENT_PRECISION * it));
+                number_in_unit(format_five_digits(rounded), units, LENGTH)
             };
             let [high, long] = [high, long].map(digits);
             format!("{waves} along the margins, {high} high and {long} long; {theory}")
@@ -260,19 +281,21 @@ fn waves(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
 }
 
 /// The lowest eigenvalues, as growth rates per time and frequencies in cycles per time.
-fn modes(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
+fn lowest_modes_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let Some(modes) = &equilibrium.stability.modes else {
         let asked = equilibrium.stability.mode_shapes;
         return asked.then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some();
     let list = |modes: &mut dyn Iterator<Item = &Mode>, cycle: f64| {
-        let listed = modes.take(MOST_MODES).map(|mode| rate(mode, cycle));
+        let listed = modes
+            .take(MOST_MODES_LISTED)
+            .map(|mode| growth_rate_text(mode, cycle));
         listed.collect::<Vec<_>>().join(", ")
     };
     let growth = list(&mut modes.iter().filter(unstable), 1.0);
     let frequencies = list(&mut modes.iter().filter(|mode| !unstable(mode)), TAU);
-    let per_time = units.of(RATE).unwrap_or("per time".into());
+    let per_time = units.unit_name(RATE).unwrap_or("per time".into());
     let cycles = units.frequency().unwrap_or("cycles per time".into());
     let phrases = [
         ("growth rates", growth, per_time),
@@ -295,28 +318,30 @@ fn modes(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
 }
 
 /// The growth rate of a mode, or its frequency with cycles of so many radians.
-fn rate(mode: &Mode, cycle: f64) -> String {
+fn growth_rate_text(mode: &Mode, cycle: f64) -> String {
     let rate = mode.eigenvalue.abs().sqrt();
     match mode.error {
         _ if mode.is_neutral() => "0".into(),
-        Some(error) => brief(rounded_to(rate / cycle, 0.5 * error / (rate * cycle))),
-        None => brief(rate / cycle),
+        Some(error) => {
+            format_five_digits(round_to_error(rate / cycle, 0.5 * error / (rate * cycle)))
+        }
+        None => format_five_digits(rate / cycle),
     }
 }
 
 /// How the tip moves when each number grows by 1 %, or in proportion to it if it is zero.
-fn changes(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
+fn tip_change_lines(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
     let change = |found: &Sensitivity| {
         let (key, zero) = (&found.key, found.value == 0.0);
         let by = if zero { 1.0 } else { 0.01 * found.value };
         let tip = found.tips.first().map(|tip| (*tip * by).to_array());
         let error = found.tip_error.unwrap_or(0.0) * by.abs();
-        let digits = |it: f64| brief(rounded_to(it, error));
+        let digits = |it: f64| format_five_digits(round_to_error(it, error));
         let tip = tip.map(|tip| format!("({})", tip.map(digits).join(", ")));
-        let tip = in_unit(tip.unwrap_or_default(), units, LENGTH);
+        let tip = number_in_unit(tip.unwrap_or_default(), units, LENGTH);
         match zero {
             true => {
-                let unit = in_unit_of_key("1".into(), units, key);
+                let unit = number_in_key_unit("1".into(), units, key);
                 format!("{key} is 0: each {unit} of it moves the tip by {tip} at first")
             }
             false => format!("+1 % of {key} moves the tip by {tip}"),
@@ -326,11 +351,11 @@ fn changes(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
     found.iter().map(change).collect()
 }
 
-fn work(equilibrium: &Equilibrium) -> String {
+fn solver_work_line(equilibrium: &Equilibrium) -> String {
     let work = equilibrium.work;
     let (steps, factorizations, evaluations) =
         (work.steps, work.factorizations, work.force_evaluations);
-    let time = seconds(equilibrium.wall_seconds);
+    let time = duration_text(equilibrium.wall_seconds);
     if equilibrium.method.is_shooting() {
         return format!(
             "{steps} corrections, {factorizations} linearisations, {evaluations} evaluations of all slopes in {time}"
@@ -343,11 +368,14 @@ fn work(equilibrium: &Equilibrium) -> String {
 
 /// The lines about a blade.
 pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
-    let length = |it: f64| in_unit(brief(it), units, LENGTH);
-    let stiffness = |it: f64| in_unit(brief(it), units, COUPLE_STIFFNESS);
+    let length = |it: f64| number_in_unit(format_five_digits(it), units, LENGTH);
+    let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, COUPLE_STIFFNESS);
     let mass = |it: f64| match units.grams() {
-        Some(grams) => format!("; its mass is {} g", brief(grams * it)),
-        None => format!("; its mass is {}", in_unit(brief(it), units, MASS)),
+        Some(grams) => format!("; its mass is {} g", format_five_digits(grams * it)),
+        None => format!(
+            "; its mass is {}",
+            number_in_unit(format_five_digits(it), units, MASS)
+        ),
     };
     let mut lines = vec![format!(
         "at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
@@ -362,16 +390,16 @@ pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
         "each vein there: a strip {strip} wide, torsion {a1}, bending_2 {a2}, bending_3 {a3}"
     ));
     if let Some([along, across, normal, fold]) = blade.tissue {
-        let stiffness = |it: f64| in_unit(brief(it), units, FORCE_PER_AREA);
+        let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, FORCE_PER_AREA);
         let [along, across, normal] = [along, across, normal].map(stiffness);
-        let fold = in_unit(brief(fold), units, FORCE);
+        let fold = number_in_unit(format_five_digits(fold), units, FORCE);
         lines.push(format!(
             "tissue there: along {along}, across {across}, normal {normal}, fold {fold}"
         ));
     }
     if let Some(least) = blade.least_width {
         let effect = blade.least_width_effect;
-        let effect = effect.map(|it| bound_of_positions(it, units));
+        let effect = effect.map(|it| position_error_text(it, units));
         let effect = effect.map(|it| format!("; half of that moves it by {it}"));
         lines.push(format!(
             "where narrower than {} it is as stiff as there{}",
@@ -380,7 +408,7 @@ pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
         ));
     }
     if let Some(fewer) = blade.half_as_many {
-        let (rods, apart) = (fewer.rods, bound_of_positions(fewer.difference, units));
+        let (rods, apart) = (fewer.rods, position_error_text(fewer.difference, units));
         lines.push(format!(
             "with {rods} veins in place of these it differs by {apart}"
         ));
@@ -388,21 +416,21 @@ pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     lines
 }
 
-impl Reported for Equilibria {
+impl ReportedResult for Equilibria {
     fn heading(&self) -> String {
         let leaf = self.found.first();
-        let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+        let veins = leaf.map_or("a leaf".into(), |found| veins_text(&found.equilibrium));
         format!("{}: {veins}, all shapes", self.scenario)
     }
 
     /// The equilibria, lowest energy first.
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let found = self.found.iter().enumerate();
-        let mut lines = labelled(
+        let mut lines = label_first_line(
             "found",
             found.map(|(number, found)| equilibrium_line(number, found, units)),
         );
-        let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
+        let stable = |found: &&FoundEquilibrium| found.equilibrium.stable() == Some(true);
         let stable = self.found.iter().filter(stable).count();
         let others = self.found.len() - stable;
         let failed = match self.failed {
@@ -416,30 +444,30 @@ impl Reported for Equilibria {
         lines
     }
 
-    fn work(&self) -> Option<String> {
-        Some(format!("{} in all", seconds(self.wall_seconds)))
+    fn work_line(&self) -> Option<String> {
+        Some(format!("{} in all", duration_text(self.wall_seconds)))
     }
 
-    fn remarks(&self) -> Lines {
+    fn remarks(&self) -> LabelledLines {
         let more = "there may be more: no number of starts proves that these are all";
-        let remark = labelled("remark", self.remark.clone());
-        [remark, labelled("remark", Some(more.into()))].concat()
+        let remark = label_first_line("remark", self.remark.clone());
+        [remark, label_first_line("remark", Some(more.into()))].concat()
     }
 }
 
-fn equilibrium_line(number: usize, found: &Found, units: &Units) -> String {
+fn equilibrium_line(number: usize, found: &FoundEquilibrium, units: &Units) -> String {
     let leaf = &found.equilibrium;
     let index = leaf.stability.negative_eigenvalues;
-    let stability = index.map_or("of unknown stability".into(), stable_or_index);
+    let stability = index.map_or("of unknown stability".into(), stability_phrase);
     let tip = match &leaf.tips[..] {
         [tip] => {
-            let tip = point(tip.to_array(), decimals(leaf));
-            format!(", tip {}", in_unit(tip, units, LENGTH))
+            let tip = format_position(tip.to_array(), position_decimals(leaf));
+            format!(", tip {}", number_in_unit(tip, units, LENGTH))
         }
         _ => String::new(),
     };
     let within = match leaf.accuracy.error_estimate {
-        Some(error) => format!(", within {}", bound_of_positions(error, units)),
+        Some(error) => format!(", within {}", position_error_text(error, units)),
         None => String::new(),
     };
     let plain = if found.plain {
@@ -447,31 +475,31 @@ fn equilibrium_line(number: usize, found: &Found, units: &Units) -> String {
     } else {
         ""
     };
-    let starts = counted(found.starts, "start", "starts");
+    let starts = count_in_words(found.starts, "start", "starts");
     let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
-    let energy = in_unit(as_accurate(leaf, energy, energy), units, ENERGY);
+    let energy = number_in_unit(format_as_accurate(leaf, energy, energy), units, ENERGY);
     format!("{number:>2}. energy {energy}: {stability}{tip}{within} ({starts}{plain})")
 }
 
 /// Part of the longest vein to which positions are told that were found on one grid.
-const ON_ONE_GRID: f64 = 1e-3;
+const SINGLE_GRID_PRECISION: f64 = 1e-3;
 
 /// The lines about a margin of a leaf of this length, the smallest push first.
 pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| destabilizing_push((margin, push), length, units))
+        .map(|push| critical_tip_force_line((margin, push), length, units))
         .collect();
-    lines.extend(stable_directions(margin, units));
+    lines.extend(stable_directions_line(margin, units));
     let unknown = margin.pushes.iter();
-    let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
+    let unknown = unknown.filter(|push| push.kind == InstabilityKind::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
         let why = push.remark.as_deref().unwrap_or_default();
-        let which = directions(margin, push);
+        let which = direction_text(margin, push);
         match push.more_than.filter(|least| *least > 0.0) {
             Some(least) => {
-                let least = force(units, least);
+                let least = force_text(units, least);
                 format!(
                     "a push {which} is known up to {least} only, under which it is stable: {why}"
                 )
@@ -480,7 +508,7 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
         }
     }));
     match &margin.barrier {
-        Some(found) => lines.push(barrier(found, length, units)),
+        Some(found) => lines.push(energy_barrier_line(found, length, units)),
         None if margin.climbs > 0 => {
             let what = "no pass to another equilibrium found";
             lines.push(format!("{what} from {} places", margin.climbs));
@@ -492,21 +520,27 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
 }
 
 /// A push under which stability is lost.
-fn destabilizing_push((margin, push): (&Margin, &Push), length: f64, units: &Units) -> String {
+fn critical_tip_force_line(
+    (margin, push): (&Margin, &CriticalTipForce),
+    length: f64,
+    units: &Units,
+) -> String {
     let error = push.error.unwrap_or(0.0);
     let exact = push.force.unwrap_or_default();
-    let at = force(units, rounded_to(exact, error));
+    let at = force_text(units, round_to_error(exact, error));
     let then = match push.then {
-        Some(Fate::BendsAside) => "makes it bend aside",
-        Some(Fate::Snaps) | None => "snaps it",
+        Some(PostcriticalBehavior::BendsAside) => "makes it bend aside",
+        Some(PostcriticalBehavior::Snaps) | None => "snaps it",
     };
     let rest = (push.neighbour.as_ref())
-        .map(|it| format!(" to rest with tip {}", tip(it.tip, length, units)));
-    let within = push.error.map(|error| in_unit(bound(error), units, FORCE));
+        .map(|it| format!(" to rest with tip {}", tip_text(it.tip, length, units)));
+    let within = push
+        .error
+        .map(|error| number_in_unit(upper_bound_text(error), units, FORCE));
     let within = within.map(|error| format!(", within {error}"));
     let weights = push.per_weight.map(|part| {
-        let part = rounded_to(part, part * error / exact);
-        format!(" ({} weights)", brief(part))
+        let part = round_to_error(part, part * error / exact);
+        format!(" ({} weights)", format_five_digits(part))
     });
     let place = match margin.every_tip {
         true => "at every tip",
@@ -514,7 +548,7 @@ fn destabilizing_push((margin, push): (&Margin, &Push), length: f64, units: &Uni
     };
     format!(
         "a push of {at} {} {place} {then}{}{}{}",
-        directions(margin, push),
+        direction_text(margin, push),
         rest.unwrap_or_default(),
         within.unwrap_or_default(),
         weights.unwrap_or_default(),
@@ -522,54 +556,61 @@ fn destabilizing_push((margin, push): (&Margin, &Push), length: f64, units: &Uni
 }
 
 /// Directions in which the leaf stays stable up to the largest push.
-fn stable_directions(margin: &Margin, units: &Units) -> Option<String> {
+fn stable_directions_line(margin: &Margin, units: &Units) -> Option<String> {
     let none = margin.pushes.iter();
-    let none = none.filter(|push| push.kind == Loss::NoneUpTo);
+    let none = none.filter(|push| push.kind == InstabilityKind::NoneUpTo);
     let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
-    let largest = force(units, margin.largest_push?);
+    let largest = force_text(units, margin.largest_push?);
     (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
 }
 
-fn barrier(barrier: &Barrier, length: f64, units: &Units) -> String {
-    let energy = rounded_to(barrier.energy, barrier.error.unwrap_or(0.0));
-    let energy = in_unit(brief(energy), units, ENERGY);
+fn energy_barrier_line(barrier: &Barrier, length: f64, units: &Units) -> String {
+    let energy = round_to_error(barrier.energy, barrier.error.unwrap_or(0.0));
+    let energy = number_in_unit(format_five_digits(energy), units, ENERGY);
     let error = barrier
         .error
-        .map(|error| in_unit(bound(error), units, ENERGY));
+        .map(|error| number_in_unit(upper_bound_text(error), units, ENERGY));
     let error = error.map(|error| format!(" within {error}"));
     let lifted = barrier.height.map(|height| {
-        let height = in_unit(brief(height), units, LENGTH);
+        let height = number_in_unit(format_five_digits(height), units, LENGTH);
         format!(", as the leaf lifted by {height}")
     });
     format!(
         "barrier of {energy}{}{}, over a saddle with tip {} to rest with tip {}",
         error.unwrap_or_default(),
         lifted.unwrap_or_default(),
-        tip(barrier.saddle.tip, length, units),
-        tip(barrier.neighbour.tip, length, units),
+        tip_text(barrier.saddle.tip, length, units),
+        tip_text(barrier.neighbour.tip, length, units),
     )
 }
 
-pub fn tip(tip: DVec3, length: f64, units: &Units) -> String {
-    let tip = point(tip.to_array(), decimals_within(ON_ONE_GRID * length));
-    in_unit(tip, units, LENGTH)
+pub fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
+    let tip = format_position(
+        tip.to_array(),
+        decimals_for_error(SINGLE_GRID_PRECISION * length),
+    );
+    number_in_unit(tip, units, LENGTH)
 }
 
-fn force(units: &Units, force: f64) -> String {
-    in_unit(brief(force), units, FORCE)
+fn force_text(units: &Units, force: f64) -> String {
+    number_in_unit(format_five_digits(force), units, FORCE)
 }
 
 /// The direction of a push, with that of its mirror image.
-fn directions(margin: &Margin, push: &Push) -> String {
+fn direction_text(margin: &Margin, push: &CriticalTipForce) -> String {
     let image = push.direction.opposite();
     let mut pushes = margin.pushes.iter();
     match pushes.any(|other| other.mirrored && other.direction == image) {
-        true => format!("{} ({} or {image})", word(push.direction), push.direction),
-        false => format!("{} ({})", word(push.direction), push.direction),
+        true => format!(
+            "{} ({} or {image})",
+            direction_word(push.direction),
+            push.direction
+        ),
+        false => format!("{} ({})", direction_word(push.direction), push.direction),
     }
 }
 
-fn word(direction: Direction) -> &'static str {
+fn direction_word(direction: AxisDirection) -> &'static str {
     match (direction.axis, direction.negative) {
         (0, false) => "forwards",
         (0, true) => "backwards",
@@ -587,7 +628,7 @@ mod tests {
     #[test]
     fn positions_on_one_grid_have_digits_of_the_leaf() {
         let at = |unit: f64| {
-            tip(
+            tip_text(
                 DVec3::new(1.2345, 0.0, -0.5) * unit,
                 1.5 * unit,
                 &Units::default(),

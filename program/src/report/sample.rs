@@ -5,16 +5,16 @@ use glam::{DQuat, DVec3};
 use leafdyn::relax::{Equilibrium, Method, Outcome};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
-use leafdyn::simulate::{Frame, Moment, Record, Simulation, Still, stills};
+use leafdyn::simulate::{Frame, OutputSample, Record, ShapeSnapshot, Simulation, snapshot_indices};
 use leafdyn::study::{
-    Base, Chart, Check, Confidence, Ending, Map, MapMethod, MapOutcome, MapRequest, MapRow,
-    Neutral, Peer, Reference, Row, Scaling, ScalingRow, Setting, ShootingSolution as Solution,
-    Shot, Spread,
+    AccuracySetting, BaseScenario, Chart, ChartOutcome, ChartRow, Check, Map, MapMethod,
+    MapOutcome, MapRequest, MapRow, NeutralDirection, PeerProgram, ReferenceConfidence,
+    ReferenceSolution, ScalingRow, ScalingStudy, ShootingResult, ShootingSolution, TimingSpread,
 };
 use leafdyn::{relax, simulate};
 
 /// The scenario of most samples.
-pub fn scenario(name: &str, rods: usize) -> Scenario {
+pub fn sample_scenario(name: &str, rods: usize) -> Scenario {
     let text = format!(
         r#"
         name = "{name}"
@@ -33,20 +33,20 @@ pub fn scenario(name: &str, rods: usize) -> Scenario {
 }
 
 /// A leaf at rest on one grid, with an error estimate as if from several.
-pub fn fan(rods: usize, segments: usize) -> Equilibrium {
+pub fn sample_equilibrium(rods: usize, segments: usize) -> Equilibrium {
     let options = relax::Options {
         method: Method::default().on_grid(Some(segments)),
         ..relax::Options::default()
     };
-    let mut leaf = relax::relax(&scenario("fan", rods), &options, &mut |_| {}).unwrap();
+    let mut leaf = relax::relax(&sample_scenario("fan", rods), &options, &mut |_| {}).unwrap();
     leaf.accuracy.error_estimate = Some(3e-9);
     leaf
 }
 
 /// A check of that fan whose boundary-value solution is turned about x by
 /// `angle`.
-pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
-    let relaxed = fan(rods, segments);
+pub fn sample_check(rods: usize, segments: usize, angle: f64) -> Check {
+    let relaxed = sample_equilibrium(rods, segments);
     let turn = DQuat::from_rotation_x(angle);
     let mut shapes = relaxed.shape.rods.clone();
     for node in shapes.iter_mut().flat_map(|rod| &mut rod.nodes) {
@@ -54,7 +54,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         node.rotation = turn * node.rotation;
     }
     let zero = vec![DVec3::ZERO; segments + 1];
-    let solution = Solution {
+    let solution = ShootingSolution {
         stations: relaxed.shape.stations.clone(),
         rods: shapes,
         energy: 11.08,
@@ -68,14 +68,14 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         intervals: vec![0.0, 0.5, 1.0],
         growth: 4.2,
         condition: 1e-10,
-        neutral: Some(Neutral {
+        neutral: Some(NeutralDirection {
             ratio: 1e-10,
             displacement: vec![zero; rods],
         }),
         unsharpened: None,
         work: Default::default(),
     };
-    let shot = Shot {
+    let shot = ShootingResult {
         tips: vec![turn * relaxed.tips[0]],
         found: Ok(solution),
         // The same shape is as stable.
@@ -86,13 +86,13 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
 }
 
 /// A map of 2 x 4 cells in which every outcome and reference occurs.
-pub fn map() -> Map {
+pub fn sample_map() -> Map {
     let text = r#"
         name = "vein"
         leaf = { rods = 1, length = 1.0, fan = [0.0] }
         stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
     "#;
-    let base = Base::of_text(
+    let base = BaseScenario::from_text(
         text.into(),
         "vein.toml".into(),
         &["method.step=0.01".into()],
@@ -122,9 +122,9 @@ pub fn map() -> Map {
                 | MapOutcome::OutOfTime
         );
         let reference = match cell {
-            6 => Confidence::Unconfirmed,
-            7 => Confidence::None,
-            _ => Confidence::Confirmed,
+            6 => ReferenceConfidence::Unconfirmed,
+            7 => ReferenceConfidence::None,
+            _ => ReferenceConfidence::Confirmed,
         };
         let row = MapRow {
             detail: format!("said of cell {cell}, \"quoted\""),
@@ -157,12 +157,12 @@ pub fn map() -> Map {
 }
 
 /// The same leaf released, and followed for 10 units of time.
-pub fn swing(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
+pub fn sample_motion(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
     let options = simulate::Options {
         segments: Some(segments),
         ..simulate::Options::default()
     };
-    let mut swing = Simulation::new(&scenario("swing", rods), &options).unwrap();
+    let mut swing = Simulation::new(&sample_scenario("swing", rods), &options).unwrap();
     let mut frames = vec![swing.frame()];
     while !swing.done() {
         frames.push(swing.next_frame().unwrap());
@@ -171,21 +171,27 @@ pub fn swing(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
 }
 
 /// The record of that motion.
-pub fn record(rods: usize, segments: usize) -> Record {
-    let (swing, frames) = swing(rods, segments);
-    let moments: Vec<Moment> = frames.iter().map(|frame| Moment::of(frame, true)).collect();
-    let still = |moment: usize| Still {
+pub fn sample_record(rods: usize, segments: usize) -> Record {
+    let (swing, frames) = sample_motion(rods, segments);
+    let moments: Vec<OutputSample> = frames
+        .iter()
+        .map(|frame| OutputSample::from_frame(frame, true))
+        .collect();
+    let still = |moment: usize| ShapeSnapshot {
         moment,
         curves: (0..rods)
             .map(|rod| frames[moment].centerline(rod).to_vec())
             .collect(),
     };
-    let stills = stills(&moments, 8, 1.0).into_iter().map(still).collect();
+    let stills = snapshot_indices(&moments, 8, 1.0)
+        .into_iter()
+        .map(still)
+        .collect();
     Record::new(&swing, None, moments, stills)
 }
 
-fn spread(median: f64) -> Spread {
-    Spread {
+fn sample_spread(median: f64) -> TimingSpread {
+    TimingSpread {
         min: 0.8 * median,
         q1: 0.875 * median,
         median,
@@ -194,30 +200,30 @@ fn spread(median: f64) -> Spread {
     }
 }
 
-fn row(contender: &str, knob: Setting, seconds: f64, error: f64) -> Row {
+fn sample_chart_row(contender: &str, knob: AccuracySetting, seconds: f64, error: f64) -> ChartRow {
     let contender = contender.parse().unwrap();
-    Row {
-        seconds: Some(spread(seconds)),
+    ChartRow {
+        seconds: Some(sample_spread(seconds)),
         steps: Some(8),
         factorizations: Some(9),
         force_evaluations: Some(9),
         true_error: Some(error),
         error_estimate: Some(10.0 * error),
-        ..Row::without_result(contender, knob, Ending::Ended(Outcome::Converged))
+        ..ChartRow::without_result(contender, knob, ChartOutcome::Ended(Outcome::Converged))
     }
 }
 
-fn not_run(contender: &str, knob: Setting) -> Row {
-    Row::without_result(contender.parse().unwrap(), knob, Ending::NotRun)
+fn sample_row_not_run(contender: &str, knob: AccuracySetting) -> ChartRow {
+    ChartRow::without_result(contender.parse().unwrap(), knob, ChartOutcome::NotRun)
 }
 
 /// A chart of few points, two failures and a peer.
-pub fn chart() -> Chart {
-    use Setting::{Segments, Tolerance};
-    let peer = |knob: &str, seconds: f64, true_error: Option<f64>, outcome: &str| Peer {
+pub fn sample_chart() -> Chart {
+    use AccuracySetting::{Segments, Tolerance};
+    let peer = |knob: &str, seconds: f64, true_error: Option<f64>, outcome: &str| PeerProgram {
         name: "solve_bvp".into(),
         knob: knob.into(),
-        seconds: spread(seconds),
+        seconds: sample_spread(seconds),
         true_error,
         outcome: outcome.into(),
         pareto: false,
@@ -229,7 +235,7 @@ pub fn chart() -> Chart {
         joined: true,
         threads: 1,
         rounds: 5,
-        reference: Some(Reference {
+        reference: Some(ReferenceSolution {
             confirmed: true,
             told: "relaxation and shooting agree within their error estimates".into(),
             known_within: 1e-12,
@@ -240,20 +246,20 @@ pub fn chart() -> Chart {
         }),
         remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
         rows: vec![
-            row("semi-implicit", Tolerance(1e-2), 1e-3, 1e-4),
-            row("semi-implicit", Tolerance(1e-6), 2e-3, 1e-8),
-            Row {
+            sample_chart_row("semi-implicit", Tolerance(1e-2), 1e-3, 1e-4),
+            sample_chart_row("semi-implicit", Tolerance(1e-6), 2e-3, 1e-8),
+            ChartRow {
                 error_estimate: None,
-                ..row("semi-implicit-grid", Segments(4), 5e-4, 9e-3)
+                ..sample_chart_row("semi-implicit-grid", Segments(4), 5e-4, 9e-3)
             },
-            row("explicit", Tolerance(1e-2), 2e-2, 1e-4),
-            not_run("explicit", Tolerance(1e-11)),
-            Row {
+            sample_chart_row("explicit", Tolerance(1e-2), 2e-2, 1e-4),
+            sample_row_not_run("explicit", Tolerance(1e-11)),
+            ChartRow {
                 true_error: None,
                 error_estimate: None,
-                ending: Ending::Ended(Outcome::NotAtRest),
+                ending: ChartOutcome::Ended(Outcome::NotAtRest),
                 remark: Some("perturbations grow".into()),
-                ..row("single-shooting", Tolerance(1e-6), 7e-2, 1.0)
+                ..sample_chart_row("single-shooting", Tolerance(1e-6), 7e-2, 1.0)
             },
         ],
         peers: vec![
@@ -263,22 +269,22 @@ pub fn chart() -> Chart {
         decades: Vec::new(),
         scaling: None,
     };
-    chart.compared()
+    chart.with_comparisons()
 }
 
 /// Two leaves, two contenders, one of which was too slow.
-pub fn scaling() -> Scaling {
-    let knob = Setting::Tolerance(1e-6);
-    let found = |rods: usize, row: Row| ScalingRow { rods, row };
-    Scaling {
+pub fn sample_scaling() -> ScalingStudy {
+    let knob = AccuracySetting::Tolerance(1e-6);
+    let found = |rods: usize, row: ChartRow| ScalingRow { rods, row };
+    ScalingStudy {
         scenario: "fan".into(),
         tolerance: 1e-6,
         unconfirmed: Vec::new(),
         rows: vec![
-            found(5, row("semi-implicit", knob, 1e-3, 1e-8)),
-            found(15, row("semi-implicit", knob, 3e-3, 1e-8)),
-            found(5, row("explicit", knob, 3e-2, 1e-8)),
-            found(15, not_run("explicit", knob)),
+            found(5, sample_chart_row("semi-implicit", knob, 1e-3, 1e-8)),
+            found(15, sample_chart_row("semi-implicit", knob, 3e-3, 1e-8)),
+            found(5, sample_chart_row("explicit", knob, 3e-2, 1e-8)),
+            found(15, sample_row_not_run("explicit", knob)),
         ],
     }
 }

@@ -1,56 +1,57 @@
 //! The text report of a simulation.
 
-use crate::report::Reported;
+use crate::report::ReportedResult;
 use crate::report::numbers::{
-    bound_of_positions, brief, in_unit, known, point, power_of_ten, rounded_to, seconds, veins_of,
+    duration_text, format_error_bound, format_five_digits, format_position, format_within_error,
+    number_in_unit, position_error_text, round_to_error, veins_text_for_count,
 };
-use crate::report::table::{Lines, labelled};
+use crate::report::table::{LabelledLines, label_first_line};
 use leafdyn::numbers::{larger, largest};
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, LENGTH, TIME};
-use leafdyn::simulate::{Reason, Record};
+use leafdyn::simulate::{Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
-const NOISE: f64 = 1e-13;
+const ENERGY_ROUNDING: f64 = 1e-13;
 
 /// Decimals of a position, relative to the longest rod.
-const DECIMALS: f64 = 7.0;
+const POSITION_DECIMALS: f64 = 7.0;
 
-impl Reported for Record {
+impl ReportedResult for Record {
     fn heading(&self) -> String {
-        let veins = veins_of(self.rods, self.joined);
+        let veins = veins_text_for_count(self.rods, self.joined);
         format!("{}: {veins}, method {}", self.scenario, self.scheme)
     }
 
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let mut lines = vec![
-            ("moved", moved(self, units)),
+            ("moved", motion_line(self, units)),
             ("grid", format!("{} segments a vein", self.segments)),
-            ("step", step(self, units)),
+            ("step", time_step_line(self, units)),
         ];
-        if self.choice.reason != Reason::Requested {
+        if self.choice.reason != SchemeReason::Requested {
             lines.push(("choice", self.choice.to_string()));
         }
-        lines.extend(energy(self, units));
+        lines.extend(energy_lines(self, units));
         if let [tip] = self.tips.as_slice() {
-            let decimals = (DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
-            let tip = point(tip.to_array(), decimals as usize);
-            lines.push(("tip", in_unit(tip, units, LENGTH)));
+            let decimals = (POSITION_DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
+            let tip = format_position(tip.to_array(), decimals as usize);
+            lines.push(("tip", number_in_unit(tip, units, LENGTH)));
         }
-        lines.push(("error", error(self, units)));
-        lines.push(("speed", speed(self)));
+        lines.push(("error", tip_error_line(self, units)));
+        lines.push(("speed", speed_line(self)));
         lines
     }
 
-    fn remarks(&self) -> Lines {
-        let remark = labelled("remark", self.remark());
-        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    fn remarks(&self) -> LabelledLines {
+        let remark = label_first_line("remark", self.remark());
+        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
     }
 }
 
-fn moved(record: &Record, units: &Units) -> String {
+fn motion_line(record: &Record, units: &Units) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
-    let time = |time: f64| in_unit(brief(time), units, TIME);
+    let time = |time: f64| number_in_unit(format_five_digits(time), units, TIME);
     let (reached, outputs) = (time(record.time), record.moments.len());
     let reached = format!("t = {reached} in {steps} steps, {outputs} outputs");
     let (outcome, duration) = (record.outcome(), time(record.duration));
@@ -60,12 +61,12 @@ fn moved(record: &Record, units: &Units) -> String {
     }
 }
 
-fn step(record: &Record, units: &Units) -> String {
-    let time = |step: f64| in_unit(format!("{step:.3e}"), units, TIME);
+fn time_step_line(record: &Record, units: &Units) -> String {
+    let time = |step: f64| number_in_unit(format!("{step:.3e}"), units, TIME);
     let longest = match record.time_step {
         Some(step) => format!("at most {}", time(step)),
         None => {
-            let error = power_of_ten(record.tolerance);
+            let error = format_error_bound(record.tolerance);
             format!("so that its local error is within {error}")
         }
     };
@@ -79,7 +80,7 @@ fn step(record: &Record, units: &Units) -> String {
 }
 
 /// The energies at the end, and their balance, which should not have changed.
-fn energy(record: &Record, units: &Units) -> Lines {
+fn energy_lines(record: &Record, units: &Units) -> LabelledLines {
     let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
         return Vec::new();
     };
@@ -92,43 +93,47 @@ fn energy(record: &Record, units: &Units) -> Lines {
         ("dissipated", e.dissipated),
         ("work put in", e.work),
     ];
-    let noise = NOISE * largest(parts.map(|(_, value)| value.abs()));
-    let digits = |value: f64| brief(rounded_to(value, noise));
+    let noise = ENERGY_ROUNDING * largest(parts.map(|(_, value)| value.abs()));
+    let digits = |value: f64| format_five_digits(round_to_error(value, noise));
     let (start, end) = (first.energy.balance(), e.balance());
     let change = end - start;
-    let [start, end] = [start, end].map(|value| known(value, larger(noise, change.abs())));
-    let change = in_unit(digits(change), units, ENERGY);
+    let [start, end] =
+        [start, end].map(|value| format_within_error(value, larger(noise, change.abs())));
+    let change = number_in_unit(digits(change), units, ENERGY);
     let balance = format!("{start} at the start, {end} at the end: changed by {change}");
     let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
-    let parts = in_unit(parts.join(", "), units, ENERGY);
+    let parts = number_in_unit(parts.join(", "), units, ENERGY);
     vec![("energy", parts), ("balance", balance)]
 }
 
 /// The bar on the tips, and where it ends.
-fn error(record: &Record, units: &Units) -> String {
+fn tip_error_line(record: &Record, units: &Units) -> String {
     let mut known = record.moments.iter().filter_map(|moment| moment.error);
     let (Some(bar), Some(segments)) = (known.next_back(), record.compared_segments) else {
         return "of the tips not known: there is no second run to compare with".into();
     };
-    let bar = bound_of_positions(bar, units);
+    let bar = position_error_text(bar, units);
     let tips = format!("tips within {bar}, as a run on {segments} segments a vein tells");
     match (record.error_estimate, record.error_known_until) {
         (None, Some(until)) => {
-            let until = in_unit(brief(until), units, TIME);
+            let until = number_in_unit(format_five_digits(until), units, TIME);
             format!("{tips}, until t = {until}: then the two part")
         }
         _ => tips,
     }
 }
 
-fn speed(record: &Record) -> String {
+fn speed_line(record: &Record) -> String {
     let wall = record.wall_seconds;
     let work = record.steps * record.rods * record.segments;
-    let all = format!("{} in all", seconds(wall));
+    let all = format!("{} in all", duration_text(wall));
     if !(wall > 0.0 && work > 0) {
         return all;
     }
-    let (speed, each) = (brief(record.time / wall), 1e9 * wall / work as f64);
+    let (speed, each) = (
+        format_five_digits(record.time / wall),
+        1e9 * wall / work as f64,
+    );
     format!("{all}: {speed} of simulated time a second, {each:.0} ns a step and segment")
 }
 
@@ -142,7 +147,7 @@ mod tests {
     /// The balance has the digits that its change leaves, and what is rounding is none.
     #[test]
     fn energies_have_the_digits_that_are_known() {
-        let mut record = sample::record(1, 4);
+        let mut record = sample::sample_record(1, 4);
         let last = record.moments.len() - 1;
         let zero = record.moments[0].energy.map(|_| 0.0);
         record.moments[0].energy = zero;
@@ -164,7 +169,7 @@ mod tests {
 
     #[test]
     fn an_early_end_without_a_step_of_its_own() {
-        let mut record = sample::record(1, 4);
+        let mut record = sample::sample_record(1, 4);
         record.time_step = None;
         record.stable_step = None;
         record.stopped = Some(Stopped::Diverged {

@@ -6,7 +6,7 @@
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
 use leafdyn::scenario::Stress;
-use leafdyn::shape::weights;
+use leafdyn::shape::interpolation_weights;
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::borrow::Cow;
@@ -17,41 +17,44 @@ use std::{fmt, io};
 
 /// Lines of a report, each with its label; one without a label continues the one
 /// above.
-pub type Lines = Vec<(&'static str, String)>;
+pub type LabelledLines = Vec<(&'static str, String)>;
 
 /// Lines of which only the first is labelled.
-pub fn labelled(name: &'static str, lines: impl IntoIterator<Item = String>) -> Lines {
+pub fn label_first_line(
+    name: &'static str,
+    lines: impl IntoIterator<Item = String>,
+) -> LabelledLines {
     let names = std::iter::once(name).chain(std::iter::repeat(""));
     names.zip(lines).collect()
 }
 
-pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
+pub fn file_list_text(folder: &Path, files: &[PathBuf]) -> String {
     let names = files.iter().filter_map(|file| file.file_name());
     let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
 /// What spreadsheets take for the beginning of a formula, which they run.
-const FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
 /// Before a text spreadsheets take this for a sign that it is one.
-const TEXT: char = '\'';
+const TEXT_CELL_PREFIX: char = '\'';
 
 /// The cell of a text that comes from a name, such as that of an experiment.
 pub fn text_cell(text: &str) -> Cow<'_, str> {
-    match text.starts_with(FORMULA) && text.parse::<f64>().is_err() {
-        true => format!("{TEXT}{text}").into(),
+    match text.starts_with(FORMULA_STARTS) && text.parse::<f64>().is_err() {
+        true => format!("{TEXT_CELL_PREFIX}{text}").into(),
         false => text.into(),
     }
 }
 
 /// Writes rows as CSV without a header; each may be a tuple of tuples and arrays, whose
 /// elements are its cells.
-pub fn append_csv<R: Serialize>(
+pub fn append_csv_rows<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let mut table = csv_without_header(out);
+    let mut table = csv_writer_without_header(out);
     for row in rows {
         table.serialize(row)?;
     }
@@ -59,7 +62,7 @@ pub fn append_csv<R: Serialize>(
 }
 
 /// A CSV writer that writes no header by itself.
-pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
+pub fn csv_writer_without_header<W: Write>(out: W) -> csv::Writer<W> {
     let mut builder = csv::WriterBuilder::new();
     builder.has_headers(false).from_writer(out)
 }
@@ -67,11 +70,11 @@ pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
 /// One table of several results, each given as its scenario's file, its exit status and
 /// its JSON, whose scalar values are the cells. Columns are named by their keys, those of
 /// nested objects by both keys (`work_steps`); lists are left out, except tips.
-pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
+pub fn table_of_json_results(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut columns: Vec<String> = Vec::new();
     let mut rows: Vec<HashMap<String, String>> = Vec::new();
     for (file, status, json) in results {
-        let Flat(mut cells) = serde_json::from_slice(json)?;
+        let FlattenedJson(mut cells) = serde_json::from_slice(json)?;
         let head = [
             ("file", text_cell(file).into()),
             ("exit_status", status.to_string()),
@@ -102,55 +105,58 @@ pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
 }
 
 /// A JSON value as named cells; that of a scalar has no name.
-struct Flat(Vec<(String, String)>);
+struct FlattenedJson(Vec<(String, String)>);
 
-impl<'de> Deserialize<'de> for Flat {
+impl<'de> Deserialize<'de> for FlattenedJson {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Cells;
 
         impl Cells {
-            fn one<E>(cell: impl ToString) -> Result<Flat, E> {
-                Ok(Flat(vec![(String::new(), cell.to_string())]))
+            fn single_cell<E>(cell: impl ToString) -> Result<FlattenedJson, E> {
+                Ok(FlattenedJson(vec![(String::new(), cell.to_string())]))
             }
         }
 
         impl<'de> Visitor<'de> for Cells {
-            type Value = Flat;
+            type Value = FlattenedJson;
 
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
                 f.write_str("JSON")
             }
 
-            fn visit_bool<E>(self, value: bool) -> Result<Flat, E> {
-                Cells::one(value)
+            fn visit_bool<E>(self, value: bool) -> Result<FlattenedJson, E> {
+                Cells::single_cell(value)
             }
 
-            fn visit_i64<E>(self, value: i64) -> Result<Flat, E> {
-                Cells::one(value)
+            fn visit_i64<E>(self, value: i64) -> Result<FlattenedJson, E> {
+                Cells::single_cell(value)
             }
 
-            fn visit_u64<E>(self, value: u64) -> Result<Flat, E> {
-                Cells::one(value)
+            fn visit_u64<E>(self, value: u64) -> Result<FlattenedJson, E> {
+                Cells::single_cell(value)
             }
 
-            fn visit_f64<E>(self, value: f64) -> Result<Flat, E> {
-                Cells::one(format_args!("{value:?}"))
+            fn visit_f64<E>(self, value: f64) -> Result<FlattenedJson, E> {
+                Cells::single_cell(format_args!("{value:?}"))
             }
 
-            fn visit_str<E>(self, value: &str) -> Result<Flat, E> {
-                Cells::one(text_cell(value))
+            fn visit_str<E>(self, value: &str) -> Result<FlattenedJson, E> {
+                Cells::single_cell(text_cell(value))
             }
 
-            fn visit_unit<E>(self) -> Result<Flat, E> {
-                Cells::one("")
+            fn visit_unit<E>(self) -> Result<FlattenedJson, E> {
+                Cells::single_cell("")
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Flat, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<FlattenedJson, A::Error> {
                 while list.next_element::<IgnoredAny>()?.is_some() {}
-                Ok(Flat(Vec::new()))
+                Ok(FlattenedJson(Vec::new()))
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Flat, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                mut object: A,
+            ) -> Result<FlattenedJson, A::Error> {
                 let mut cells = Vec::new();
                 while let Some(key) = object.next_key::<String>()? {
                     match key.as_str() {
@@ -165,7 +171,7 @@ impl<'de> Deserialize<'de> for Flat {
                             }
                         }
                         _ => {
-                            let Flat(inner) = object.next_value()?;
+                            let FlattenedJson(inner) = object.next_value()?;
                             for (name, cell) in inner {
                                 let below = if name.is_empty() { "" } else { "_" };
                                 cells.push((format!("{key}{below}{name}"), cell));
@@ -173,7 +179,7 @@ impl<'de> Deserialize<'de> for Flat {
                         }
                     }
                 }
-                Ok(Flat(cells))
+                Ok(FlattenedJson(cells))
             }
         }
 
@@ -182,20 +188,21 @@ impl<'de> Deserialize<'de> for Flat {
 }
 
 /// The header of a table with these columns, which commas separate.
-pub fn header(columns: &str) -> Vec<u8> {
+pub fn table_header(columns: &str) -> Vec<u8> {
     format!("{columns}\n").into_bytes()
 }
 
 /// Nodes of the finest grid that a cubic interpolates.
-const CUBIC: usize = 4;
+const CUBIC_NODES: usize = 4;
 
 /// Names of the columns. Rods are numbered from 1; strains and stress
 /// resultants are components along the directors.
-const HEADER: &str = "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3";
+const CENTERLINES_HEADER: &str =
+    "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3";
 
 /// `centerlines.csv`: one row per rod and station; the largest stresses there come last, if
 /// sections are given.
-pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let stresses = equilibrium.stress.as_ref();
     let rows = shape.rods.iter().enumerate().flat_map(|(j, rod)| {
@@ -206,7 +213,7 @@ pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
                 j + 1,
                 *sigma,
                 sigma * rod.length,
-                columns(node),
+                node_columns(node),
                 stress.as_slice().as_flattened().to_vec(),
             )
         })
@@ -216,8 +223,10 @@ pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
     } else {
         &[]
     };
-    out.write_all(&header(&[&[HEADER], names].concat().join(",")))?;
-    append_csv::<(usize, _, _, _, _)>(rows, out)
+    out.write_all(&table_header(
+        &[&[CENTERLINES_HEADER], names].concat().join(","),
+    ))?;
+    append_csv_rows::<(usize, _, _, _, _)>(rows, out)
 }
 
 /// Names of the columns. Modes and rods are numbered from 1; displacements and
@@ -225,11 +234,16 @@ pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
 const MODES_HEADER: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
 
 /// `modes.csv`: one row per mode, rod and station.
-pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-    out.write_all(&header(MODES_HEADER))?;
-    let mut table = csv_without_header(out);
+pub fn write_modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(&table_header(MODES_HEADER))?;
+    let mut table = csv_writer_without_header(out);
     let shape = &equilibrium.shape;
-    let place = |&at: &f64| (at, weights(&shape.curve_stations, at, CUBIC));
+    let place = |&at: &f64| {
+        (
+            at,
+            interpolation_weights(&shape.curve_stations, at, CUBIC_NODES),
+        )
+    };
     let places: Vec<_> = shape.stations.iter().map(place).collect();
     for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
         let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
@@ -250,7 +264,7 @@ pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
 }
 
 /// The columns from `x` onwards.
-fn columns(node: &NodeState) -> [f64; 19] {
+fn node_columns(node: &NodeState) -> [f64; 19] {
     let NodeState {
         position: r,
         rotation: q,
@@ -271,18 +285,18 @@ fn columns(node: &NodeState) -> [f64; 19] {
 const SENSITIVITY_HEADER: &str = "key,value,rod,sigma,d_x,d_y,d_z,error";
 
 /// Cells of a row.
-type Row<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
+type SensitivityTableRow<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
 
 /// `sensitivity.csv`: a row for every number and station, or for the tips where only
 /// they are known.
-pub fn sensitivity_table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_sensitivity_table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let all = leaf.sensitivities.iter().flatten();
-    out.write_all(&header(SENSITIVITY_HEADER))?;
-    append_csv(all.flat_map(rows), out)
+    out.write_all(&table_header(SENSITIVITY_HEADER))?;
+    append_csv_rows(all.flat_map(sensitivity_table_rows), out)
 }
 
-fn rows(of: &Sensitivity) -> Vec<Row<'_>> {
-    let row = |(rod, sigma): (usize, f64), d: &DVec3, error| -> Row {
+fn sensitivity_table_rows(of: &Sensitivity) -> Vec<SensitivityTableRow<'_>> {
+    let row = |(rod, sigma): (usize, f64), d: &DVec3, error| -> SensitivityTableRow {
         (&of.key, of.value, rod + 1, sigma, d.to_array(), error)
     };
     if of.positions.is_empty() {
@@ -315,12 +329,12 @@ mod tests {
         ];
         for name in names {
             let cell = text_cell(name);
-            let runs = cell.starts_with(FORMULA) && cell.parse::<f64>().is_err();
+            let runs = cell.starts_with(FORMULA_STARTS) && cell.parse::<f64>().is_err();
             assert!(!runs, "{cell}");
             assert!(cell == name || cell == format!("'{name}"));
         }
         let refused = br#"{ "scenario": "=1+1", "tolerance": -1e-6 }"#.to_vec();
-        let table = rows_of_json(&[("@a.toml".into(), 2, refused)]).unwrap();
+        let table = table_of_json_results(&[("@a.toml".into(), 2, refused)]).unwrap();
         let table = String::from_utf8(table).unwrap();
         assert!(table.contains("'@a.toml,2,'=1+1,-1e-6"), "{table}");
     }

@@ -1,17 +1,20 @@
 //! A trace, and a boundary, as text and as rows of CSV: every point of every branch or curve.
 
 use crate::report::numbers::{
-    ROUNDING, bound_of_positions, brief, decimals_within, in_unit, known, power_of_ten, rounded_to,
-    seconds, short, veins_of,
+    ROUNDING_OF_LENGTHS, decimals_for_error, duration_text, format_error_bound, format_five_digits,
+    format_four_digits, format_within_error, number_in_unit, position_error_text, round_to_error,
+    veins_text_for_count,
 };
-use crate::report::table::{Lines, csv_without_header, header, labelled};
-use crate::report::{Reported, branch_end, numbers, stable_or_index};
+use crate::report::table::{
+    LabelledLines, csv_writer_without_header, label_first_line, table_header,
+};
+use crate::report::{ReportedResult, branch_end_phrase, numbers, stability_phrase};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH};
 use leafdyn::study::{
-    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,
-    Stuck, Trace, TraceBranch, TracePoint,
+    BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd, CorrectorFailure, ForceDisplacementLine,
+    PointKind, StabilityBoundary, Trace, TraceBranch, TracePoint, VerificationFailure,
 };
 use serde::Serialize;
 use std::io;
@@ -19,60 +22,69 @@ use std::io::Write;
 
 /// `value` is that of the varied number. Branches and points are numbered from 1. The tip is
 /// the joint one, or the first rod's.
-const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
+const TRACE_COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
     negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
 
 /// Further columns if tips are held: the force on their holder.
-const REACTION: &str = ",reaction_x,reaction_y,reaction_z";
+const REACTION_COLUMNS: &str = ",reaction_x,reaction_y,reaction_z";
 
 /// And with grips: the force on each.
-fn on_grip(number: usize) -> String {
+fn grip_reaction_columns(number: usize) -> String {
     let number = number + 1;
     format!(",grip_{number}_x,grip_{number}_y,grip_{number}_z")
 }
 
-impl Reported for Trace {
+impl ReportedResult for Trace {
     fn heading(&self) -> String {
-        let veins = veins_of(self.rods, self.joined);
+        let veins = veins_text_for_count(self.rods, self.joined);
         format!("{}: {veins}, followed", self.scenario)
     }
 
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let [from, to] = self.range.map(|value| self.keys.text(value));
-        let to = in_unit(to, units, self.keys.dimension());
+        let to = number_in_unit(to, units, self.keys.dimension());
         let mut lines = vec![("vary", format!("{} from {from} to {to}", self.keys))];
         let branches = self.branches.iter().enumerate();
         let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
-        lines.extend(labelled("branch", branches));
-        lines.extend(self.law.iter().map(|law| ("law", law_line(self, law))));
+        lines.extend(label_first_line("branch", branches));
+        lines.extend(
+            self.law
+                .iter()
+                .map(|law| ("law", force_displacement_line(self, law))),
+        );
         let errors = self.branches.iter().flat_map(|branch| &branch.points);
         let errors = errors.filter_map(|point| point.error);
         lines.extend(errors.reduce(f64::max).map(|worst| {
-            let (worst, segments) = (bound_of_positions(worst, units), self.segments);
-            let what = error_location(self);
+            let (worst, segments) = (position_error_text(worst, units), self.segments);
+            let what = error_location_words(self);
             let error = format!("{what} within {worst}, followed on {segments} segments a vein");
             ("error", error)
         }));
         lines
     }
 
-    fn work(&self) -> Option<String> {
-        let (count, time) = (self.factorizations, seconds(self.wall_seconds));
+    fn work_line(&self) -> Option<String> {
+        let (count, time) = (self.factorizations, duration_text(self.wall_seconds));
         Some(format!("{count} factorisations to follow, {time} in all"))
     }
 
-    fn remarks(&self) -> Lines {
-        let remark = labelled("remark", self.remark.clone());
-        let advice = labelled("advice", advice(self));
-        [remark, labelled("doubtful", self.doubts.clone()), advice].concat()
+    fn remarks(&self) -> LabelledLines {
+        let remark = label_first_line("remark", self.remark.clone());
+        let advice = label_first_line("advice", option_advice(self));
+        [
+            remark,
+            label_first_line("doubtful", self.doubts.clone()),
+            advice,
+        ]
+        .concat()
     }
 }
 
 /// So many losses of stability along a branch suggest that it goes on for ever.
-const MANY_LOSSES: usize = 3;
+const MANY_STABILITY_LOSSES: usize = 3;
 
 /// Options with which a trace tells more, or less.
-fn advice(trace: &Trace) -> Vec<String> {
+fn option_advice(trace: &Trace) -> Vec<String> {
     let mut advice = Vec::new();
     if passes_crossings(trace) {
         advice.push("branches cross here that are not followed: --switch follows them".into());
@@ -81,7 +93,7 @@ fn advice(trace: &Trace) -> Vec<String> {
         let losses = trace.branches.iter().map(TraceBranch::destabilizations);
         let first = losses
             .enumerate()
-            .find(|(_, losses)| *losses >= MANY_LOSSES);
+            .find(|(_, losses)| *losses >= MANY_STABILITY_LOSSES);
         advice.extend(first.map(|(branch, losses)| {
             let branch = branch + 1;
             format!(
@@ -95,7 +107,7 @@ fn advice(trace: &Trace) -> Vec<String> {
 
 /// Whether other branches cross those of a trace, and were not to be followed.
 pub fn passes_crossings(trace: &Trace) -> bool {
-    let mut critical = trace.branches.iter().flat_map(TraceBranch::critical);
+    let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
     !trace.switch && critical.any(|(_, point)| point.kind != PointKind::Fold)
 }
 
@@ -106,28 +118,28 @@ fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<Strin
         None => String::new(),
     };
     let (number, points) = (number + 1, branch.points.len());
-    let end = branch_end(&branch.end);
+    let end = branch_end_phrase(&branch.end);
     let mut lines = vec![format!("{number}{from}: {points} points, {end}")];
     let first = branch.points.first();
-    lines.extend(first.map(|point| format!("  from {}", place(trace, point))));
+    lines.extend(first.map(|point| format!("  from {}", point_values_text(trace, point))));
     let mut before = first.map_or(0, |point| point.index);
-    for (_, point) in branch.critical() {
-        lines.push(format!("  {}", critical(trace, point, before)));
+    for (_, point) in branch.critical_points() {
+        lines.push(format!("  {}", critical_point_line(trace, point, before)));
         before = point.index;
     }
     let last = branch.points.last();
-    lines.extend(last.map(|point| format!("  to {}", place(trace, point))));
+    lines.extend(last.map(|point| format!("  to {}", point_values_text(trace, point))));
     lines.extend(branch.remark.iter().map(|remark| format!("  {remark}")));
     lines
 }
 
 /// The fitted line of force against displacement.
-fn law_line(trace: &Trace, law: &Law) -> String {
+fn force_displacement_line(trace: &Trace, law: &ForceDisplacementLine) -> String {
     let unit = slope_unit(&trace.units);
     format!(
         "force against displacement along {}: slope {}{unit}, R² = {:.7}, off the line by {:.2} % at most",
         ['x', 'y', 'z'][law.axis],
-        brief(law.slope),
+        format_five_digits(law.slope),
         law.r_squared,
         100.0 * law.deviation
     )
@@ -135,10 +147,10 @@ fn law_line(trace: &Trace, law: &Law) -> String {
 
 /// The unit of force per displacement after a blank, or nothing if it is not known.
 pub fn slope_unit(units: &Units) -> String {
-    in_unit(String::new(), units, FORCE_PER_LENGTH)
+    number_in_unit(String::new(), units, FORCE_PER_LENGTH)
 }
 
-pub fn error_location(trace: &Trace) -> &'static str {
+pub fn error_location_words(trace: &Trace) -> &'static str {
     match (trace.held, trace.grips) {
         (true, _) => "middles of the veins",
         (false, 0) => "tips",
@@ -146,27 +158,29 @@ pub fn error_location(trace: &Trace) -> &'static str {
     }
 }
 
-fn place(trace: &Trace, point: &TracePoint) -> String {
-    let stability = stable_or_index(point.index);
+fn point_values_text(trace: &Trace, point: &TracePoint) -> String {
+    let stability = stability_phrase(point.index);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
-            let error = point.error.unwrap_or(WITHOUT_ERROR * tip.length());
-            let decimals = decimals_within(error.max(ROUNDING * tip.length()));
-            let tip = numbers::point(tip.to_array(), decimals);
-            format!(", tip {}", in_unit(tip, &trace.units, LENGTH))
+            let error = point.error.unwrap_or(DEFAULT_TIP_ERROR * tip.length());
+            let decimals = decimals_for_error(error.max(ROUNDING_OF_LENGTHS * tip.length()));
+            let tip = numbers::format_position(tip.to_array(), decimals);
+            format!(", tip {}", number_in_unit(tip, &trace.units, LENGTH))
         }
         _ => String::new(),
     };
     let text = |force: &DVec3| {
         let error = trace.tolerance * force.length();
-        let [x, y, z] = force.to_array().map(|it| short(rounded_to(it, error)));
-        in_unit(format!("({x}, {y}, {z})"), &trace.units, FORCE)
+        let [x, y, z] = force
+            .to_array()
+            .map(|it| format_four_digits(round_to_error(it, error)));
+        number_in_unit(format!("({x}, {y}, {z})"), &trace.units, FORCE)
     };
     let reaction = point.reaction.as_ref().map(text);
     let reaction = reaction.map_or(String::new(), |force| format!(", reaction {force}"));
     let grips = point.grip_reactions.iter().enumerate();
     let grips = grips.map(|(k, force)| format!(", on grip {} {}", k + 1, text(force)));
-    let value = value_of(trace, point);
+    let value = varied_value_text(trace, point);
     format!(
         "{value}: {stability}{tip}{reaction}{}",
         grips.collect::<String>()
@@ -175,38 +189,42 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
 
 /// The number that varies at a point: as it was prescribed, with the digits that its error
 /// leaves, or, at a point of no meaning of its own, where it is about.
-fn value_of(trace: &Trace, point: &TracePoint) -> String {
+fn varied_value_text(trace: &Trace, point: &TracePoint) -> String {
     let value = match point.value_error {
-        Some(error) => known(point.value, error),
+        Some(error) => format_within_error(point.value, error),
         None if trace.range.contains(&point.value) => trace.keys.text(point.value),
-        None => brief(point.value),
+        None => format_five_digits(point.value),
     };
-    in_unit(value, &trace.units, trace.keys.dimension())
+    number_in_unit(value, &trace.units, trace.keys.dimension())
 }
 
 /// Part of its distance from the base to which a tip without an error is told.
-const WITHOUT_ERROR: f64 = 1e-3;
+const DEFAULT_TIP_ERROR: f64 = 1e-3;
 
-fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
+fn critical_point_line(trace: &Trace, point: &TracePoint, before: usize) -> String {
     let what = match point.kind {
         PointKind::Fold => "fold".into(),
         PointKind::Branching(1) | PointKind::Regular => "branches cross".into(),
         PointKind::Branching(modes) => format!("branches cross in {modes} directions"),
     };
     let within = match point.value_error {
-        Some(error) => format!(", within {}", power_of_ten(error)),
+        Some(error) => format!(", within {}", format_error_bound(error)),
         None => String::new(),
     };
-    let (value, after) = (value_of(trace, point), point.index);
+    let (value, after) = (varied_value_text(trace, point), point.index);
     format!("{what} at {value}{within}: index {before} to {after}")
 }
 
 /// `trace.csv`: one row per branch and point.
-pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
-    let (reaction, more) = if trace.held { (REACTION, 3) } else { ("", 0) };
-    let grips: String = (0..trace.grips).map(on_grip).collect();
-    out.write_all(&header(&[COLUMNS, reaction, &grips].concat()))?;
-    let mut table = csv_without_header(out);
+pub fn write_trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+    let (reaction, more) = if trace.held {
+        (REACTION_COLUMNS, 3)
+    } else {
+        ("", 0)
+    };
+    let grips: String = (0..trace.grips).map(grip_reaction_columns).collect();
+    out.write_all(&table_header(&[TRACE_COLUMNS, reaction, &grips].concat()))?;
+    let mut table = csv_writer_without_header(out);
     for (number, branch) in trace.branches.iter().enumerate() {
         for point in &branch.points {
             let reaction = point.reaction.unwrap_or_default().to_array();
@@ -217,14 +235,14 @@ pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
             let forces = reaction.into_iter().take(more).chain(grips);
             // Adding zero turns -0 into 0.
             let forces: Vec<f64> = forces.map(|x| x + 0.0).collect();
-            table.serialize((number + 1, point.point, cells(point), forces))?;
+            table.serialize((number + 1, point.point, trace_table_cells(point), forces))?;
         }
     }
     table.flush()
 }
 
 /// The columns from `kind` to `twist`.
-fn cells(point: &TracePoint) -> impl Serialize {
+fn trace_table_cells(point: &TracePoint) -> impl Serialize {
     let tip = point.tips.first();
     // Adding zero turns -0 into 0.
     let tip = tip.map_or([f64::NAN; 3], |tip| tip.to_array().map(|x| x + 0.0));
@@ -243,113 +261,139 @@ fn cells(point: &TracePoint) -> impl Serialize {
     )
 }
 
-impl Reported for Boundary {
+impl ReportedResult for StabilityBoundary {
     fn heading(&self) -> String {
-        let veins = veins_of(self.rods, self.joined);
+        let veins = veins_text_for_count(self.rods, self.joined);
         format!("{}: {veins}, the boundary", self.scenario)
     }
 
-    fn lines(&self, units: &Units) -> Lines {
+    fn report_lines(&self, units: &Units) -> LabelledLines {
         let vary = self.keys.iter().zip(self.ranges).map(|(keys, [from, to])| {
             let [from, to] = [from, to].map(|value| keys.text(value));
-            let to = in_unit(to, units, keys.dimension());
+            let to = number_in_unit(to, units, keys.dimension());
             format!("{keys} from {from} to {to}")
         });
-        let mut lines = labelled("vary", vary);
+        let mut lines = label_first_line("vary", vary);
         let second = &self.keys[1];
-        let start = in_unit(second.text(self.start), units, second.dimension());
+        let start = number_in_unit(second.text(self.start), units, second.dimension());
         let start = format!("at {second} = {start}");
         lines.push(("begun", start));
         let curves = self.curves.iter().enumerate();
         let curves = curves.flat_map(|(number, curve)| curve_lines(self, number, curve));
-        lines.extend(labelled("curve", curves));
+        lines.extend(label_first_line("curve", curves));
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         let worst = points.map(|point| point.error).reduce(f64::max);
         lines.extend(worst.map(|worst| {
             (
                 "error",
-                format!("tips within {}", bound_of_positions(worst, units)),
+                format!("tips within {}", position_error_text(worst, units)),
             )
         }));
-        lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
+        lines.extend(
+            (self.map.iter()).flat_map(|map| label_first_line("map", boundary_map_lines(map))),
+        );
         lines
     }
 
-    fn work(&self) -> Option<String> {
-        Some(format!("{} in all", seconds(self.wall_seconds)))
+    fn work_line(&self) -> Option<String> {
+        Some(format!("{} in all", duration_text(self.wall_seconds)))
     }
 
-    fn remarks(&self) -> Lines {
-        let remark = labelled("remark", self.remark.clone());
-        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    fn remarks(&self) -> LabelledLines {
+        let remark = label_first_line("remark", self.remark.clone());
+        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
     }
 }
 
 /// The kind of a curve, its ends and its special points.
-fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec<String> {
-    let what = sides(curve).unwrap_or_else(|| "no point verified".into());
+fn curve_lines(boundary: &StabilityBoundary, number: usize, curve: &BoundaryCurve) -> Vec<String> {
+    let what = index_change_text(curve).unwrap_or_else(|| "no point verified".into());
     let (number, points) = (number + 1, curve.points.len());
     let mut lines = vec![format!("{number}: {points} points, {what}")];
     let end = |label: &str, point: Option<&BoundaryPoint>, end: usize| {
-        let phrase = curve_end(&curve.ends[end]);
-        let at = point.map_or(String::new(), |point| place_in_plane(boundary, point));
+        let phrase = curve_end_phrase(&curve.ends[end]);
+        let at = point.map_or(String::new(), |point| boundary_point_text(boundary, point));
         format!("  {label} {at}: {phrase}")
     };
     lines.push(end("from", curve.points.first(), 0));
-    let special = curve.points.iter().filter(|point| is_special(point));
-    lines.extend(
-        special.map(|point| format!("  {} at {}", point.kind, place_in_plane(boundary, point))),
-    );
+    let special = curve
+        .points
+        .iter()
+        .filter(|point| is_codimension_two(point));
+    lines.extend(special.map(|point| {
+        format!(
+            "  {} at {}",
+            point.kind,
+            boundary_point_text(boundary, point)
+        )
+    }));
     lines.push(end("to", curve.points.last(), 1));
     lines
 }
 
 /// How a curve ended on one of its sides, as a phrase.
-fn curve_end(end: &End) -> &'static str {
+fn curve_end_phrase(end: &BranchEnd) -> &'static str {
     match end {
-        End::Reached | End::Returned => "the end of a range",
-        End::Closed => "closed",
-        End::Met => "on a curve above",
-        End::MostPoints | End::Enough => "goes on: allow more points",
-        End::Unstable => "loses its stability",
-        End::Stopped | End::Stuck(Stuck::Stopped) => "goes on: stopped",
-        End::Stuck(Stuck::Unfolded) => {
+        BranchEnd::RangeEndReached | BranchEnd::RangeStartReached => "the end of a range",
+        BranchEnd::LoopClosed => "closed",
+        BranchEnd::KnownBoundaryMet => "on a curve above",
+        BranchEnd::PointLimitReached | BranchEnd::StopCriterionMet => "goes on: allow more points",
+        BranchEnd::StabilityLost => "loses its stability",
+        BranchEnd::RunLimitReached | BranchEnd::StepFailed(CorrectorFailure::Stopped) => {
+            "goes on: stopped"
+        }
+        BranchEnd::StepFailed(CorrectorFailure::Unfolded) => {
             "the second number breaks the symmetry by which branches cross"
         }
-        End::Stuck(Stuck::Separated) => "modes that become neutral together part",
-        End::Stuck(Stuck::OutOfRange(_)) => "no leaf is there",
-        End::Stuck(_) => "lost",
-        End::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
-        End::Unverified(Doubt::OtherIndex) => "not verified: finer grids have another index",
-        End::Unverified(Doubt::Inaccurate) => "not verified: the tolerance is not reached",
-        End::Unverified(_) => "not verified: finer grids have another curve",
+        BranchEnd::StepFailed(CorrectorFailure::Separated) => {
+            "modes that become neutral together part"
+        }
+        BranchEnd::StepFailed(CorrectorFailure::OutOfRange(_)) => "no leaf is there",
+        BranchEnd::StepFailed(_) => "lost",
+        BranchEnd::PointUnverified(VerificationFailure::Unsolved) => {
+            "not verified: finer grids have none"
+        }
+        BranchEnd::PointUnverified(VerificationFailure::OtherIndex) => {
+            "not verified: finer grids have another index"
+        }
+        BranchEnd::PointUnverified(VerificationFailure::Inaccurate) => {
+            "not verified: the tolerance is not reached"
+        }
+        BranchEnd::PointUnverified(_) => "not verified: finer grids have another curve",
     }
 }
 
 /// Most disagreeing cells that are listed.
-const MOST_NAMED: usize = 5;
+const MOST_CELLS_LISTED: usize = 5;
 
 /// Whether the map agrees with the curves.
-fn map_lines(map: &BoundaryMap) -> Vec<String> {
+fn boundary_map_lines(map: &BoundaryMap) -> Vec<String> {
     let (columns, rows) = (map.first.len(), map.second.len());
     let verdict = match map.disagreeing.len() {
         0 => "all as the curves say".into(),
         count => format!("{count} not as the curves say: others may begin elsewhere"),
     };
-    let known = format!("{} with an equilibrium of the branch", map.known());
+    let known = format!(
+        "{} with an equilibrium of the branch",
+        map.known_cell_count()
+    );
     let mut lines = vec![format!("{columns} x {rows} cells, {known}, {verdict}")];
-    let named = map.disagreeing.iter().take(MOST_NAMED);
+    let named = map.disagreeing.iter().take(MOST_CELLS_LISTED);
     lines.extend(named.map(|[column, row]| {
         let (first, second) = (map.first[column - 1], map.second[row - 1]);
         let what = map.index[row - 1][column - 1];
         let what = what.map_or("none".into(), |index| format!("index {index}"));
-        format!("  at ({}, {}): {what}", brief(first), brief(second))
+        format!(
+            "  at ({}, {}): {what}",
+            format_five_digits(first),
+            format_five_digits(second)
+        )
     }));
     lines
 }
 
 /// How the index changes across a curve.
-pub fn sides(curve: &BoundaryCurve) -> Option<String> {
+pub fn index_change_text(curve: &BoundaryCurve) -> Option<String> {
     let point = curve.points.first()?;
     let what = match (point.kind, curve.multiplicity) {
         ("fold" | "cusp", _) => "fold".into(),
@@ -361,29 +405,29 @@ pub fn sides(curve: &BoundaryCurve) -> Option<String> {
 }
 
 /// Whether a point is a cusp or a crossing.
-pub fn is_special(point: &BoundaryPoint) -> bool {
+pub fn is_codimension_two(point: &BoundaryPoint) -> bool {
     matches!(point.kind, "cusp" | "crossing")
 }
 
-fn place_in_plane(boundary: &Boundary, point: &BoundaryPoint) -> String {
+fn boundary_point_text(boundary: &StabilityBoundary, point: &BoundaryPoint) -> String {
     let number = |i: usize| match point.errors[i] {
         0.0 => boundary.keys[i].text(point.values[i]),
         error => {
-            let value = known(point.values[i], error);
-            format!("{value} within {}", power_of_ten(error))
+            let value = format_within_error(point.values[i], error);
+            format!("{value} within {}", format_error_bound(error))
         }
     };
     format!("({}, {})", number(0), number(1))
 }
 
 /// `boundary.csv`: one row per curve and point, with columns named by the keys.
-pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_boundary_table(boundary: &StabilityBoundary, out: &mut dyn Write) -> io::Result<()> {
     let [first, second] = &boundary.keys;
     let errors = "error_1,error_2,tip_x,tip_y,tip_z,error,index_before,index_behind";
-    out.write_all(&header(&format!(
+    out.write_all(&table_header(&format!(
         "curve,point,kind,{first},{second},{errors}"
     )))?;
-    let mut table = csv_without_header(out);
+    let mut table = csv_writer_without_header(out);
     for (number, curve) in boundary.curves.iter().enumerate() {
         for point in &curve.points {
             // The joint tip, or the first rod's; adding zero turns -0 into 0.

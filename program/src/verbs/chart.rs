@@ -1,13 +1,17 @@
 //! `leafdyn chart`: charts speed against accuracy.
 
 use crate::files;
-use crate::report::contender;
-use crate::verbs::help::FOR_EXPERTS;
-use crate::verbs::progress::fraction_of;
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
-use crate::verbs::{Refusal, Status};
+use crate::report::contender_name;
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::completed_fraction;
+use crate::verbs::request::{
+    DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
+};
+use crate::verbs::{ExitStatus, Refusal};
 use clap::{Args, ValueHint};
-use leafdyn::study::{Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
+use leafdyn::study::{
+    Chart as Charted, ChartOptions, ChartProgress, ParameterKeys, SolverConfig, VaryError,
+};
 use leafdyn::{relax, study};
 use std::path::PathBuf;
 
@@ -17,20 +21,20 @@ use std::path::PathBuf;
 /// reference that errors are measured against (the files are still written and
 /// say so); 2 the request was refused.
 #[derive(Debug, Args)]
-pub struct Chart {
+pub struct ChartArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// About how long to measure; slow runs are made once whatever they take
     #[arg(long, value_name = "S", default_value_t = ChartOptions::default().seconds, allow_negative_numbers = true)]
     seconds: f64,
 
     /// Chart these methods only
-    #[arg(long, value_name = "LIST", value_parser = words::<Contender>(Contender::ALL.map(Contender::word)), value_delimiter = ',')]
-    methods: Vec<Contender>,
+    #[arg(long, value_name = "LIST", value_parser = word_parser::<SolverConfig>(SolverConfig::ALL.map(SolverConfig::word)), value_delimiter = ',')]
+    methods: Vec<SolverConfig>,
 
     /// Measurements of other programs, as benches/peers writes them; may repeat
-    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath, help_heading = FOR_EXPERTS)]
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath, help_heading = EXPERT_OPTIONS_HEADING)]
     peers: Vec<PathBuf>,
 
     /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35
@@ -38,24 +42,30 @@ pub struct Chart {
     rods: Vec<usize>,
 }
 
-impl Chart {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl ChartArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
-            reads: &self.peers,
-            puts: Some("--rods"),
+            input_files: &self.peers,
+            value_option: Some("--rods"),
             ..VerbTraits::default()
         };
-        self.request.each::<Charted>(traits, |job| self.one(job))
+        self.request
+            .run_each_scenario::<Charted>(traits, |job| self.run_scenario(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let scenario = &job.scenario;
         if self.request.tolerance.is_some() && self.rods.is_empty() {
             let why = "a chart runs over all tolerances; it is that of --rods";
             return Err(format!("--tolerance: {why}").into());
         }
-        let rods: Keys = "leaf.rods".parse()?;
-        let leaf = |&count: &usize| Ok(job.base.at(&[(&rods, count as f64)])?.scenario);
+        let rods: ParameterKeys = "leaf.rods".parse()?;
+        let leaf = |&count: &usize| {
+            Ok(job
+                .base
+                .scenario_with_values(&[(&rods, count as f64)])?
+                .scenario)
+        };
         let leaves: Result<Vec<_>, VaryError> = self.rods.iter().map(leaf).collect();
         let leaves = leaves?;
         let mut options = ChartOptions {
@@ -63,26 +73,29 @@ impl Chart {
             ..ChartOptions::default()
         };
         if !self.methods.is_empty() {
-            let wanted = |who: &Contender| self.methods.contains(who);
+            let wanted = |who: &SolverConfig| self.methods.contains(who);
             options.contenders.retain(wanted);
         }
         for file in &self.peers {
-            options.peers.extend(files::read_peers(file)?);
+            options.peers.extend(files::read_peer_measurements(file)?);
         }
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let (mut rounds, mut first) = (0, 1);
-        let mut progress = |turn: &Turn| {
+        let mut progress = |turn: &ChartProgress| {
             // All contenders run in the first rounds; later the number of rounds changes.
             if turn.rounds != rounds {
                 (rounds, first) = (turn.rounds, turn.round);
                 line.next_phase();
             }
-            let fraction = fraction_of(turn.round - first, rounds - first + 1);
+            let fraction = completed_fraction(turn.round - first, rounds - first + 1);
             line.update(fraction, || {
-                let Turn {
-                    rods, knob, round, ..
+                let ChartProgress {
+                    rods,
+                    setting: knob,
+                    round,
+                    ..
                 } = turn;
-                let who = contender(turn.contender);
+                let who = contender_name(turn.contender);
                 format!("{rods} veins, {who}, {knob}, round {round} of {rounds}")
             });
         };
@@ -95,13 +108,13 @@ impl Chart {
         }
         drop(line);
         for remark in &chart.remarks {
-            job.remark(Some(remark));
+            job.print_remark(Some(remark));
         }
         let scaling = chart.scaling.iter();
         let mut confirmed = scaling.map(|scaling| scaling.unconfirmed.is_empty());
-        let success = chart.confirmed() && confirmed.all(|confirmed| confirmed);
-        let scaling = chart.scaling.iter().map(|scaling| job.write(scaling));
-        let written = [job.write(&chart)].into_iter().chain(scaling);
+        let success = chart.is_reference_confirmed() && confirmed.all(|confirmed| confirmed);
+        let scaling = chart.scaling.iter().map(|scaling| job.write_files(scaling));
+        let written = [job.write_files(&chart)].into_iter().chain(scaling);
         job.deliver_written(&chart, success, &chart, written)
     }
 }

@@ -1,19 +1,19 @@
 //! `leafdyn check`: compares the shapes found by two independent methods.
 
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
-use crate::verbs::{Refusal, Status};
+use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
+use crate::verbs::{ExitStatus, Refusal};
 use clap::Args;
 use leafdyn::study;
-use leafdyn::study::{Check as Checked, CheckOptions, Verdict};
+use leafdyn::study::{Check as Checked, CheckOptions, CheckVerdict};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
 ///
 /// Exit status: 0 both methods agree; 1 they differ or could not be compared
 /// (the files are still written and say why); 2 the request was refused.
 #[derive(Debug, Args)]
-pub struct Check {
+pub struct CheckArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// Shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
     #[arg(long, value_name = "N")]
@@ -24,29 +24,31 @@ pub struct Check {
     keep_unstable: bool,
 }
 
-impl Check {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl CheckArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         self.request
-            .each::<Checked>(VerbTraits::default(), |job| self.one(job))
+            .run_each_scenario::<Checked>(VerbTraits::default(), |job| self.run_scenario(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let options = CheckOptions {
             tolerance: self.request.tolerance,
             keep_unstable: self.keep_unstable,
             intervals: self.intervals,
             ..CheckOptions::default()
         };
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         let check = study::check(&job.scenario, &options, &mut |progress| {
             line.update_solver(progress, tolerance)
         })?;
         drop(line);
-        if let Verdict::NotCompared(reason) | Verdict::NotIndependent(reason) = &check.verdict {
-            job.remark(Some(reason));
+        if let CheckVerdict::NotCompared(reason) | CheckVerdict::NotIndependent(reason) =
+            &check.verdict
+        {
+            job.print_remark(Some(reason));
         }
-        let success = matches!(check.verdict, Verdict::Agree);
-        job.deliver(&check, success)
+        let success = matches!(check.verdict, CheckVerdict::Agree);
+        job.write_and_deliver(&check, success)
     }
 }

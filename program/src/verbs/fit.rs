@@ -1,14 +1,15 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
-use crate::verbs::progress::{duration, fraction_of};
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
-use crate::verbs::{Refusal, Status, note};
+use crate::verbs::progress::{completed_fraction, format_duration};
+use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
+use crate::verbs::{ExitStatus, Refusal, print_note};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
-    Data, Fit as Fitted, FitBudget, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
+    Data, DataReadingOptions, Fit as Fitted, FitBudget, FitRequest, FitStep, FreeParameter,
+    MeasuredColumn, RowFilter,
 };
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -18,9 +19,9 @@ use std::path::PathBuf;
 /// Exit status: 0 a minimum at which the data determine every free number; 1 not
 /// (the files are still written and say which); 2 the request was refused.
 #[derive(Debug, Args)]
-pub struct Fit {
+pub struct FitArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// Measured data as CSV, with a header: experiments (keys of the scenario, results, their sd_), or points on veins (rod, sigma, x, y, z, sd, experiment); may repeat
     #[arg(long, value_name = "FILE.csv", required = true, value_hint = ValueHint::FilePath)]
@@ -31,12 +32,12 @@ pub struct Fit {
     column: Vec<MeasuredColumn>,
 
     /// Read the first row of each file of data, and then every K-th
-    #[arg(long, value_name = "K", default_value = "1", hide_default_value = true, value_parser = step_of)]
+    #[arg(long, value_name = "K", default_value = "1", hide_default_value = true, value_parser = parse_row_stride)]
     every: NonZeroUsize,
 
     /// Read only rows whose number in a column is so, as in 'load.tip_force[0]>0.5' (also <, >=, <=, =); several are joined by ' and ', or by repeating it
     #[arg(long, value_name = "COLUMN>VALUE")]
-    rows: Vec<RowChoice>,
+    rows: Vec<RowFilter>,
 
     /// A number that is free, by its key as in --vary, and its bounds; of a quantity given as a list or a profile every entry; or offset:COLUMN, what is added to a column of experiments, as for slack; may repeat
     #[arg(
@@ -45,7 +46,7 @@ pub struct Fit {
         required = true,
         allow_negative_numbers = true
     )]
-    free: Vec<Free>,
+    free: Vec<FreeParameter>,
 
     /// Let data far off the others count less
     #[arg(long)]
@@ -61,42 +62,43 @@ pub struct Fit {
 }
 
 /// Fits that may take less than so many seconds are announced in the line of progress alone.
-const SHORT: f64 = 300.0;
+const UNANNOUNCED_FIT_SECONDS: f64 = 300.0;
 
 /// Says what a fit takes at most, if that may be long.
-fn announce(name: &str, budget: FitBudget) {
-    if budget.seconds > SHORT {
-        let (most, time) = (budget.evaluations, duration(budget.seconds));
+fn announce_budget(name: &str, budget: FitBudget) {
+    if budget.seconds > UNANNOUNCED_FIT_SECONDS {
+        let (most, time) = (budget.evaluations, format_duration(budget.seconds));
         let leaves = match budget.leaves {
             1 => "one leaf".into(),
             leaves => format!("{leaves} leaves"),
         };
-        note(&format!(
+        print_note(&format!(
             "{name}: at most {most} evaluations of {leaves}, {time} if all take as long as the first; most fits need a tenth"
         ));
     }
 }
 
 /// Parses the distance of rows.
-fn step_of(text: &str) -> Result<NonZeroUsize, &'static str> {
+fn parse_row_stride(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number from 1")
 }
 
-impl Fit {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl FitArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let reads: Vec<_> = self.data.iter().chain(&self.candidates).cloned().collect();
         let traits = VerbTraits {
-            varies: true,
-            reads: &reads,
+            varies_numbers: true,
+            input_files: &reads,
             ..VerbTraits::default()
         };
-        self.request.each::<Fitted>(traits, |job| self.one(job))
+        self.request
+            .run_each_scenario::<Fitted>(traits, |job| self.run_scenario(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let base = job.base.clone();
         let mut data = Data {
-            reading: Reading {
+            reading: DataReadingOptions {
                 columns: self.column.clone(),
                 every: self.every,
                 rows: self.rows.clone(),
@@ -125,7 +127,7 @@ impl Fit {
             limit: Limit::default(),
             most_evaluations: self.most_evaluations,
         };
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let (mut profiling, mut most) = (false, String::new());
         let fit = study::fit(&request, &mut |now| {
             let FitStep {
@@ -135,14 +137,14 @@ impl Fit {
                 budget,
             } = *now;
             if let Some(budget) = budget {
-                announce(&job.scenario.name, budget);
-                most = format!(" (at most {} in all)", duration(budget.seconds));
+                announce_budget(&job.scenario.name, budget);
+                most = format!(" (at most {} in all)", format_duration(budget.seconds));
                 return;
             }
             if known.is_some() && !std::mem::replace(&mut profiling, true) {
                 line.next_phase();
             }
-            let fraction = known.and_then(|(known, all)| fraction_of(known, all));
+            let fraction = known.and_then(|(known, all)| completed_fraction(known, all));
             let intervals = known.map_or(String::new(), |(known, all)| {
                 format!("{known} of {all} intervals, ")
             });
@@ -151,7 +153,7 @@ impl Fit {
             });
         })?;
         drop(line);
-        job.remark(fit.remarks.first());
-        job.deliver(&fit, fit.is_success())
+        job.print_remark(fit.remarks.first());
+        job.write_and_deliver(&fit, fit.is_success())
     }
 }

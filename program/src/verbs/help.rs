@@ -2,7 +2,7 @@
 //! the program for editors, shells and readers.
 
 use crate::files;
-use crate::verbs::{Cli, Refusal, Status, show, show_report};
+use crate::verbs::{Cli, ExitStatus, Refusal, show_report, write_standard_output};
 use clap::{Args, CommandFactory, ValueEnum, ValueHint};
 use clap_complete::Shell;
 use leafdyn::scenario::schema;
@@ -10,16 +10,16 @@ use std::io::ErrorKind;
 use std::path::PathBuf;
 
 /// The heading in the help of options that few need.
-pub const FOR_EXPERTS: &str = "Options for experts";
+pub const EXPERT_OPTIONS_HEADING: &str = "Options for experts";
 
 /// Print the JSON schema of scenarios, by which editors complete and check them.
 #[derive(Debug, Args)]
-pub struct Schema {}
+pub struct SchemaArguments {}
 
-impl Schema {
-    pub fn run(self) -> Result<Status, Refusal> {
-        show(format!("{:#}\n", schema()).as_bytes())?;
-        Ok(Status::Success)
+impl SchemaArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
+        write_standard_output(format!("{:#}\n", schema()).as_bytes())?;
+        Ok(ExitStatus::Success)
     }
 }
 
@@ -27,17 +27,17 @@ impl Schema {
 ///
 /// As in: leafdyn completions bash > ~/.local/share/bash-completion/completions/leafdyn
 #[derive(Debug, Args)]
-pub struct Completions {
+pub struct CompletionsArguments {
     /// The shell
     shell: Shell,
 }
 
-impl Completions {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl CompletionsArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "leafdyn", &mut script);
-        show(&script)?;
-        Ok(Status::Success)
+        write_standard_output(&script)?;
+        Ok(ExitStatus::Success)
     }
 }
 
@@ -45,13 +45,13 @@ impl Completions {
 ///
 /// As in: leafdyn man relax > leafdyn-relax.1
 #[derive(Debug, Args)]
-pub struct Man {
+pub struct ManArguments {
     /// The verb; left out: the program
     verb: Option<String>,
 }
 
-impl Man {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl ManArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let mut program = Cli::command();
         program.build();
         let page = match self.verb.as_deref() {
@@ -65,8 +65,8 @@ impl Man {
         };
         let mut text = Vec::new();
         page.render(&mut text)?;
-        show(&text)?;
-        Ok(Status::Success)
+        write_standard_output(&text)?;
+        Ok(ExitStatus::Success)
     }
 }
 
@@ -74,10 +74,10 @@ impl Man {
 ///
 /// Exit status: 0 written; 2 the file is there already, or cannot be written.
 #[derive(Debug, Args)]
-pub struct New {
+pub struct NewArguments {
     /// What it is about
-    #[arg(value_enum, default_value_t = Example::Leaf)]
-    example: Example,
+    #[arg(value_enum, default_value_t = ExampleScenario::Leaf)]
+    example: ExampleScenario,
 
     /// The file [default: the example's name and .toml]
     #[arg(value_hint = ValueHint::FilePath)]
@@ -85,7 +85,7 @@ pub struct New {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Example {
+enum ExampleScenario {
     /// A leaf of nine veins under its own weight
     Leaf,
     /// A blade from its outline and thickness, under its own weight
@@ -98,19 +98,19 @@ enum Example {
     Motion,
 }
 
-impl Example {
+impl ExampleScenario {
     /// Its name, its text, and the next command.
     fn contents(self) -> (&'static str, &'static str, &'static str) {
         match self {
-            Example::Leaf => ("leaf", include_str!("examples/leaf.toml"), "relax FILE"),
-            Example::Blade => ("blade", include_str!("examples/blade.toml"), "relax FILE"),
-            Example::Rod => ("rod", include_str!("examples/rod.toml"), "relax FILE"),
-            Example::PullTest => (
+            ExampleScenario::Leaf => ("leaf", include_str!("examples/leaf.toml"), "relax FILE"),
+            ExampleScenario::Blade => ("blade", include_str!("examples/blade.toml"), "relax FILE"),
+            ExampleScenario::Rod => ("rod", include_str!("examples/rod.toml"), "relax FILE"),
+            ExampleScenario::PullTest => (
                 "pull-test",
                 include_str!("examples/pull-test.toml"),
                 "trace FILE --vary load.tip_force[0]=1.5..5",
             ),
-            Example::Motion => (
+            ExampleScenario::Motion => (
                 "motion",
                 include_str!("examples/motion.toml"),
                 "simulate FILE",
@@ -119,12 +119,12 @@ impl Example {
     }
 }
 
-impl New {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl NewArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let (name, text, next) = self.example.contents();
         let file = self.file.unwrap_or_else(|| format!("{name}.toml").into());
         let path = file.display();
-        files::write_new(&file, text.as_bytes()).map_err(|reason| match reason.kind() {
+        files::write_new_file(&file, text.as_bytes()).map_err(|reason| match reason.kind() {
             ErrorKind::AlreadyExists => format!("{path}: is there already: name another file"),
             _ => format!("{path}: cannot be written: {reason}"),
         })?;
@@ -132,6 +132,6 @@ impl New {
         show_report(&format!(
             "{path}: written; change it, then\n  leafdyn {next}\n"
         ))?;
-        Ok(Status::Success)
+        Ok(ExitStatus::Success)
     }
 }

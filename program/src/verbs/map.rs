@@ -1,12 +1,14 @@
 //! `leafdyn map`: maps where each method fails.
 
 use crate::report;
-use crate::verbs::progress::fraction_of;
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
-use crate::verbs::{Interrupted, Refusal, Status};
+use crate::verbs::progress::completed_fraction;
+use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
+use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::study;
-use leafdyn::study::{CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary};
+use leafdyn::study::{
+    DEFAULT_CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, ParameterSweep,
+};
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -19,20 +21,20 @@ const SHARD: &str = "--shard is gone: give each job a part of the range, as in -
 /// Exit status: 0 the map is made, whatever the methods did; 2 the request was
 /// refused; 130 stopped by Ctrl-C (the files have the finished cells).
 #[derive(Debug, Args)]
-pub struct Map {
+pub struct MapArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// What varies, once or twice: numbers of the scenario as in --set, entries of lists counted from 0 (load.gravity[2]), method.step, method.segments; several keys that vary together are joined by +
     #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", required = true)]
-    vary: Vec<Vary>,
+    vary: Vec<ParameterSweep>,
 
     /// The methods: semi-implicit, explicit, explicit-motion, single-shooting, shooting, shooting-from-rest [default: all; explicit-motion if method.step is set or varies]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Option<Vec<MapMethod>>,
 
     /// Time allowed for each method in each cell
-    #[arg(long, value_name = "S", default_value_t = CELL_SECONDS, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_CELL_SECONDS, allow_negative_numbers = true)]
     cell_seconds: f64,
 
     /// Refused: replaced by maps of parts of the ranges
@@ -44,21 +46,22 @@ pub struct Map {
     show: MapShow,
 }
 
-impl Map {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl MapArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
-            varies: true,
-            puts: Some("--vary"),
-            partial: true,
+            varies_numbers: true,
+            value_option: Some("--vary"),
+            keeps_partial_result: true,
             ..VerbTraits::default()
         };
         if self.shard.is_some() {
             return Err(SHARD.into());
         }
-        self.request.each::<Cells>(traits, |job| self.one(job))
+        self.request
+            .run_each_scenario::<Cells>(traits, |job| self.run_scenario(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let mut request = MapRequest::new(
             job.base.clone(),
             self.vary.clone(),
@@ -70,32 +73,32 @@ impl Map {
         let clock = Instant::now();
         let rows = solve(job, &request);
         if job.is_interrupted() && rows.is_empty() {
-            return Err(Interrupted("no cell was finished").into());
+            return Err(InterruptedRun("no cell was finished").into());
         }
         let mut map = Cells::new(request, rows);
         map.show = self.show;
         if !job.is_interrupted() {
-            let line = Mutex::new(job.progress());
+            let line = Mutex::new(job.progress_line());
             map.find_jumps(&|done, pairs| {
                 if let Ok(mut line) = line.lock() {
-                    line.update(fraction_of(done, pairs), || {
+                    line.update(completed_fraction(done, pairs), || {
                         format!("{done} of {pairs} pairs of cells that stand apart")
                     });
                 }
             });
         }
-        let work = report::MapWork {
+        let work = report::ReportedMap {
             map: &map,
             seconds: clock.elapsed().as_secs_f64(),
         };
-        job.deliver_written(&map, true, &work, [job.write(&map)])
+        job.deliver_written(&map, true, &work, [job.write_files(&map)])
     }
 }
 
 /// The rows of all cells or, of a run that a signal ends, those of the finished ones.
-fn solve(job: &Job, request: &MapRequest) -> Vec<MapRow> {
-    let cells = spread((0..request.cells()).collect());
-    let mut line = job.progress();
+fn solve(job: &ScenarioJob, request: &MapRequest) -> Vec<MapRow> {
+    let cells = interleave((0..request.cells()).collect());
+    let mut line = job.progress_line();
     let (mut rows, mut finished) = (Vec::new(), 0);
     study::map(request, &cells, &mut |new| {
         // Cells that a signal cuts short still arrive.
@@ -104,7 +107,7 @@ fn solve(job: &Job, request: &MapRequest) -> Vec<MapRow> {
         }
         rows.extend(new);
         finished += 1;
-        line.update(fraction_of(finished, cells.len()), || {
+        line.update(completed_fraction(finished, cells.len()), || {
             format!("{finished} of {} cells", cells.len())
         });
         true
@@ -114,7 +117,7 @@ fn solve(job: &Job, request: &MapRequest) -> Vec<MapRow> {
 
 /// All of them, so ordered that those before any of them are a fair sample of all: hard cells stand side by side,
 /// and the time that is left is estimated from the cells that are finished.
-fn spread<T>(all: Vec<T>) -> Vec<T> {
+fn interleave<T>(all: Vec<T>) -> Vec<T> {
     let count = all.len();
     // Steps of the golden section, which leave no gap for long.
     let golden = (0.618 * count as f64).round().max(1.0) as usize;
@@ -134,7 +137,7 @@ mod tests {
     #[test]
     fn cells_come_from_all_over_the_map() {
         for count in [0, 1, 2, 3, 6, 7, 48, 117, 1024] {
-            let mut order = spread((0..count).collect::<Vec<usize>>());
+            let mut order = interleave((0..count).collect::<Vec<usize>>());
             let first: Vec<usize> = order.iter().copied().take(count / 4).collect();
             for quarter in 0..4 {
                 let within = |cell: &&usize| **cell * 4 / count == quarter;

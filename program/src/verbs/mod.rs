@@ -11,7 +11,7 @@ mod request;
 mod simulate;
 mod trace;
 
-use crate::report::Refused;
+use crate::report::RefusalDocument;
 use crate::{files, report};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
@@ -29,7 +29,7 @@ use std::time::Duration;
 use std::{env, io, process, thread};
 
 /// What the program says without a verb.
-const FIRST_HELP: &str = "\
+const HELP_WITHOUT_VERB: &str = "\
 leafdyn finds how a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability.
 
   leafdyn new leaf           writes leaf.toml, a scenario to begin with; leafdyn new --help: what else there is
@@ -46,21 +46,21 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    Relax(relax::Relax),
-    Check(check::Check),
-    Fit(fit::Fit),
-    Chart(chart::Chart),
-    Map(map::Map),
-    Simulate(simulate::Simulate),
-    Trace(trace::Trace),
-    New(help::New),
-    Schema(help::Schema),
-    Completions(help::Completions),
-    Man(help::Man),
+    Relax(relax::RelaxArguments),
+    Check(check::CheckArguments),
+    Fit(fit::FitArguments),
+    Chart(chart::ChartArguments),
+    Map(map::MapArguments),
+    Simulate(simulate::SimulateArguments),
+    Trace(trace::TraceArguments),
+    New(help::NewArguments),
+    Schema(help::SchemaArguments),
+    Completions(help::CompletionsArguments),
+    Man(help::ManArguments),
 }
 
 impl Cli {
-    fn run(self) -> Result<Status, Refusal> {
+    fn run(self) -> Result<ExitStatus, Refusal> {
         let done = match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
@@ -74,12 +74,12 @@ impl Cli {
             Verb::Completions(completions) => completions.run(),
             Verb::Man(man) => man.run(),
         };
-        done.map_err(name_options)
+        done.map_err(refusal_with_option_names)
     }
 }
 
 /// The first error of this kind among the causes of a refusal, itself included.
-fn cause<E: Error + 'static>(refusal: &Refusal) -> Option<&E> {
+fn find_cause<E: Error + 'static>(refusal: &Refusal) -> Option<&E> {
     let first: &(dyn Error + 'static) = &**refusal;
     let mut causes = successors(Some(first), |&error| error.source());
     causes.find_map(|error| error.downcast_ref())
@@ -87,19 +87,19 @@ fn cause<E: Error + 'static>(refusal: &Refusal) -> Option<&E> {
 
 /// A refusal with what it is about as the user types it: options, overrides, and the limit on
 /// memory.
-fn name_options(refusal: Refusal) -> Refusal {
+fn refusal_with_option_names(refusal: Refusal) -> Refusal {
     if let Some(RefusedOption {
         option,
         value,
         reason,
-    }) = cause(&refusal)
+    }) = find_cause(&refusal)
     {
         return format!("--{} {value}: {reason}", option.replace('_', "-")).into();
     }
-    if let Some(error) = cause::<ScenarioError>(&refusal) {
-        return error.told("--set").into();
+    if let Some(error) = find_cause::<ScenarioError>(&refusal) {
+        return error.message_with_option("--set").into();
     }
-    match cause::<TooMuch>(&refusal) {
+    match find_cause::<TooMuch>(&refusal) {
         Some(too_much) => format!("{too_much}, or raise the limit with --memory").into(),
         None => refusal,
     }
@@ -114,58 +114,58 @@ pub fn main() -> ExitCode {
 pub fn main_with(arguments: Vec<OsString>) -> u8 {
     // Found before parsing, which may fail.
     let json = arguments.iter().any(|argument| argument == "--json");
-    JSON.store(json, Ordering::Relaxed);
+    IS_JSON_OUTPUT.store(json, Ordering::Relaxed);
     let command_line = match Cli::try_parse_from(arguments) {
         Ok(command_line) => command_line,
         Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            note(FIRST_HELP);
-            return Status::Refused as u8;
+            print_note(HELP_WITHOUT_VERB);
+            return ExitStatus::Refused as u8;
         }
         Err(error) if error.use_stderr() => {
-            let message = error.render().to_string() + suggestion(&error);
+            let message = error.render().to_string() + scenario_suggestion(&error);
             let message = message.trim_start_matches("error: ").trim_end();
-            return refuse(message, json) as u8;
+            return report_refusal(message, json) as u8;
         }
         // Help, or the version.
         Err(help) => help.exit(),
     };
     let interrupted = stop_at_once_on_interrupt();
     let status = interrupted.and_then(|()| command_line.run());
-    let status = status.unwrap_or_else(|refusal| match Status::of_refusal(&refusal) {
-        Status::Interrupted => {
-            note(&refusal.to_string());
+    let status = status.unwrap_or_else(|refusal| match ExitStatus::from_refusal(&refusal) {
+        ExitStatus::Interrupted => {
+            print_note(&refusal.to_string());
             if json {
-                show_refused(&refusal.to_string(), Status::Interrupted.code());
+                print_refusal_json(&refusal.to_string(), ExitStatus::Interrupted.exit_code());
             }
-            Status::Interrupted
+            ExitStatus::Interrupted
         }
-        _ => refuse(&refusal.to_string(), json),
+        _ => report_refusal(&refusal.to_string(), json),
     });
-    status.code() as u8
+    status.exit_code() as u8
 }
 
 /// Whether standard output is JSON.
-static JSON: AtomicBool = AtomicBool::new(false);
+static IS_JSON_OUTPUT: AtomicBool = AtomicBool::new(false);
 
 /// Reports an error on standard error and, with `json`, as JSON on standard output.
-fn refuse(error: &str, json: bool) -> Status {
-    note(&format!("error: {error}"));
+fn report_refusal(error: &str, json: bool) -> ExitStatus {
+    print_note(&format!("error: {error}"));
     if json {
-        show_refused(error, Status::Refused as i32);
+        print_refusal_json(error, ExitStatus::Refused as i32);
     }
-    Status::Refused
+    ExitStatus::Refused
 }
 
-fn show_refused(error: &str, exit_status: i32) {
+fn print_refusal_json(error: &str, exit_status: i32) {
     let mut bytes = Vec::new();
-    if report::write_json(&Refused::new(error, exit_status), &mut bytes).is_ok() {
+    if report::write_json(&RefusalDocument::new(error, exit_status), &mut bytes).is_ok() {
         // A failure to report the error cannot be reported.
-        let _ = show(&bytes);
+        let _ = write_standard_output(&bytes);
     }
 }
 
 /// How to get a scenario, if none is named.
-fn suggestion(error: &clap::Error) -> &'static str {
+fn scenario_suggestion(error: &clap::Error) -> &'static str {
     let missing = error.kind() == ErrorKind::MissingRequiredArgument;
     let which = error.get(ContextKind::InvalidArg);
     // The usage, which names it as well, is another part of the message.
@@ -186,7 +186,7 @@ type Refusal = Box<dyn Error + Send + Sync>;
 /// Exit status of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
-enum Status {
+enum ExitStatus {
     /// At rest within the tolerance; of a check: both methods agree; of a
     /// simulation: followed to its end; of a chart: its reference is confirmed.
     Success = 0,
@@ -202,35 +202,35 @@ enum Status {
     Interrupted = 128 + SIGINT,
 }
 
-impl Status {
-    fn of(success: bool) -> Self {
+impl ExitStatus {
+    fn from_success(success: bool) -> Self {
         match success {
-            true => Status::Success,
-            false => Status::Failure,
+            true => ExitStatus::Success,
+            false => ExitStatus::Failure,
         }
     }
 
     /// The number that the process ends with: of a signal 128 and its number.
-    fn code(self) -> i32 {
+    fn exit_code(self) -> i32 {
         match self {
-            Status::Interrupted => 128 + SIGNAL.load(Ordering::Relaxed),
+            ExitStatus::Interrupted => 128 + FIRST_SIGNAL.load(Ordering::Relaxed),
             _ => self as i32,
         }
     }
 
     /// That of a run that ended with this refusal.
-    fn of_refusal(refusal: &Refusal) -> Self {
-        match cause::<Interrupted>(refusal) {
-            Some(_) => Status::Interrupted,
-            None => Status::Refused,
+    fn from_refusal(refusal: &Refusal) -> Self {
+        match find_cause::<InterruptedRun>(refusal) {
+            Some(_) => ExitStatus::Interrupted,
+            None => ExitStatus::Refused,
         }
     }
 }
 
 /// A signal ended a run that has found nothing of use.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {}", what_stopped(), .0)]
-struct Interrupted(&'static str);
+#[error("{}: {}", signal_phrase(), .0)]
+struct InterruptedRun(&'static str);
 
 /// The signals that end a run: a closed terminal, Ctrl-C, and a request to end.
 #[cfg(unix)]
@@ -242,11 +242,11 @@ const SIGINT: i32 = 2;
 const SIGTERM: i32 = 15;
 
 /// The first signal that came.
-static SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
+static FIRST_SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
 
 /// What is told of a run that a signal ended.
-fn what_stopped() -> &'static str {
-    match SIGNAL.load(Ordering::Relaxed) {
+fn signal_phrase() -> &'static str {
+    match FIRST_SIGNAL.load(Ordering::Relaxed) {
         #[cfg(unix)]
         SIGHUP => "stopped by SIGHUP",
         #[cfg(unix)]
@@ -256,7 +256,7 @@ fn what_stopped() -> &'static str {
 }
 
 /// Time after a signal in which a run ends by itself, with what it has found.
-const GRACE: Duration = Duration::from_secs(10);
+const GRACE_AFTER_SIGNAL: Duration = Duration::from_secs(10);
 
 /// A run that ends with what it has found, once this is `true`; without one the process ends at
 /// once.
@@ -269,7 +269,7 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     let hangup = (!ignores_hangup()).then_some(SIGHUP);
     let signals = [SIGINT, SIGTERM].into_iter().chain(hangup);
     let mut signals = signal_hook::iterator::Signals::new(signals)?;
-    thread::spawn(move || signals.forever().for_each(stop));
+    thread::spawn(move || signals.forever().for_each(handle_signal));
     Ok(())
 }
 
@@ -277,7 +277,7 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
 /// is of use, with that.
 #[cfg(windows)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
-    ctrlc::set_handler(|| stop(SIGINT))?;
+    ctrlc::set_handler(|| handle_signal(SIGINT))?;
     Ok(())
 }
 
@@ -292,35 +292,35 @@ fn ignores_hangup() -> bool {
 }
 
 /// Ends the process after a signal: at once, or with what it has found.
-fn stop(signal: i32) {
+fn handle_signal(signal: i32) {
     if let Some(cancel) = cancel().as_ref()
         && !cancel.load(Ordering::Relaxed)
     {
-        SIGNAL.store(signal, Ordering::Relaxed);
+        FIRST_SIGNAL.store(signal, Ordering::Relaxed);
         cancel.store(true, Ordering::Relaxed);
         clear_progress_line();
-        note("stopping with what was found so far; Ctrl-C again: at once, without it");
+        print_note("stopping with what was found so far; Ctrl-C again: at once, without it");
         thread::spawn(|| {
-            thread::sleep(GRACE);
-            end_now();
+            thread::sleep(GRACE_AFTER_SIGNAL);
+            exit_after_signal();
         });
         return;
     }
-    SIGNAL.store(signal, Ordering::Relaxed);
-    end_now();
+    FIRST_SIGNAL.store(signal, Ordering::Relaxed);
+    exit_after_signal();
 }
 
 /// Ends the process after a signal.
-fn end_now() -> ! {
-    files::abandon_unfinished();
+fn exit_after_signal() -> ! {
+    files::remove_unfinished_files();
     clear_progress_line();
-    let stopped = what_stopped();
-    note(&format!(
+    let stopped = signal_phrase();
+    print_note(&format!(
         "{stopped}: nothing of an unfinished result is kept"
     ));
-    let status = Status::Interrupted.code();
-    if JSON.load(Ordering::Relaxed) {
-        show_refused(stopped, status);
+    let status = ExitStatus::Interrupted.exit_code();
+    if IS_JSON_OUTPUT.load(Ordering::Relaxed) {
+        print_refusal_json(stopped, status);
     }
     process::exit(status);
 }
@@ -348,22 +348,23 @@ fn cancel() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
 }
 
 /// Prints a line to standard error; failures are ignored.
-fn note(line: &str) {
+fn print_note(line: &str) {
     let _ = writeln!(io::stderr(), "{}", printable(line));
 }
 
 /// Prints a report to standard output.
 fn show_report(report: &str) -> Result<(), Refusal> {
-    show(printable(report).as_bytes())
+    write_standard_output(printable(report).as_bytes())
 }
 
 /// Writes to standard output. Whoever reads a report may close it when he has seen enough
 /// (`| head`); of JSON half is of no use.
-fn show(bytes: &[u8]) -> Result<(), Refusal> {
+fn write_standard_output(bytes: &[u8]) -> Result<(), Refusal> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
         Err(error)
-            if error.kind() == io::ErrorKind::BrokenPipe && !JSON.load(Ordering::Relaxed) =>
+            if error.kind() == io::ErrorKind::BrokenPipe
+                && !IS_JSON_OUTPUT.load(Ordering::Relaxed) =>
         {
             Ok(())
         }

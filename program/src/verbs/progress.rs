@@ -1,7 +1,7 @@
 //! A progress line on standard error for long runs.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use leafdyn::relax::{Correction, Progress};
+use leafdyn::relax::{CorrectionProgress, Progress};
 use std::io;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -13,7 +13,7 @@ const LONG_RUN: Duration = Duration::from_millis(500);
 const REDRAWS_PER_SECOND: u8 = 10;
 
 /// No estimate is made from a smaller fraction.
-const MIN_FRACTION: f64 = 1e-3;
+const LEAST_FRACTION_FOR_ESTIMATE: f64 = 1e-3;
 
 /// The progress line; it vanishes when dropped.
 pub struct ProgressLine {
@@ -21,8 +21,8 @@ pub struct ProgressLine {
     start: Instant,
     shown: bool,
     bar: Option<ProgressBar>,
-    grids: Grids,
-    shooting: Option<Corrections>,
+    grids: GridProgress,
+    shooting: Option<ShootingProgress>,
     /// When the current phase of the run began.
     phase_start: Duration,
 }
@@ -34,7 +34,7 @@ impl ProgressLine {
             start: Instant::now(),
             shown: shown && io::stderr().is_terminal(),
             bar: None,
-            grids: Grids::default(),
+            grids: GridProgress::default(),
             shooting: None,
             phase_start: Duration::ZERO,
         }
@@ -47,12 +47,16 @@ impl ProgressLine {
                 grid,
                 step,
                 residual,
-            } => self.grids.fraction(grid, step, residual, tolerance),
+            } => self
+                .grids
+                .completed_fraction(grid, step, residual, tolerance),
             Progress::Shooting(now) => {
                 if self.shooting.is_none() {
                     self.next_phase();
                 }
-                self.shooting.get_or_insert_default().fraction(now)
+                self.shooting
+                    .get_or_insert_default()
+                    .completed_fraction(now)
             }
         };
         self.update(fraction, || progress.to_string());
@@ -72,7 +76,7 @@ impl ProgressLine {
                 .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
                 .with_prefix(self.scenario.clone())
         });
-        let left = remaining(elapsed.saturating_sub(self.phase_start), fraction);
+        let left = remaining_time_text(elapsed.saturating_sub(self.phase_start), fraction);
         let (message, elapsed) = (message(), elapsed.as_secs_f64());
         bar.set_message(format!("{message}, {elapsed:.0} s{left}"));
     }
@@ -84,21 +88,21 @@ impl ProgressLine {
 }
 
 /// An estimate of the remaining time, to follow the elapsed time; empty if unknown.
-fn remaining(elapsed: Duration, fraction: Option<f64>) -> String {
-    let known = fraction.filter(|fraction| (MIN_FRACTION..=1.0).contains(fraction));
-    let left = |fraction: f64| duration(elapsed.as_secs_f64() * (1.0 / fraction - 1.0));
+fn remaining_time_text(elapsed: Duration, fraction: Option<f64>) -> String {
+    let known = fraction.filter(|fraction| (LEAST_FRACTION_FOR_ESTIMATE..=1.0).contains(fraction));
+    let left = |fraction: f64| format_duration(elapsed.as_secs_f64() * (1.0 / fraction - 1.0));
     known.map_or(String::new(), |fraction| {
         format!(", {} left", left(fraction))
     })
 }
 
 /// The completed fraction of `all` equal parts.
-pub fn fraction_of(done: usize, all: usize) -> Option<f64> {
+pub fn completed_fraction(done: usize, all: usize) -> Option<f64> {
     Some(done as f64 / all.max(1) as f64)
 }
 
 /// Where a number is between two others, from 0 to 1; linearly, or by logarithms.
-pub fn fraction_between(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
+pub fn range_fraction(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
     let place = |value: f64| if log { value.abs().ln() } else { value };
     let fraction = (place(at) - place(from)) / (place(to) - place(from));
     fraction.is_finite().then_some(fraction)
@@ -106,32 +110,44 @@ pub fn fraction_between(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
 
 /// The grids of a relaxation, each twice as fine as the one before.
 #[derive(Default)]
-struct Grids {
+struct GridProgress {
     /// The grids so far, the current one last.
-    seen: Vec<usize>,
+    segments_so_far: Vec<usize>,
 }
 
-impl Grids {
+impl GridProgress {
     /// Estimates the completed fraction of the work: the first grid, on which the leaf
     /// moves, counts as six Newton steps there, every other grid as two. Every grid reduces
     /// the error by about three digits.
-    fn fraction(&mut self, grid: usize, step: usize, residual: f64, tolerance: f64) -> Option<f64> {
-        const FIRST: f64 = 6.0;
-        const LATER: f64 = 2.0;
+    fn completed_fraction(
+        &mut self,
+        grid: usize,
+        step: usize,
+        residual: f64,
+        tolerance: f64,
+    ) -> Option<f64> {
+        const FIRST_GRID_WORK: f64 = 6.0;
+        const LATER_GRID_WORK: f64 = 2.0;
         const DIGITS: f64 = 3.0;
         /// Digits by which the residual falls until the leaf is at rest.
-        const REST: f64 = 12.0;
-        if self.seen.last() != Some(&grid) {
-            self.seen.push(grid);
+        const REST_DIGITS: f64 = 12.0;
+        if self.segments_so_far.last() != Some(&grid) {
+            self.segments_so_far.push(grid);
         }
-        let current = self.seen.len() - 1;
+        let current = self.segments_so_far.len() - 1;
         let wanted = (-tolerance.log10() / DIGITS).ceil().clamp(0.0, 16.0) as usize;
         let last = current.max(wanted);
         let size = |grid: usize| (1_u64 << grid.min(32)) as f64;
-        let work = |grid: usize| if grid == 0 { FIRST } else { LATER * size(grid) };
+        let work = |grid: usize| {
+            if grid == 0 {
+                FIRST_GRID_WORK
+            } else {
+                LATER_GRID_WORK * size(grid)
+            }
+        };
         let here = match current {
-            0 => (-residual.log10() / REST).clamp(0.0, 1.0),
-            _ => (step as f64 / LATER).min(1.0),
+            0 => (-residual.log10() / REST_DIGITS).clamp(0.0, 1.0),
+            _ => (step as f64 / LATER_GRID_WORK).min(1.0),
         };
         let before: f64 = (0..current).map(work).sum();
         let all: f64 = (0..=last).map(work).sum();
@@ -140,35 +156,35 @@ impl Grids {
 }
 
 /// Fraction of the remaining work that a linearisation takes.
-const LINEARISATION: f64 = 0.9;
+const LINEARIZATION_WORK_FRACTION: f64 = 0.9;
 
 /// The corrections of a shooting method.
 #[derive(Default)]
-struct Corrections {
+struct ShootingProgress {
     /// Size of the first correction of the final problem.
     first: Option<f64>,
 }
 
-impl Corrections {
+impl ShootingProgress {
     /// Estimates the completed fraction of the work: that of the continuation or, after it,
     /// of the wanted digits and the linearisation for the next ones.
-    fn fraction(&mut self, now: &Correction) -> Option<f64> {
-        if now.way < 1.0 {
-            return Some(now.way);
+    fn completed_fraction(&mut self, now: &CorrectionProgress) -> Option<f64> {
+        if now.lambda < 1.0 {
+            return Some(now.lambda);
         }
         let digits = match now.size.is_finite() {
             true => {
                 let first = *self.first.get_or_insert(now.size);
-                fraction_between(first, now.size, now.wanted, true)?.clamp(0.0, 1.0)
+                range_fraction(first, now.size, now.convergence_size, true)?.clamp(0.0, 1.0)
             }
             false => 0.0,
         };
-        Some(digits + (1.0 - digits) * LINEARISATION * now.linearized)
+        Some(digits + (1.0 - digits) * LINEARIZATION_WORK_FRACTION * now.linearized)
     }
 }
 
 /// Formats a duration for people.
-pub fn duration(seconds: f64) -> String {
+pub fn format_duration(seconds: f64) -> String {
     let seconds = seconds.ceil();
     match seconds as u64 {
         _ if !seconds.is_finite() => "?".into(),
@@ -191,7 +207,7 @@ mod tests {
     use super::*;
 
     fn after_10_s(fraction: Option<f64>) -> String {
-        remaining(Duration::from_secs(10), fraction)
+        remaining_time_text(Duration::from_secs(10), fraction)
     }
 
     #[test]
@@ -202,30 +218,30 @@ mod tests {
         for unknown in [None, Some(0.0), Some(-0.1), Some(1.5), Some(f64::NAN)] {
             assert_eq!(after_10_s(unknown), "");
         }
-        assert_eq!(after_10_s(fraction_of(3, 4)), ", 4 s left");
-        assert_eq!(after_10_s(fraction_of(0, 0)), "");
+        assert_eq!(after_10_s(completed_fraction(3, 4)), ", 4 s left");
+        assert_eq!(after_10_s(completed_fraction(0, 0)), "");
     }
 
     #[test]
     fn ranges_may_decrease_and_be_logarithmic() {
         let close = |part: Option<f64>, wanted: f64| (part.unwrap() - wanted).abs() < 1e-12;
-        assert!(close(fraction_between(2.0, 1.0, -2.0, false), 0.25));
-        assert!(close(fraction_between(-0.1, -1.0, -100.0, true), 1.0 / 3.0));
-        assert_eq!(fraction_between(1.0, 1.0, 1.0, false), None);
+        assert!(close(range_fraction(2.0, 1.0, -2.0, false), 0.25));
+        assert!(close(range_fraction(-0.1, -1.0, -100.0, true), 1.0 / 3.0));
+        assert_eq!(range_fraction(1.0, 1.0, 1.0, false), None);
     }
 
     #[test]
     fn a_shooting_follows_its_continuation_and_then_adds_digits() {
-        let mut corrections = Corrections::default();
+        let mut corrections = ShootingProgress::default();
         let mut part = |way: f64, linearized: f64, size: f64| {
-            let now = Correction {
-                way,
+            let now = CorrectionProgress {
+                lambda: way,
                 iteration: 0,
                 linearized,
                 size,
-                wanted: 1e-10,
+                convergence_size: 1e-10,
             };
-            corrections.fraction(&now).unwrap()
+            corrections.completed_fraction(&now).unwrap()
         };
         assert_eq!(part(0.25, 0.5, 1e-3), 0.25);
         let parts = [
@@ -244,9 +260,11 @@ mod tests {
 
     #[test]
     fn a_relaxation_goes_on_from_grid_to_grid() {
-        let mut grids = Grids::default();
+        let mut grids = GridProgress::default();
         let mut part = |grid: usize, step: usize, residual: f64| {
-            grids.fraction(grid, step, residual, 1e-6).unwrap()
+            grids
+                .completed_fraction(grid, step, residual, 1e-6)
+                .unwrap()
         };
         let parts = [
             part(8, 1, 1.0),

@@ -1,15 +1,17 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
-use crate::files::{Kind, LIVE};
-use crate::report::numbers::brief;
-use crate::verbs::help::FOR_EXPERTS;
-use crate::verbs::progress::{ProgressLine, fraction_of};
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
-use crate::verbs::{Interrupted, Refusal, Status};
+use crate::files::{FileKind, LIVE_PAGE_FILE};
+use crate::report::numbers::format_five_digits;
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::{ProgressLine, completed_fraction};
+use crate::verbs::request::{
+    DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
+};
+use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study;
-use leafdyn::study::{Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
+use leafdyn::study::{Equilibria, MarginError, MarginProgress, ParameterKeys, SensitivityError};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;
@@ -19,12 +21,12 @@ const DEFAULT_MODES: usize = 3;
 /// Exit status: 0 at rest within the tolerance; 1 not (the files are still
 /// written and say how far it came); 2 the request was refused.
 #[derive(Debug, Args)]
-pub struct Relax {
+pub struct RelaxArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// How the leaf is brought to rest
-    #[arg(long, value_name = "NAME", value_parser = words::<Method>(Method::ALL.map(Method::word)), default_value_t)]
+    #[arg(long, value_name = "NAME", value_parser = word_parser::<Method>(Method::ALL.map(Method::word)), default_value_t)]
     method: Method,
 
     /// One fixed grid of N segments a rod, without extrapolation; left out: as fine as the tolerance needs
@@ -32,11 +34,11 @@ pub struct Relax {
     segments: Option<usize>,
 
     /// With --method shooting: shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
-    #[arg(long, value_name = "N", help_heading = FOR_EXPERTS)]
+    #[arg(long, value_name = "N", help_heading = EXPERT_OPTIONS_HEADING)]
     intervals: Option<usize>,
 
     /// Which equilibrium, where there are several: that of a leaf which is loaded slowly before its tips are brought together, or of one released from arcs under all of its loads
-    #[arg(long, value_name = "NAME", value_parser = words::<Route>(Route::ALL.map(Route::word)), default_value_t)]
+    #[arg(long, value_name = "NAME", value_parser = word_parser::<Route>(Route::ALL.map(Route::word)), default_value_t)]
     path: Route,
 
     /// Stop at a saddle instead of leaving it for a stable equilibrium
@@ -58,24 +60,27 @@ pub struct Relax {
         value_delimiter = ',',
         conflicts_with = "all"
     )]
-    sensitivity: Vec<Keys>,
+    sensitivity: Vec<ParameterKeys>,
 
     /// Also find how far a stable leaf is from losing its stability: which push at the tip unseats it, and the lowest barrier to another equilibrium
     #[arg(long, conflicts_with_all = ["all", "sensitivity"])]
     margin: bool,
 
     /// Solve for the whole leaf, even if half of it would do
-    #[arg(long, help_heading = FOR_EXPERTS)]
+    #[arg(long, help_heading = EXPERT_OPTIONS_HEADING)]
     full_model: bool,
 }
 
-fn update_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
+fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
     match progress {
         MarginProgress::Relaxing(progress) => line.update_solver(progress, tolerance),
         MarginProgress::Searching { done, all, push } => {
-            line.update(fraction_of(*done, *all), || {
+            line.update(completed_fraction(*done, *all), || {
                 let push = push.map(|(direction, force)| {
-                    format!(", pushed by {} along {direction}", brief(force))
+                    format!(
+                        ", pushed by {} along {direction}",
+                        format_five_digits(force)
+                    )
                 });
                 format!("{done} of {all} searches{}", push.unwrap_or_default())
             });
@@ -83,46 +88,49 @@ fn update_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: 
     }
 }
 
-impl Relax {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl RelaxArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
-            varies: !self.sensitivity.is_empty(),
-            stations: true,
-            parallel: true,
-            partial: self.all || self.margin,
-            reads: &[],
-            puts: None,
+            varies_numbers: !self.sensitivity.is_empty(),
+            has_station_choice: true,
+            runs_in_parallel: true,
+            keeps_partial_result: self.all || self.margin,
+            input_files: &[],
+            value_option: None,
         };
         match self.all {
-            true => self.request.each::<Equilibria>(traits, |job| self.all(job)),
-            false => (self.request).each::<Equilibrium>(traits, |job| self.one(job)),
+            true => self
+                .request
+                .run_each_scenario::<Equilibria>(traits, |job| self.find_all_equilibria(job)),
+            false => (self.request)
+                .run_each_scenario::<Equilibrium>(traits, |job| self.run_scenario(job)),
         }
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
-        let live = match job.selection.kinds.contains(&Kind::Live) {
-            true => Some(job.live()?),
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let live = match job.selection.kinds.contains(&FileKind::Live) {
+            true => Some(job.write_live_page()?),
             false => None,
         };
-        let equilibrium = self.solve(job)?;
+        let equilibrium = self.solve_equilibrium(job)?;
         if job.is_interrupted() && !equilibrium.outcome.is_at_rest() {
-            return Err(Interrupted("the leaf is not at rest").into());
+            return Err(InterruptedRun("the leaf is not at rest").into());
         }
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
-        job.remark(equilibrium.remark.as_ref());
+        job.print_remark(equilibrium.remark.as_ref());
         for doubt in &equilibrium.doubts {
-            job.remark(Some(doubt));
+            job.print_remark(Some(doubt));
         }
         let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
         let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;
         let success = equilibrium.outcome.is_success() && !unwanted;
-        let live = live.map(|page| job.write_table(LIVE, page.as_bytes()));
-        let written = [job.write(&equilibrium)].into_iter().chain(live);
+        let live = live.map(|page| job.write_table(LIVE_PAGE_FILE, page.as_bytes()));
+        let written = [job.write_files(&equilibrium)].into_iter().chain(live);
         job.deliver_written(&equilibrium, success, &equilibrium, written)
     }
 
     /// The method with its options; refused if they do not fit the method.
-    fn method(&self) -> Result<Method, Refusal> {
+    fn method_with_options(&self) -> Result<Method, Refusal> {
         let settings = Settings {
             segments: self.segments,
             intervals: self.intervals,
@@ -137,9 +145,9 @@ impl Relax {
         })
     }
 
-    fn solve(&self, job: &Job) -> Result<Equilibrium, Refusal> {
+    fn solve_equilibrium(&self, job: &ScenarioJob) -> Result<Equilibrium, Refusal> {
         let options = Options {
-            method: self.method()?,
+            method: self.method_with_options()?,
             route: self.path,
             tolerance: self.request.tolerance,
             modes: self.modes.unwrap_or(DEFAULT_MODES),
@@ -149,7 +157,7 @@ impl Relax {
             stations: job.selection.stations,
             ..Options::default()
         };
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         if !self.sensitivity.is_empty() {
             let (base, keys) = (&job.base, &self.sensitivity);
@@ -168,7 +176,7 @@ impl Relax {
                     searching = true;
                     line.next_phase();
                 }
-                update_margin(&mut line, progress, tolerance);
+                update_margin_progress(&mut line, progress, tolerance);
             });
             return found.map_err(|error| match error {
                 MarginError::Relax(error) => error.into(),
@@ -180,11 +188,11 @@ impl Relax {
         })?)
     }
 
-    fn all(&self, job: &Job) -> Result<Delivered, Refusal> {
-        let Method::SemiImplicit(how) = self.method()? else {
+    fn find_all_equilibria(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let Method::SemiImplicit(how) = self.method_with_options()? else {
             return Err("--all: only with the method semi-implicit".into());
         };
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let (mut known, mut last_new) = (0, 0);
         let mut all = study::equilibria(
             &job.scenario,
@@ -196,18 +204,18 @@ impl Relax {
                     (known, last_new) = (found, starts);
                 }
                 // Assuming that no more are found.
-                let fraction = fraction_of(starts, last_new + study::IN_VAIN);
+                let fraction = completed_fraction(starts, last_new + study::MOST_FRUITLESS_STARTS);
                 line.update(fraction, || format!("{starts} starts, {found} equilibria"));
             },
         )?;
         drop(line);
         if job.is_interrupted() && all.found.is_empty() {
-            return Err(Interrupted("no equilibrium was found").into());
+            return Err(InterruptedRun("no equilibrium was found").into());
         }
         for found in &mut all.found {
             let leaf = found.equilibrium.clone();
             found.equilibrium = leaf.at_stations(&job.scenario, job.selection.stations);
         }
-        job.deliver(&all, !all.found.is_empty())
+        job.write_and_deliver(&all, !all.found.is_empty())
     }
 }

@@ -3,22 +3,22 @@
 //!
 //! One scenario of a request, and the delivery of its result.
 
-use crate::files::{Document, Kind, Selection, Written};
-use crate::report::table::{list_files, rows_of_json};
-use crate::report::{Refused, Reported};
-use crate::verbs::help::FOR_EXPERTS;
-use crate::verbs::progress::{ProgressLine, fraction_of};
+use crate::files::{FileKind, FileSelection, ResultDocument, WrittenResult};
+use crate::report::table::{file_list_text, table_of_json_results};
+use crate::report::{RefusalDocument, ReportedResult};
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::verbs::{
-    Interrupted, Refusal, Status, cause, limit_until_interrupt, name_options, note, refuse, show,
-    show_report, what_stopped,
+    ExitStatus, InterruptedRun, Refusal, find_cause, limit_until_interrupt, print_note,
+    refusal_with_option_names, report_refusal, show_report, signal_phrase, write_standard_output,
 };
 use crate::{files, live, report};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
 use leafdyn::memory;
 use leafdyn::relax::Limit;
-use leafdyn::scenario::{Entries, Place, Scenario, ScenarioError, printable};
-use leafdyn::study::{Base, UnknownWord};
+use leafdyn::scenario::{Entries, Scenario, ScenarioError, SourceLocation, printable};
+use leafdyn::study::{BaseScenario, UnknownWord};
 use rayon::prelude::*;
 use std::any::Any;
 use std::collections::HashMap;
@@ -33,7 +33,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
-pub struct Request {
+pub struct ScenarioArguments {
     /// The leaf, as a TOML file, or JSON of a result; - is standard input; of several each has a folder of its own, and all one table
     #[arg(value_name = "SCENARIO", required = true, value_hint = ValueHint::FilePath)]
     scenarios: Vec<PathBuf>,
@@ -51,15 +51,15 @@ pub struct Request {
     out: Option<PathBuf>,
 
     /// Which files to write: some of json, csv, svg, png, html, vtk, glb, gif, or none [default: those of the first four that the verb has]
-    #[arg(long, value_name = "LIST", value_parser = kinds)]
-    write: Option<Kinds>,
+    #[arg(long, value_name = "LIST", value_parser = parse_file_kinds)]
+    write: Option<FileKinds>,
 
     /// Write K + 1 equally spaced stations of every vein [default: those of the finest grid, at least 17]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=MOST_STATIONS))]
     stations: Option<u32>,
 
     /// Most memory that the request may take, as in 2GB; what would take more is refused before it starts [default: half of what the machine has]
-    #[arg(long, value_name = "SIZE", value_parser = memory::parse, help_heading = FOR_EXPERTS)]
+    #[arg(long, value_name = "SIZE", value_parser = memory::parse, help_heading = EXPERT_OPTIONS_HEADING)]
     memory: Option<u64>,
 
     /// Print the result as JSON on standard output and nothing else there
@@ -76,26 +76,28 @@ const MOST_STATIONS: i64 = 1_000_000;
 
 /// A list of kinds of files.
 #[derive(Clone, Debug)]
-struct Kinds(Vec<Kind>);
+struct FileKinds(Vec<FileKind>);
 
-fn kinds(list: &str) -> Result<Kinds, String> {
+fn parse_file_kinds(list: &str) -> Result<FileKinds, String> {
     if list.trim() == "none" {
-        return Ok(Kinds(Vec::new()));
+        return Ok(FileKinds(Vec::new()));
     }
     let kind = |word: &str| {
         word.trim().parse().map_err(|_| {
-            let words = Kind::ALL.map(Kind::word).join(", ");
+            let words = FileKind::ALL.map(FileKind::word).join(", ");
             format!("{word}: must be some of {words}, with commas between them, or none")
         })
     };
     list.split(',')
         .map(kind)
         .collect::<Result<_, _>>()
-        .map(Kinds)
+        .map(FileKinds)
 }
 
 /// Parses one of these words.
-pub fn words<T>(words: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
+pub fn word_parser<T>(
+    words: impl IntoIterator<Item = &'static str>,
+) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err = UnknownWord> + Clone + Send + Sync + 'static,
 {
@@ -106,45 +108,45 @@ where
 #[derive(Clone, Copy, Default)]
 pub struct VerbTraits<'f> {
     /// Whether it varies numbers of the scenario and settings of methods.
-    pub varies: bool,
+    pub varies_numbers: bool,
     /// Whether the stations in its files can be chosen.
-    pub stations: bool,
+    pub has_station_choice: bool,
     /// Whether scenarios run in parallel; otherwise one after the other, each on all
     /// cores.
-    pub parallel: bool,
+    pub runs_in_parallel: bool,
     /// Whether a part of a result, as it is known at a signal, is of use; of several scenarios those
     /// that are finished are.
-    pub partial: bool,
+    pub keeps_partial_result: bool,
     /// Files that it reads besides its scenarios.
-    pub reads: &'f [PathBuf],
+    pub input_files: &'f [PathBuf],
     /// The option besides --set that puts values into its scenarios.
-    pub puts: Option<&'f str>,
+    pub value_option: Option<&'f str>,
 }
 
-impl Request {
+impl ScenarioArguments {
     /// Runs a verb whose results are `R` for every scenario.
-    pub fn each<R: Written>(
+    pub fn run_each_scenario<R: WrittenResult>(
         &self,
         traits: VerbTraits,
-        run: impl Fn(&Job) -> Result<Delivered, Refusal> + Sync,
-    ) -> Result<Status, Refusal> {
+        run: impl Fn(&ScenarioJob) -> Result<DeliveredResult, Refusal> + Sync,
+    ) -> Result<ExitStatus, Refusal> {
         self.memory.into_iter().for_each(memory::allow);
-        let selection = self.selection::<R>(traits)?;
+        let selection = self.selected_files::<R>(traits)?;
         self.check_scenarios::<R>(traits, &selection)?;
-        let limit = match traits.partial || !self.single() {
+        let limit = match traits.keeps_partial_result || !self.is_single_scenario() {
             true => limit_until_interrupt(),
             false => Limit::default(),
         };
-        let job = |file: &Path| self.open::<R>(file, traits, (&selection, &limit));
+        let job = |file: &Path| self.open_job::<R>(file, traits, (&selection, &limit));
         if let [file] = self.scenarios.as_slice() {
-            let done = attempt(&job(file)?, &run);
-            let done = done.map_err(|refusal| self.as_typed(traits, refusal))?;
+            let done = run_catching_panics(&job(file)?, &run);
+            let done = done.map_err(|refusal| self.refusal_with_option(traits, refusal))?;
             match self.json {
-                true => show(&done.json)?,
+                true => write_standard_output(&done.json)?,
                 false => show_report(&done.report)?,
             }
             // The JSON output includes an error.
-            let refused = done.error.map(|error| refuse(&error, false));
+            let refused = done.error.map(|error| report_refusal(&error, false));
             return Ok(refused.unwrap_or(done.status));
         }
         // All are checked before the first is solved.
@@ -159,38 +161,41 @@ impl Request {
         }
         let line = Mutex::new(ProgressLine::new("scenarios", true));
         let finished = AtomicUsize::new(0);
-        let solve = |job: Result<Job, Refusal>| {
+        let solve = |job: Result<ScenarioJob, Refusal>| {
             let done = job.and_then(|job| {
                 if job.is_interrupted() {
-                    return Err(Interrupted("before this scenario was begun").into());
+                    return Err(InterruptedRun("before this scenario was begun").into());
                 }
-                attempt(&job, &run).map_err(|refusal| self.as_typed(traits, refusal))
+                run_catching_panics(&job, &run)
+                    .map_err(|refusal| self.refusal_with_option(traits, refusal))
             });
             let done = done.map_err(|refusal| {
-                let status = Status::of_refusal(&refusal);
-                (name_options(refusal).to_string(), status)
+                let status = ExitStatus::from_refusal(&refusal);
+                (refusal_with_option_names(refusal).to_string(), status)
             });
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
-            if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
+            if let (true, Ok(mut line)) = (traits.runs_in_parallel, line.lock()) {
                 let all = self.scenarios.len();
-                line.update(fraction_of(count, all), || format!("{count} of {all}"));
+                line.update(completed_fraction(count, all), || {
+                    format!("{count} of {all}")
+                });
             }
             done
         };
-        let done: Vec<_> = match traits.parallel {
+        let done: Vec<_> = match traits.runs_in_parallel {
             true => jobs.into_par_iter().map(solve).collect(),
             false => jobs.into_iter().map(solve).collect(),
         };
-        self.finish::<R>(&selection, done)
+        self.output_results::<R>(&selection, done)
     }
 
     /// Names the option that put a refused value into a scenario, if it was not --set.
-    fn as_typed(&self, traits: VerbTraits, refusal: Refusal) -> Refusal {
-        match (traits.puts, cause(&refusal)) {
+    fn refusal_with_option(&self, traits: VerbTraits, refusal: Refusal) -> Refusal {
+        match (traits.value_option, find_cause(&refusal)) {
             (
                 Some(option),
                 Some(ScenarioError {
-                    place: Place::Set { given },
+                    place: SourceLocation::Set { given },
                     problem,
                     ..
                 }),
@@ -202,18 +207,18 @@ impl Request {
     }
 
     /// Checks what the scenarios share: standard input, and the table of several.
-    fn check_scenarios<R: Written>(
+    fn check_scenarios<R: WrittenResult>(
         &self,
         traits: VerbTraits,
-        selection: &Selection,
+        selection: &FileSelection,
     ) -> Result<(), Refusal> {
         let from_input = self.scenarios.iter().filter(|path| path.as_os_str() == "-");
         if from_input.count() > 1 {
             return Err("standard input can be read only once: name one - and files".into());
         }
-        if !self.single() && selection.kinds.contains(&Kind::Csv) {
-            let (folder, name) = self.table::<R>();
-            files::check_inputs(folder, &[&name], self.inputs(traits))?;
+        if !self.is_single_scenario() && selection.kinds.contains(&FileKind::Csv) {
+            let (folder, name) = self.table_location::<R>();
+            files::check_inputs(folder, &[&name], self.input_files(traits))?;
             if self.out.is_none() {
                 files::check_table(&folder.join(name), &self.scenarios)?;
             }
@@ -222,12 +227,12 @@ impl Request {
     }
 
     /// All files that are read.
-    fn inputs<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
-        self.scenarios.iter().chain(traits.reads)
+    fn input_files<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
+        self.scenarios.iter().chain(traits.input_files)
     }
 
     /// The folder and the name of the table of several scenarios.
-    fn table<R: Written>(&self) -> (&Path, String) {
+    fn table_location<R: WrittenResult>(&self) -> (&Path, String) {
         let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
             None | Some("summary") => "table.csv".to_string(),
             Some(verb) => format!("{verb}_table.csv"),
@@ -236,12 +241,12 @@ impl Request {
     }
 
     /// Outputs the results of several scenarios, and writes their table.
-    fn finish<R: Written>(
+    fn output_results<R: WrittenResult>(
         &self,
-        selection: &Selection,
-        all: Vec<Result<Delivered, (String, Status)>>,
-    ) -> Result<Status, Refusal> {
-        let mut status = Status::Success;
+        selection: &FileSelection,
+        all: Vec<Result<DeliveredResult, (String, ExitStatus)>>,
+    ) -> Result<ExitStatus, Refusal> {
+        let mut status = ExitStatus::Success;
         let (mut documents, mut errors) = (Vec::new(), Vec::new());
         let mut unsolved = 0;
         for (done, file) in all.into_iter().zip(&self.scenarios) {
@@ -254,88 +259,95 @@ impl Request {
                 }
                 Err((error, this)) => {
                     let mut json = Vec::new();
-                    report::write_json(&Refused::new(&error, this.code()), &mut json)?;
-                    unsolved += usize::from(this == Status::Interrupted);
-                    let told = (this != Status::Interrupted).then_some(error);
+                    report::write_json(&RefusalDocument::new(&error, this.exit_code()), &mut json)?;
+                    unsolved += usize::from(this == ExitStatus::Interrupted);
+                    let told = (this != ExitStatus::Interrupted).then_some(error);
                     (this, told, json)
                 }
             };
             status = status.max(this);
             if error.is_some() {
-                status = status.max(Status::Refused);
+                status = status.max(ExitStatus::Refused);
             }
             errors.extend(error);
-            documents.push((file.display().to_string(), this.code(), json));
+            documents.push((file.display().to_string(), this.exit_code(), json));
         }
         for error in errors {
-            note(&format!("error: {error}"));
+            print_note(&format!("error: {error}"));
         }
         if unsolved > 0 {
             let count = self.scenarios.len();
-            note(&format!(
+            print_note(&format!(
                 "{}: {unsolved} of {count} scenarios are not solved",
-                what_stopped()
+                signal_phrase()
             ));
         }
-        if selection.kinds.contains(&Kind::Csv) {
-            let (out, name) = self.table::<R>();
-            let rows = rows_of_json(&documents)?;
+        if selection.kinds.contains(&FileKind::Csv) {
+            let (out, name) = self.table_location::<R>();
+            let rows = table_of_json_results(&documents)?;
             let file = files::write_table(out, &name, &rows)?;
             if !self.json {
-                show_report(&format!("table      {}\n", list_files(out, &[file])))?;
+                show_report(&format!("table      {}\n", file_list_text(out, &[file])))?;
             }
         }
         if self.json {
             let texts = documents.iter().map(|(_, _, json)| json.trim_ascii());
             let texts: Vec<_> = texts.collect();
-            show(&[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat())?;
+            write_standard_output(
+                &[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat(),
+            )?;
         }
         Ok(status)
     }
 
     /// The files to write; refused if the verb has no such files.
-    fn selection<R: Written>(&self, traits: VerbTraits) -> Result<Selection, Refusal> {
-        let has: Vec<Kind> = R::names().map(Kind::of).collect();
-        let has = |kind: &Kind| has.contains(kind) || !self.single() && *kind == Kind::Csv;
+    fn selected_files<R: WrittenResult>(
+        &self,
+        traits: VerbTraits,
+    ) -> Result<FileSelection, Refusal> {
+        let has: Vec<FileKind> = R::file_names().map(FileKind::from_file_name).collect();
+        let has = |kind: &FileKind| {
+            has.contains(kind) || !self.is_single_scenario() && *kind == FileKind::Csv
+        };
         let stations = self.stations.map(|count| count as usize);
-        if let (Some(count), false) = (stations, traits.stations) {
+        if let (Some(count), false) = (stations, traits.has_station_choice) {
             return Err(format!("--stations {count}: the files of this verb have none").into());
         }
         let kinds = match &self.write {
-            Some(Kinds(kinds)) => kinds.clone(),
-            None => Kind::USUAL.into_iter().filter(has).collect(),
+            Some(FileKinds(kinds)) => kinds.clone(),
+            None => FileKind::DEFAULT_KINDS.into_iter().filter(has).collect(),
         };
         if let Some(kind) = kinds.iter().find(|kind| !has(kind)) {
-            let all = Kind::ALL.into_iter().filter(has).map(Kind::word);
+            let all = FileKind::ALL.into_iter().filter(has).map(FileKind::word);
             let (word, all) = (kind.word(), all.collect::<Vec<_>>().join(", "));
             return Err(format!("--write {word}: this verb writes {all}").into());
         }
-        Ok(Selection { kinds, stations })
+        Ok(FileSelection { kinds, stations })
     }
 
     /// Opens a scenario and chooses the folder for its files; refused before the run if
     /// the folder is not writable.
-    fn open<R: Written>(
+    fn open_job<R: WrittenResult>(
         &self,
         path: &Path,
         traits: VerbTraits,
-        (selection, limit): (&Selection, &Limit),
-    ) -> Result<Job, Refusal> {
+        (selection, limit): (&FileSelection, &Limit),
+    ) -> Result<ScenarioJob, Refusal> {
         let (file, text) = match path.to_str() {
-            Some("-") => ("standard input".into(), standard_input()?),
+            Some("-") => ("standard input".into(), read_standard_input()?),
             _ => (path.display().to_string(), leafdyn::scenario::text(path)?),
         };
-        let base = Base::new(
-            &Entries::of_text(&text, &file)?,
+        let base = BaseScenario::new(
+            &Entries::from_text(&text, &file)?,
             &self.overrides,
-            traits.varies,
+            traits.varies_numbers,
         )?;
         let scenario = base.scenario().clone();
         if let Some(stations) = selection.stations {
-            memory::stations(scenario.rods.len(), stations)?;
+            memory::check_station_memory(scenario.rods.len(), stations)?;
         }
         let folder = match &self.out {
-            Some(out) if self.single() => out.clone(),
+            Some(out) if self.is_single_scenario() => out.clone(),
             out => {
                 // Names of scenarios are names of folders.
                 let out = out.as_deref().unwrap_or(Path::new("out"));
@@ -344,72 +356,76 @@ impl Request {
         };
         let source = match path.to_str() {
             Some("-") => "-".into(),
-            _ => files::source(&folder, path),
+            _ => files::relative_source_path(&folder, path),
         };
         if !selection.kinds.is_empty() {
             files::check_writable(&folder)?;
-            files::check_inputs(&folder, &R::replaced(&selection.kinds), self.inputs(traits))?;
-            if self.out.is_none() || !self.single() {
+            files::check_inputs(
+                &folder,
+                &R::replaced_files(&selection.kinds),
+                self.input_files(traits),
+            )?;
+            if self.out.is_none() || !self.is_single_scenario() {
                 files::check_source(&folder, &source)?;
             }
         }
-        Ok(Job {
+        Ok(ScenarioJob {
             json: self.json,
             verbose: self.verbose,
-            single: self.single(),
+            is_only_scenario: self.is_single_scenario(),
             scenario,
             base,
             folder,
             selection: selection.clone(),
             file,
             source,
-            parallel: traits.parallel && !self.single(),
+            runs_in_parallel: traits.runs_in_parallel && !self.is_single_scenario(),
             limit: limit.clone(),
         })
     }
 
     /// Whether it is about one scenario only.
-    fn single(&self) -> bool {
+    fn is_single_scenario(&self) -> bool {
         self.scenarios.len() == 1
     }
 }
 
-fn standard_input() -> Result<String, Refusal> {
+fn read_standard_input() -> Result<String, Refusal> {
     let mut bytes = Vec::new();
     io::stdin()
         .lock()
         .take(leafdyn::scenario::MOST_BYTES + 1)
         .read_to_end(&mut bytes)?;
-    Ok(leafdyn::scenario::utf8(bytes, "standard input")?)
+    Ok(leafdyn::scenario::decode_utf8(bytes, "standard input")?)
 }
 
 /// One scenario of a request, and where its files go.
-pub struct Job {
+pub struct ScenarioJob {
     /// Whether its result is printed as JSON.
     pub(super) json: bool,
     /// Whether the report says what it took.
     pub(super) verbose: bool,
     /// Whether it is the only one of its request.
-    pub(super) single: bool,
+    pub(super) is_only_scenario: bool,
     pub scenario: Scenario,
     /// The scenario as a base for varied numbers.
-    pub base: Base,
+    pub base: BaseScenario,
     pub folder: PathBuf,
-    pub selection: Selection,
+    pub selection: FileSelection,
     pub(super) file: String,
     pub(super) source: String,
     /// Whether several run in parallel.
-    pub(super) parallel: bool,
+    pub(super) runs_in_parallel: bool,
     /// When the run ends with what it has found: at a signal, if that is of use.
     pub limit: Limit,
 }
 
 /// The lines that list files, or why these could not be written.
-pub type Listed = Result<Vec<String>, Refusal>;
+pub type FileLines = Result<Vec<String>, Refusal>;
 
 /// The delivered result of a scenario.
-pub struct Delivered {
-    pub(super) status: Status,
+pub struct DeliveredResult {
+    pub(super) status: ExitStatus,
     /// The text for standard output.
     pub(super) report: String,
     /// The result as JSON, if it is printed or part of a table.
@@ -419,33 +435,33 @@ pub struct Delivered {
 }
 
 /// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.
-pub fn attempt(
-    job: &Job,
-    run: impl Fn(&Job) -> Result<Delivered, Refusal>,
-) -> Result<Delivered, Refusal> {
+pub fn run_catching_panics(
+    job: &ScenarioJob,
+    run: impl Fn(&ScenarioJob) -> Result<DeliveredResult, Refusal>,
+) -> Result<DeliveredResult, Refusal> {
     // What a panic leaves half done is dropped with the job; files are complete or absent.
     let done = catch_unwind(AssertUnwindSafe(|| run(job)));
-    done.unwrap_or_else(|cause| Err(format!("{}: {}", job.file, program_error(&*cause)).into()))
+    done.unwrap_or_else(|cause| Err(format!("{}: {}", job.file, panic_message(&*cause)).into()))
 }
 
 /// What a panic says.
-fn program_error(cause: &(dyn Any + Send)) -> String {
+fn panic_message(cause: &(dyn Any + Send)) -> String {
     let text = (cause.downcast_ref::<&str>().copied())
         .or_else(|| cause.downcast_ref::<String>().map(String::as_str));
     let cause = text.unwrap_or("no cause is known");
     format!("an error of the program, not of the scenario, ended the run: {cause}")
 }
 
-impl Job {
+impl ScenarioJob {
     /// Its progress line; hidden if scenarios run in parallel, which share one.
-    pub fn progress(&self) -> ProgressLine {
-        ProgressLine::new(&self.scenario.name, !self.parallel)
+    pub fn progress_line(&self) -> ProgressLine {
+        ProgressLine::new(&self.scenario.name, !self.runs_in_parallel)
     }
 
     /// Prints a remark on the result to standard error if the output is JSON.
-    pub fn remark(&self, remark: Option<impl Display>) {
+    pub fn print_remark(&self, remark: Option<impl Display>) {
         if let (true, Some(remark)) = (self.json, remark) {
-            note(&format!("{}: {remark}", self.scenario.name));
+            print_note(&format!("{}: {remark}", self.scenario.name));
         }
     }
 
@@ -456,69 +472,73 @@ impl Job {
     }
 
     /// A result with its input; of a run that a signal has ended it says so.
-    pub fn document<'a, R>(&'a self, result: &'a R) -> Document<'a, R> {
-        let mut document = Document::new(result, &self.scenario, Some(&self.source));
-        let status = Status::Interrupted.code();
+    pub fn result_document<'a, R>(&'a self, result: &'a R) -> ResultDocument<'a, R> {
+        let mut document = ResultDocument::new(result, &self.scenario, Some(&self.source));
+        let status = ExitStatus::Interrupted.exit_code();
         let interrupted = self.is_interrupted();
-        document.refused = interrupted.then(|| Refused::new(what_stopped(), status));
+        document.refused = interrupted.then(|| RefusalDocument::new(signal_phrase(), status));
         document
     }
 
     /// Writes the files of a result; returns the line that lists them, if there are any.
-    pub fn write<R: Written>(&self, result: &R) -> Listed {
-        let files = files::write_all(&self.folder, &self.document(result), &self.selection.kinds)?;
+    pub fn write_files<R: WrittenResult>(&self, result: &R) -> FileLines {
+        let files = files::write_result_files(
+            &self.folder,
+            &self.result_document(result),
+            &self.selection.kinds,
+        )?;
         Ok(self.list_files(&files))
     }
 
     /// The live page with its scenario.
-    pub fn live(&self) -> Result<String, Refusal> {
+    pub fn write_live_page(&self) -> Result<String, Refusal> {
         let given = match self.base.overrides().is_empty() {
             true => Some(self.base.text().to_owned()),
             false => self.base.toml(&[]),
         };
         let name = format!("{}.toml", self.scenario.name);
-        let page = live::page(&given.unwrap_or_default(), &name, &[]);
+        let page = live::live_page(&given.unwrap_or_default(), &name, &[]);
         page.map_err(|why| format!("--write live: {why}").into())
     }
 
     /// Writes a file of this content; returns the line that lists it.
-    pub fn write_table(&self, name: &str, content: &[u8]) -> Listed {
+    pub fn write_table(&self, name: &str, content: &[u8]) -> FileLines {
         let file = files::write_table(&self.folder, name, content)?;
         Ok(self.list_files(&[file]))
     }
 
     /// The line that lists files, if there are any.
     pub fn list_files(&self, files: &[PathBuf]) -> Vec<String> {
-        let list = (!files.is_empty()).then(|| list_files(&self.folder, files));
+        let list = (!files.is_empty()).then(|| file_list_text(&self.folder, files));
         list.into_iter().collect()
     }
 
     /// Writes the files of a result and returns its output: JSON, or the report.
-    pub fn deliver<R: Written + Reported>(
+    pub fn write_and_deliver<R: WrittenResult + ReportedResult>(
         &self,
         result: &R,
         success: bool,
-    ) -> Result<Delivered, Refusal> {
-        self.deliver_written(result, success, result, [self.write(result)])
+    ) -> Result<DeliveredResult, Refusal> {
+        self.deliver_written(result, success, result, [self.write_files(result)])
     }
 
     /// Returns the output of a result, JSON or a report, with files that are written as they
     /// are listed, up to one that cannot be: the result is output in either case.
-    pub fn deliver_written<R: Written>(
+    pub fn deliver_written<R: WrittenResult>(
         &self,
         result: &R,
         success: bool,
-        report: &impl Reported,
-        written: impl IntoIterator<Item = Listed>,
-    ) -> Result<Delivered, Refusal> {
+        report: &impl ReportedResult,
+        written: impl IntoIterator<Item = FileLines>,
+    ) -> Result<DeliveredResult, Refusal> {
         let (mut files, mut written) = (Vec::new(), written.into_iter());
         let error = written.try_for_each(|list| list.map(|list| files.extend(list)));
         let error = error.err().map(|error| error.to_string());
         let mut json = Vec::new();
-        if self.json || !self.single {
-            let mut document = self.document(result);
+        if self.json || !self.is_only_scenario {
+            let mut document = self.result_document(result);
             if let Some(error) = &error {
-                document.refused = Some(Refused::new(error, Status::Refused as i32));
+                document.refused = Some(RefusalDocument::new(error, ExitStatus::Refused as i32));
             }
             report::write_json(&document, &mut json)?;
         }
@@ -526,10 +546,10 @@ impl Job {
             true => String::new(),
             false => report.report(&self.scenario.units, files, self.verbose),
         };
-        Ok(Delivered {
+        Ok(DeliveredResult {
             status: match self.is_interrupted() {
-                true => Status::Interrupted,
-                false => Status::of(success),
+                true => ExitStatus::Interrupted,
+                false => ExitStatus::from_success(success),
             },
             report,
             json,
@@ -548,7 +568,7 @@ mod tests {
     #[derive(Parser)]
     struct Verb {
         #[command(flatten)]
-        request: Request,
+        request: ScenarioArguments,
     }
 
     /// Whichever of several scenarios ends in a panic, the table has a row for each.
@@ -567,15 +587,18 @@ mod tests {
             }
             let verb = Verb::try_parse_from(arguments).unwrap();
             let traits = VerbTraits {
-                parallel,
+                runs_in_parallel: parallel,
                 ..VerbTraits::default()
             };
-            let run = |job: &Job| match &*job.scenario.name {
+            let run = |job: &ScenarioJob| match &*job.scenario.name {
                 "first" => panic!("index {} out of bounds", 43),
-                _ => job.deliver(&job.scenario.relax()?, true),
+                _ => job.write_and_deliver(&job.scenario.relax()?, true),
             };
-            let status = verb.request.each::<Equilibrium>(traits, run).unwrap();
-            assert_eq!(status, Status::Refused);
+            let status = verb
+                .request
+                .run_each_scenario::<Equilibrium>(traits, run)
+                .unwrap();
+            assert_eq!(status, ExitStatus::Refused);
             let table = fs::read_to_string(out.join("table.csv")).unwrap();
             let rows: Vec<&str> = table.lines().skip(1).collect();
             assert_eq!(rows.len(), names.len(), "{table}");

@@ -1,29 +1,31 @@
 //! `leafdyn simulate`: follows the motion of a leaf.
 
-use crate::files::Recording;
-use crate::report::numbers::brief;
-use crate::verbs::progress::{ProgressLine, duration, fraction_between};
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
-use crate::verbs::{Interrupted, Refusal, Status, note};
+use crate::files::MotionRecording;
+use crate::report::numbers::format_five_digits;
+use crate::verbs::progress::{ProgressLine, format_duration, range_fraction};
+use crate::verbs::request::{
+    DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
+};
+use crate::verbs::{ExitStatus, InterruptedRun, Refusal, print_note};
 use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
 
 /// Longer simulations, in seconds, are announced with their expected duration, and longer runs on
 /// finer grids.
-const ANNOUNCED: f64 = 60.0;
+const ANNOUNCED_SECONDS: f64 = 60.0;
 
-const FINER_ANNOUNCED: f64 = 5.0;
+const FINER_GRID_ANNOUNCED_SECONDS: f64 = 5.0;
 
 /// Larger recordings, in bytes, are announced with their expected size.
-const LARGE: u64 = 1_000_000_000;
+const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
 /// What is told of an option that is gone.
 const RESUME: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
                       none is continued; leave it out to simulate from the beginning";
 
 /// What is told where no output but the first was made.
-const NOT_MOVED: Interrupted = Interrupted("no output was made");
+const NOT_MOVED: InterruptedRun = InterruptedRun("no output was made");
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -32,12 +34,12 @@ const NOT_MOVED: Interrupted = Interrupted("no output was made");
 /// 2 the request was refused; 130 stopped by Ctrl-C (the files are whole, up
 /// to the last output).
 #[derive(Debug, Args)]
-pub struct Simulate {
+pub struct SimulateArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// How the leaf is moved; left out: in the way that costs less, as the report says
-    #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(Scheme::word)))]
+    #[arg(long, value_name = "NAME", value_parser = word_parser::<Scheme>(Scheme::ALL.map(Scheme::word)))]
     method: Option<Scheme>,
 
     /// N segments a rod; left out: 16, or as many as the rest shape needs, and doubled until the tips are as accurate as the tolerance, within some 10 s
@@ -53,20 +55,21 @@ pub struct Simulate {
     resume: bool,
 }
 
-impl Simulate {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl SimulateArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
-            stations: true,
-            partial: true,
+            has_station_choice: true,
+            keeps_partial_result: true,
             ..VerbTraits::default()
         };
         if self.resume {
             return Err(RESUME.into());
         }
-        self.request.each::<Record>(traits, |job| self.one(job))
+        self.request
+            .run_each_scenario::<Record>(traits, |job| self.run_scenario(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let options = Options {
             scheme: self.method,
             segments: self.segments,
@@ -78,21 +81,21 @@ impl Simulate {
             Err(_) if job.is_interrupted() => return Err(NOT_MOVED.into()),
             motion => motion?,
         };
-        announce(&motion, job, ANNOUNCED);
-        let mut line = job.progress();
+        announce_duration(&motion, job, ANNOUNCED_SECONDS);
+        let mut line = job.progress_line();
         let mut last = None;
         while let Some(run) = motion.next_run(&mut |run| {
             show_progress(&mut line, run);
             true
         }) {
-            let (simulation, recording, stopped) = self.record(run, &mut line, job)?;
+            let (simulation, recording, stopped) = self.run_and_record(run, &mut line, job)?;
             if job.is_interrupted() && (last.is_some() || simulation.frames().1 == 0) {
                 // A run on a coarser grid is whole.
                 break;
             }
             let (simulation, _, stopped) = last.insert((simulation, recording, stopped));
             motion.end_run(simulation, *stopped);
-            announce(&motion, job, FINER_ANNOUNCED);
+            announce_duration(&motion, job, FINER_GRID_ANNOUNCED_SECONDS);
         }
         drop(line);
         match last {
@@ -105,25 +108,25 @@ impl Simulate {
     }
 
     /// Runs a simulation to its end, or until it stops early, and records it.
-    fn record(
+    fn run_and_record(
         &self,
         mut simulation: Simulation,
         line: &mut ProgressLine,
-        job: &Job,
-    ) -> Result<(Simulation, Recording, Option<Stopped>), Refusal> {
+        job: &ScenarioJob,
+    ) -> Result<(Simulation, MotionRecording, Option<Stopped>), Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
-        let mut recording = Recording::begin(folder, &mut simulation, selection)?;
+        let mut recording = MotionRecording::begin(folder, &mut simulation, selection)?;
         let bytes = recording.expected_bytes(&simulation);
-        if bytes > LARGE {
-            let (name, size) = (&job.scenario.name, memory::size(bytes));
-            note(&format!("{name}: some {size} to record"));
+        if bytes > ANNOUNCED_BYTES {
+            let (name, size) = (&job.scenario.name, memory::format_bytes(bytes));
+            print_note(&format!("{name}: some {size} to record"));
         }
         let mut stopped = None;
         while stopped.is_none() && !simulation.done() {
             match simulation.next_frame() {
                 Err(why) => stopped = Some(why),
                 Ok(frame) => {
-                    recording.add(&simulation, &frame)?;
+                    recording.add_output(&simulation, &frame)?;
                     show_progress(line, &simulation);
                 }
             }
@@ -134,16 +137,16 @@ impl Simulate {
     fn deliver(
         &self,
         simulation: &Simulation,
-        recording: &mut Recording,
+        recording: &mut MotionRecording,
         stopped: Option<Stopped>,
-        job: &Job,
-    ) -> Result<Delivered, Refusal> {
-        let record = recording.record(simulation, stopped)?;
-        job.remark(record.remark());
+        job: &ScenarioJob,
+    ) -> Result<DeliveredResult, Refusal> {
+        let record = recording.finished_record(simulation, stopped)?;
+        job.print_remark(record.remark());
         for doubt in &record.doubts {
-            job.remark(Some(doubt));
+            job.print_remark(Some(doubt));
         }
-        let written = recording.finish(&job.document(&record));
+        let written = recording.finish(&job.result_document(&record));
         let written = written.map(|files| job.list_files(&files));
         let written = [written.map_err(Refusal::from)];
         job.deliver_written(&record, stopped.is_none(), &record, written)
@@ -151,13 +154,17 @@ impl Simulate {
 }
 
 /// Says what the next run takes, if it takes more than so many seconds.
-fn announce(motion: &Refinement, job: &Job, seconds: f64) {
+fn announce_duration(motion: &Refinement, job: &ScenarioJob, seconds: f64) {
     if let Some((steps, expected)) = motion.expected()
         && expected > seconds
     {
-        let (name, segments, steps) = (&job.scenario.name, motion.segments(), brief(steps));
-        let time = duration(expected);
-        note(&format!(
+        let (name, segments, steps) = (
+            &job.scenario.name,
+            motion.segments(),
+            format_five_digits(steps),
+        );
+        let time = format_duration(expected);
+        print_note(&format!(
             "{name}: {steps} steps to make on {segments} segments a vein, some {time}"
         ));
     }
@@ -172,9 +179,9 @@ fn show_progress(line: &mut ProgressLine, simulation: &Simulation) {
     if simulation.frames().1 == 1 {
         line.next_phase();
     }
-    line.update(fraction_between(0.0, time, duration, false), || {
+    line.update(range_fraction(0.0, time, duration, false), || {
         let segments = simulation.segments();
-        let [time, duration] = [time, duration].map(brief);
+        let [time, duration] = [time, duration].map(format_five_digits);
         format!("t = {time} of {duration}, {segments} segments a vein")
     });
 }

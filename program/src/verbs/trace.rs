@@ -1,14 +1,16 @@
 //! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
-use crate::report::numbers::brief;
-use crate::verbs::progress::fraction_between;
-use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
-use crate::verbs::{Interrupted, Refusal, Status};
+use crate::report::numbers::format_five_digits;
+use crate::verbs::progress::range_fraction;
+use crate::verbs::request::{
+    DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
+};
+use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::study;
 use leafdyn::study::{
-    Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, TraceShow,
-    TraceUntil, Vary,
+    BoundaryRequest, MOST_POINTS, ParameterSweep, StabilityBoundary, Trace as Traced, TraceError,
+    TraceRequest, TraceShow, TraceUntil,
 };
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.
@@ -17,20 +19,20 @@ use leafdyn::study::{
 /// circle, or to where --until ends them; 1 not (the files are still written and say how far); 2 the request
 /// was refused.
 #[derive(Debug, Args)]
-pub struct Trace {
+pub struct TraceArguments {
     #[command(flatten)]
-    request: Request,
+    request: ScenarioArguments,
 
     /// What varies, once or twice: a number of the scenario as in --set, an entry of a list counted from 0 (load.gravity[2]); several keys that vary together are joined by +; COUNT values set the longest step
     #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", required = true)]
-    vary: Vec<Vary>,
+    vary: Vec<ParameterSweep>,
 
     /// Also follow the branches that cross
     #[arg(long)]
     switch: bool,
 
     /// What ends a branch before the end of the range: the loss of its stability (where it is unstable from its beginning: of one more direction)
-    #[arg(long, value_name = "WHAT", value_parser = words::<TraceUntil>([TraceUntil::Unstable.word()]))]
+    #[arg(long, value_name = "WHAT", value_parser = word_parser::<TraceUntil>([TraceUntil::Unstable.word()]))]
     until: Option<TraceUntil>,
 
     /// Go to the first equilibrium by Newton's method, stable or not
@@ -50,29 +52,31 @@ pub struct Trace {
     show: Vec<TraceShow>,
 
     /// Of a boundary also a coarse map under the curves: the index in so many cells along both numbers, each reached from one beside it
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = cells)]
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_cell_counts)]
     map: Option<[usize; 2]>,
 }
 
-impl Trace {
-    pub fn run(self) -> Result<Status, Refusal> {
+impl TraceArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
-            varies: true,
-            puts: Some("--vary"),
-            partial: true,
+            varies_numbers: true,
+            value_option: Some("--vary"),
+            keeps_partial_result: true,
             ..VerbTraits::default()
         };
         match self.vary.as_slice() {
             [_] if self.map.is_some() => {
                 Err("--map: a map is drawn over two numbers; give --vary twice".into())
             }
-            [along] => (self.request).each::<Traced>(traits, |job| self.one(job, along)),
+            [along] => (self.request)
+                .run_each_scenario::<Traced>(traits, |job| self.trace_scenario(job, along)),
             [_, _] if !self.show.is_empty() => {
                 Err("--show: a boundary is drawn over both numbers; give one --vary".into())
             }
-            [along, across] => {
-                (self.request).each::<Boundary>(traits, |job| self.boundary(job, along, across))
-            }
+            [along, across] => (self.request)
+                .run_each_scenario::<StabilityBoundary>(traits, |job| {
+                    self.trace_boundary(job, along, across)
+                }),
             more => Err(format!(
                 "--vary is given {} times: give one number to follow branches, two for a boundary",
                 more.len()
@@ -81,7 +85,7 @@ impl Trace {
         }
     }
 
-    fn trace_request(&self, job: &Job, vary: &Vary) -> TraceRequest {
+    fn trace_request(&self, job: &ScenarioJob, vary: &ParameterSweep) -> TraceRequest {
         TraceRequest {
             base: job.base.clone(),
             vary: vary.clone(),
@@ -95,49 +99,59 @@ impl Trace {
         }
     }
 
-    fn boundary(&self, job: &Job, along: &Vary, across: &Vary) -> Result<Delivered, Refusal> {
+    fn trace_boundary(
+        &self,
+        job: &ScenarioJob,
+        along: &ParameterSweep,
+        across: &ParameterSweep,
+    ) -> Result<DeliveredResult, Refusal> {
         let request = BoundaryRequest {
             trace: self.trace_request(job, along),
             across: across.clone(),
             map: self.map,
         };
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let mut seen = (usize::MAX, [0.0; 2]);
-        let boundary = study::boundary(&request, &mut |curve, points, [first, second]| {
-            // A curve is followed to both ends of the second number's range.
-            let fraction = match curve {
-                None => fraction_between(along.ends()[0], first, along.ends()[1], along.log),
-                Some(number) => {
-                    if number != seen.0 {
-                        seen = (number, [second; 2]);
-                        line.next_phase();
+        let boundary =
+            study::trace_stability_boundary(&request, &mut |curve, points, [first, second]| {
+                // A curve is followed to both ends of the second number's range.
+                let fraction = match curve {
+                    None => range_fraction(along.ends()[0], first, along.ends()[1], along.log),
+                    Some(number) => {
+                        if number != seen.0 {
+                            seen = (number, [second; 2]);
+                            line.next_phase();
+                        }
+                        seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
+                        let [from, to] = across.ends();
+                        let [low, high] = seen.1.map(|at| range_fraction(from, at, to, across.log));
+                        low.zip(high).map(|(low, high)| (high - low).abs())
                     }
-                    seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
-                    let [from, to] = across.ends();
-                    let [low, high] = seen.1.map(|at| fraction_between(from, at, to, across.log));
-                    low.zip(high).map(|(low, high)| (high - low).abs())
-                }
-            };
-            line.update(fraction, || {
-                let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
-                let [first, second] = [first, second].map(brief);
-                format!("{what}, {points} points, at {first}, {second}")
-            });
-        })
-        .map_err(name_option)?;
+                };
+                line.update(fraction, || {
+                    let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
+                    let [first, second] = [first, second].map(format_five_digits);
+                    format!("{what}, {points} points, at {first}, {second}")
+                });
+            })
+            .map_err(refusal_with_option)?;
         drop(line);
         if job.is_interrupted() && boundary.curves.is_empty() {
-            return Err(Interrupted("no curve was found").into());
+            return Err(InterruptedRun("no curve was found").into());
         }
-        job.remark(boundary.remark.as_ref());
+        job.print_remark(boundary.remark.as_ref());
         boundary
             .doubts
             .iter()
-            .for_each(|doubt| job.remark(Some(doubt)));
-        job.deliver(&boundary, boundary.complete)
+            .for_each(|doubt| job.print_remark(Some(doubt)));
+        job.write_and_deliver(&boundary, boundary.complete)
     }
 
-    fn one(&self, job: &Job, vary: &Vary) -> Result<Delivered, Refusal> {
+    fn trace_scenario(
+        &self,
+        job: &ScenarioJob,
+        vary: &ParameterSweep,
+    ) -> Result<DeliveredResult, Refusal> {
         let request = self.trace_request(job, vary);
         let scenario = request.base.scenario();
         for show in &self.show {
@@ -152,7 +166,7 @@ impl Trace {
             };
             return Err(format!("--show {show}: {why}").into());
         }
-        let mut line = job.progress();
+        let mut line = job.progress_line();
         let mut seen = (0, vary.ends()[0]);
         let mut trace = study::trace(&request, &mut |branch, points, value| {
             if branch != seen.0 {
@@ -163,28 +177,28 @@ impl Trace {
             let [from, to] = vary.ends();
             let backwards = (value - seen.1) * (to - from) < 0.0;
             let to = if backwards { from } else { to };
-            line.update(fraction_between(seen.1, value, to, vary.log), || {
-                let at = brief(value);
+            line.update(range_fraction(seen.1, value, to, vary.log), || {
+                let at = format_five_digits(value);
                 format!("branch {}, {points} points, at {at}", branch + 1)
             });
         })
-        .map_err(name_option)?;
+        .map_err(refusal_with_option)?;
         drop(line);
         if job.is_interrupted() && trace.branches.iter().all(|branch| branch.points.is_empty()) {
-            return Err(Interrupted("no point was found").into());
+            return Err(InterruptedRun("no point was found").into());
         }
         trace.show.clone_from(&self.show);
-        job.remark(trace.remark.as_ref());
+        job.print_remark(trace.remark.as_ref());
         trace
             .doubts
             .iter()
-            .for_each(|doubt| job.remark(Some(doubt)));
-        job.deliver(&trace, trace.complete)
+            .for_each(|doubt| job.print_remark(Some(doubt)));
+        job.write_and_deliver(&trace, trace.complete)
     }
 }
 
 /// Parses the numbers of cells along both axes, as in 16x16.
-fn cells(given: &str) -> Result<[usize; 2], String> {
+fn parse_cell_counts(given: &str) -> Result<[usize; 2], String> {
     let sides = given.split_once('x').map(|(columns, rows)| [columns, rows]);
     let sides = sides.map(|sides| sides.map(|side| side.trim().parse().ok()));
     match sides {
@@ -194,7 +208,7 @@ fn cells(given: &str) -> Result<[usize; 2], String> {
 }
 
 /// An error together with the option that caused it.
-fn name_option(error: TraceError) -> Refusal {
+fn refusal_with_option(error: TraceError) -> Refusal {
     match error {
         TraceError::Vary { .. } => format!("--vary {error}").into(),
         error => error.into(),

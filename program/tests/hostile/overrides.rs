@@ -1,7 +1,7 @@
 //! Entries replaced on the command line: what is taken, and that refusals say where
 //! it was typed.
 
-use leafdyn::scenario::{Key, Place};
+use leafdyn::scenario::{Key, SourceLocation};
 use leafdyn_testing::valid::{VALID, all_refused, holds, with};
 use leafdyn_testing::*;
 
@@ -60,11 +60,11 @@ fn refused_overrides_say_that_they_are_overrides() {
 fn errors_carry_values() {
     let error = with(&["leaf.rods=4"]).unwrap_err();
     let (file, line) = ("leaf.toml".into(), Some(10));
-    assert_eq!(error.place, Place::File { file, line });
+    assert_eq!(error.place, SourceLocation::File { file, line });
     assert_eq!(error.key.map(Key::path), Some("stiffness.bending_2"));
     let given = "leaf.rods=0".to_string();
     let error = with(&[&given]).unwrap_err();
-    assert_eq!(error.place, Place::Set { given });
+    assert_eq!(error.place, SourceLocation::Set { given });
     let both = format!("{}: {}", error.place, error.problem);
     assert_eq!(error.to_string(), both);
 }

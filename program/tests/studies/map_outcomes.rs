@@ -1,7 +1,9 @@
 //! A few cells of the maps in docs/where-methods-fail.md, failures included: if
 //! a method comes to do better there, the page has to be written anew.
 
-use leafdyn::study::{Base, Confidence, MapMethod, MapOutcome, MapRequest, MapRow};
+use leafdyn::study::{
+    BaseScenario, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
+};
 use leafdyn_testing::*;
 
 use MapOutcome::{Diverged, NotConverged, OtherEquilibrium, OutOfTime, Right, Saddle};
@@ -23,7 +25,7 @@ fn cell(
     methods: &[MapMethod],
     seconds: f64,
 ) -> Vec<MapRow> {
-    let base = Base::read(&path(&format!("paper/{figure}")), &entries(set)).unwrap();
+    let base = BaseScenario::read(&path(&format!("paper/{figure}")), &entries(set)).unwrap();
     let axis = |(key, value): &(&str, &str)| format!("{key}={value}..{value}:1");
     let axes = values.iter().map(|of| axis(of).parse().unwrap()).collect();
     let request = MapRequest::new(base, axes, Some(methods.to_vec()), None, seconds).unwrap();
@@ -62,7 +64,7 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
         let rows = cell("fig04", set, &values, &[EXPLICIT_MOTION], LONG);
         expect(&rows, &[outcome]);
         assert!(rows[0].detail.contains(says), "{}", rows[0].detail);
-        assert_eq!(rows[0].reference, Confidence::Confirmed);
+        assert_eq!(rows[0].reference, ReferenceConfidence::Confirmed);
     }
 }
 

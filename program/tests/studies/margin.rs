@@ -3,7 +3,7 @@
 //! symmetric bifurcations, where coarse grids bear more, the energy vanishes like the square
 //! of the distance.
 
-use leafdyn::relax::{Barrier, Fate, Loss, Margin, Push};
+use leafdyn::relax::{Barrier, CriticalTipForce, InstabilityKind, Margin, PostcriticalBehavior};
 use leafdyn::study::relax_with_margin;
 use leafdyn_testing::branch::follow;
 use leafdyn_testing::workplace::{Json, Workplace, timeless};
@@ -26,7 +26,7 @@ fn margin(scenario: &Scenario) -> Margin {
     found(scenario).1
 }
 
-fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
+fn push<'m>(margin: &'m Margin, direction: &str) -> &'m CriticalTipForce {
     let mut pushes = margin.pushes.iter();
     let found = pushes.find(|push| push.direction.to_string() == direction);
     found.unwrap_or_else(|| panic!("{direction}: {margin:?}"))
@@ -34,7 +34,7 @@ fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
 
 /// The force of a push, which must be right within its error bar.
 #[track_caller]
-fn is_at(push: &Push, right: f64) {
+fn is_at(push: &CriticalTipForce, right: f64) {
     let (force, error) = (push.force.unwrap(), push.error.unwrap());
     close(&format!("{push:?}"), force, right, error.max(1e-11));
     assert!(error < 1e-5 * right, "{push:?}");
@@ -67,7 +67,13 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
         let down = push(&margin, "-x");
         is_at(down, right);
         let lost = (down.kind, down.then);
-        assert_eq!(lost, (Loss::BranchPoint, Some(Fate::BendsAside)));
+        assert_eq!(
+            lost,
+            (
+                InstabilityKind::BranchPoint,
+                Some(PostcriticalBehavior::BendsAside)
+            )
+        );
         // The least comes first.
         assert_eq!(margin.pushes[0].direction, down.direction);
     }
@@ -107,7 +113,10 @@ fn a_buckled_column_snaps_as_the_elastica() {
     let (leaf, margin) = found(&column);
     let least = &margin.pushes[0];
     is_at(least, MOST);
-    assert_eq!((least.kind, least.then), (Loss::Fold, Some(Fate::Snaps)));
+    assert_eq!(
+        (least.kind, least.then),
+        (InstabilityKind::Fold, Some(PostcriticalBehavior::Snaps))
+    );
     let back = if leaf.tips[0].y > 0.0 { "-y" } else { "+y" };
     assert_eq!(least.direction.to_string(), back);
 
@@ -174,7 +183,7 @@ fn the_barrier_of_a_clamped_arch_vanishes_at_its_fold() {
         set_stiffness(1e4, f64::INFINITY)
     );
     let trace = follow(ROD, &arch, "load.gravity[1]=0..-40", false);
-    let fold = -trace.branches[0].critical().next().unwrap().1.value;
+    let fold = -trace.branches[0].critical_points().next().unwrap().1.value;
     vanish_as_at_a_fold(PARTS.map(|part| {
         let load = format!("load.gravity=[0, {:?}, 0]", (part - 1.0) * fold);
         let (leaf, margin) = found(&rod(&format!("{arch}; {load}")));
@@ -219,7 +228,7 @@ fn below_its_load_a_column_gives_way_at_what_is_left_of_it() {
         let least = &found.pushes[0];
         let (force, error) = (least.force.unwrap(), least.error.unwrap());
         assert_eq!(least.direction.to_string(), "-x");
-        assert_eq!(least.kind, Loss::BranchPoint);
+        assert_eq!(least.kind, InstabilityKind::BranchPoint);
         close(&format!("{part}"), force, part * EULER, error);
         assert!(error < 1e-4 * force, "{part}: {force} within {error}");
         assert!(found.barrier.is_none(), "{found:?}");
@@ -354,6 +363,6 @@ fn a_column_within_a_millionth_of_its_load_has_a_margin() {
     assert!(error < 0.5 * right, "{down:?}");
     for direction in ["+y", "-y", "+z", "-z"] {
         let across = push(&margin, direction);
-        assert_eq!(across.kind, Loss::NoneUpTo, "{across:?}");
+        assert_eq!(across.kind, InstabilityKind::NoneUpTo, "{across:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! `simulate` takes the method that costs less, whose steps it knows or estimates beforehand, unless
 //! one is requested or only one can move the leaf; and it says which and why.
 
-use leafdyn::simulate::{Choice, Options, Reason, Simulation};
+use leafdyn::simulate::{Choice, Options, SchemeReason, Simulation};
 use leafdyn_testing::motion::{SLENDER_VEINS, Scheme, moving, run};
 use leafdyn_testing::workplace::{Json, Workplace, contains};
 use leafdyn_testing::*;
@@ -78,7 +78,7 @@ fn the_cheaper_method_is_taken() {
         let choice = by_default(&leaf);
         assert_eq!(
             (choice.scheme, choice.reason),
-            (scheme, Reason::Cost),
+            (scheme, SchemeReason::Cost),
             "{name}"
         );
         let [explicit, semi_implicit] = choice.costs.unwrap();
@@ -122,23 +122,23 @@ fn what_decides_before_costs() {
             "",
             moving(Scheme::SemiImplicit, None),
             Scheme::SemiImplicit,
-            Reason::Requested,
+            SchemeReason::Requested,
         ),
         (
             "",
             moving(Scheme::Explicit, None),
             Scheme::Explicit,
-            Reason::Requested,
+            SchemeReason::Requested,
         ),
         (
             "stiffness.axial=inf",
             default(),
             Scheme::SemiImplicit,
-            Reason::RigidRods,
+            SchemeReason::RigidRods,
         ),
-        (free, default(), Scheme::Explicit, Reason::FreeBase),
-        (pulse, default(), Scheme::Explicit, Reason::ShortPulse),
-        ("", step(1e-3), Scheme::Explicit, Reason::GivenStep),
+        (free, default(), Scheme::Explicit, SchemeReason::FreeBase),
+        (pulse, default(), Scheme::Explicit, SchemeReason::ShortPulse),
+        ("", step(1e-3), Scheme::Explicit, SchemeReason::GivenStep),
     ] {
         let choice = chosen(&leaf(overrides), &options);
         let expected = Choice {

@@ -37,19 +37,25 @@ mod continuation;
 mod refine;
 mod singular_point;
 
-pub use crate::branch::boundary::continuation::{Boundary, Special, WalkOptions, follow};
-pub use crate::branch::boundary::refine::{Accuracy, Verified};
-pub(crate) use crate::branch::boundary::singular_point::Direction;
-use crate::branch::boundary::singular_point::{Manifold, SingularPoint};
-pub use crate::branch::boundary::singular_point::{Plane, Seed, Solution};
-use crate::branch::continuation::{End, Walk, walk};
-use crate::branch::critical::{Critical, Kind};
-use crate::branch::equations::{Equations, Stuck};
-use crate::branch::refine::{Doubt, Refined, index_at, on_finer, refine_critical};
-use crate::branch::{Point, every_second, prolong_field};
-use crate::leaf::{Field, Grid, State};
+pub use crate::branch::boundary::continuation::{
+    BoundaryContinuationOptions, CodimensionTwoKind, ContinuedBoundary, follow_boundary,
+};
+pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
+pub(crate) use crate::branch::boundary::singular_point::TwoParameterDirection;
+pub use crate::branch::boundary::singular_point::{
+    BoundarySeed, TwoParameterProblem, TwoParameterState,
+};
+use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
+use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
+use crate::branch::critical::{CriticalKind, CriticalPoint};
+use crate::branch::equations::{BranchEquations, CorrectorFailure};
+use crate::branch::refine::{
+    ExtrapolatedPoint, VerificationFailure, index_at, on_finer, refine_critical,
+};
+use crate::branch::{EquilibriumPoint, prolong_field, restrict_field};
+use crate::leaf::{Grid, NodalField, State};
 use crate::relax::accuracy::transfer::{prolong, restrict};
-use crate::relax::solve_on_grid::settle_from;
+use crate::relax::solve_on_grid::relax_from_state;
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use glam::DVec3;
@@ -58,46 +64,49 @@ use std::ops::RangeInclusive;
 /// The longest step, as a part of the path, and the largest number of points on it.
 const LONGEST: f64 = 1.0;
 
-const MOST: usize = 100;
+const MAX_PATH_POINTS: usize = 100;
 
 /// The finest grid for repeating a path, in segments.
-const FINEST: usize = 1024;
+const FINEST_PATH_GRID: usize = 1024;
 
 /// Segments of the coarsest grid for counting an index again.
-const RECOUNTED: usize = 256;
+const COARSEST_INDEX_GRID: usize = 256;
 
 /// Least number of grids for a critical point.
 const CRITICAL_GRIDS: usize = 4;
 
 /// An equilibrium at a point of the parameter plane.
 #[derive(Clone, Debug)]
-pub struct AtRest {
+pub struct ConfirmedEquilibrium {
     /// State and parameters on a grid, and that grid.
-    pub solution: Solution,
+    pub solution: TwoParameterState,
     pub grid: Grid,
     /// Morse index, confirmed on finer grids.
     pub index: usize,
 }
 
 /// What was found on the straight path from an equilibrium to another point of the plane.
-pub struct Path {
+pub struct ParameterPath {
     /// The grid on which it was followed.
     pub grid: Grid,
     /// Tips of all rods along it, in the family's units.
     pub tips: Vec<Vec<DVec3>>,
     /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
-    pub critical: Vec<Critical>,
+    pub critical: Vec<CriticalPoint>,
     /// Whether the branch turns back before the end of the path.
     turned: bool,
     /// The equilibrium at the end; none if the branch turns back before, or is lost.
-    pub end: Option<AtRest>,
+    pub end: Option<ConfirmedEquilibrium>,
     pub factorizations: usize,
 }
 
 /// The scenarios on the straight path between two points of the plane.
-type Between<'p> = dyn Fn([f64; 1]) -> Result<Scenario, String> + Sync + 'p;
+type PathScenarios<'p> = dyn Fn([f64; 1]) -> Result<Scenario, String> + Sync + 'p;
 
-fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> {
+fn scenarios_on_path<'p>(
+    plane: &'p TwoParameterProblem,
+    [from, to]: [[f64; 2]; 2],
+) -> Box<PathScenarios<'p>> {
     Box::new(move |[part]: [f64; 1]| {
         let at = |i: usize| match part {
             1.0 => to[i],
@@ -111,10 +120,14 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 /// plane, by arclength, unless it turns back. The equilibrium at the end is accepted if three
 /// finer grids in a row have it with the same index. If they do not, or this is not the index
 /// on the grid of the path, that grid is too coarse, and a finer one is tried.
-pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
-    let make = between(plane, [from.solution.params, to]);
+pub fn follow_path(
+    plane: &TwoParameterProblem,
+    from: &ConfirmedEquilibrium,
+    to: [f64; 2],
+) -> ParameterPath {
+    let make = scenarios_on_path(plane, [from.solution.params, to]);
     let family = plane.along_path(&*make);
-    let mut path = Path {
+    let mut path = ParameterPath {
         grid: from.grid.clone(),
         tips: Vec::new(),
         critical: Vec::new(),
@@ -123,7 +136,7 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
         factorizations: 0,
     };
     let Ok(family) = family else { return path };
-    let mut equations = Equations::new(&family, from.grid.clone());
+    let mut equations = BranchEquations::new(&family, from.grid.clone());
     let Ok(mut first) = equations.correct(&from.solution.state, 0.0, None) else {
         return path;
     };
@@ -132,12 +145,12 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
         let index = last
             .as_ref()
             .and_then(|it| index_at(&mut equations, it).ok());
-        let finer = 2 * first.state.segments() <= FINEST;
+        let finer = 2 * first.state.segments() <= FINEST_PATH_GRID;
         if let (Some(last), Some(index)) = (last, index)
             && (index == last.index || !finer)
         {
-            path.end = Some(AtRest {
-                solution: Solution {
+            path.end = Some(ConfirmedEquilibrium {
+                solution: TwoParameterState {
                     state: last.state,
                     params: to,
                 },
@@ -155,63 +168,72 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
 
 /// The index of an equilibrium counted again, on fine grids alone; none if they do not have
 /// it, or do not agree.
-pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
-    let make = between(plane, [at.solution.params; 2]);
+pub fn recount_index(plane: &TwoParameterProblem, at: &ConfirmedEquilibrium) -> Option<usize> {
+    let make = scenarios_on_path(plane, [at.solution.params; 2]);
     let family = plane.along_path(&*make).ok()?;
-    let mut equations = Equations::new(&family, at.grid.clone());
+    let mut equations = BranchEquations::new(&family, at.grid.clone());
     let mut point = equations.correct(&at.solution.state, 0.0, None).ok()?;
-    while point.state.segments() < RECOUNTED {
+    while point.state.segments() < COARSEST_INDEX_GRID {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }
     index_at(&mut equations, &point).ok()
 }
 
 /// The point at the end of the path on this grid, if the branch reaches it.
-fn follow_on_grid(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<Point> {
+fn follow_on_grid(
+    equations: &mut BranchEquations,
+    first: &EquilibriumPoint,
+    path: &mut ParameterPath,
+) -> Option<EquilibriumPoint> {
     let mut first = first.clone();
-    first.tangent = first.tangent.growing();
-    let turned = |points: &[Point]| points[points.len() - 1].tangent.params[0] < 0.0;
-    let how = Walk {
-        enough: Some(&turned),
-        ..Walk::new(LONGEST, MOST)
+    first.tangent = first.tangent.towards_larger_parameter();
+    let turned = |points: &[EquilibriumPoint]| points[points.len() - 1].tangent.params[0] < 0.0;
+    let how = ContinuationOptions {
+        stop_criterion: Some(&turned),
+        ..ContinuationOptions::new(LONGEST, MAX_PATH_POINTS)
     };
     let before = equations.factorizations;
-    let branch = walk(equations, first, &how, &mut |_, _| {});
+    let branch = follow_branch(equations, first, &how, &mut |_, _| {});
     path.factorizations += equations.factorizations - before;
     path.grid.clone_from(equations.grid());
-    let tips = |point: &Point| point.state.tips().collect();
+    let tips = |point: &EquilibriumPoint| point.state.tips().collect();
     path.tips = branch.points.iter().map(tips).collect();
     path.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
-    path.turned = matches!(branch.end, Some(End::Enough | End::Returned));
+    path.turned = matches!(
+        branch.end,
+        Some(BranchEnd::StopCriterionMet | BranchEnd::RangeStartReached)
+    );
     match branch.end {
-        Some(End::Reached) if branch.missed.is_empty() => branch.points.last().cloned(),
+        Some(BranchEnd::RangeEndReached) if branch.unlocated_index_changes.is_empty() => {
+            branch.points.last().cloned()
+        }
         _ => None,
     }
 }
 
 /// A critical point on the path between two points of the plane, extrapolated over grids.
 pub fn refine_on_path(
-    plane: &Plane,
+    plane: &TwoParameterProblem,
     ends: [[f64; 2]; 2],
     grid: &Grid,
-    critical: &Critical,
+    critical: &CriticalPoint,
     accuracy: f64,
-) -> Result<Refined, Doubt> {
-    let make = between(plane, ends);
+) -> Result<ExtrapolatedPoint, VerificationFailure> {
+    let make = scenarios_on_path(plane, ends);
     let family = plane.along_path(&*make)?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }
 
 /// Distances from the boundary at which they are sought, in this order: arclengths on the
 /// solution manifold, or fractions of the ranges.
-const AWAY: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
+const NEIGHBOUR_DISTANCES: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 
 /// The finest grid used for pictures, in segments.
-const FINEST_DRAWN: usize = 64;
+const FINEST_PICTURE_GRID: usize = 64;
 
 /// A leaf next to a boundary.
-pub struct Neighbour {
-    pub solution: Solution,
+pub struct BoundaryNeighbour {
+    pub solution: TwoParameterState,
     pub index: usize,
     /// If it is where the leaf of the other, stable side comes to rest beyond the boundary, the
     /// initial state of that fall: the unstable equilibrium at a branch point, or the fold.
@@ -221,36 +243,53 @@ pub struct Neighbour {
 /// The leaves on both sides of a point of a boundary with this tangent `along` it in the
 /// parameter plane: equilibria, the one of smaller index first. If that is stable, the other is
 /// where it comes to rest beyond the boundary. None if one of them is not found.
-pub fn beside(plane: &Plane, point: &Verified, along: [f64; 2]) -> Option<[Neighbour; 2]> {
-    let (grid, point) = &for_pictures(plane, point);
+pub fn leaves_beside_boundary(
+    plane: &TwoParameterProblem,
+    point: &VerifiedBoundaryPoint,
+    along: [f64; 2],
+) -> Option<[BoundaryNeighbour; 2]> {
+    let (grid, point) = &point_on_picture_grid(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
     let at = |away: f64, indices: RangeInclusive<usize>| {
-        on_sheet(plane, grid, point, along, (away, &indices))
+        equilibrium_across_boundary(plane, grid, point, along, (away, &indices))
     };
-    let low = AWAY.iter().find_map(|away| at(-away, fewer..=fewer))?;
+    let low = NEIGHBOUR_DISTANCES
+        .iter()
+        .find_map(|away| at(-away, fewer..=fewer))?;
     let high = match (fewer, point.kind) {
-        (0, Kind::Branching) => {
+        (0, CriticalKind::Branching) => {
             // Another boundary may be close: take the equilibrium of least index.
-            let found = AWAY.iter().filter_map(|away| at(*away, more..=usize::MAX));
-            at_rest(plane, grid, found.min_by_key(|found| found.index)?.solution)?
+            let found = NEIGHBOUR_DISTANCES
+                .iter()
+                .filter_map(|away| at(*away, more..=usize::MAX));
+            relaxed_neighbour(plane, grid, found.min_by_key(|found| found.index)?.solution)?
         }
-        (0, Kind::Fold) => at_rest(plane, grid, beyond(point, &low.solution, along)?)?,
-        _ => AWAY.iter().find_map(|away| at(*away, more..=more))?,
+        (0, CriticalKind::Fold) => relaxed_neighbour(
+            plane,
+            grid,
+            initial_state_beyond_fold(point, &low.solution, along)?,
+        )?,
+        _ => NEIGHBOUR_DISTANCES
+            .iter()
+            .find_map(|away| at(*away, more..=more))?,
     };
     Some([low, high])
 }
 
 /// The point on the coarsest grid that pictures allow.
-fn for_pictures(plane: &Plane, point: &Verified) -> (Grid, Verified) {
-    let mut grid = Grid::through(&point.stations, plane.first().kinks());
+fn point_on_picture_grid(
+    plane: &TwoParameterProblem,
+    point: &VerifiedBoundaryPoint,
+) -> (Grid, VerifiedBoundaryPoint) {
+    let mut grid = Grid::from_stations(&point.stations, plane.first_leaf().kinks());
     let mut point = point.clone();
-    while grid.segments() > FINEST_DRAWN
+    while grid.segments() > FINEST_PICTURE_GRID
         && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
     {
-        point.across.increments = every_second(
+        point.across.increments = restrict_field(
             &point.across.increments,
-            usize::from(!plane.first().hinged()),
+            usize::from(!plane.first_leaf().hinged()),
         );
         (grid, point.state) = (coarse, state);
     }
@@ -258,60 +297,72 @@ fn for_pictures(plane: &Plane, point: &Verified) -> (Grid, Verified) {
 }
 
 /// The equilibrium at a distance across the boundary, if its index is one of these.
-fn on_sheet(
-    plane: &Plane,
+fn equilibrium_across_boundary(
+    plane: &TwoParameterProblem,
     grid: &Grid,
-    point: &Verified,
+    point: &VerifiedBoundaryPoint,
     along: [f64; 2],
     (away, indices): (f64, &RangeInclusive<usize>),
-) -> Option<Neighbour> {
-    let mut manifold = Manifold::new(plane, grid.clone());
-    let along = Direction {
+) -> Option<BoundaryNeighbour> {
+    let mut manifold = TwoParameterEquations::new(plane, grid.clone());
+    let along = TwoParameterDirection {
         params: along,
         ..manifold.unit_parameter(0)
     };
-    let start = Solution {
+    let start = TwoParameterState {
         state: point.state.clone(),
         params: point.params,
     };
-    let start = manifold.beside(&start, &point.across, away).ok()?;
-    let rates = manifold.rates(&start, false).ok()?;
+    let start = manifold
+        .displace_equilibrium(&start, &point.across, away)
+        .ok()?;
+    let rates = manifold.parameter_derivatives(&start, false).ok()?;
     let normals = [&along, &point.across];
-    let found = manifold.bordered(start, normals, &[], Some(&rates), false);
+    let found = manifold.correct_bordered(start, normals, &[], Some(&rates), false);
     let found = found.ok()?;
     let index = found.solved.negative;
-    (indices.contains(&index) && inside(found.solution.params)).then_some(Neighbour {
-        solution: found.solution,
-        index,
-        fallen_from: None,
-    })
+    (indices.contains(&index) && is_in_parameter_range(found.solution.params)).then_some(
+        BoundaryNeighbour {
+            solution: found.solution,
+            index,
+            fallen_from: None,
+        },
+    )
 }
 
 /// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with
 /// parameters on the side of the boundary opposite to the stable one.
-fn beyond(point: &Verified, stable: &Solution, along: [f64; 2]) -> Option<Solution> {
+fn initial_state_beyond_fold(
+    point: &VerifiedBoundaryPoint,
+    stable: &TwoParameterState,
+    along: [f64; 2],
+) -> Option<TwoParameterState> {
     let normal = [-along[1], along[0]];
     let off: f64 = (0..2)
         .map(|i| (stable.params[i] - point.params[i]) * normal[i])
         .sum();
     let length = along[0].hypot(along[1]).copysign(-off);
-    let mut away = AWAY.iter().map(|away| away / length);
+    let mut away = NEIGHBOUR_DISTANCES.iter().map(|away| away / length);
     let params = away.find_map(|away| {
         let params = [0, 1].map(|i| point.params[i] + away * normal[i]);
-        inside(params).then_some(params)
+        is_in_parameter_range(params).then_some(params)
     })?;
-    Some(Solution {
+    Some(TwoParameterState {
         state: point.state.clone(),
         params,
     })
 }
 
 /// The equilibrium to which a leaf relaxes.
-fn at_rest(plane: &Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
+fn relaxed_neighbour(
+    plane: &TwoParameterProblem,
+    grid: &Grid,
+    from: TwoParameterState,
+) -> Option<BoundaryNeighbour> {
     let leaf = plane.leaf(from.params).ok()?;
-    let state = settle_from(&leaf, grid, from.state.clone(), &Limit::default())?;
-    Some(Neighbour {
-        solution: Solution {
+    let state = relax_from_state(&leaf, grid, from.state.clone(), &Limit::default())?;
+    Some(BoundaryNeighbour {
+        solution: TwoParameterState {
             state,
             params: from.params,
         },
@@ -320,21 +371,21 @@ fn at_rest(plane: &Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
     })
 }
 
-fn inside(params: [f64; 2]) -> bool {
+fn is_in_parameter_range(params: [f64; 2]) -> bool {
     params.iter().all(|part| (0.0..=1.0).contains(part))
 }
 
 /// Segments of the coarsest.
-const COARSEST: usize = 8;
+const COARSEST_BOUNDARY_GRID: usize = 8;
 
 /// Initial guess for a boundary point on the grid with all segments halved, with its
 /// directions.
-pub fn manifold_on_finer<'a>(
-    manifold: &mut Manifold<'a>,
+pub fn boundary_point_on_finer<'a>(
+    manifold: &mut TwoParameterEquations<'a>,
     point: &SingularPoint,
-) -> Result<(Manifold<'a>, SingularPoint), Stuck> {
+) -> Result<(TwoParameterEquations<'a>, SingularPoint), CorrectorFailure> {
     let state = prolong(
-        manifold.leaves.at(point.solution.params)?,
+        manifold.leaves.leaf_at(point.solution.params)?,
         &point.solution.state,
     );
     let finer = manifold.refined();
@@ -342,22 +393,22 @@ pub fn manifold_on_finer<'a>(
         prolong_field(field, manifold.first_node())
     });
     let point = SingularPoint {
-        tangent: finer.normalised(point.tangent),
-        normal: finer.normalised(point.normal),
+        tangent: finer.normalize_direction(point.tangent),
+        normal: finer.normalize_direction(point.normal),
         ..point
     };
     Ok((finer, point))
 }
 
 /// Initial guess for the point on the grid with every second node.
-pub fn manifold_on_coarser(
-    plane: &Plane,
+pub fn boundary_point_on_coarser(
+    plane: &TwoParameterProblem,
     grid: &Grid,
     point: &SingularPoint,
 ) -> Option<(Grid, SingularPoint)> {
     let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
-    let first = usize::from(!plane.first().hinged());
-    let point = transferred(point, state, |field| every_second(field, first));
+    let first = usize::from(!plane.first_leaf().hinged());
+    let point = transferred(point, state, |field| restrict_field(field, first));
     Some((coarse, point))
 }
 
@@ -365,18 +416,18 @@ pub fn manifold_on_coarser(
 fn transferred(
     point: &SingularPoint,
     state: State,
-    field: impl Fn(&Field) -> Field,
+    field: impl Fn(&NodalField) -> NodalField,
 ) -> SingularPoint {
-    let direction = |it: &Direction| Direction {
+    let direction = |it: &TwoParameterDirection| TwoParameterDirection {
         increments: field(&it.increments),
         params: it.params,
     };
     SingularPoint {
-        solution: Solution {
+        solution: TwoParameterState {
             state,
             ..point.solution
         },
-        soft: point.soft.iter().map(&field).collect(),
+        border_modes: point.border_modes.iter().map(&field).collect(),
         tangent: direction(&point.tangent),
         normal: direction(&point.normal),
         ..point.clone()
@@ -385,12 +436,16 @@ fn transferred(
 
 /// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
 /// not its refinement.
-pub fn state_on_coarser(plane: &Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
+pub fn state_on_coarser(
+    plane: &TwoParameterProblem,
+    grid: &Grid,
+    state: &State,
+) -> Option<(Grid, State)> {
     let half = state.segments() / 2;
-    if half < COARSEST || 2 * half != state.segments() {
+    if half < COARSEST_BOUNDARY_GRID || 2 * half != state.segments() {
         return None;
     }
-    let coarse = coarsened(grid, half, plane.first().kinks());
+    let coarse = coarsened(grid, half, plane.first_leaf().kinks());
     (coarse.refined() == *grid).then(|| (coarse, restrict(state)))
 }
 
@@ -398,5 +453,5 @@ pub fn state_on_coarser(plane: &Plane, grid: &Grid, state: &State) -> Option<(Gr
 pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
     let stations = grid.sigma().iter().copied();
     let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
-    Grid::through(&stations, kinks)
+    Grid::from_stations(&stations, kinks)
 }

@@ -5,13 +5,17 @@
 //! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
 
 use crate::branch;
-use crate::branch::critical::{Critical, Kind};
-use crate::branch::equations::{Equations, ITERATIONS, STIFF, Stuck};
-use crate::branch::family::{Family, OutOfRange, forces_on, rate};
-use crate::branch::refine::Refined;
-use crate::branch::{add, between, combined, dot, equations, plus, times};
-use crate::leaf::Field;
-use crate::newton::{Contraction, converged};
+use crate::branch::critical::{CriticalKind, CriticalPoint};
+use crate::branch::equations::{BranchEquations, CorrectorFailure, ITERATIONS, STIFF};
+use crate::branch::family::{
+    LeafFamily, OutOfRange, force_parameter_derivative, unbalanced_forces,
+};
+use crate::branch::refine::ExtrapolatedPoint;
+use crate::branch::{
+    add_scaled, combine_fields, dot, equations, increments_between, scale_field, scaled_sum,
+};
+use crate::leaf::NodalField;
+use crate::newton::{Contraction, remaining_error};
 use crate::numbers::{larger, largest};
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -20,26 +24,26 @@ use std::ops::Range;
 const DIFFERENCE: f64 = 3e-4;
 
 /// A parameter's work on a mode, relative to the largest possible, below which it is rounding.
-const FORCED: f64 = 1e-5;
+const ROUNDING_FORCING: f64 = 1e-5;
 
 /// Eigenvalues that differ by more than this, relative to their derivative with respect to
 /// arclength, do not vanish together.
-const TOGETHER: f64 = 1e-5;
+const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
 
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
 pub struct SingularPoint {
-    pub solution: Solution,
+    pub solution: TwoParameterState,
     /// The kind of critical point, along the first parameter.
-    pub kind: Kind,
+    pub kind: CriticalKind,
     /// How many modes become neutral together.
-    pub neutral: usize,
+    pub neutral_modes: usize,
     /// The modes of the border: first the neutral ones.
-    pub soft: Vec<Field>,
+    pub border_modes: Vec<NodalField>,
     /// Directions along the boundary and across it on the solution manifold; the latter points
     /// to where there are more negative eigenvalues.
-    pub tangent: Direction,
-    pub normal: Direction,
+    pub tangent: TwoParameterDirection,
+    pub normal: TwoParameterDirection,
     /// Derivative of the eigenvalue of H along the latter.
     pub slope: f64,
     /// Morse index beyond the boundary, on the side of the normal.
@@ -48,31 +52,31 @@ pub struct SingularPoint {
     pub others: Vec<f64>,
     /// At a fold: the derivative of the parameters with respect to arclength along the boundary,
     /// as the component along `heading`; it changes sign at a cusp.
-    pub speed: f64,
+    pub fold_speed: f64,
     /// The direction of the curve of folds in the parameter plane.
-    pub heading: [f64; 2],
+    pub fold_direction: [f64; 2],
 }
 
 /// A critical point of a branch in the parameter plane.
 #[derive(Clone, Copy)]
-pub struct Seed<'c> {
-    pub critical: &'c Critical,
+pub struct BoundarySeed<'c> {
+    pub critical: &'c CriticalPoint,
     /// The same extrapolated over grids.
-    pub refined: &'c Refined,
+    pub refined: &'c ExtrapolatedPoint,
     /// Both parameters at the start of the branch, as fractions of their ranges,
     pub from: [f64; 2],
     /// and their derivatives with respect to its parameter.
     pub direction: [f64; 2],
 }
 
-impl Seed<'_> {
+impl BoundarySeed<'_> {
     /// Both parameters at a value of the branch's parameter.
-    pub fn params(&self, parameter: f64) -> [f64; 2] {
+    pub fn parameters_at(&self, parameter: f64) -> [f64; 2] {
         [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
     }
 
     /// The parameter that is constant along the branch, if there is one.
-    pub fn given(&self) -> Option<usize> {
+    pub fn constant_parameter(&self) -> Option<usize> {
         [1, 0]
             .into_iter()
             .find(|&which| self.direction[which] == 0.0)
@@ -81,40 +85,43 @@ impl Seed<'_> {
 
 impl SingularPoint {
     /// The first point of a boundary, the normal of which is along the branch.
-    pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, Stuck> {
+    pub fn begin(
+        manifold: &mut TwoParameterEquations,
+        seed: &BoundarySeed,
+    ) -> Result<SingularPoint, CorrectorFailure> {
         let (critical, direction) = (seed.critical, seed.direction);
-        let modes = critical.modes.iter().chain(&critical.soft);
-        let soft = independent(manifold, modes, critical.soft.len());
-        let solution = Solution {
+        let modes = critical.modes.iter().chain(&critical.border_modes);
+        let soft = orthonormalize_modes(manifold, modes, critical.border_modes.len());
+        let solution = TwoParameterState {
             state: critical.state.clone(),
-            params: seed.params(critical.fraction),
+            params: seed.parameters_at(critical.fraction),
         };
-        let across = Direction {
+        let across = TwoParameterDirection {
             increments: critical.tangent.increments.clone(),
             params: direction.map(|part| part * critical.tangent.params[0]),
         };
-        let slope = critical.slope / manifold.inner(&across, &across).sqrt();
-        let across = manifold.normalised(across);
-        let along = manifold.normalised(Direction {
+        let slope = critical.eigenvalue_slope / manifold.direction_product(&across, &across).sqrt();
+        let across = manifold.normalize_direction(across);
+        let along = manifold.normalize_direction(TwoParameterDirection {
             params: [-direction[1], direction[0]],
             ..manifold.unit_parameter(1)
         });
         let like = SingularPoint {
             solution,
             kind: critical.kind,
-            neutral: critical.modes.len(),
-            soft,
+            neutral_modes: critical.modes.len(),
+            border_modes: soft,
             tangent: along,
             normal: across,
             slope,
             index: 0,
             others: Vec::new(),
-            speed: 0.0,
-            heading: [0.0; 2],
+            fold_speed: 0.0,
+            fold_direction: [0.0; 2],
         };
         let search = like.search(manifold, None, like.solution.clone(), (1e-11, 0.1));
         let found = search.secant(manifold)?;
-        like.completed(manifold, found)
+        like.with_own_directions(manifold, found)
     }
 
     /// The search for a point of the boundary near this one, from `solution`: in the plane normal
@@ -122,35 +129,39 @@ impl SingularPoint {
     /// accuracy, and not further than this.
     pub fn search(
         &self,
-        manifold: &Manifold,
+        manifold: &TwoParameterEquations,
         given: Option<usize>,
-        solution: Solution,
+        solution: TwoParameterState,
         (accuracy, furthest): (f64, f64),
-    ) -> Search {
+    ) -> BoundaryPointSearch {
         let (across, slope, along) = match given {
             Some(which) => {
-                let (across, slope) = self.across_at(manifold, which);
+                let (across, slope) = self.crossing_at_fixed_parameter(manifold, which);
                 (across, slope, manifold.unit_parameter(which))
             }
             None => (self.normal.clone(), self.slope, self.tangent.clone()),
         };
-        Search {
+        BoundaryPointSearch {
             solution,
             across,
             slope,
             along,
-            soft: self.soft.clone(),
-            neutral: self.neutral,
+            soft: self.border_modes.clone(),
+            neutral: self.neutral_modes,
             accuracy,
             furthest,
         }
     }
 
     /// The boundary point that was found from this one, with the directions of this one.
-    pub fn moved(&self, manifold: &Manifold, found: Found) -> SingularPoint {
-        let Found { sample, eigen, .. } = found;
+    pub fn with_search_result(
+        &self,
+        manifold: &TwoParameterEquations,
+        found: BoundarySearchResult,
+    ) -> SingularPoint {
+        let BoundarySearchResult { sample, eigen, .. } = found;
         SingularPoint {
-            soft: soft(manifold, &sample, &eigen),
+            border_modes: next_border_modes(manifold, &sample, &eigen),
             index: index(&sample, &eigen),
             others: eigen.others,
             solution: sample.solution,
@@ -159,43 +170,47 @@ impl SingularPoint {
     }
 
     /// The same with its own directions; the tangent is oriented as here.
-    pub fn completed(&self, manifold: &mut Manifold, found: Found) -> Result<SingularPoint, Stuck> {
-        let border = manifold.momenta(&self.soft);
+    pub fn with_own_directions(
+        &self,
+        manifold: &mut TwoParameterEquations,
+        found: BoundarySearchResult,
+    ) -> Result<SingularPoint, CorrectorFailure> {
+        let border = manifold.multiply_all_by_mass(&self.border_modes);
         let solution = found.sample.solution;
-        let rates = manifold.rates(&solution, false)?;
-        let sample = manifold.sample(solution, &border, rates, true)?;
-        let eigen = eigen(&sample, self.neutral);
+        let rates = manifold.parameter_derivatives(&solution, false)?;
+        let sample = manifold.linearize_bordered(solution, &border, rates, true)?;
+        let eigen = border_eigenvalues(&sample, self.neutral_modes);
         let basis = self.basis(manifold, &sample, &eigen)?;
-        let soft = soft(manifold, &sample, &eigen);
-        let change = self.change(manifold, &sample, &basis, &soft)?;
+        let soft = next_border_modes(manifold, &sample, &eigen);
+        let change = self.eigenvalue_derivatives(manifold, &sample, &basis, &soft)?;
         let slope = change[0].hypot(change[1]);
-        if !(slope.is_finite() && slope > NEUTRAL) {
-            return Err(Stuck::NotConverged);
+        if !(slope.is_finite() && slope > NEUTRAL_EIGENVALUE) {
+            return Err(CorrectorFailure::NotConverged);
         }
-        if eigen.spread > TOGETHER * slope {
-            return Err(Stuck::Separated);
+        if eigen.spread > COINCIDENT_EIGENVALUE_TOLERANCE * slope {
+            return Err(CorrectorFailure::Separated);
         }
         let [a, b] = change.map(|part| part / slope);
-        let normal = Direction::mixed([a, b], &basis);
-        let mut tangent = Direction::mixed([-b, a], &basis);
-        if manifold.inner(&tangent, &self.tangent) < 0.0 {
+        let normal = TwoParameterDirection::linear_combination([a, b], &basis);
+        let mut tangent = TwoParameterDirection::linear_combination([-b, a], &basis);
+        if manifold.direction_product(&tangent, &self.tangent) < 0.0 {
             tangent = tangent.reversed();
         }
         let forcing = self.forcing(&sample, &eigen, slope);
-        if self.kind == Kind::Branching && forcing.largest > FORCED {
-            return Err(Stuck::Unfolded);
+        if self.kind == CriticalKind::Branching && forcing.largest > ROUNDING_FORCING {
+            return Err(CorrectorFailure::Unfolded);
         }
         // A fold moves in the direction in which the parameters do no work on the mode.
         let mut heading = forcing.free;
-        if heading[0] * self.heading[0] + heading[1] * self.heading[1] < 0.0 {
+        if heading[0] * self.fold_direction[0] + heading[1] * self.fold_direction[1] < 0.0 {
             heading = heading.map(|part| -part);
         }
         Ok(SingularPoint {
             kind: self.kind,
-            neutral: self.neutral,
-            soft,
-            speed: heading[0] * tangent.params[0] + heading[1] * tangent.params[1],
-            heading,
+            neutral_modes: self.neutral_modes,
+            border_modes: soft,
+            fold_speed: heading[0] * tangent.params[0] + heading[1] * tangent.params[1],
+            fold_direction: heading,
             tangent,
             normal,
             slope,
@@ -208,35 +223,37 @@ impl SingularPoint {
     /// Derivatives of the eigenvalue in both directions on the manifold: with K X + B H = 0
     /// and B^T X = 1 that of H is -X^T dK X. The second-order distance of a straight line from
     /// the manifold cancels in central differences, except for stiff segments, which are corrected.
-    fn change(
+    fn eigenvalue_derivatives(
         &self,
-        manifold: &mut Manifold,
-        sample: &Sample,
-        basis: &[Direction; 2],
-        soft: &[Field],
-    ) -> Result<[f64; 2], Stuck> {
-        let modes = &soft[..self.neutral.min(soft.len())];
-        let border = manifold.momenta(soft);
+        manifold: &mut TwoParameterEquations,
+        sample: &TwoParameterLinearization,
+        basis: &[TwoParameterDirection; 2],
+        soft: &[NodalField],
+    ) -> Result<[f64; 2], CorrectorFailure> {
+        let modes = &soft[..self.neutral_modes.min(soft.len())];
+        let border = manifold.multiply_all_by_mass(soft);
         let stiff = manifold
             .leaves
-            .at(sample.solution.params)?
+            .leaf_at(sample.solution.params)?
             .least_compliance()
             * STIFF
             <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
             let mut at = |step: f64| {
-                let mut solution = manifold.beside(&sample.solution, direction, step)?;
+                let mut solution =
+                    manifold.displace_equilibrium(&sample.solution, direction, step)?;
                 if stiff {
                     let (normals, rates) = ([&basis[0], &basis[1]], Some(&sample.rates[..]));
-                    let corrected = manifold.bordered(solution, normals, &border, rates, false)?;
+                    let corrected =
+                        manifold.correct_bordered(solution, normals, &border, rates, false)?;
                     solution = corrected.solution;
                 }
-                Ok::<_, Stuck>((step, manifold.curvature(solution, modes)?))
+                Ok::<_, CorrectorFailure>((step, manifold.curvature(solution, modes)?))
             };
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match at(step) {
                 // At an end of a range there may be no leaf beyond.
-                Err(Stuck::OutOfRange(_)) => at(0.0),
+                Err(CorrectorFailure::OutOfRange(_)) => at(0.0),
                 found => found,
             });
             let ((after, above), (before, below)) = (after?, before?);
@@ -248,19 +265,22 @@ impl SingularPoint {
     /// Two orthonormal directions that span the tangent plane of the solution manifold.
     fn basis(
         &self,
-        manifold: &Manifold,
-        sample: &Sample,
-        eigen: &Eigen,
-    ) -> Result<[Direction; 2], Stuck> {
+        manifold: &TwoParameterEquations,
+        sample: &TwoParameterLinearization,
+        eigen: &BorderEigenvalues,
+    ) -> Result<[TwoParameterDirection; 2], CorrectorFailure> {
         let solved = &sample.solved;
         let p = solved.modes.len();
-        let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
-        let least = eigen.least();
+        let others = eigen
+            .others
+            .iter()
+            .zip(&eigen.vectors[self.neutral_modes..]);
+        let least = eigen.smallest_nonneutral();
         let left = others.filter(|(value, _)| value.abs() < least);
         let mut frozen: Vec<&Vec<f64>> = left.map(|(_, vector)| vector).collect();
-        if self.kind == Kind::Branching {
+        if self.kind == CriticalKind::Branching {
             // Another branch may leave along a neutral mode: exclude that from the tangent plane.
-            frozen.extend(&eigen.vectors[..self.neutral]);
+            frozen.extend(&eigen.vectors[..self.neutral_modes]);
         }
         let rows = (p + frozen.len()).max(p + 2);
         let mut matrix = DMatrix::<f64>::zeros(rows, p + 2);
@@ -278,37 +298,42 @@ impl SingularPoint {
             }
         }
         let svd = matrix.svd(false, true);
-        let right = svd.v_t.ok_or(Stuck::NotConverged)?;
+        let right = svd.v_t.ok_or(CorrectorFailure::NotConverged)?;
         let mut order: Vec<usize> = (0..p + 2).collect();
         order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
         let direction = |row: usize| {
             let part = |c: usize| right[(row, c)];
             let parts: Vec<f64> = (0..p).map(part).collect();
-            let mut increments = combined(&parts, &solved.modes);
+            let mut increments = combine_fields(&parts, &solved.modes);
             for i in 0..2 {
-                add(&mut increments, part(p + i), &solved.rates[i].increments);
+                add_scaled(&mut increments, part(p + i), &solved.rates[i].increments);
             }
-            Direction {
+            TwoParameterDirection {
                 increments,
                 params: [part(p), part(p + 1)],
             }
         };
-        let first = manifold.normalised(direction(order[0]));
+        let first = manifold.normalize_direction(direction(order[0]));
         let second = direction(order[1]);
-        let part = manifold.inner(&first, &second);
-        let second = Direction {
-            increments: plus(&second.increments, -part, &first.increments),
+        let part = manifold.direction_product(&first, &second);
+        let second = TwoParameterDirection {
+            increments: scaled_sum(&second.increments, -part, &first.increments),
             params: [0, 1].map(|i| second.params[i] - part * first.params[i]),
         };
-        Ok([first, manifold.normalised(second)])
+        Ok([first, manifold.normalize_direction(second)])
     }
 
-    fn forcing(&self, sample: &Sample, eigen: &Eigen, slope: f64) -> Forcing {
+    fn forcing(
+        &self,
+        sample: &TwoParameterLinearization,
+        eigen: &BorderEigenvalues,
+        slope: f64,
+    ) -> ParameterForcing {
         let (solved, rates) = (&sample.solved, &sample.rates);
         let mut largest = 0.0_f64;
         let mut free = [0.0; 2];
-        for vector in &eigen.vectors[..self.neutral] {
-            let mode = combined(vector, &solved.modes);
+        for vector in &eigen.vectors[..self.neutral_modes] {
+            let mode = combine_fields(vector, &solved.modes);
             let forcing = [0, 1].map(|i| {
                 let multipliers = &solved.rates[i].multipliers;
                 vector
@@ -324,46 +349,57 @@ impl SingularPoint {
             let size = forcing[0].hypot(forcing[1]);
             free = [-forcing[1] / size, forcing[0] / size];
         }
-        Forcing { largest, free }
+        ParameterForcing { largest, free }
     }
 
     /// The direction on the manifold, across the boundary, in which one of the parameters
     /// is constant, and the derivative of the eigenvalue along it.
-    pub fn across_at(&self, manifold: &Manifold, which: usize) -> (Direction, f64) {
+    pub fn crossing_at_fixed_parameter(
+        &self,
+        manifold: &TwoParameterEquations,
+        which: usize,
+    ) -> (TwoParameterDirection, f64) {
         let parts = [self.tangent.params[which], -self.normal.params[which]];
         let both = [self.normal.clone(), self.tangent.clone()];
-        let across = manifold.normalised(Direction::mixed(parts, &both));
-        let slope = self.slope * manifold.inner(&across, &self.normal);
+        let across =
+            manifold.normalize_direction(TwoParameterDirection::linear_combination(parts, &both));
+        let slope = self.slope * manifold.direction_product(&across, &self.normal);
         (across, slope)
     }
 
     /// The same point with the opposite orientation along the boundary.
-    pub fn turned(&self) -> SingularPoint {
+    pub fn reversed(&self) -> SingularPoint {
         SingularPoint {
             tangent: self.tangent.reversed(),
-            speed: -self.speed,
+            fold_speed: -self.fold_speed,
             ..self.clone()
         }
     }
 }
 
 /// The modes for the next border: from the eigenvectors of H.
-fn soft(manifold: &Manifold, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
+fn next_border_modes(
+    manifold: &TwoParameterEquations,
+    sample: &TwoParameterLinearization,
+    eigen: &BorderEigenvalues,
+) -> Vec<NodalField> {
     let modes = eigen.vectors.iter();
-    let modes: Vec<Field> = modes.map(|it| combined(it, &sample.solved.modes)).collect();
-    independent(manifold, modes.iter(), modes.len())
+    let modes: Vec<NodalField> = modes
+        .map(|it| combine_fields(it, &sample.solved.modes))
+        .collect();
+    orthonormalize_modes(manifold, modes.iter(), modes.len())
 }
 
 /// Morse index beyond the boundary: from the inertia of the bordered matrix, which is that of
 /// the matrix and that of H together. Only the boundary's own neutral modes count as negative.
-fn index(sample: &Sample, eigen: &Eigen) -> usize {
-    let least = eigen.least();
+fn index(sample: &TwoParameterLinearization, eigen: &BorderEigenvalues) -> usize {
+    let least = eigen.smallest_nonneutral();
     let held_negative = eigen.others.iter().filter(|&&h| h < least).count();
     sample.solved.negative.saturating_sub(held_negative)
 }
 
 /// Work of the parameters' force rates on the neutral modes.
-struct Forcing {
+struct ParameterForcing {
     /// The largest, relative to the largest possible.
     largest: f64,
     /// The direction in the parameter plane in which it vanishes.
@@ -372,46 +408,46 @@ struct Forcing {
 
 /// At most `count` of these modes, orthonormal in the mass product; linearly dependent ones
 /// are left out.
-fn independent<'m>(
-    manifold: &Manifold,
-    modes: impl Iterator<Item = &'m Field>,
+fn orthonormalize_modes<'m>(
+    manifold: &TwoParameterEquations,
+    modes: impl Iterator<Item = &'m NodalField>,
     count: usize,
-) -> Vec<Field> {
-    let mut kept: Vec<Field> = Vec::new();
+) -> Vec<NodalField> {
+    let mut kept: Vec<NodalField> = Vec::new();
     for mode in modes {
-        let size = manifold.product(mode, mode).sqrt();
-        let mut mode = times(mode, 1.0 / size);
+        let size = manifold.mass_product(mode, mode).sqrt();
+        let mut mode = scale_field(mode, 1.0 / size);
         for _ in 0..2 {
             for other in &kept {
-                let part = manifold.product(other, &mode);
-                add(&mut mode, -part, other);
+                let part = manifold.mass_product(other, &mode);
+                add_scaled(&mut mode, -part, other);
             }
         }
-        let size = manifold.product(&mode, &mode).sqrt();
+        let size = manifold.mass_product(&mode, &mode).sqrt();
         if size > 1e-6 && kept.len() < count {
-            kept.push(times(&mode, 1.0 / size));
+            kept.push(scale_field(&mode, 1.0 / size));
         }
     }
     kept
 }
 
 /// Eigenvalues below this, or below their rounding error, belong to neutral modes.
-pub const NEUTRAL: f64 = 1e-7;
+pub const NEUTRAL_EIGENVALUE: f64 = 1e-7;
 
 /// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 30;
 
 /// Differences over less than this do not give a reliable slope.
-const LOCAL: f64 = 1e-6;
+const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-6;
 
 /// Relative accuracy of the derivative of the eigenvalue in the combined Newton method; and the
 /// size below which increments that do not shrink are due to rounding.
-const SLOPES: f64 = 1e-3;
+const EIGENVALUE_SLOPE_ACCURACY: f64 = 1e-3;
 
-const ROUNDED: f64 = 1e-9;
+const ROUNDING_INCREMENT: f64 = 1e-9;
 
 /// Eigenvalues of H at one evaluation.
-pub struct Eigen {
+pub struct BorderEigenvalues {
     /// The mean of those that become neutral, and the largest difference between them.
     pub value: f64,
     pub spread: f64,
@@ -422,24 +458,24 @@ pub struct Eigen {
     pub rounding: f64,
 }
 
-impl Eigen {
+impl BorderEigenvalues {
     /// The least eigenvalue that does not belong to a neutral mode.
-    pub fn least(&self) -> f64 {
-        NEUTRAL.max(self.rounding)
+    pub fn smallest_nonneutral(&self) -> f64 {
+        NEUTRAL_EIGENVALUE.max(self.rounding)
     }
 }
 
 /// A search for a point of a boundary.
-pub struct Search {
+pub struct BoundaryPointSearch {
     /// From here,
-    pub solution: Solution,
+    pub solution: TwoParameterState,
     /// in this direction, along which the eigenvalue has this derivative,
-    pub across: Direction,
+    pub across: TwoParameterDirection,
     pub slope: f64,
     /// in the plane normal to this,
-    pub along: Direction,
+    pub along: TwoParameterDirection,
     /// with these modes in the border, the first `neutral` of which become neutral,
-    pub soft: Vec<Field>,
+    pub soft: Vec<NodalField>,
     pub neutral: usize,
     /// to this accuracy, and not further than this.
     pub accuracy: f64,
@@ -447,9 +483,9 @@ pub struct Search {
 }
 
 /// A boundary point without its directions.
-pub struct Found {
-    pub sample: Sample,
-    pub eigen: Eigen,
+pub struct BoundarySearchResult {
+    pub sample: TwoParameterLinearization,
+    pub eigen: BorderEigenvalues,
     /// Distance from the start of the search.
     pub distance: f64,
 }
@@ -459,7 +495,7 @@ pub struct Found {
 /// Modes that a symmetry keeps apart do not mix, and H couples them by no more than rounding. Where
 /// their eigenvalues coincide, its eigenvectors are any mixture of them: then each part has its
 /// own.
-pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
+pub fn border_eigenvalues(sample: &TwoParameterLinearization, neutral: usize) -> BorderEigenvalues {
     let h = &sample.solved.h;
     let (own, count) = (neutral.min(h.nrows()), h.nrows());
     let coupling = h.view((0, own), (own, count - own));
@@ -477,7 +513,7 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
     let (own, others) = values.split_at(own);
     let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
     let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
-    Eigen {
+    BorderEigenvalues {
         value: own.iter().sum::<f64>() / neutral as f64,
         spread: most - least,
         vectors,
@@ -502,7 +538,7 @@ fn eigenpairs(h: &DMatrix<f64>, rows: Range<usize>) -> Vec<(f64, Vec<f64>)> {
     (0..count).map(pair).collect()
 }
 
-impl Search {
+impl BoundaryPointSearch {
     /// The same point by Newton's method for the state and the zero of the eigenvalue
     /// together, from a good initial guess; also returns the estimated iteration error. At branch
     /// points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
@@ -510,18 +546,18 @@ impl Search {
     /// matrix, the amplitude of the mode is undetermined.
     pub fn newton(
         &self,
-        manifold: &mut Manifold,
+        manifold: &mut TwoParameterEquations,
         frozen: bool,
         contraction: &mut Contraction,
-    ) -> Result<(Found, f64), Stuck> {
-        let border = manifold.momenta(&self.soft);
-        let along = manifold.momentum(&self.along.increments);
+    ) -> Result<(BoundarySearchResult, f64), CorrectorFailure> {
+        let border = manifold.multiply_all_by_mass(&self.soft);
+        let along = manifold.multiply_by_mass(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
-            let rates = manifold.rates(&solution, false)?;
-            let mut sample = manifold.sample(solution, &border, rates, false)?;
-            let eigen = eigen(&sample, self.neutral);
+            let rates = manifold.parameter_derivatives(&solution, false)?;
+            let mut sample = manifold.linearize_bordered(solution, &border, rates, false)?;
+            let eigen = border_eigenvalues(&sample, self.neutral);
             let forces = &sample.solved.forces.multipliers;
             let excited = |mode: &Vec<f64>| {
                 let force: f64 = mode.iter().zip(forces).map(|(part, f)| part * f).sum();
@@ -530,7 +566,8 @@ impl Search {
             if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
                 break;
             }
-            let (slope, numbers) = self.change(manifold, &sample, &eigen, &border, frozen)?;
+            let (slope, numbers) =
+                self.eigenvalue_gradient(manifold, &sample, &eigen, &border, frozen)?;
             let value = eigen.value / self.slope;
             let functions = [
                 (&along, self.along.params.as_slice(), 0.0),
@@ -538,27 +575,27 @@ impl Search {
             ];
             let (next, size) = manifold.newton_step(&sample, &functions)?;
             solution = next;
-            if previous > ROUNDED {
+            if previous > ROUNDING_INCREMENT {
                 contraction.update(size, previous);
             }
             // State and parameters have different scales: the constant may be large.
-            let first = match contraction.is_measured() || size < ROUNDED {
+            let first = match contraction.is_measured() || size < ROUNDING_INCREMENT {
                 true => contraction.error_after_first(size, 0.0),
                 false => f64::INFINITY,
             };
-            let accuracy = (self.accuracy, ROUNDED);
+            let accuracy = (self.accuracy, ROUNDING_INCREMENT);
             // With less accurate derivatives, increments cannot shrink faster than these are known;
             // and as the forces in segments follow their strains one iteration later, what the
             // first increment left may be subtracted twice by the second.
             let slopes = match iteration {
                 1 => 1.0,
-                _ => SLOPES.max(size / previous),
+                _ => EIGENVALUE_SLOPE_ACCURACY.max(size / previous),
             };
-            if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
+            if let Some(left) = remaining_error(size, previous, [slopes; 2], accuracy, first) {
                 let moved = manifold.difference(&self.solution, &solution);
-                let distance = manifold.inner(&moved, &self.across);
+                let distance = manifold.direction_product(&moved, &self.across);
                 sample.solution = solution;
-                let found = Found {
+                let found = BoundarySearchResult {
                     sample,
                     eigen,
                     distance,
@@ -567,27 +604,29 @@ impl Search {
             }
             previous = size;
         }
-        Err(Stuck::NotConverged)
+        Err(CorrectorFailure::NotConverged)
     }
 
     /// Derivatives of the eigenvalue with respect to increments and parameters, over its slope.
-    fn change(
+    fn eigenvalue_gradient(
         &self,
-        manifold: &mut Manifold,
-        sample: &Sample,
-        eigen: &Eigen,
-        border: &[Field],
+        manifold: &mut TwoParameterEquations,
+        sample: &TwoParameterLinearization,
+        eigen: &BorderEigenvalues,
+        border: &[NodalField],
         frozen: bool,
-    ) -> Result<(Field, [f64; 2]), Stuck> {
+    ) -> Result<(NodalField, [f64; 2]), CorrectorFailure> {
         let own = &eigen.vectors[..self.neutral];
-        let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
-        let modes: Vec<Field> = modes.collect();
+        let modes = own
+            .iter()
+            .map(|it| combine_fields(it, &sample.solved.modes));
+        let modes: Vec<NodalField> = modes.collect();
         let part = 1.0 / (self.slope * self.neutral as f64);
-        let mut all = times(&modes[0], 0.0);
+        let mut all = scale_field(&modes[0], 0.0);
         let mut numbers = [0.0; 2];
         for mode in &modes {
             let (change, rates) = manifold.curvature_change(&sample.solution, mode)?;
-            add(&mut all, part, &change);
+            add_scaled(&mut all, part, &change);
             for (number, rate) in numbers.iter_mut().zip(rates) {
                 *number += part * rate;
             }
@@ -595,23 +634,30 @@ impl Search {
         if frozen {
             for (vector, mode) in own.iter().zip(&modes) {
                 let along = dot(&all, mode);
-                add(&mut all, -along, &combined(vector, border));
+                add_scaled(&mut all, -along, &combine_fields(vector, border));
             }
         }
         Ok((all, numbers))
     }
 
     /// The zero of the eigenvalue by a secant method.
-    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, Stuck> {
-        let border = manifold.momenta(&self.soft);
-        let rates = manifold.rates(&self.solution, false)?;
+    pub fn secant(
+        &self,
+        manifold: &mut TwoParameterEquations,
+    ) -> Result<BoundarySearchResult, CorrectorFailure> {
+        let border = manifold.multiply_all_by_mass(&self.soft);
+        let rates = manifold.parameter_derivatives(&self.solution, false)?;
         // From the previous solution, to which the next is close.
-        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, Stuck> {
-            let solution = manifold.moved(from, &self.across, step)?;
+        let mut at = |from: &TwoParameterState,
+                      step: f64,
+                      distance: f64|
+         -> Result<BoundarySearchResult, CorrectorFailure> {
+            let solution = manifold.displace_along_direction(from, &self.across, step)?;
             let normals = [&self.along, &self.across];
-            let sample = manifold.bordered(solution, normals, &border, Some(&rates), false)?;
-            let eigen = eigen(&sample, self.neutral);
-            Ok(Found {
+            let sample =
+                manifold.correct_bordered(solution, normals, &border, Some(&rates), false)?;
+            let eigen = border_eigenvalues(&sample, self.neutral);
+            Ok(BoundarySearchResult {
                 sample,
                 eigen,
                 distance,
@@ -624,7 +670,7 @@ impl Search {
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || (distance + step).abs() > self.furthest {
-                return Err(Stuck::NotConverged);
+                return Err(CorrectorFailure::NotConverged);
             }
             if step.abs() < self.accuracy {
                 return Ok(best);
@@ -632,7 +678,7 @@ impl Search {
             let next = at(&last, step, distance + step)?;
             let after = next.eigen.value;
             last.clone_from(&next.sample.solution);
-            if step.abs() > LOCAL {
+            if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
                 slope = (after - value) / step;
             }
             (distance, value) = (distance + step, after);
@@ -644,51 +690,58 @@ impl Search {
                 return Ok(best);
             }
         }
-        Err(Stuck::NotConverged)
+        Err(CorrectorFailure::NotConverged)
     }
 }
 
 /// Increment along a mode of mass one over which the matrix is differenced.
-const ALONG_MODE: f64 = 1e-5;
+const MODE_DIFFERENCE_STEP: f64 = 1e-5;
 
 /// Leaves that differ in two parameters, their equations, and what solves these.
-pub type Plane<'a> = Family<'a, 2>;
+pub type TwoParameterProblem<'a> = LeafFamily<'a, 2>;
 
-pub type Manifold<'a> = Equations<'a, 2>;
+pub type TwoParameterEquations<'a> = BranchEquations<'a, 2>;
 
-pub type Solution = branch::Solution<2>;
+pub type TwoParameterState = branch::ParametrizedState<2>;
 
-pub type Direction = branch::Direction<2>;
+pub type TwoParameterDirection = branch::BranchDirection<2>;
 
-pub type Sample = equations::Sample<2>;
+pub type TwoParameterLinearization = equations::BorderedLinearization<2>;
 
-impl Direction {
+impl TwoParameterDirection {
     /// The linear combination of two directions.
-    pub fn mixed(parts: [f64; 2], [a, b]: &[Direction; 2]) -> Direction {
-        let scaled = times(&a.increments, parts[0]);
-        Direction {
-            increments: plus(&scaled, parts[1], &b.increments),
+    pub fn linear_combination(
+        parts: [f64; 2],
+        [a, b]: &[TwoParameterDirection; 2],
+    ) -> TwoParameterDirection {
+        let scaled = scale_field(&a.increments, parts[0]);
+        TwoParameterDirection {
+            increments: scaled_sum(&scaled, parts[1], &b.increments),
             params: [0, 1].map(|i| parts[0] * a.params[i] + parts[1] * b.params[i]),
         }
     }
 }
 
-impl Manifold<'_> {
+impl TwoParameterEquations<'_> {
     /// The direction in which one parameter changes and nothing else.
-    pub fn unit_parameter(&self, which: usize) -> Direction {
+    pub fn unit_parameter(&self, which: usize) -> TwoParameterDirection {
         let nodes = self.system.nodes();
         let mut params = [0.0; 2];
         params[which] = 1.0;
-        Direction {
+        TwoParameterDirection {
             increments: vec![vec![[0.0; 6]; nodes]; self.rods()],
             params,
         }
     }
 
     /// What leads from one solution to another.
-    pub fn difference(&self, a: &Solution, b: &Solution) -> Direction {
-        Direction {
-            increments: between(&a.state, &b.state, self.first_node()),
+    pub fn difference(
+        &self,
+        a: &TwoParameterState,
+        b: &TwoParameterState,
+    ) -> TwoParameterDirection {
+        TwoParameterDirection {
+            increments: increments_between(&a.state, &b.state, self.first_node()),
             params: [0, 1].map(|i| b.params[i] - a.params[i]),
         }
     }
@@ -696,28 +749,41 @@ impl Manifold<'_> {
     /// State and parameters `step` further along a direction from an equilibrium: parameters
     /// change first, since the forces in the segments depend on all of their change, however short
     /// the step.
-    pub fn beside(
+    pub fn displace_equilibrium(
         &mut self,
-        solution: &Solution,
-        to: &Direction,
+        solution: &TwoParameterState,
+        to: &TwoParameterDirection,
         step: f64,
-    ) -> Result<Solution, OutOfRange> {
+    ) -> Result<TwoParameterState, OutOfRange> {
         let (params, none) = (solution.params, self.unit_parameter(0).increments);
-        let state = self.advanced(&solution.state, to.further(params, step), &none, 1.0)?;
-        self.moved(&Solution { state, params }, to, step)
+        let state = self.state_after_increments(
+            &solution.state,
+            to.parameters_after_step(params, step),
+            &none,
+            1.0,
+        )?;
+        self.displace_along_direction(&TwoParameterState { state, params }, to, step)
     }
 
     /// The product of the matrix and a mode.
-    fn stiffness_times(&mut self, mut solution: Solution, mode: &Field) -> Result<Field, Stuck> {
+    fn stiffness_times(
+        &mut self,
+        mut solution: TwoParameterState,
+        mode: &NodalField,
+    ) -> Result<NodalField, CorrectorFailure> {
         self.assemble(&mut solution, true)?;
         Ok(self.pattern(0)?.product(&self.system, mode))
     }
 
     /// The mean second derivative of the energy along modes.
-    pub fn curvature(&mut self, mut solution: Solution, modes: &[Field]) -> Result<f64, Stuck> {
+    pub fn curvature(
+        &mut self,
+        mut solution: TwoParameterState,
+        modes: &[NodalField],
+    ) -> Result<f64, CorrectorFailure> {
         self.assemble(&mut solution, true)?;
         let pattern = self.pattern(0)?;
-        let along = |mode: &Field| dot(&pattern.product(&self.system, mode), mode);
+        let along = |mode: &NodalField| dot(&pattern.product(&self.system, mode), mode);
         Ok(modes.iter().map(along).sum::<f64>() / modes.len() as f64)
     }
 
@@ -726,17 +792,17 @@ impl Manifold<'_> {
     /// energy are symmetric.
     pub fn curvature_change(
         &mut self,
-        solution: &Solution,
-        mode: &Field,
-    ) -> Result<(Field, [f64; 2]), Stuck> {
-        let way = Direction {
+        solution: &TwoParameterState,
+        mode: &NodalField,
+    ) -> Result<(NodalField, [f64; 2]), CorrectorFailure> {
+        let way = TwoParameterDirection {
             increments: mode.clone(),
             params: [0.0; 2],
         };
-        let mut change = times(mode, 0.0);
-        for step in [ALONG_MODE, -ALONG_MODE] {
-            let moved = self.moved(solution, &way, step)?;
-            add(
+        let mut change = scale_field(mode, 0.0);
+        for step in [MODE_DIFFERENCE_STEP, -MODE_DIFFERENCE_STEP] {
+            let moved = self.displace_along_direction(solution, &way, step)?;
+            add_scaled(
                 &mut change,
                 -0.5 / step,
                 &self.stiffness_times(moved, mode)?,
@@ -745,8 +811,8 @@ impl Manifold<'_> {
         let mut numbers = [0.0; 2];
         for (which, number) in numbers.iter_mut().enumerate() {
             let alone = self.unit_parameter(which);
-            let changed = rate(|step| {
-                let beside = self.beside(solution, &alone, step)?;
+            let changed = force_parameter_derivative(|step| {
+                let beside = self.displace_equilibrium(solution, &alone, step)?;
                 self.stiffness_times(beside, mode)
             })?;
             *number = -dot(&changed, mode);
@@ -757,18 +823,21 @@ impl Manifold<'_> {
     }
 
     /// A solution with the segment forces computed from its strains.
-    pub fn with_segment_forces(&mut self, solution: &Solution) -> Result<Solution, OutOfRange> {
+    pub fn with_segment_forces(
+        &mut self,
+        solution: &TwoParameterState,
+    ) -> Result<TwoParameterState, OutOfRange> {
         self.forces(solution)?;
-        let none = Direction {
+        let none = TwoParameterDirection {
             params: [0.0; 2],
             ..self.unit_parameter(0)
         };
-        self.moved(solution, &none, 1.0)
+        self.displace_along_direction(solution, &none, 1.0)
     }
 
     /// The unbalanced forces; the system is left with the segments of this state.
-    fn forces(&mut self, solution: &Solution) -> Result<Field, OutOfRange> {
-        let leaf = self.leaves.at(solution.params)?;
-        Ok(forces_on(leaf, &solution.state, &mut self.system))
+    fn forces(&mut self, solution: &TwoParameterState) -> Result<NodalField, OutOfRange> {
+        let leaf = self.leaves.leaf_at(solution.params)?;
+        Ok(unbalanced_forces(leaf, &solution.state, &mut self.system))
     }
 }

@@ -1,26 +1,31 @@
 //! Held nodes: the effect of moving their holders, and the changes of the forces on these.
 
 use crate::leaf::Leaf;
-use crate::leaf::derivative::{Forces, LeafRate, Response, at_constant_force, change};
+use crate::leaf::derivative::{
+    LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
+    value_derivative,
+};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{Field, Increment, State, add, shift, turn};
+use crate::leaf::state::{
+    Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
+};
 use crate::rod::Segment;
 use crate::rotation;
 use crate::scenario::{Clamp, Scenario};
 use glam::{DQuat, DVec3};
 
 /// The rate of change of the position and the orientation of the tips' holder, in the leaf's units.
-pub(super) struct HeldRate {
+pub(super) struct TipSupportDerivative {
     shift: DVec3,
     /// Rotations of the clamps, one per rod; empty for a pinned tip.
     turns: Vec<DVec3>,
 }
 
-impl HeldRate {
+impl TipSupportDerivative {
     /// `None` if the tips are free, or their holder does not move.
     pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
-        let held = leaf.held.as_ref()?;
-        let of = |value: &dyn Fn(&Scenario) -> f64| change(terms, value);
+        let held = leaf.tip_support.as_ref()?;
+        let of = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
         let axis =
             |axis: usize| of(&|s| s.held_tip.as_ref().map_or(0.0, |held| held.position[axis]));
         let shift = DVec3::from_array([0, 1, 2].map(axis)) / leaf.scale.length;
@@ -35,21 +40,21 @@ impl HeldRate {
         let clamps = held.clamps.iter().flatten().enumerate();
         let turns: Vec<DVec3> = clamps.map(turn).collect();
         let moves = shift != DVec3::ZERO || turns.iter().any(|turn| *turn != DVec3::ZERO);
-        moves.then_some(HeldRate { shift, turns })
+        moves.then_some(TipSupportDerivative { shift, turns })
     }
 }
 
-impl HeldRate {
+impl TipSupportDerivative {
     /// The increment of the tip of rod `j`.
-    fn of_tip(&self, j: usize) -> Increment {
-        increment(
+    fn tip_increment(&self, j: usize) -> Increment {
+        increment_from_vectors(
             self.turns.get(j).copied().unwrap_or(DVec3::ZERO),
             self.shift,
         )
     }
 }
 
-fn increment(turned: DVec3, moved: DVec3) -> Increment {
+fn increment_from_vectors(turned: DVec3, moved: DVec3) -> Increment {
     let [a, b] = [turned.to_array(), moved.to_array()];
     [a[0], a[1], a[2], b[0], b[1], b[2]]
 }
@@ -58,7 +63,11 @@ impl DiscreteLeaf {
     /// The increments of held nodes by the motion of their holders; rods without any have none.
     /// Where grips hold nodes depends on the natural leaf: on those of the weighted leaves, of which
     /// the change is the sum.
-    pub(super) fn held_motion(&self, rate: &LeafRate, each: &[(f64, DiscreteLeaf)]) -> Field {
+    pub(super) fn support_motion_increments(
+        &self,
+        rate: &LeafParameterDerivative,
+        each: &[(f64, DiscreteLeaf)],
+    ) -> NodalField {
         let (n, nodes) = (self.segments(), self.moving_nodes());
         let mut motion = vec![Vec::new(); self.rods()];
         let mut put = |j: usize, i: usize, by: Increment| {
@@ -69,10 +78,14 @@ impl DiscreteLeaf {
             }
         };
         for j in 0..self.rods() {
-            put(j, 0, increment(DVec3::ZERO, rate.of_hinge(j)));
+            put(
+                j,
+                0,
+                increment_from_vectors(DVec3::ZERO, rate.hinge_displacement_rate(j)),
+            );
         }
         for (j, held) in (0..self.rods()).flat_map(|j| rate.held.iter().map(move |it| (j, it))) {
-            put(j, n, held.of_tip(j));
+            put(j, n, held.tip_increment(j));
         }
         for (k, own) in self.grips.iter().enumerate() {
             let (mut turned, mut moved) = (DVec3::ZERO, DVec3::ZERO);
@@ -83,18 +96,18 @@ impl DiscreteLeaf {
                     turned += *weight * rotation::log(to * from.conjugate());
                 }
             }
-            put(own.rod, own.node, increment(turned, moved));
+            put(own.rod, own.node, increment_from_vectors(turned, moved));
         }
         motion
     }
 
     /// Adds the effect of holders that move and rotate by these increments of held nodes.
-    pub(super) fn add_held_motion(
+    pub(super) fn add_support_motion(
         &self,
         state: &State,
         segments: &[Segment],
-        motion: Field,
-        forces: &mut Forces,
+        motion: NodalField,
+        forces: &mut ParameterForces,
     ) {
         for (j, rod) in motion.iter().enumerate() {
             for (i, by) in rod.iter().enumerate() {
@@ -103,8 +116,8 @@ impl DiscreteLeaf {
                 }
             }
         }
-        self.add_response_of_ties(state, &motion, forces);
-        forces.moved = motion;
+        self.add_coupling_response(state, &motion, forces);
+        forces.support_increments = motion;
     }
 
     /// Adds what moving node `i` of rod `j` does to its segments, and to the energy.
@@ -113,46 +126,52 @@ impl DiscreteLeaf {
         (state, segments): (&State, &[Segment]),
         (j, i): (usize, usize),
         by: &Increment,
-        forces: &mut Forces,
+        forces: &mut ParameterForces,
     ) {
         let n = self.segments();
-        let (turned, moved) = (turn(by), shift(by));
+        let (turned, moved) = (rotation_part(by), displacement_part(by));
         let (first, count) = (self.first_node(), self.moving_nodes().len());
         if i > 0 {
             let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
-            let k = at_constant_force(segment, section);
-            let nodes = forces.on_nodes(j, count);
+            let k = hessian_at_constant_force(segment, section);
+            let nodes = forces.node_forces_mut(j, count);
             if i > first {
                 let moment = k.ab * turned + k.xa.transpose() * moved;
                 let force = k.xx * moved + k.xb * turned;
-                add(&mut nodes[i - 1 - first], -moment, force);
+                add_to_increment(&mut nodes[i - 1 - first], -moment, force);
             }
             // A node that is only pinned rotates freely.
             let moment = k.bb * turned + k.xb.transpose() * moved;
-            add(&mut nodes[i - first], -moment, DVec3::ZERO);
+            add_to_increment(&mut nodes[i - first], -moment, DVec3::ZERO);
             let gap = segment.gap_increment(section, moved, DVec3::ZERO, turned);
-            forces.on_gaps(j, n)[i - 1] += gap;
+            forces.gap_effects_mut(j, n)[i - 1] += gap;
         }
         if i < n {
             let (section, segment) = (self.section(j, i), &segments[j * n + i]);
-            let k = at_constant_force(segment, section);
-            let nodes = forces.on_nodes(j, count);
+            let k = hessian_at_constant_force(segment, section);
+            let nodes = forces.node_forces_mut(j, count);
             let moment = k.aa * turned - k.xa.transpose() * moved;
-            add(&mut nodes[i - first], -moment, DVec3::ZERO);
-            add(
+            add_to_increment(&mut nodes[i - first], -moment, DVec3::ZERO);
+            add_to_increment(
                 &mut nodes[i + 1 - first],
                 k.xb.transpose() * moved - k.ab.transpose() * turned,
                 k.xx * moved - k.xa * turned,
             );
-            forces.on_gaps(j, n)[i] += segment.gap_increment(section, -moved, turned, DVec3::ZERO);
+            forces.gap_effects_mut(j, n)[i] +=
+                segment.gap_increment(section, -moved, turned, DVec3::ZERO);
         }
-        let [moment, force] = self.unbalanced(state, j, i);
+        let [moment, force] = self.unbalanced_node_load(state, j, i);
         forces.energy -= force.dot(moved) + moment.dot(turned);
     }
 
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
     /// tip neighbours are displaced alike, and what turns there is held.
-    fn add_response_of_ties(&self, state: &State, increments: &Field, forces: &mut Forces) {
+    fn add_coupling_response(
+        &self,
+        state: &State,
+        increments: &NodalField,
+        forces: &mut ParameterForces,
+    ) {
         let (n, first, count) = (
             self.segments(),
             self.first_node(),
@@ -165,16 +184,21 @@ impl DiscreteLeaf {
             if both == [[0.0; 6]; 2] {
                 continue;
             }
-            let pull = self.spring(g, i) * (shift(&both[1]) - shift(&both[0]));
+            let pull = self.node_coupling(g, i)
+                * (displacement_part(&both[1]) - displacement_part(&both[0]));
             let mut on = [[DVec3::ZERO, pull], [DVec3::ZERO, -pull]];
-            if self.tied() {
+            if self.has_tissue() {
                 let tissue = self.tissue_response(state, (g, i), &both);
                 for (on, tissue) in on.iter_mut().zip(tissue) {
                     (on[0], on[1]) = (on[0] + tissue[0], on[1] + tissue[1]);
                 }
             }
             for (j, [moment, force]) in [g, g + 1].into_iter().zip(on) {
-                add(&mut forces.on_nodes(j, count)[i - first], moment, force);
+                add_to_increment(
+                    &mut forces.node_forces_mut(j, count)[i - first],
+                    moment,
+                    force,
+                );
             }
         }
     }
@@ -184,21 +208,22 @@ impl DiscreteLeaf {
     pub fn grip_force_rates(
         &self,
         state: &State,
-        rate: &LeafRate,
-        response: &Response,
+        rate: &LeafParameterDerivative,
+        response: &LinearResponse,
     ) -> Vec<DVec3> {
         let n = self.segments();
-        let mut loads = Forces::zeros(self.rods());
+        let mut loads = ParameterForces::zeros(self.rods());
         for j in 0..self.rods() {
             self.add_load_changes(state, j, rate, &mut loads);
         }
-        self.add_tissue_changes(state, &self.each_of(rate), &mut loads);
-        self.add_response_of_ties(state, &response.nodes, &mut loads);
+        self.add_tissue_changes(state, &self.weighted_leaves_on_grid(rate), &mut loads);
+        self.add_coupling_response(state, &response.nodes, &mut loads);
         let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
         for held in &self.grips {
             let (j, i) = (held.rod, held.node);
-            let carried = |segment: usize| response.carried[j * n + segment];
-            let mut force = shift(&loads.nodes[j][i - self.first_node()]) - carried(i - 1);
+            let carried = |segment: usize| response.force_changes[j * n + segment];
+            let mut force =
+                displacement_part(&loads.nodes[j][i - self.first_node()]) - carried(i - 1);
             if i < n {
                 force += carried(i);
             }
@@ -209,13 +234,17 @@ impl DiscreteLeaf {
 
     /// The change of the force on the holder of the tip, as in [`DiscreteLeaf::reaction`]: of
     /// the loads on the tip, and of the forces in the last segments.
-    pub fn reaction_rate(&self, rate: &LeafRate, response: &Response) -> DVec3 {
+    pub fn reaction_rate(
+        &self,
+        rate: &LeafParameterDerivative,
+        response: &LinearResponse,
+    ) -> DVec3 {
         let n = self.segments();
-        let weight = self.load_factor * self.grid.weight(n);
+        let weight = self.load_factor * self.grid.node_weight(n);
         let mut force = self.load_factor * rate.tip_force;
         for (j, rod) in rate.rods.iter().enumerate() {
             let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
-            force += weight * gravity - response.carried[j * n + n - 1];
+            force += weight * gravity - response.force_changes[j * n + n - 1];
             force += self.load_factor * self.own_load_rate(rate, j, n);
         }
         force

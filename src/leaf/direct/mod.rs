@@ -11,8 +11,8 @@ mod veinwise;
 
 use crate::leaf::block_tridiagonal::group_and_lane;
 use crate::leaf::direct::sparse::{Cholesky, Sparse, Symbolic};
-use crate::leaf::direct::veinwise::Condensed;
-use crate::leaf::state::{Field, Increment};
+use crate::leaf::direct::veinwise::CondensedFactors;
+use crate::leaf::state::{Increment, NodalField};
 use crate::leaf::system::System;
 use crate::memory;
 use faer::sparse::SymbolicSparseColMat;
@@ -21,16 +21,16 @@ use std::sync::{Arc, OnceLock};
 /// Up to so many segments the matrix is factorised vein after vein. Measured with the leaf of Fig. 4:
 /// the sparse factorisation takes 1 to 3 times as long on 32 segments, 2 to 5 times on 8 and 16; its
 /// symbolic part takes about half as long again.
-const MOST_CONDENSED: usize = 32;
+const MAX_CONDENSED_SEGMENTS: usize = 32;
 
 /// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
 /// symbolic factorisation where one is needed.
 pub struct DirectSolver {
-    unknowns: Arc<Unknowns>,
+    unknowns: Arc<UnknownNumbering>,
     /// The first node of a rod with equations.
     first: usize,
     /// Whether the matrix is factorised vein after vein, if its pivots allow it.
-    condenses: bool,
+    uses_condensation: bool,
     symbolic: OnceLock<Result<Arc<Symbolic>, DirectError>>,
     /// Number of border rows, which follow all unknowns.
     border: usize,
@@ -38,22 +38,22 @@ pub struct DirectSolver {
 
 /// The solution of a bordered system.
 #[derive(Clone, Debug)]
-pub struct Bordered {
+pub struct BorderedSolution {
     /// The increments.
-    pub increments: Field,
+    pub increments: NodalField,
     /// The multipliers of the border.
     pub multipliers: Vec<f64>,
 }
 
 /// The factors of a leaf's matrix.
-pub struct Factors {
-    unknowns: Arc<Unknowns>,
+pub struct MatrixFactors {
+    unknowns: Arc<UnknownNumbering>,
     border: usize,
-    kind: Kind,
+    kind: FactorizationKind,
 }
 
-enum Kind {
-    Condensed(Condensed),
+enum FactorizationKind {
+    Condensed(CondensedFactors),
     Sparse(Sparse),
     Cholesky(Cholesky),
 }
@@ -70,37 +70,41 @@ pub enum DirectError {
 impl DirectSolver {
     /// For the matrix of this leaf.
     pub fn new(system: &System) -> Result<Self, DirectError> {
-        DirectSolver::bordered(system, 0)
+        DirectSolver::with_border(system, 0)
     }
 
     /// For this matrix, and others of the same leaf with the same coupling: axes along which it is
     /// zero separate the rods.
-    pub fn of_coupling(system: &System) -> Result<Self, DirectError> {
-        DirectSolver::along(system, system.coupled_unknowns(), 0)
+    pub fn for_coupling_pattern(system: &System) -> Result<Self, DirectError> {
+        DirectSolver::with_coupling(system, system.coupled_unknowns(), 0)
     }
 
     /// For the matrix bordered by `rows` dense rows and columns at the end.
-    pub fn bordered(system: &System, rows: usize) -> Result<Self, DirectError> {
-        let [turns, shifts] = [system.tied(), system.coupled()];
+    pub fn with_border(system: &System, rows: usize) -> Result<Self, DirectError> {
+        let [turns, shifts] = [system.has_tissue(), system.coupled()];
         let coupled = [turns, turns, turns, shifts, shifts, shifts];
-        DirectSolver::along(system, coupled, rows)
+        DirectSolver::with_coupling(system, coupled, rows)
     }
 
     /// For rods of whose nodes these unknowns are coupled, with border rows.
-    fn along(system: &System, coupled: [bool; 6], border: usize) -> Result<Self, DirectError> {
+    fn with_coupling(
+        system: &System,
+        coupled: [bool; 6],
+        border: usize,
+    ) -> Result<Self, DirectError> {
         let (rods, n) = (system.rods(), system.nodes());
         let solver = DirectSolver {
-            unknowns: Arc::new(Unknowns::new(system, coupled)),
+            unknowns: Arc::new(UnknownNumbering::new(system, coupled)),
             first: system.first(),
-            condenses: border == 0
+            uses_condensation: border == 0
                 && coupled != [false; 6]
-                && !system.tied()
-                && system.segments() <= MOST_CONDENSED
-                && memory::factor(rods * (3 * n).pow(2)).is_ok(),
+                && !system.has_tissue()
+                && system.segments() <= MAX_CONDENSED_SEGMENTS
+                && memory::check_factor_memory(rods * (3 * n).pow(2)).is_ok(),
             symbolic: OnceLock::new(),
             border,
         };
-        if !solver.condenses {
+        if !solver.uses_condensation {
             solver.symbolic(system)?;
         }
         Ok(solver)
@@ -114,8 +118,8 @@ impl DirectSolver {
             .map_err(|&error| error)
     }
 
-    fn factors(&self, kind: Kind) -> Factors {
-        Factors {
+    fn factors(&self, kind: FactorizationKind) -> MatrixFactors {
+        MatrixFactors {
             unknowns: self.unknowns.clone(),
             border: self.border,
             kind,
@@ -130,30 +134,30 @@ impl DirectSolver {
     /// The unknowns of the rotation and of the displacement of node `i` of rod `j`.
     /// A joint tip has one displacement for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 6] {
-        self.unknowns.of(j, i - self.first)
+        self.unknowns.node_numbers(j, i - self.first)
     }
 
     /// The matrix assembled in `system` times increments: forces, those on a joint tip all
     /// on the first rod's.
-    pub fn product(&self, system: &System, increments: &Field) -> Field {
+    pub fn product(&self, system: &System, increments: &NodalField) -> NodalField {
         let unknowns = &self.unknowns;
         let mut x = vec![0.0; self.size()];
         for (j, rod) in increments.iter().enumerate() {
             for (i, node) in rod.iter().enumerate() {
                 for (c, part) in node.iter().enumerate() {
-                    x[unknowns.at(j, i, c)] = *part;
+                    x[unknowns.component_number(j, i, c)] = *part;
                 }
             }
         }
         let mut y = vec![0.0; self.size()];
-        entries(system, unknowns, &[], self.size(), 0.0, |a, b, k| {
+        for_each_matrix_entry(system, unknowns, &[], self.size(), 0.0, |a, b, k| {
             y[a] += k * x[b];
             if a != b {
                 y[b] += k * x[a];
             }
         });
-        let mut forces = self.unknowns.field(&y);
-        if unknowns.tip.is_some() {
+        let mut forces = self.unknowns.to_field(&y);
+        if unknowns.first_tip_unknown.is_some() {
             let others = forces.iter_mut().skip(1);
             others.for_each(|rod| rod[unknowns.nodes - 1][3..].fill(0.0));
         }
@@ -162,7 +166,7 @@ impl DirectSolver {
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
     /// `shift` times its mass matrix.
-    pub fn factorize(&self, system: &System, shift: f64) -> Result<Factors, DirectError> {
+    pub fn factorize(&self, system: &System, shift: f64) -> Result<MatrixFactors, DirectError> {
         self.factorize_bordered(system, shift, &[])
     }
 
@@ -172,34 +176,39 @@ impl DirectSolver {
         &self,
         system: &System,
         shift: f64,
-    ) -> Result<Option<Factors>, DirectError> {
-        if self.condenses {
+    ) -> Result<Option<MatrixFactors>, DirectError> {
+        if self.uses_condensation {
             let factors = self.factorize(system, shift)?;
-            return Ok((factors.negative() == 0).then_some(factors));
+            return Ok((factors.negative_eigenvalue_count() == 0).then_some(factors));
         }
         let symbolic = self.symbolic(system)?;
         let cholesky = symbolic.factorize_definite(system, &self.unknowns, shift)?;
-        Ok(cholesky.map(|cholesky| self.factors(Kind::Cholesky(cholesky))))
+        Ok(cholesky.map(|cholesky| self.factors(FactorizationKind::Cholesky(cholesky))))
     }
 
     /// As [`DirectSolver::factorize`], by the sparse factorisation, whose pivots tell the signs of
     /// eigenvalues closer to zero where veins are stiff.
-    pub fn factorize_sparse(&self, system: &System, shift: f64) -> Result<Factors, DirectError> {
+    pub fn factorize_sparse(
+        &self,
+        system: &System,
+        shift: f64,
+    ) -> Result<MatrixFactors, DirectError> {
         let symbolic = self.symbolic(system)?;
-        let kind = Kind::Sparse(symbolic.factorize(system, &self.unknowns, shift, &[])?);
+        let kind =
+            FactorizationKind::Sparse(symbolic.factorize(system, &self.unknowns, shift, &[])?);
         Ok(self.factors(kind))
     }
 
     /// Number of negative eigenvalues of the matrix assembled in `system` plus `shift` times its
     /// mass matrix.
     pub fn count_negative(&self, system: &System, shift: f64) -> Result<usize, DirectError> {
-        let condensed = match self.condenses {
-            true => Condensed::count(system, shift),
+        let condensed = match self.uses_condensation {
+            true => CondensedFactors::count_negative_eigenvalues(system, shift),
             false => None,
         };
         match condensed {
             Some(negative) => Ok(negative),
-            None => Ok(self.factorize(system, shift)?.negative()),
+            None => Ok(self.factorize(system, shift)?.negative_eigenvalue_count()),
         }
     }
 
@@ -209,49 +218,54 @@ impl DirectSolver {
         &self,
         system: &System,
         shift: f64,
-        border: &[Field],
-    ) -> Result<Factors, DirectError> {
-        let condensed = match self.condenses {
-            true => Condensed::new(system, shift),
+        border: &[NodalField],
+    ) -> Result<MatrixFactors, DirectError> {
+        let condensed = match self.uses_condensation {
+            true => CondensedFactors::new(system, shift),
             false => None,
         };
         let kind = match condensed {
-            Some(condensed) => Kind::Condensed(condensed),
+            Some(condensed) => FactorizationKind::Condensed(condensed),
             None => {
                 let symbolic = self.symbolic(system)?;
-                Kind::Sparse(symbolic.factorize(system, &self.unknowns, shift, border)?)
+                FactorizationKind::Sparse(symbolic.factorize(
+                    system,
+                    &self.unknowns,
+                    shift,
+                    border,
+                )?)
             }
         };
         Ok(self.factors(kind))
     }
 }
 
-impl Factors {
+impl MatrixFactors {
     /// Number of negative eigenvalues, by Sylvester's law of inertia.
-    pub fn negative(&self) -> usize {
+    pub fn negative_eigenvalue_count(&self) -> usize {
         match &self.kind {
-            Kind::Condensed(condensed) => condensed.negative(),
-            Kind::Sparse(sparse) => sparse.negative(),
-            Kind::Cholesky(_) => 0,
+            FactorizationKind::Condensed(condensed) => condensed.negative(),
+            FactorizationKind::Sparse(sparse) => sparse.negative_eigenvalue_count(),
+            FactorizationKind::Cholesky(_) => 0,
         }
     }
 
     /// Solves in place, with unknowns numbered as by [`DirectSolver::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            Kind::Condensed(condensed) => condensed.solve(&self.unknowns, b),
-            Kind::Sparse(sparse) => sparse.solve(b),
-            Kind::Cholesky(cholesky) => cholesky.solve(b),
+            FactorizationKind::Condensed(condensed) => condensed.solve(&self.unknowns, b),
+            FactorizationKind::Sparse(sparse) => sparse.solve(b),
+            FactorizationKind::Cholesky(cholesky) => cholesky.solve(b),
         }
     }
 
-    /// As [`Factors::solve_vector`], in half of the time where the matrix is factorised vein after
+    /// As [`MatrixFactors::solve_vector`], in half of the time where the matrix is factorised vein after
     /// vein, and without the last digits of stiff veins: for directions that are orthogonalised.
-    pub fn solve_quickly(&mut self, b: &mut [f64]) {
+    pub fn solve_unrefined(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            Kind::Condensed(condensed) => condensed.solve_once(&self.unknowns, b),
-            Kind::Sparse(sparse) => sparse.solve(b),
-            Kind::Cholesky(cholesky) => cholesky.solve(b),
+            FactorizationKind::Condensed(condensed) => condensed.solve_unrefined(&self.unknowns, b),
+            FactorizationKind::Sparse(sparse) => sparse.solve(b),
+            FactorizationKind::Cholesky(cholesky) => cholesky.solve(b),
         }
     }
 
@@ -274,36 +288,36 @@ impl Factors {
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
     /// the border.
-    pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
+    pub fn solve_bordered(&mut self, rhs: &NodalField, below: &[f64]) -> BorderedSolution {
         let unknowns = self.unknowns.clone();
         let mut b = vec![0.0; unknowns.count + self.border];
         for (j, rod) in rhs.iter().enumerate() {
             for (i, rhs) in rod.iter().enumerate() {
-                unknowns.gather(j, i, rhs, &mut b);
+                unknowns.add_node_forces(j, i, rhs, &mut b);
             }
         }
         b[unknowns.count..].copy_from_slice(below);
         self.solve_vector(&mut b);
-        Bordered {
-            increments: unknowns.field(&b),
+        BorderedSolution {
+            increments: unknowns.to_field(&b),
             multipliers: b[unknowns.count..].to_vec(),
         }
     }
 }
 
 /// Blocks of the grid of rods and nodes no larger than this are not dissected.
-const DISSECTION_LEAF: usize = 4;
+const UNDISSECTED_BLOCK_SIZE: usize = 4;
 
 /// Of a block this many times wider than it is long, in unknowns, the rods are eliminated one
 /// after the other.
-const WIDE: f64 = 2.5;
+const WIDE_BLOCK_RATIO: f64 = 2.5;
 
 /// The numbering of the unknowns of the nodes.
-pub struct Unknowns {
+pub struct UnknownNumbering {
     /// The unknowns of node i (from the first with equations) of rod j, at j n + i.
     numbers: Vec<[usize; 6]>,
     /// First unknown of the joint tip.
-    pub tip: Option<usize>,
+    pub first_tip_unknown: Option<usize>,
     /// Nodes of a rod that have equations.
     pub nodes: usize,
     /// Number of unknowns.
@@ -312,12 +326,12 @@ pub struct Unknowns {
     coupled: [bool; 6],
 }
 
-impl Unknowns {
+impl UnknownNumbering {
     /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
     /// of which these unknowns are coupled only.
     pub fn new(system: &System, coupled: [bool; 6]) -> Self {
         let (rods, n) = (system.rods(), system.nodes());
-        let mut order = Order {
+        let mut order = DissectionOrder {
             numbers: vec![[0; 6]; rods * n],
             count: 0,
             nodes: n,
@@ -325,7 +339,7 @@ impl Unknowns {
             coupled,
         };
         order.dissect((0, rods), (0, n));
-        let Order {
+        let DissectionOrder {
             mut numbers,
             mut count,
             ..
@@ -337,9 +351,9 @@ impl Unknowns {
             }
             count += 3;
         }
-        Unknowns {
+        UnknownNumbering {
             numbers,
-            tip,
+            first_tip_unknown: tip,
             nodes: n,
             count,
             coupled,
@@ -347,25 +361,26 @@ impl Unknowns {
     }
 
     /// Component `c` of node `i` (from 0) of rod `j`.
-    pub fn at(&self, j: usize, i: usize, c: usize) -> usize {
-        self.of(j, i)[c]
+    pub fn component_number(&self, j: usize, i: usize, c: usize) -> usize {
+        self.node_numbers(j, i)[c]
     }
 
     /// All six unknowns of node `i` (from 0) of rod `j`.
-    pub fn of(&self, j: usize, i: usize) -> [usize; 6] {
+    pub fn node_numbers(&self, j: usize, i: usize) -> [usize; 6] {
         self.numbers[j * self.nodes + i]
     }
 
     /// Adds the forces on a node to a vector of all unknowns.
-    pub fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
+    pub fn add_node_forces(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
         for c in 0..6 {
-            all[self.at(j, i, c)] += forces[c];
+            all[self.component_number(j, i, c)] += forces[c];
         }
     }
 
     /// The values at all nodes, from a vector of all unknowns.
-    pub fn field(&self, all: &[f64]) -> Field {
-        let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
+    pub fn to_field(&self, all: &[f64]) -> NodalField {
+        let node =
+            |j: usize, i: usize| std::array::from_fn(|c| all[self.component_number(j, i, c)]);
         let rods = self.numbers.chunks_exact(self.nodes).enumerate();
         rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
             .collect()
@@ -373,7 +388,7 @@ impl Unknowns {
 }
 
 /// The numbering, as far as it has come.
-struct Order {
+struct DissectionOrder {
     numbers: Vec<[usize; 6]>,
     count: usize,
     nodes: usize,
@@ -381,7 +396,7 @@ struct Order {
     coupled: [bool; 6],
 }
 
-impl Order {
+impl DissectionOrder {
     /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
     /// first, then the line between them. A rod is separated from its neighbours by the
     /// unknowns that are coupled to theirs alone: its others precede these.
@@ -391,47 +406,52 @@ impl Order {
         let (across, along) = (6 * width, axes * length);
         if width == 0 || length == 0 {
         } else if width == 1 {
-            self.bisect(rods.0, nodes, |_| true);
-        } else if width * length <= DISSECTION_LEAF {
+            self.dissect_rod(rods.0, nodes, |_| true);
+        } else if width * length <= UNDISSECTED_BLOCK_SIZE {
             for j in rods.0..rods.1 {
-                (nodes.0..nodes.1).for_each(|i| self.number(j, i, |_| true));
+                (nodes.0..nodes.1).for_each(|i| self.number_node(j, i, |_| true));
             }
-        } else if across as f64 >= WIDE * along as f64 {
-            (rods.0..rods.1).for_each(|j| self.separate(j, nodes));
+        } else if across as f64 >= WIDE_BLOCK_RATIO * along as f64 {
+            (rods.0..rods.1).for_each(|j| self.number_rod(j, nodes));
         } else if across > along {
             let middle = rods.0 + width / 2;
             self.dissect((rods.0, middle), nodes);
             self.dissect((middle + 1, rods.1), nodes);
-            self.separate(middle, nodes);
+            self.number_rod(middle, nodes);
         } else {
             let middle = nodes.0 + length / 2;
             self.dissect(rods, (nodes.0, middle));
             self.dissect(rods, (middle + 1, nodes.1));
-            (rods.0..rods.1).for_each(|j| self.number(j, middle, |_| true));
+            (rods.0..rods.1).for_each(|j| self.number_node(j, middle, |_| true));
         }
     }
 
     /// A rod's own unknowns, then those that are coupled.
-    fn separate(&mut self, j: usize, nodes: (usize, usize)) {
+    fn number_rod(&mut self, j: usize, nodes: (usize, usize)) {
         let coupled = self.coupled;
         let is_coupled = |c: usize| coupled[c];
-        self.bisect(j, nodes, |c| !is_coupled(c));
-        (nodes.0..nodes.1).for_each(|i| self.number(j, i, is_coupled));
+        self.dissect_rod(j, nodes, |c| !is_coupled(c));
+        (nodes.0..nodes.1).for_each(|i| self.number_node(j, i, is_coupled));
     }
 
     /// Nested dissection of the nodes of a rod, some components of each.
-    fn bisect(&mut self, j: usize, nodes: (usize, usize), some: impl Fn(usize) -> bool + Copy) {
+    fn dissect_rod(
+        &mut self,
+        j: usize,
+        nodes: (usize, usize),
+        some: impl Fn(usize) -> bool + Copy,
+    ) {
         if nodes.0 == nodes.1 {
             return;
         }
         let middle = nodes.0 + (nodes.1 - nodes.0) / 2;
-        self.bisect(j, (nodes.0, middle), some);
-        self.bisect(j, (middle + 1, nodes.1), some);
-        self.number(j, middle, some);
+        self.dissect_rod(j, (nodes.0, middle), some);
+        self.dissect_rod(j, (middle + 1, nodes.1), some);
+        self.number_node(j, middle, some);
     }
 
     /// Some components of a node; not those of the joint tip, which follows.
-    fn number(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
+    fn number_node(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
         let own = match self.joined && i + 1 == self.nodes {
             true => 3,
             false => 6,
@@ -445,10 +465,10 @@ impl Order {
 
 /// Calls `add` with row, column and value of the entries of one triangle of K and its border, some
 /// of them in several parts: the same positions in the same order for all systems of a pattern.
-pub fn entries(
+pub fn for_each_matrix_entry(
     system: &System,
-    unknowns: &Unknowns,
-    border: &[Field],
+    unknowns: &UnknownNumbering,
+    border: &[NodalField],
     first_border: usize,
     shift: f64,
     mut add: impl FnMut(usize, usize, f64),
@@ -460,7 +480,10 @@ pub fn entries(
         for i in 0..n {
             let (own, next) = chain.blocks(i, lane);
             let mass = system.mass(j, i);
-            let (here, ahead) = (unknowns.of(j, i), unknowns.of(j, (i + 1).min(n - 1)));
+            let (here, ahead) = (
+                unknowns.node_numbers(j, i),
+                unknowns.node_numbers(j, (i + 1).min(n - 1)),
+            );
             for r in 0..6 {
                 add(here[r], here[r], shift * mass[r / 3]);
                 for c in r..6 {
@@ -470,16 +493,16 @@ pub fn entries(
                     add(here[r], ahead[c], next[r][c]);
                 }
             }
-            if let Some(spring) = system.spring(j, i)
-                && (unknowns.tip.is_none() || i + 1 < n)
+            if let Some(spring) = system.node_coupling(j, i)
+                && (unknowns.first_tip_unknown.is_none() || i + 1 < n)
             {
-                let other = unknowns.of(j + 1, i);
+                let other = unknowns.node_numbers(j + 1, i);
                 for c in (0..3).filter(|&c| unknowns.coupled[3 + c]) {
                     add(here[3 + c], other[3 + c], -spring[c]);
                 }
             }
-            if let Some(across) = system.across(j, i) {
-                let other = unknowns.of(j + 1, i);
+            if let Some(across) = system.gap_block(j, i) {
+                let other = unknowns.node_numbers(j + 1, i);
                 for (r, row) in across.iter().enumerate() {
                     for (c, value) in row.iter().enumerate() {
                         // The displacement of a joint tip meets itself, in either order.
@@ -491,7 +514,7 @@ pub fn entries(
         }
         for (k, row) in border.iter().enumerate() {
             for (i, forces) in row[j].iter().enumerate() {
-                for (at, force) in unknowns.of(j, i).into_iter().zip(forces) {
+                for (at, force) in unknowns.node_numbers(j, i).into_iter().zip(forces) {
                     add(at, first_border + k, *force);
                 }
             }

@@ -1,7 +1,7 @@
 //! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
 
-use crate::leaf::direct::{DirectError, Unknowns, entries, lower_triangle};
-use crate::leaf::state::Field;
+use crate::leaf::direct::{DirectError, UnknownNumbering, for_each_matrix_entry, lower_triangle};
+use crate::leaf::state::NodalField;
 use crate::leaf::system::System;
 use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -57,13 +57,17 @@ impl Cholesky {
 
 impl Symbolic {
     /// Of a leaf's matrix with so many border rows after all unknowns.
-    pub fn new(system: &System, unknowns: &Unknowns, rows: usize) -> Result<Self, DirectError> {
+    pub fn new(
+        system: &System,
+        unknowns: &UnknownNumbering,
+        rows: usize,
+    ) -> Result<Self, DirectError> {
         let border = unknowns.count;
         let size = border + rows;
         let (rods, n) = (system.rods(), system.nodes());
         let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
         let mut pairs = Vec::new();
-        entries(system, unknowns, &ones, border, 0.0, |a, b, _| {
+        for_each_matrix_entry(system, unknowns, &ones, border, 0.0, |a, b, _| {
             pairs.push([a.min(b), a.max(b)]);
         });
         let (lower, places) = lower_triangle(size, &pairs);
@@ -87,12 +91,13 @@ impl Symbolic {
             places,
             size,
         };
-        memory::factor(symbolic.fill()).map_err(|_| DirectError::Memory)?;
+        memory::check_factor_memory(symbolic.factor_entry_count())
+            .map_err(|_| DirectError::Memory)?;
         Ok(symbolic)
     }
 
     /// Number of stored entries of the factors.
-    pub fn fill(&self) -> usize {
+    pub fn factor_entry_count(&self) -> usize {
         self.supernodes().len_val()
     }
 
@@ -105,17 +110,17 @@ impl Symbolic {
 
     /// The entries of the lower triangle of the matrix assembled in `system` plus `shift` times the
     /// mass matrix, and of its border.
-    fn entries(
+    fn matrix_entries(
         &self,
         system: &System,
-        unknowns: &Unknowns,
+        unknowns: &UnknownNumbering,
         shift: f64,
-        border: &[Field],
+        border: &[NodalField],
     ) -> Vec<f64> {
         let mut values = vec![0.0; self.lower.compute_nnz()];
         let mut places = self.places.iter();
         let first_border = unknowns.count;
-        entries(
+        for_each_matrix_entry(
             system,
             unknowns,
             border,
@@ -135,11 +140,11 @@ impl Symbolic {
     pub fn factorize_definite(
         self: &Arc<Self>,
         system: &System,
-        unknowns: &Unknowns,
+        unknowns: &UnknownNumbering,
         shift: f64,
     ) -> Result<Option<Cholesky>, DirectError> {
         let symbolic = self.supernodes();
-        let entries = self.entries(system, unknowns, shift, &[]);
+        let entries = self.matrix_entries(system, unknowns, shift, &[]);
         let scratch = supernodal::factorize_supernodal_numeric_llt_scratch::<usize, f64>(
             symbolic,
             Par::Seq,
@@ -168,12 +173,12 @@ impl Symbolic {
     pub fn factorize(
         self: &Arc<Self>,
         system: &System,
-        unknowns: &Unknowns,
+        unknowns: &UnknownNumbering,
         shift: f64,
-        border: &[Field],
+        border: &[NodalField],
     ) -> Result<Sparse, DirectError> {
         let symbolic = self.supernodes();
-        let values = self.entries(system, unknowns, shift, border);
+        let values = self.matrix_entries(system, unknowns, shift, border);
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -206,7 +211,7 @@ impl Symbolic {
 }
 
 impl Sparse {
-    fn parts(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
+    fn factor_view(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
         let symbolic = self.symbolic.supernodes();
         let perm = PermRef::new_checked(&self.forward, &self.inverse, self.symbolic.size);
         supernodal::SupernodalIntranodeLbltRef::new(symbolic, &self.values, &self.subdiagonal, perm)
@@ -214,7 +219,7 @@ impl Sparse {
 
     /// What is not a number in the matrix spreads to a pivot.
     fn has_finite_pivots(&self) -> bool {
-        let parts = self.parts();
+        let parts = self.factor_view();
         let mut nodes = (0..parts.symbolic().n_supernodes()).map(|s| parts.supernode(s).val());
         nodes.all(|pivots| (0..pivots.ncols()).all(|k| pivots[(k, k)].is_finite()))
             && self.subdiagonal.iter().all(|value| value.is_finite())
@@ -222,8 +227,8 @@ impl Sparse {
 
     /// Number of negative eigenvalues, by Sylvester's law of inertia: the
     /// negative 1 x 1 pivots, and one for each 2 x 2 pivot (two if negative definite).
-    pub fn negative(&self) -> usize {
-        let parts = self.parts();
+    pub fn negative_eigenvalue_count(&self) -> usize {
+        let parts = self.factor_view();
         let mut negative = 0;
         for s in 0..parts.symbolic().n_supernodes() {
             let node = parts.supernode(s);
@@ -252,12 +257,13 @@ impl Sparse {
     pub fn solve(&mut self, b: &mut [f64]) {
         let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
         let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
-        self.parts().solve_in_place_no_numeric_permute_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        self.factor_view()
+            .solve_in_place_no_numeric_permute_with_conj(
+                Conj::No,
+                MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
+                Par::Seq,
+                MemStack::new(&mut memory),
+            );
         self.memory = memory;
         for (b, &k) in b.iter_mut().zip(&self.inverse) {
             *b = x[k];

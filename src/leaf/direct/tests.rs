@@ -16,14 +16,14 @@ const LEAF: &str = r#"
 
 /// The leaf with some entries replaced, in the state it starts in, its nodes displaced by a few
 /// hundredths, so that segments carry forces of both signs.
-fn on(segments: usize, entries: &[&str]) -> System {
+fn assembled_system(segments: usize, entries: &[&str]) -> System {
     let entries: Vec<String> = entries.iter().map(|&entry| entry.into()).collect();
     let leaf = Leaf::new(&Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap());
     let leaf = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
-    let mut state: State = crate::relax::start(&leaf);
+    let mut state: State = crate::relax::initial_state(&leaf);
     for j in 0..state.rods() {
         let base = state.base(j);
-        let last = segments - usize::from(leaf.leaf.joined() || leaf.leaf.held.is_some());
+        let last = segments - usize::from(leaf.leaf.joined() || leaf.leaf.tip_support.is_some());
         for i in 1..=last {
             let wave = 0.01 * (3.0 * (i + 2 * j) as f64).sin();
             state.x[base + i] += wave * DVec3::new(0.2, 1.0, -0.7);
@@ -63,16 +63,20 @@ fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
     ];
     for entries in leaves {
         for segments in [1, 2, 8, 15, 32] {
-            let system = on(segments, entries);
-            let condensed = DirectSolver::of_coupling(&system).unwrap();
+            let system = assembled_system(segments, entries);
+            let condensed = DirectSolver::for_coupling_pattern(&system).unwrap();
             for shift in [0.0, 5.0, -10.0, -300.0, -4e3] {
                 let what = format!("{entries:?}, {segments} segments, shift {shift}");
                 let mut here = condensed.factorize(&system, shift).unwrap();
-                condensed_ones += usize::from(matches!(here.kind, Kind::Condensed(_)));
+                condensed_ones += usize::from(matches!(here.kind, FactorizationKind::Condensed(_)));
                 let mut there = condensed.factorize_sparse(&system, shift).unwrap();
-                assert_eq!(here.negative(), there.negative(), "{what}");
+                assert_eq!(
+                    here.negative_eigenvalue_count(),
+                    there.negative_eigenvalue_count(),
+                    "{what}"
+                );
                 let count = condensed.count_negative(&system, shift);
-                assert_eq!(count, Ok(there.negative()), "{what}");
+                assert_eq!(count, Ok(there.negative_eigenvalue_count()), "{what}");
                 let mut solutions = [load(condensed.size()), load(condensed.size())];
                 here.solve_vector(&mut solutions[0]);
                 there.solve_vector(&mut solutions[1]);
@@ -91,17 +95,26 @@ fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
 /// Where a pivot is too small for what it divides, the sparse factorisation takes over.
 #[test]
 fn small_pivots_are_left_to_the_sparse_factorisation() {
-    let system = on(8, &[]);
-    let solver = DirectSolver::of_coupling(&system).unwrap();
+    let system = assembled_system(8, &[]);
+    let solver = DirectSolver::for_coupling_pattern(&system).unwrap();
     // The shift at which the first pivot vanishes: at a rotation about an axis of its own.
     let group = &system.groups[0].matrix;
     let (own, _) = group.blocks(0, 0);
     let turns = nalgebra::Matrix3::from_fn(|r, c| own[r.min(c)][r.max(c)]);
     let [rotary, _] = system.mass(0, 0);
     let shift = -turns.symmetric_eigenvalues()[1] / rotary;
-    assert!(Condensed::new(&system, shift).is_none());
-    let there = solver.factorize_sparse(&system, shift).unwrap().negative();
-    assert_eq!(solver.factorize(&system, shift).unwrap().negative(), there);
+    assert!(CondensedFactors::new(&system, shift).is_none());
+    let there = solver
+        .factorize_sparse(&system, shift)
+        .unwrap()
+        .negative_eigenvalue_count();
+    assert_eq!(
+        solver
+            .factorize(&system, shift)
+            .unwrap()
+            .negative_eigenvalue_count(),
+        there
+    );
     assert_eq!(solver.count_negative(&system, shift), Ok(there));
 }
 
@@ -109,10 +122,10 @@ fn small_pivots_are_left_to_the_sparse_factorisation() {
 /// sparse ones, these stay small.
 #[test]
 fn sparse_factors_are_as_small_as_the_coupling_allows() {
-    let system = on(64, &[]);
-    let fill = |solver: DirectSolver| solver.symbolic(&system).unwrap().fill();
+    let system = assembled_system(64, &[]);
+    let fill = |solver: DirectSolver| solver.symbolic(&system).unwrap().factor_entry_count();
     let any = fill(DirectSolver::new(&system).unwrap());
-    let own = fill(DirectSolver::of_coupling(&system).unwrap());
+    let own = fill(DirectSolver::for_coupling_pattern(&system).unwrap());
     assert!(own <= any * 9 / 10, "{own} for {any}");
 }
 
@@ -135,8 +148,8 @@ fn counts_change_at_the_eigenvalues() {
         ],
     ];
     for entries in leaves {
-        let system = on(12, entries);
-        let solver = DirectSolver::of_coupling(&system).unwrap();
+        let system = assembled_system(12, entries);
+        let solver = DirectSolver::for_coupling_pattern(&system).unwrap();
         for number in [1, 5, 12, 40] {
             let found = [true, false].map(|condensed| {
                 let mut between = [-1e6, 1e6];
@@ -144,7 +157,10 @@ fn counts_change_at_the_eigenvalues() {
                     let middle = 0.5 * (between[0] + between[1]);
                     let count = match condensed {
                         true => solver.count_negative(&system, middle).unwrap(),
-                        false => solver.factorize_sparse(&system, middle).unwrap().negative(),
+                        false => solver
+                            .factorize_sparse(&system, middle)
+                            .unwrap()
+                            .negative_eigenvalue_count(),
                     };
                     let enough = count >= number;
                     between[usize::from(!enough)] = middle;

@@ -18,14 +18,14 @@
 //! into [-P^-1 P^-1 B; B^T P^-1 C - B^T P^-1 B]; the negative pivots are as many as the negative
 //! eigenvalues of P.
 
-use crate::leaf::block_tridiagonal::{ChainBlock, group_and_lane};
-use crate::leaf::direct::Unknowns;
+use crate::leaf::block_tridiagonal::{RodBlock, group_and_lane};
+use crate::leaf::direct::UnknownNumbering;
 use crate::leaf::system::System;
 use pulp::{Arch, Simd, WithSimd};
 
 /// The factorised matrix.
-pub struct Condensed {
-    veins: Vec<Vein>,
+pub struct CondensedFactors {
+    veins: Vec<CondensedRod>,
     /// Coupling of every vein with the next, at the displacements that are eliminated.
     coupling: Vec<Vec<f64>>,
     /// Minus the inverse of the matrix that is left for the displacement of a joint tip.
@@ -33,38 +33,38 @@ pub struct Condensed {
     /// Number of negative pivots.
     negative: usize,
     /// Displacements of a vein, and those of them that are eliminated with it.
-    width: usize,
-    own: usize,
+    displacements_per_rod: usize,
+    eliminated_displacements: usize,
     arch: Arch,
 }
 
-impl Condensed {
+impl CondensedFactors {
     /// Factorises the matrix assembled in `system` plus `shift` times its mass matrix. `None` if
     /// pivots are too small or not numbers.
     pub fn new(system: &System, shift: f64) -> Option<Self> {
         let mut work = Workspace::new(system);
-        let (width, own) = (work.width, work.own);
-        let mut condensed = Condensed {
+        let (width, own) = (work.displacements_per_rod, work.eliminated_displacements);
+        let mut condensed = CondensedFactors {
             veins: Vec::with_capacity(system.rods()),
             coupling: (1..system.rods())
-                .map(|j| coupling(system, j - 1, own))
+                .map(|j| gap_coupling(system, j - 1, own))
                 .collect(),
             tip: None,
             negative: 0,
-            width,
-            own,
+            displacements_per_rod: width,
+            eliminated_displacements: own,
             arch: system.arch,
         };
         for j in 0..system.rods() {
-            let mut vein = Vein::default();
+            let mut vein = CondensedRod::default();
             let before = j.checked_sub(1);
             let before = before.map(|k| (&condensed.veins[k], condensed.coupling[k].as_slice()));
             condensed.negative += vein.eliminate((system, shift, j), before, &mut work)?;
-            mirror(&mut vein.swept, width);
+            symmetrize_matrix(&mut vein.swept, width);
             condensed.veins.push(vein);
         }
         if system.joined {
-            let (negative, tip) = tip(condensed.veins.last()?, &work)?;
+            let (negative, tip) = invert_tip_block(condensed.veins.last()?, &work)?;
             condensed.negative += negative;
             condensed.tip = Some(tip);
         }
@@ -73,19 +73,19 @@ impl Condensed {
 
     /// The number of negative eigenvalues alone, without the factors. `None` as for
     /// [`Condensed::new`].
-    pub fn count(system: &System, shift: f64) -> Option<usize> {
+    pub fn count_negative_eigenvalues(system: &System, shift: f64) -> Option<usize> {
         let mut work = Workspace::new(system);
-        let [mut vein, mut last] = [(); 2].map(|()| Vein::default());
+        let [mut vein, mut last] = [(); 2].map(|()| CondensedRod::default());
         let mut negative = 0;
         let mut gap = Vec::new();
         for j in 0..system.rods() {
             let before = (j > 0).then_some((&last, gap.as_slice()));
             negative += vein.eliminate((system, shift, j), before, &mut work)?;
-            gap = coupling(system, j, work.own);
+            gap = gap_coupling(system, j, work.eliminated_displacements);
             std::mem::swap(&mut vein, &mut last);
         }
         if system.joined {
-            negative += tip(&last, &work)?.0;
+            negative += invert_tip_block(&last, &work)?.0;
         }
         Some(negative)
     }
@@ -97,17 +97,17 @@ impl Condensed {
 
     /// Solves in place, with these numbers of the unknowns. A step of iterative refinement makes the
     /// solution as accurate as one without inverse matrices.
-    pub fn solve(&self, unknowns: &Unknowns, b: &mut [f64]) {
+    pub fn solve(&self, unknowns: &UnknownNumbering, b: &mut [f64]) {
         let mut x = b.to_vec();
-        self.solve_once(unknowns, &mut x);
+        self.solve_unrefined(unknowns, &mut x);
         self.subtract_product(unknowns, &x, b);
-        self.solve_once(unknowns, b);
+        self.solve_unrefined(unknowns, b);
         b.iter_mut().zip(&x).for_each(|(b, x)| *b += x);
     }
 
     /// Solves in place without refinement.
-    pub fn solve_once(&self, unknowns: &Unknowns, b: &mut [f64]) {
-        self.arch.dispatch(Solution {
+    pub fn solve_unrefined(&self, unknowns: &UnknownNumbering, b: &mut [f64]) {
+        self.arch.dispatch(CondensedSolve {
             condensed: self,
             unknowns,
             b,
@@ -115,16 +115,16 @@ impl Condensed {
     }
 
     /// Subtracts the matrix times `x` from `b`.
-    fn subtract_product(&self, unknowns: &Unknowns, x: &[f64], b: &mut [f64]) {
+    fn subtract_product(&self, unknowns: &UnknownNumbering, x: &[f64], b: &mut [f64]) {
         for (j, vein) in self.veins.iter().enumerate() {
             for (i, node) in vein.nodes.iter().enumerate() {
-                let here = unknowns.of(j, i);
+                let here = unknowns.node_numbers(j, i);
                 let own = here.map(|k| x[k]);
-                for (at, row) in here.iter().zip(&node.own) {
+                for (at, row) in here.iter().zip(&node.eliminated_displacements) {
                     b[*at] -= product(row, &own);
                 }
                 if i + 1 < vein.nodes.len() {
-                    let ahead = unknowns.of(j, i + 1);
+                    let ahead = unknowns.node_numbers(j, i + 1);
                     let next = ahead.map(|k| x[k]);
                     for (r, row) in node.next.iter().enumerate() {
                         b[here[r]] -= product(row, &next);
@@ -133,8 +133,8 @@ impl Condensed {
                         }
                     }
                 }
-                if j + 1 < self.veins.len() && 3 * i < self.own {
-                    let other = unknowns.of(j + 1, i);
+                if j + 1 < self.veins.len() && 3 * i < self.eliminated_displacements {
+                    let other = unknowns.node_numbers(j + 1, i);
                     for c in 0..3 {
                         let coupling = self.coupling[j][3 * i + c];
                         b[here[3 + c]] += coupling * x[other[3 + c]];
@@ -151,13 +151,17 @@ fn product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
 }
 
 /// The coupling of a vein with the next at the displacements that are eliminated with it.
-fn coupling(system: &System, j: usize, own: usize) -> Vec<f64> {
-    let spring = |k: usize| system.spring(j, k / 3).map_or(0.0, |spring| spring[k % 3]);
+fn gap_coupling(system: &System, j: usize, own: usize) -> Vec<f64> {
+    let spring = |k: usize| {
+        system
+            .node_coupling(j, k / 3)
+            .map_or(0.0, |spring| spring[k % 3])
+    };
     (0..own).map(spring).collect()
 }
 
 /// Completes a symmetric matrix of padded rows, given by its upper triangle.
-fn mirror(a: &mut [f64], width: usize) {
+fn symmetrize_matrix(a: &mut [f64], width: usize) {
     let stride = padded(width);
     for r in 1..width {
         for c in 0..r {
@@ -168,44 +172,51 @@ fn mirror(a: &mut [f64], width: usize) {
 
 /// The number of negative pivots of a joint tip after the last vein, and minus the inverse of
 /// its matrix.
-fn tip(last: &Vein, work: &Workspace) -> Option<(usize, Matrix3)> {
-    let at = |k: usize| (work.own + k) * padded(work.width) + work.own;
+fn invert_tip_block(last: &CondensedRod, work: &Workspace) -> Option<(usize, Matrix3)> {
+    let at = |k: usize| {
+        (work.eliminated_displacements + k) * padded(work.displacements_per_rod)
+            + work.eliminated_displacements
+    };
     let entry = |r: usize, c: usize| last.swept[at(r.min(c)) + r.max(c)];
     let mut tip: Matrix3 = std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)));
     let scale = std::array::from_fn(|k| tip[k][k].abs());
-    Some((sweep3(&mut tip, scale)?, tip))
+    Some((sweep_matrix3(&mut tip, scale)?, tip))
 }
 
 /// Solves for a vector of all unknowns, in place.
-struct Solution<'a> {
-    condensed: &'a Condensed,
-    unknowns: &'a Unknowns,
+struct CondensedSolve<'a> {
+    condensed: &'a CondensedFactors,
+    unknowns: &'a UnknownNumbering,
     b: &'a mut [f64],
 }
 
-impl WithSimd for Solution<'_> {
+impl WithSimd for CondensedSolve<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Solution {
+        let CondensedSolve {
             condensed,
             unknowns,
             b,
         } = self;
-        let Condensed { width, own, .. } = *condensed;
+        let CondensedFactors {
+            displacements_per_rod: width,
+            eliminated_displacements: own,
+            ..
+        } = *condensed;
         let rods = condensed.veins.len();
         let mut turns = vec![[0.0; 3]; width / 3];
         // S^-1 times what is left for the displacements of every vein, then these themselves.
         let mut shifts = vec![0.0; rods * width];
         let mut load = vec![0.0; width];
         let mut tip = unknowns
-            .tip
+            .first_tip_unknown
             .map_or([0.0; 3], |tip| [b[tip], b[tip + 1], b[tip + 2]]);
         for (j, vein) in condensed.veins.iter().enumerate() {
             load.fill(0.0);
             for (i, turn) in turns.iter_mut().enumerate() {
-                let at = unknowns.of(j, i);
+                let at = unknowns.node_numbers(j, i);
                 for c in 0..3 {
                     turn[c] = b[at[c]];
                     if 3 * i < own {
@@ -215,7 +226,7 @@ impl WithSimd for Solution<'_> {
             }
             vein.solve_rotations(&mut turns);
             for (i, turn) in turns.iter().enumerate() {
-                let at = unknowns.of(j, i);
+                let at = unknowns.node_numbers(j, i);
                 for c in 0..3 {
                     b[at[c]] = turn[c];
                 }
@@ -229,7 +240,7 @@ impl WithSimd for Solution<'_> {
                 }
             }
             let here = &mut here[..width];
-            vein.multiply(&load[..own], here);
+            vein.multiply_swept(&load[..own], here);
             for c in 0..width - own {
                 tip[c] += load[own + c] - here[own + c];
             }
@@ -237,7 +248,7 @@ impl WithSimd for Solution<'_> {
         }
         if let Some(inverse) = condensed.tip {
             tip = inverse.map(|row| -(row[0] * tip[0] + row[1] * tip[1] + row[2] * tip[2]));
-            let first = unknowns.tip.expect("a joint tip has numbers");
+            let first = unknowns.first_tip_unknown.expect("a joint tip has numbers");
             b[first..first + 3].copy_from_slice(&tip);
         }
         let mut product = vec![0.0; width];
@@ -248,7 +259,7 @@ impl WithSimd for Solution<'_> {
                 for k in 0..own {
                     load[k] = condensed.coupling[j][k] * next[k];
                 }
-                vein.multiply(&load[..own], &mut product);
+                vein.multiply_swept(&load[..own], &mut product);
                 for k in 0..own {
                     here[k] -= product[k];
                 }
@@ -260,9 +271,9 @@ impl WithSimd for Solution<'_> {
                 }
                 here[own + c] = *tip;
             }
-            vein.rotations_of(here, &mut turns);
+            vein.balancing_rotations(here, &mut turns);
             for (i, turn) in turns.iter().enumerate() {
-                let at = unknowns.of(j, i);
+                let at = unknowns.node_numbers(j, i);
                 for c in 0..3 {
                     b[at[c]] -= turn[c];
                     if 3 * i < own {
@@ -276,8 +287,8 @@ impl WithSimd for Solution<'_> {
 
 /// A vein of a factorised leaf.
 #[derive(Default)]
-pub struct Vein {
-    pub nodes: Vec<Node>,
+pub struct CondensedRod {
+    pub nodes: Vec<CondensedNode>,
     /// The swept matrix: -S^-1 and, in the columns of a joint tip, S^-1 times the matrix between
     /// the vein and the tip; rows padded, symmetric.
     pub swept: Vec<f64>,
@@ -285,24 +296,24 @@ pub struct Vein {
 
 /// A node of a vein: the blocks of the assembled matrix, the inverse pivot of its rotation, and
 /// that times the block between it and the next rotation.
-pub struct Node {
-    pub own: ChainBlock,
-    pub next: ChainBlock,
+pub struct CondensedNode {
+    pub eliminated_displacements: RodBlock,
+    pub next: RodBlock,
     inverse: Matrix3,
-    ahead: Matrix3,
+    inverse_times_next: Matrix3,
 }
 
-impl Vein {
+impl CondensedRod {
     /// Eliminates vein `j` after the one `before` it, and what couples them; the number of
     /// negative pivots. Of the swept matrix the upper triangle is written.
     pub fn eliminate(
         &mut self,
         (system, shift, j): (&System, f64, usize),
-        before: Option<(&Vein, &[f64])>,
+        before: Option<(&CondensedRod, &[f64])>,
         work: &mut Workspace,
     ) -> Option<usize> {
-        self.assemble(system, j, shift, work.width);
-        system.arch.dispatch(Elimination {
+        self.assemble(system, j, shift, work.displacements_per_rod);
+        system.arch.dispatch(RodElimination {
             vein: self,
             before,
             work,
@@ -327,7 +338,7 @@ impl Vein {
                 }
             }
             if i + 1 == n {
-                next = ChainBlock::default();
+                next = RodBlock::default();
             }
             for r in 0..3 {
                 let row = &mut self.swept[(3 * i + r) * stride..][..width];
@@ -336,18 +347,18 @@ impl Vein {
                     row[3 * i + 3..3 * i + 6].copy_from_slice(&next[3 + r][3..]);
                 }
             }
-            self.nodes.push(Node {
-                own,
+            self.nodes.push(CondensedNode {
+                eliminated_displacements: own,
                 next,
                 inverse: Matrix3::default(),
-                ahead: Matrix3::default(),
+                inverse_times_next: Matrix3::default(),
             });
         }
     }
 
     /// The swept matrix times a vector of the eliminated displacements.
     #[inline(always)]
-    pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
+    pub fn multiply_swept(&self, vector: &[f64], product: &mut [f64]) {
         product.fill(0.0);
         let stride = padded(product.len());
         for (row, factor) in self.swept.chunks_exact(stride).zip(vector) {
@@ -363,7 +374,9 @@ impl Vein {
         for (i, node) in self.nodes.iter().enumerate() {
             if i + 1 < self.nodes.len() {
                 for c in 0..3 {
-                    let passed: f64 = (0..3).map(|k| node.ahead[k][c] * turns[i][k]).sum();
+                    let passed: f64 = (0..3)
+                        .map(|k| node.inverse_times_next[k][c] * turns[i][k])
+                        .sum();
                     turns[i + 1][c] -= passed;
                 }
             }
@@ -375,7 +388,7 @@ impl Vein {
         for i in (0..self.nodes.len() - 1).rev() {
             let next = turns[i + 1];
             for c in 0..3 {
-                let row = self.nodes[i].ahead[c];
+                let row = self.nodes[i].inverse_times_next[c];
                 turns[i][c] -= row[0] * next[0] + row[1] * next[1] + row[2] * next[2];
             }
         }
@@ -384,7 +397,15 @@ impl Vein {
     /// Subtracts from the forces on the nodes those of rotations.
     #[inline(always)]
     pub fn subtract_rotations(&self, turns: &[[f64; 3]], load: &mut [f64]) {
-        for (i, Node { own, next, .. }) in self.nodes.iter().enumerate() {
+        for (
+            i,
+            CondensedNode {
+                eliminated_displacements: own,
+                next,
+                ..
+            },
+        ) in self.nodes.iter().enumerate()
+        {
             let ahead = i + 1 < self.nodes.len();
             for c in 0..3 {
                 for k in 0..3 {
@@ -400,9 +421,17 @@ impl Vein {
 
     /// The rotations that balance the moments of displacements, with the opposite sign.
     #[inline(always)]
-    pub fn rotations_of(&self, shifts: &[f64], turns: &mut [[f64; 3]]) {
+    pub fn balancing_rotations(&self, shifts: &[f64], turns: &mut [[f64; 3]]) {
         turns.fill([0.0; 3]);
-        for (i, Node { own, next, .. }) in self.nodes.iter().enumerate() {
+        for (
+            i,
+            CondensedNode {
+                eliminated_displacements: own,
+                next,
+                ..
+            },
+        ) in self.nodes.iter().enumerate()
+        {
             let ahead = i + 1 < self.nodes.len();
             for c in 0..3 {
                 for k in 0..3 {
@@ -420,44 +449,52 @@ impl Vein {
 
 /// Condenses a vein to its displacements, subtracts what the vein `before` it leaves, and
 /// eliminates its own displacements; returns the number of negative pivots.
-struct Elimination<'a> {
+struct RodElimination<'a> {
     work: &'a mut Workspace,
-    vein: &'a mut Vein,
-    before: Option<(&'a Vein, &'a [f64])>,
+    vein: &'a mut CondensedRod,
+    before: Option<(&'a CondensedRod, &'a [f64])>,
 }
 
-impl WithSimd for Elimination<'_> {
+impl WithSimd for RodElimination<'_> {
     type Output = Option<usize>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<usize> {
-        let Elimination { work, vein, before } = self;
+        let RodElimination { work, vein, before } = self;
         let turns = eliminate_rotations(simd, vein, work)?;
         if let Some((before, coupling)) = before {
             add_previous(&mut vein.swept, &before.swept, coupling, work)?;
         }
-        Some(turns + sweep(simd, &mut vein.swept, work)?)
+        Some(turns + sweep_displacements(simd, &mut vein.swept, work)?)
     }
 }
 
 /// Eliminates the rotations base to tip: the displacements of nodes up to the next one are
 /// coupled with a rotation once those before it are eliminated.
 #[inline(always)]
-fn eliminate_rotations<S: Simd>(simd: S, vein: &mut Vein, work: &mut Workspace) -> Option<usize> {
-    let Vein { nodes, swept } = vein;
-    let width = work.width;
+fn eliminate_rotations<S: Simd>(
+    simd: S,
+    vein: &mut CondensedRod,
+    work: &mut Workspace,
+) -> Option<usize> {
+    let CondensedRod { nodes, swept } = vein;
+    let width = work.displacements_per_rod;
     let stride = padded(width);
     for k in 0..width {
-        work.scale[k] = swept[k * stride + k].abs();
+        work.diagonal_sizes[k] = swept[k * stride + k].abs();
     }
     let mut negative = 0;
     for i in 0..nodes.len() {
         let filled = (3 * (i + 2)).min(width);
-        let mut pivot: Matrix3 = matrix3(|r, c| nodes[i].own[r][c]);
+        let mut pivot: Matrix3 = matrix3(|r, c| nodes[i].eliminated_displacements[r][c]);
         let turn_scale = std::array::from_fn(|k| pivot[k][k].abs());
         match i.checked_sub(1).map(|k| &nodes[k]) {
             None => work.rows.fill(0.0),
-            Some(Node { next, ahead, .. }) => {
+            Some(CondensedNode {
+                next,
+                inverse_times_next: ahead,
+                ..
+            }) => {
                 let turned = matrix3(|r, c| ahead[c][r]);
                 multiply_rows(simd, &turned, &work.before, &mut work.rows);
                 for r in 0..3 {
@@ -470,7 +507,11 @@ fn eliminate_rotations<S: Simd>(simd: S, vein: &mut Vein, work: &mut Workspace) 
                 }
             }
         }
-        let Node { own, next, .. } = &nodes[i];
+        let CondensedNode {
+            eliminated_displacements: own,
+            next,
+            ..
+        } = &nodes[i];
         for r in 0..3 {
             let row = &mut work.rows[r * stride..][..filled];
             for c in 0..3 {
@@ -480,14 +521,15 @@ fn eliminate_rotations<S: Simd>(simd: S, vein: &mut Vein, work: &mut Workspace) 
                 }
             }
         }
-        negative += sweep3(&mut pivot, turn_scale)?;
+        negative += sweep_matrix3(&mut pivot, turn_scale)?;
         multiply_rows(simd, &pivot, &work.rows, &mut work.scaled);
-        let (rows, scaled) = (rows_of(&work.rows), rows_of(&work.scaled));
-        if !are_small(rows, scaled, &work.scale, |_| false) {
+        let (rows, scaled) = (split_three_rows(&work.rows), split_three_rows(&work.scaled));
+        if !is_growth_bounded(rows, scaled, &work.diagonal_sizes, |_| false) {
             return None;
         }
-        subtract_product(simd, swept, rows, scaled, filled);
-        nodes[i].ahead = matrix3(|r, c| -(0..3).map(|k| pivot[r][k] * next[k][c]).sum::<f64>());
+        subtract_rank_three_product(simd, swept, rows, scaled, filled);
+        nodes[i].inverse_times_next =
+            matrix3(|r, c| -(0..3).map(|k| pivot[r][k] * next[k][c]).sum::<f64>());
         nodes[i].inverse = pivot.map(|row| row.map(|value| -value));
         std::mem::swap(&mut work.rows, &mut work.before);
     }
@@ -503,13 +545,17 @@ fn add_previous(
     coupling: &[f64],
     work: &Workspace,
 ) -> Option<()> {
-    let Workspace { width, own, .. } = *work;
+    let Workspace {
+        displacements_per_rod: width,
+        eliminated_displacements: own,
+        ..
+    } = *work;
     let stride = padded(width);
     for a in 0..width {
         let factor = coupling.get(a).copied().unwrap_or(1.0);
         let row = &mut swept[a * stride..][..width];
         let from = &before[a * stride..][..width];
-        let small = factor * from[a].abs() * factor <= GROWTH * work.scale[a];
+        let small = factor * from[a].abs() * factor <= MAX_PIVOT_GROWTH * work.diagonal_sizes[a];
         if a < own && !small {
             return None;
         }
@@ -526,10 +572,10 @@ fn add_previous(
 /// The largest factor by which the elimination of a pivot may change a diagonal entry of a
 /// matrix, in units of the entry that was assembled. In a positive definite one it is less than
 /// one.
-pub const GROWTH: f64 = 1e3;
+pub const MAX_PIVOT_GROWTH: f64 = 1e3;
 
 /// Rows are padded to a multiple of so many numbers, with zeros.
-pub const LANES: usize = 8;
+pub const ROW_PADDING: usize = 8;
 
 pub type Matrix3 = [[f64; 3]; 3];
 
@@ -541,16 +587,16 @@ pub fn matrix3(entry: impl Fn(usize, usize) -> f64) -> Matrix3 {
 
 /// The length of a padded row.
 pub fn padded(width: usize) -> usize {
-    width.div_ceil(LANES) * LANES
+    width.div_ceil(ROW_PADDING) * ROW_PADDING
 }
 
 /// Memory for the elimination of a vein.
 pub struct Workspace {
     /// Displacements of a vein, and those of them that are eliminated with it.
-    pub width: usize,
-    pub own: usize,
+    pub displacements_per_rod: usize,
+    pub eliminated_displacements: usize,
     /// Sizes of the diagonal entries that were assembled.
-    pub scale: Vec<f64>,
+    pub diagonal_sizes: Vec<f64>,
     /// Three rows of the matrix, those before them, and their multiples by an inverse pivot.
     pub rows: Vec<f64>,
     pub before: Vec<f64>,
@@ -564,9 +610,9 @@ impl Workspace {
         let width = 3 * system.nodes();
         let rows = || vec![0.0; 3 * padded(width)];
         Workspace {
-            width,
-            own: if system.joined { width - 3 } else { width },
-            scale: vec![0.0; width],
+            displacements_per_rod: width,
+            eliminated_displacements: if system.joined { width - 3 } else { width },
+            diagonal_sizes: vec![0.0; width],
             rows: rows(),
             before: rows(),
             scaled: rows(),
@@ -579,8 +625,12 @@ impl Workspace {
 /// upper triangle; the number of negative pivots. A node whose pivot is too small for what it
 /// divides is left for later; `None` if only such are left.
 #[inline(always)]
-pub fn sweep<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
-    let Workspace { width, own, .. } = *work;
+pub fn sweep_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
+    let Workspace {
+        displacements_per_rod: width,
+        eliminated_displacements: own,
+        ..
+    } = *work;
     let stride = padded(width);
     work.swept.fill(false);
     let (mut negative, mut left) = (0, own / 3);
@@ -599,18 +649,18 @@ pub fn sweep<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<us
                 column[first + r..].copy_from_slice(&a[(first + r) * stride..][first + r..stride]);
             }
             let mut pivot = matrix3(|r, c| work.rows[r * stride + first + c]);
-            let own_scale = std::array::from_fn(|k| work.scale[first + k]);
-            let Some(below_zero) = sweep3(&mut pivot, own_scale) else {
+            let own_scale = std::array::from_fn(|k| work.diagonal_sizes[first + k]);
+            let Some(below_zero) = sweep_matrix3(&mut pivot, own_scale) else {
                 continue;
             };
             multiply_rows(simd, &pivot, &work.rows, &mut work.scaled);
-            let (columns, scaled) = (rows_of(&work.rows), rows_of(&work.scaled));
+            let (columns, scaled) = (split_three_rows(&work.rows), split_three_rows(&work.scaled));
             let is_free = |i: usize| i / 3 == node || work.swept[i / 3];
-            if !are_small(columns, scaled, &work.scale, is_free) {
+            if !is_growth_bounded(columns, scaled, &work.diagonal_sizes, is_free) {
                 continue;
             }
             negative += below_zero;
-            subtract_product(simd, a, columns, scaled, width);
+            subtract_rank_three_product(simd, a, columns, scaled, width);
             for (r, z) in scaled.into_iter().enumerate() {
                 for i in 0..first {
                     a[i * stride + first + r] = z[i];
@@ -631,7 +681,7 @@ pub fn sweep<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<us
 
 /// Three rows of one memory.
 #[inline(always)]
-pub fn rows_of(rows: &[f64]) -> [&[f64]; 3] {
+pub fn split_three_rows(rows: &[f64]) -> [&[f64]; 3] {
     let stride = rows.len() / 3;
     [0, 1, 2].map(|r| &rows[r * stride..][..stride])
 }
@@ -639,7 +689,7 @@ pub fn rows_of(rows: &[f64]) -> [&[f64]; 3] {
 /// Minus a matrix times three rows.
 #[inline(always)]
 pub fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: &mut [f64]) {
-    let [r0, r1, r2] = rows_of(rows).map(|row| S::as_simd_f64s(row).0);
+    let [r0, r1, r2] = split_three_rows(rows).map(|row| S::as_simd_f64s(row).0);
     let products = product.chunks_exact_mut(rows.len() / 3);
     for (product, row) in products.zip(factor) {
         let [m0, m1, m2] = row.map(|value| simd.splat_f64s(-value));
@@ -655,7 +705,7 @@ pub fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: 
 /// Subtracts from the upper triangle of a matrix of padded rows, up to row and column `filled`, the
 /// product of three columns and three rows. Less than a lane is written beside the triangle.
 #[inline(always)]
-pub fn subtract_product<S: Simd>(
+pub fn subtract_rank_three_product<S: Simd>(
     simd: S,
     a: &mut [f64],
     [c0, c1, c2]: [&[f64]; 3],
@@ -680,9 +730,9 @@ pub fn subtract_product<S: Simd>(
     }
 }
 
-/// [`sweep`] of a matrix of three rows: minus its inverse.
+/// [`sweep_displacements`] of a matrix of three rows: minus its inverse.
 #[inline(always)]
-pub fn sweep3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
+pub fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
     let mut swept = [false; 3];
     let mut negative = 0;
     for _ in 0..3 {
@@ -692,7 +742,7 @@ pub fn sweep3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
         let k = left.max_by(|i, k| size(i).total_cmp(&size(k)))?;
         let column = a.map(|row| row[k]);
         let pivot = column[k];
-        let small = |i: usize| column[i] * column[i] <= GROWTH * scale[i] * pivot.abs();
+        let small = |i: usize| column[i] * column[i] <= MAX_PIVOT_GROWTH * scale[i] * pivot.abs();
         if !(pivot != 0.0 && (0..3).all(|i| swept[i] || small(i))) {
             return None;
         }
@@ -713,7 +763,7 @@ pub fn sweep3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
 /// Whether the product of three columns and three rows changes no diagonal entry by too much,
 /// but for some; what is not a number does.
 #[inline(always)]
-pub fn are_small(
+pub fn is_growth_bounded(
     [c0, c1, c2]: [&[f64]; 3],
     [z0, z1, z2]: [&[f64]; 3],
     scale: &[f64],
@@ -721,5 +771,5 @@ pub fn are_small(
 ) -> bool {
     // By parts: those of a pivot that is not definite may cancel.
     let change = |i: usize| (c0[i] * z0[i]).abs() + (c1[i] * z1[i]).abs() + (c2[i] * z2[i]).abs();
-    (0..scale.len()).all(|i| is_free(i) || change(i) <= GROWTH * scale[i])
+    (0..scale.len()).all(|i| is_free(i) || change(i) <= MAX_PIVOT_GROWTH * scale[i])
 }

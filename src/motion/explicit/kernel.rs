@@ -40,9 +40,9 @@
 //! Material data of rods, for the loops over their nodes.
 
 use crate::leaf::Loads;
-pub use crate::motion::explicit::packs::{Array, Layout};
-use crate::rotation::{B, Quaternions};
-use crate::simd::{Lanes, Vectors, WIDTH, cut, cut_mut, slice, slice_mut};
+pub use crate::motion::explicit::packs::{AlignedArray, PackLayout};
+use crate::rotation::{HALF_ANGLE_POLYNOMIAL, Quaternions};
+use crate::simd::{Lanes, MAX_LANES, Vectors, array_chunks, array_chunks_mut, slice, slice_mut};
 use glam::DVec3;
 use pulp::Simd;
 use std::ops::Deref;
@@ -50,59 +50,59 @@ use std::sync::Arc;
 
 /// Nodes of a block. Measured: with half as many, steps of short rods take 1.05 times as long,
 /// due to the beginnings and ends of the loops; more gain nothing.
-pub const BLOCK: usize = 224;
+pub const NODES_PER_BLOCK: usize = 224;
 
 /// What moves besides the positions: arrays of a pack.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct PackMotion {
     /// Rotations as quaternions, normalised up to rounding and the truncation error of [`nodes`].
-    pub q: [Array; 4],
+    pub q: [AlignedArray; 4],
     /// Velocities, half a step behind or ahead.
-    pub v: [Array; 3],
+    pub v: [AlignedArray; 3],
     /// Angular momenta along the lab axes, likewise.
-    pub p: [Array; 3],
+    pub p: [AlignedArray; 3],
 }
 
 /// Strains of the last two steps, for internal damping: R^T dx, then psi.
 /// Empty without it.
 #[derive(Clone, Debug)]
-pub struct Past {
-    pub last: [[Array; 3]; 2],
-    pub earlier: [[Array; 3]; 2],
+pub struct StrainHistory {
+    pub last: [[AlignedArray; 3]; 2],
+    pub earlier: [[AlignedArray; 3]; 2],
 }
 
 /// Constitutive law at an instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Law {
+pub struct StepLaw {
     /// Whether there is internal friction.
     pub damped: bool,
     /// Whether the rest curvature varies, and its work is summed up.
-    pub changes: bool,
+    pub rest_varies: bool,
     /// Factor of the rest curvature if that varies, or one.
-    pub rest: f64,
+    pub rest_curvature_factor: f64,
     pub retardation: f64,
     /// Weights of the present and the previous strains in their rate.
-    pub rates: [f64; 3],
+    pub strain_rate_weights: [f64; 3],
     /// Whether the present strains are stored.
-    pub remember: bool,
+    pub stores_strains: bool,
 }
 
 /// Forces of the segments of a block on their ends. Node i of the block is at WIDTH + i, and at
 /// WIDTH - 1 the last one of the block before.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct Block {
+pub struct BlockForces {
     /// Force N of the segment from node i to i + 1.
-    n: [[f64; WIDTH + BLOCK]; 3],
+    n: [[f64; MAX_LANES + NODES_PER_BLOCK]; 3],
     /// Twice the moment on its left and on its right end.
-    left: [[f64; WIDTH + BLOCK]; 3],
-    right: [[f64; WIDTH + BLOCK]; 3],
+    left: [[f64; MAX_LANES + NODES_PER_BLOCK]; 3],
+    right: [[f64; MAX_LANES + NODES_PER_BLOCK]; 3],
 }
 
-impl Block {
+impl BlockForces {
     pub fn new() -> Self {
-        let zeros = [[0.0; WIDTH + BLOCK]; 3];
-        Block {
+        let zeros = [[0.0; MAX_LANES + NODES_PER_BLOCK]; 3];
+        BlockForces {
             n: zeros,
             left: zeros,
             right: zeros,
@@ -110,28 +110,28 @@ impl Block {
     }
 
     /// The entries before a pack.
-    fn begin(&mut self) {
+    fn begin_pack(&mut self) {
         for array in self.n.iter_mut().chain(&mut self.right) {
-            array[WIDTH - 1] = 0.0;
+            array[MAX_LANES - 1] = 0.0;
         }
     }
 
     /// Proceeds to the next block after a whole one.
-    fn advance(&mut self) {
+    fn advance_block(&mut self) {
         for array in self.n.iter_mut().chain(&mut self.right) {
-            array[WIDTH - 1] = array[WIDTH + BLOCK - 1];
+            array[MAX_LANES - 1] = array[MAX_LANES + NODES_PER_BLOCK - 1];
         }
     }
 }
 
 /// A time step of a pack: a kick by all forces, of length `kick`, velocities
 /// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
-pub struct Step<'a> {
-    pub layout: Layout,
+pub struct PackStep<'a> {
+    pub layout: PackLayout,
     /// Which pack.
     pub pack: usize,
     /// Positions of the whole leaf.
-    pub positions: &'a [Array; 3],
+    pub positions: &'a [AlignedArray; 3],
     /// Positions of the pack after the step, except a shared tip, which is set elsewhere.
     pub next: [&'a mut [f64]; 3],
     /// Force per displacement and unit of sigma of the coupling to the rod before each, and
@@ -139,23 +139,23 @@ pub struct Step<'a> {
     pub coupling: Option<[[f64; 3]; 2]>,
     /// Moments and forces on the nodes of the whole leaf besides, laid out as positions, if there
     /// are any.
-    pub applied: Option<&'a [[Array; 3]; 2]>,
-    pub motion: &'a mut Motion,
+    pub applied: Option<&'a [[AlignedArray; 3]; 2]>,
+    pub motion: &'a mut PackMotion,
     /// Block by block.
-    pub material: &'a [Arc<Material>],
-    pub past: &'a mut Past,
-    pub law: Law,
+    pub material: &'a [Arc<BlockMaterial>],
+    pub past: &'a mut StrainHistory,
+    pub law: StepLaw,
     /// Without the force on a shared tip.
     pub loads: Loads,
     /// Nodes and sizes of the dead moments on a single rod.
     pub moments: &'a [(usize, DVec3)],
-    pub keep: f64,
+    pub velocity_factor: f64,
     pub kick: f64,
     pub drift: f64,
     /// Whether quaternions are normalised; rounding and truncated series slowly change their
     /// length.
     pub normalise: bool,
-    pub block: &'a mut Block,
+    pub block: &'a mut BlockForces,
 }
 
 /// Sums over a pack in a step.
@@ -166,38 +166,42 @@ pub struct StepTotals {
     /// Power of internal friction, divided by the retardation time.
     pub friction: f64,
     /// Derivative of the elastic energy with respect to the factor of the rest curvature.
-    pub rest: f64,
+    pub rest_factor_derivative: f64,
     /// Force of the rods' last segments.
     pub last_force: [f64; 3],
 }
 
 /// Nodes of the blocks of a pack of `rods`, up to the last node, in whole groups of `width`: the
 /// index of the first and their number.
-fn spans(layout: Layout, rods: usize, width: usize) -> impl Iterator<Item = (usize, usize)> {
+fn block_spans(
+    layout: PackLayout,
+    rods: usize,
+    width: usize,
+) -> impl Iterator<Item = (usize, usize)> {
     let end = (rods - 1) * layout.stride + layout.segments + 1;
-    (0..end).step_by(BLOCK).map(move |start| {
+    (0..end).step_by(NODES_PER_BLOCK).map(move |start| {
         let nodes = (end - start).next_multiple_of(width);
-        (start, nodes.min(BLOCK))
+        (start, nodes.min(NODES_PER_BLOCK))
     })
 }
 
-impl pulp::WithSimd for Step<'_> {
+impl pulp::WithSimd for PackStep<'_> {
     type Output = StepTotals;
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> StepTotals {
-        let (layout, rods) = (self.layout, self.layout.rods_of(self.pack));
+        let (layout, rods) = (self.layout, self.layout.pack_rods(self.pack));
         let mut totals = StepTotals::default();
         let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
-        self.block.begin();
-        for (start, count) in spans(layout, rods.len(), S::F64_LANES) {
-            let nodes = Nodes {
+        self.block.begin_pack();
+        for (start, count) in block_spans(layout, rods.len(), S::F64_LANES) {
+            let nodes = BlockNodes {
                 start,
                 count,
-                first: layout.at(rods.start, start),
+                first: layout.node_index(rods.start, start),
                 x: self.positions,
                 q: &self.motion.q,
-                material: &self.material[start / BLOCK],
+                material: &self.material[start / NODES_PER_BLOCK],
                 law: &self.law,
             };
             let (past, block) = (&mut *self.past, &mut *self.block);
@@ -207,9 +211,9 @@ impl pulp::WithSimd for Step<'_> {
                 let tip = (rod * layout.stride + layout.segments).wrapping_sub(start);
                 if tip < count {
                     for c in 0..3 {
-                        totals.last_force[c] += block.n[c][WIDTH + tip - 1];
-                        block.n[c][WIDTH + tip] = self.loads.tip_force[c];
-                        block.left[c][WIDTH + tip] = 0.0;
+                        totals.last_force[c] += block.n[c][MAX_LANES + tip - 1];
+                        block.n[c][MAX_LANES + tip] = self.loads.tip_force[c];
+                        block.left[c][MAX_LANES + tip] = 0.0;
                     }
                 }
             }
@@ -217,50 +221,50 @@ impl pulp::WithSimd for Step<'_> {
                 let node = node.wrapping_sub(start);
                 if node < count {
                     for c in 0..3 {
-                        block.left[c][WIDTH + node] += 2.0 * moment[c];
+                        block.left[c][MAX_LANES + node] += 2.0 * moment[c];
                     }
                 }
             }
             energy = energy + self.kick_and_drift(simd, (start, count));
-            self.block.advance();
+            self.block.advance_block();
         }
         // Velocities were sums of two.
         totals.twice_kinetic = 0.25 * energy.sum();
         totals.friction = sums.friction.sum();
-        totals.rest = sums.rest.sum();
+        totals.rest_factor_derivative = sums.rest_factor_derivative.sum();
         totals
     }
 }
 
 /// Only the forces of a pack's segments, written to `forces`.
-pub struct Forces<'a> {
-    pub layout: Layout,
+pub struct PackForces<'a> {
+    pub layout: PackLayout,
     /// Which pack.
     pub pack: usize,
-    pub positions: &'a [Array; 3],
-    pub motion: &'a Motion,
-    pub material: &'a [Arc<Material>],
-    pub past: &'a mut Past,
-    pub law: Law,
+    pub positions: &'a [AlignedArray; 3],
+    pub motion: &'a PackMotion,
+    pub material: &'a [Arc<BlockMaterial>],
+    pub past: &'a mut StrainHistory,
+    pub law: StepLaw,
     pub forces: &'a mut Vec<[f64; 3]>,
 }
 
-impl pulp::WithSimd for Forces<'_> {
+impl pulp::WithSimd for PackForces<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let (layout, rods) = (self.layout, self.layout.rods_of(self.pack));
-        let mut block = Block::new();
+        let (layout, rods) = (self.layout, self.layout.pack_rods(self.pack));
+        let mut block = BlockForces::new();
         let sums = &mut SegmentSums::zero(simd);
-        for (start, count) in spans(layout, rods.len(), S::F64_LANES) {
-            let nodes = Nodes {
+        for (start, count) in block_spans(layout, rods.len(), S::F64_LANES) {
+            let nodes = BlockNodes {
                 start,
                 count,
-                first: layout.at(rods.start, start),
+                first: layout.node_index(rods.start, start),
                 x: self.positions,
                 q: &self.motion.q,
-                material: &self.material[start / BLOCK],
+                material: &self.material[start / NODES_PER_BLOCK],
                 law: &self.law,
             };
             forces(simd, nodes, self.past, &mut block, sums);
@@ -268,7 +272,8 @@ impl pulp::WithSimd for Forces<'_> {
                 let (rod, i) = ((start + at) / layout.stride, (start + at) % layout.stride);
                 rod < rods.len() && i < layout.segments
             });
-            (self.forces).extend(of_segments.map(|at| [0, 1, 2].map(|c| block.n[c][WIDTH + at])));
+            (self.forces)
+                .extend(of_segments.map(|at| [0, 1, 2].map(|c| block.n[c][MAX_LANES + at])));
         }
     }
 }
@@ -282,7 +287,7 @@ const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
-impl Step<'_> {
+impl PackStep<'_> {
     /// Moves the nodes of the block `range` (index of the first, count) with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
     /// kick. Every node rotates as a torque-free body with one axis of symmetry:
@@ -294,24 +299,26 @@ impl Step<'_> {
         let moving = match (self.coupling, self.applied) {
             (coupling, Some([moments, _])) => {
                 self.add_moments(range, moments);
-                self.translate::<S, true, true>(simd, range, coupling.unwrap_or(none))
+                self.translate_nodes::<S, true, true>(simd, range, coupling.unwrap_or(none))
             }
-            (Some(coupling), None) => self.translate::<S, true, false>(simd, range, coupling),
-            (None, None) => self.translate::<S, false, false>(simd, range, none),
+            (Some(coupling), None) => self.translate_nodes::<S, true, false>(simd, range, coupling),
+            (None, None) => self.translate_nodes::<S, false, false>(simd, range, none),
         };
         let turning = match self.normalise {
-            true => self.rotate::<S, true>(simd, range),
-            false => self.rotate::<S, false>(simd, range),
+            true => self.rotate_nodes::<S, true>(simd, range),
+            false => self.rotate_nodes::<S, false>(simd, range),
         };
         moving + turning
     }
 
     /// Adds moments on the nodes to those of the segments.
-    fn add_moments(&mut self, (start, nodes): (usize, usize), moments: &[Array; 3]) {
-        let first = self.layout.at(self.layout.rods_of(self.pack).start, start);
+    fn add_moments(&mut self, (start, nodes): (usize, usize), moments: &[AlignedArray; 3]) {
+        let first = self
+            .layout
+            .node_index(self.layout.pack_rods(self.pack).start, start);
         for (left, moments) in self.block.left.iter_mut().zip(moments) {
             let moments = &moments[first..first + nodes];
-            for (left, moment) in left[WIDTH..].iter_mut().zip(moments) {
+            for (left, moment) in left[MAX_LANES..].iter_mut().zip(moments) {
                 *left += 2.0 * moment;
             }
         }
@@ -319,7 +326,7 @@ impl Step<'_> {
 
     /// Velocities and positions.
     #[inline(always)]
-    fn translate<S: Simd, const COUPLED: bool, const APPLIED: bool>(
+    fn translate_nodes<S: Simd, const COUPLING_REASON: bool, const APPLIED: bool>(
         &mut self,
         simd: S,
         range: (usize, usize),
@@ -328,21 +335,23 @@ impl Step<'_> {
         let (start, nodes) = range;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[start / BLOCK];
-        let weight = own(&material.weight);
-        let coupled = cut(&material.coupled, (0, nodes));
-        let (mass, per_mass) = (own(&material.mass), own(&material.per_mass));
-        let n_right = cut(&self.block.n, (WIDTH, nodes));
-        let n_left = cut(&self.block.n, (WIDTH - 1, nodes));
+        let material = &blocks[start / NODES_PER_BLOCK];
+        let weight = own(&material.load_length);
+        let coupled = array_chunks(&material.coupling_weights, (0, nodes));
+        let (mass, per_mass) = (own(&material.mass), own(&material.inverse_mass));
+        let n_right = array_chunks(&self.block.n, (MAX_LANES, nodes));
+        let n_left = array_chunks(&self.block.n, (MAX_LANES - 1, nodes));
         let stride = self.layout.stride;
-        let first = self.layout.at(self.layout.rods_of(self.pack).start, start);
-        let of_rods = |first| cut(self.positions, (first, nodes));
+        let first = self
+            .layout
+            .node_index(self.layout.pack_rods(self.pack).start, start);
+        let of_rods = |first| array_chunks(self.positions, (first, nodes));
         let (before, x, after) = (
             of_rods(first - stride),
             of_rods(first),
             of_rods(first + stride),
         );
-        let forces = cut(
+        let forces = array_chunks(
             self.applied.map_or(self.positions, |[_, forces]| forces),
             (first, nodes),
         );
@@ -352,10 +361,13 @@ impl Step<'_> {
             slice_mut(next_y, range),
             slice_mut(next_z, range),
         ];
-        let mut v = cut_mut(&mut self.motion.v, range);
+        let mut v = array_chunks_mut(&mut self.motion.v, range);
         let [to_before, to_after] = coupling.map(|coupling| Vectors::splat(simd, coupling));
         let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
-        let (keep, kick) = (Lanes::splat(simd, self.keep), Lanes::splat(simd, self.kick));
+        let (keep, kick) = (
+            Lanes::splat(simd, self.velocity_factor),
+            Lanes::splat(simd, self.kick),
+        );
         let step = Lanes::splat(simd, self.drift);
         let mut energy = Lanes::splat(simd, 0.0);
         let mut at = 0;
@@ -364,7 +376,7 @@ impl Step<'_> {
             let force = Vectors::load(simd, &n_right, at) - Vectors::load(simd, &n_left, at);
             let mut force = gravity.mul_add(weight, force);
             let x = Vectors::load(simd, &x, at);
-            if COUPLED {
+            if COUPLING_REASON {
                 let pull = (Vectors::load(simd, &before, at) - x) * to_before;
                 force = pull.mul_add(Lanes::load(simd, coupled[0], at), force);
                 let pull = (Vectors::load(simd, &after, at) - x) * to_after;
@@ -387,7 +399,7 @@ impl Step<'_> {
 
     /// Angular momenta and rotations.
     #[inline(always)]
-    fn rotate<S: Simd, const NORMALISE: bool>(
+    fn rotate_nodes<S: Simd, const NORMALISE: bool>(
         &mut self,
         simd: S,
         range: (usize, usize),
@@ -395,11 +407,14 @@ impl Step<'_> {
         let (start, nodes) = range;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[start / BLOCK];
-        let (per_inertia, per_spin) = (own(&material.per_inertia), own(&material.per_spin));
-        let left = cut(&self.block.left, (WIDTH, nodes));
-        let right = cut(&self.block.right, (WIDTH - 1, nodes));
-        let Motion { q, p, .. } = &mut *self.motion;
+        let material = &blocks[start / NODES_PER_BLOCK];
+        let (per_inertia, per_spin) = (
+            own(&material.inverse_inertia),
+            own(&material.inverse_spin_excess),
+        );
+        let left = array_chunks(&self.block.left, (MAX_LANES, nodes));
+        let right = array_chunks(&self.block.right, (MAX_LANES - 1, nodes));
+        let PackMotion { q, p, .. } = &mut *self.motion;
         let [i, j, k, l] = q;
         let q = [
             slice_mut(i, range),
@@ -407,8 +422,8 @@ impl Step<'_> {
             slice_mut(k, range),
             slice_mut(l, range),
         ];
-        let mut p = cut_mut(p, range);
-        let keep = Lanes::splat(simd, self.keep);
+        let mut p = array_chunks_mut(p, range);
+        let keep = Lanes::splat(simd, self.velocity_factor);
         let half_kick = Lanes::splat(simd, 0.5 * self.kick);
         let half_step = Lanes::splat(simd, 0.5 * self.drift);
         let one = Lanes::splat(simd, 1.0);
@@ -469,7 +484,7 @@ impl Step<'_> {
 
 /// The rate of a strain, from it and the last two.
 #[inline(always)]
-fn rate<S: Simd>(
+fn strain_rate<S: Simd>(
     (last, earlier): (&mut [&mut [f64]; 3], &mut [&mut [f64]; 3]),
     (now, at): (Vectors<S>, usize),
     rates: [Lanes<S>; 3],
@@ -489,18 +504,18 @@ fn rate<S: Simd>(
 
 /// The nodes of a block.
 #[derive(Clone, Copy)]
-pub struct Nodes<'a> {
+pub struct BlockNodes<'a> {
     /// Index of the first in the arrays of the pack, and their number.
     pub start: usize,
     pub count: usize,
     /// Index of the first in the arrays of the leaf.
     pub first: usize,
     /// Of the leaf.
-    pub x: &'a [Array; 3],
+    pub x: &'a [AlignedArray; 3],
     /// Of the pack.
-    pub q: &'a [Array; 4],
-    pub material: &'a Material,
-    pub law: &'a Law,
+    pub q: &'a [AlignedArray; 4],
+    pub material: &'a BlockMaterial,
+    pub law: &'a StepLaw,
 }
 
 /// Sums of the loops over segments: see [`crate::motion::explicit::kernel::StepTotals`].
@@ -509,7 +524,7 @@ pub struct SegmentSums<S: Simd> {
     /// With internal friction.
     pub friction: Lanes<S>,
     /// If rest curvatures vary.
-    pub rest: Lanes<S>,
+    pub rest_factor_derivative: Lanes<S>,
 }
 
 impl<S: Simd> SegmentSums<S> {
@@ -518,7 +533,7 @@ impl<S: Simd> SegmentSums<S> {
         let zero = Lanes::splat(simd, 0.0);
         SegmentSums {
             friction: zero,
-            rest: zero,
+            rest_factor_derivative: zero,
         }
     }
 }
@@ -527,36 +542,42 @@ impl<S: Simd> SegmentSums<S> {
 #[inline(always)]
 pub fn forces<S: Simd>(
     simd: S,
-    nodes: Nodes,
-    past: &mut Past,
-    block: &mut Block,
+    nodes: BlockNodes,
+    past: &mut StrainHistory,
+    block: &mut BlockForces,
     sums: &mut SegmentSums<S>,
 ) {
     let (law, round) = (nodes.law, nodes.material.round);
-    match (law.damped, law.changes) {
-        (false, false) if round => loops::<S, true, false, false>(simd, nodes, past, block, sums),
-        (false, false) => loops::<S, false, false, false>(simd, nodes, past, block, sums),
-        (false, true) => loops::<S, false, false, true>(simd, nodes, past, block, sums),
-        (true, _) => loops::<S, false, true, true>(simd, nodes, past, block, sums),
+    match (law.damped, law.rest_varies) {
+        (false, false) if round => {
+            segment_force_loop::<S, true, false, false>(simd, nodes, past, block, sums)
+        }
+        (false, false) => {
+            segment_force_loop::<S, false, false, false>(simd, nodes, past, block, sums)
+        }
+        (false, true) => {
+            segment_force_loop::<S, false, false, true>(simd, nodes, past, block, sums)
+        }
+        (true, _) => segment_force_loop::<S, false, true, true>(simd, nodes, past, block, sums),
     }
 }
 
 /// Smallest |s|^2: between two rods, whose segment has no stiffness, it could be zero.
-const LEAST: f64 = 1e-8;
+const MIN_SQUARED_NORM: f64 = 1e-8;
 
 /// Up to this delta, of a segment bent by 0.2, so many terms of B are accurate to rounding.
-const SHORT: f64 = 0.01;
+const SERIES_DELTA_LIMIT: f64 = 0.01;
 
-const TERMS: usize = 5;
+const SERIES_TERMS: usize = 5;
 
 /// B(delta).
 #[inline(always)]
-fn series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
-    let [a, b, c, d, e, ..] = B;
-    let short: [f64; TERMS] = [a, b, c, d, e];
-    match delta.largest() < SHORT {
+fn rotation_vector_series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
+    let [a, b, c, d, e, ..] = HALF_ANGLE_POLYNOMIAL;
+    let short: [f64; SERIES_TERMS] = [a, b, c, d, e];
+    match delta.largest() < SERIES_DELTA_LIMIT {
         true => delta.polynomial(&short),
-        false => delta.polynomial(&B),
+        false => delta.polynomial(&HALF_ANGLE_POLYNOMIAL),
     }
 }
 
@@ -583,14 +604,19 @@ fn stiffness<S: Simd>(along_2: Lanes<S>, excess_1: Lanes<S>, excess_3: Lanes<S>)
 }
 
 #[inline(always)]
-fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
+fn segment_force_loop<
+    S: Simd,
+    const ROUND: bool,
+    const DAMPED: bool,
+    const NEARBY_VALUE_OFFSETS: bool,
+>(
     simd: S,
-    nodes: Nodes,
-    past: &mut Past,
-    block: &mut Block,
+    nodes: BlockNodes,
+    past: &mut StrainHistory,
+    block: &mut BlockForces,
     sums: &mut SegmentSums<S>,
 ) {
-    let Nodes {
+    let BlockNodes {
         start,
         count,
         material,
@@ -598,36 +624,45 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         ..
     } = nodes;
     let (x0, x1) = (
-        cut(nodes.x, (nodes.first, count)),
-        cut(nodes.x, (nodes.first + 1, count)),
+        array_chunks(nodes.x, (nodes.first, count)),
+        array_chunks(nodes.x, (nodes.first + 1, count)),
     );
     let (q0, q1) = (
-        cut(nodes.q, (start, count)),
-        cut(nodes.q, (start + 1, count)),
+        array_chunks(nodes.q, (start, count)),
+        array_chunks(nodes.q, (start + 1, count)),
     );
     let own = |array| slice(array, (0, count));
-    let (shear, bend) = (own(&material.shear), own(&material.bend));
-    let stretch_excess = cut(&material.stretch_excess, (0, count));
-    let bend_excess = cut(&material.bend_excess, (0, count));
-    let rest_force = cut(&material.rest_force, (0, count));
-    let rest_moment = cut(&material.rest_moment, (0, count));
-    let rest_turn = cut(&material.rest_turn, (0, count));
-    let mut force = cut_mut(&mut block.n, (WIDTH, count));
-    let mut left = cut_mut(&mut block.left, (WIDTH, count));
-    let mut right = cut_mut(&mut block.right, (WIDTH, count));
+    let (shear, bend) = (own(&material.shear), own(&material.bending_stiffness));
+    let stretch_excess = array_chunks(&material.stretch_excess, (0, count));
+    let bend_excess = array_chunks(&material.bend_excess, (0, count));
+    let rest_force = array_chunks(&material.rest_force, (0, count));
+    let rest_moment = array_chunks(&material.rest_moment, (0, count));
+    let rest_turn = array_chunks(&material.rest_turn, (0, count));
+    let mut force = array_chunks_mut(&mut block.n, (MAX_LANES, count));
+    let mut left = array_chunks_mut(&mut block.left, (MAX_LANES, count));
+    let mut right = array_chunks_mut(&mut block.right, (MAX_LANES, count));
     let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
     let mut past = DAMPED.then(|| {
         let range = (start, count);
         (
-            (cut_mut(last_v, range), cut_mut(earlier_v, range)),
-            (cut_mut(last_psi, range), cut_mut(earlier_psi, range)),
+            (
+                array_chunks_mut(last_v, range),
+                array_chunks_mut(earlier_v, range),
+            ),
+            (
+                array_chunks_mut(last_psi, range),
+                array_chunks_mut(earlier_psi, range),
+            ),
         )
     });
-    let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
+    let rates = law.strain_rate_weights.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
-    let rest = Lanes::splat(simd, law.rest);
+    let rest = Lanes::splat(simd, law.rest_curvature_factor);
     let (two, four) = (Lanes::splat(simd, 2.0), Lanes::splat(simd, 4.0));
-    let (quarter, least) = (Lanes::splat(simd, 0.25), Lanes::splat(simd, LEAST));
+    let (quarter, least) = (
+        Lanes::splat(simd, 0.25),
+        Lanes::splat(simd, MIN_SQUARED_NORM),
+    );
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
@@ -639,7 +674,7 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         let (even, odd) = (a.neg_mul_add(bw, b.scale(aw)), a.cross(b));
         // Along the directors in the middle, and along the lab axes.
         let (w, w_lab) = (even - odd, even + odd);
-        let series = series(delta);
+        let series = rotation_vector_series(delta);
         let two_sigma = series.mul_add(delta + delta, two);
         // The moment A (2 sigma w - u0) = A2 2 sigma w + extra.
         let bend = Lanes::load(simd, bend, at);
@@ -647,22 +682,23 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, bend_excess[c], at));
         let stiff = bend * two_sigma;
         let mut extra = -load(&rest_moment);
-        if CHANGES {
+        if NEARBY_VALUE_OFFSETS {
             extra = extra.scale(rest);
         }
         extra.x = (excess_1 * two_sigma).mul_add(w.x, extra.x);
         if !ROUND {
             extra.z = (excess_3 * two_sigma).mul_add(w.z, extra.z);
         }
-        if CHANGES {
-            sums.rest = sums.rest + load(&rest_turn).dot(w.mul_add(stiff, extra));
+        if NEARBY_VALUE_OFFSETS {
+            sums.rest_factor_derivative =
+                sums.rest_factor_derivative + load(&rest_turn).dot(w.mul_add(stiff, extra));
         }
         if let Some((_, (last, earlier))) = &mut past {
-            let rate = rate(
+            let rate = strain_rate(
                 (last, earlier),
                 (w.scale(two_sigma), at),
                 rates,
-                law.remember,
+                law.stores_strains,
             );
             let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
@@ -690,8 +726,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
             m = d1.mul_add(two_sigma * extra.x, m);
             d1.mul_add(excess_1 * d1.dot(dx) - rest_force, dx.scale(shear))
         } else {
-            m = m + extra.scale(two_sigma).along(directors);
-            let v = dx.onto(directors);
+            m = m + extra.scale(two_sigma).from_director_components(directors);
+            let v = dx.director_components(directors);
             let rest_force = load(&rest_force);
             let mut extra = Vectors::new(
                 excess_1 * v.x - rest_force.x,
@@ -699,16 +735,16 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
                 excess_3 * v.z - rest_force.z,
             );
             if let Some(((last, earlier), _)) = &mut past {
-                let rate = rate((last, earlier), (v, at), rates, law.remember);
+                let rate = strain_rate((last, earlier), (v, at), rates, law.stores_strains);
                 let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
                 extra = friction.mul_add(retardation, extra);
             }
-            extra.along(directors) + dx.scale(shear)
+            extra.from_director_components(directors) + dx.scale(shear)
         };
         n.store(&mut force, at);
         let g = dx.cross(n);
-        let t = m.less_cross(w_lab.scale(twice), g);
+        let t = m.subtract_cross(w_lab.scale(twice), g);
         (g + t).store(&mut left, at);
         (g - t).store(&mut right, at);
         at += S::F64_LANES;
@@ -732,85 +768,89 @@ pub fn quaternion<S: Simd>(
 
 /// A node, and the segment from it to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Node {
+pub struct NodeData {
     /// H/ds.
-    pub stretch: [f64; 3],
+    pub stretch_stiffness: [f64; 3],
     /// ds v0.
     pub rest_length: [f64; 3],
     /// A/ds.
-    pub bend: [f64; 3],
+    pub bending_stiffness: [f64; 3],
     /// ds u0, times its factor if that is constant.
     pub rest_turn: [f64; 3],
     /// Mass; zero for a held node and for a shared tip.
     pub mass: f64,
     /// 1/mass; zero for a held node, and for a shared tip.
-    pub per_mass: f64,
+    pub inverse_mass: f64,
     /// 1/J of a node about d2 and d3; zero for a held node.
-    pub per_inertia: f64,
+    pub inverse_inertia: f64,
     /// 1/J1 - 1/J.
-    pub per_spin: f64,
+    pub inverse_spin_excess: f64,
     /// Length of rod whose loads act on the node.
-    pub weight: f64,
+    pub load_length: f64,
     /// Fraction of the length whose coupling to the rods before and after acts on the node.
-    pub coupled: [f64; 2],
+    pub coupling_weights: [f64; 2],
 }
 
 /// The nodes of a block, one array for each number of a [`Node`], and derived
 /// quantities.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(align(64))]
-pub struct Material {
+pub struct BlockMaterial {
     /// Whether all segments are as stiff along d3 as along d2, and straight at rest.
     pub round: bool,
     /// H2/ds, and the excess of H1/ds and H3/ds over it.
-    pub shear: [f64; BLOCK],
-    pub stretch_excess: [[f64; BLOCK]; 2],
+    pub shear: [f64; NODES_PER_BLOCK],
+    pub stretch_excess: [[f64; NODES_PER_BLOCK]; 2],
     /// H v0: minus the force where the segment has no length.
-    pub rest_force: [[f64; BLOCK]; 3],
+    pub rest_force: [[f64; NODES_PER_BLOCK]; 3],
     /// A2/ds, and the excess of A1/ds and A3/ds over it.
-    pub bend: [f64; BLOCK],
-    pub bend_excess: [[f64; BLOCK]; 2],
-    pub rest_turn: [[f64; BLOCK]; 3],
+    pub bending_stiffness: [f64; NODES_PER_BLOCK],
+    pub bend_excess: [[f64; NODES_PER_BLOCK]; 2],
+    pub rest_turn: [[f64; NODES_PER_BLOCK]; 3],
     /// A u0: minus the moment where the segment is straight.
-    pub rest_moment: [[f64; BLOCK]; 3],
-    pub mass: [f64; BLOCK],
-    pub per_mass: [f64; BLOCK],
-    pub per_inertia: [f64; BLOCK],
-    pub per_spin: [f64; BLOCK],
-    pub weight: [f64; BLOCK],
-    pub coupled: [[f64; BLOCK]; 2],
+    pub rest_moment: [[f64; NODES_PER_BLOCK]; 3],
+    pub mass: [f64; NODES_PER_BLOCK],
+    pub inverse_mass: [f64; NODES_PER_BLOCK],
+    pub inverse_inertia: [f64; NODES_PER_BLOCK],
+    pub inverse_spin_excess: [f64; NODES_PER_BLOCK],
+    pub load_length: [f64; NODES_PER_BLOCK],
+    pub coupling_weights: [[f64; NODES_PER_BLOCK]; 2],
 }
 
-impl Material {
-    fn new(nodes: &[Node]) -> Self {
-        let gather = |number: &dyn Fn(&Node) -> f64| {
-            let mut array = [0.0; BLOCK];
+impl BlockMaterial {
+    fn new(nodes: &[NodeData]) -> Self {
+        let gather = |number: &dyn Fn(&NodeData) -> f64| {
+            let mut array = [0.0; NODES_PER_BLOCK];
             for (slot, node) in array.iter_mut().zip(nodes) {
                 *slot = number(node);
             }
             array
         };
-        let round = |node: &Node| {
-            let [_, bend_2, bend_3] = node.bend;
-            let [_, shear_2, shear_3] = node.stretch;
+        let round = |node: &NodeData| {
+            let [_, bend_2, bend_3] = node.bending_stiffness;
+            let [_, shear_2, shear_3] = node.stretch_stiffness;
             let straight = [&node.rest_turn, &node.rest_length].map(|rest| rest[1..] == [0.0, 0.0]);
             bend_2 == bend_3 && shear_2 == shear_3 && straight == [true; 2]
         };
-        Material {
+        BlockMaterial {
             round: nodes.iter().all(round),
-            shear: gather(&|node| node.stretch[1]),
-            stretch_excess: [0, 2].map(|c| gather(&|node| node.stretch[c] - node.stretch[1])),
-            rest_force: [0, 1, 2].map(|c| gather(&|node| node.stretch[c] * node.rest_length[c])),
-            bend: gather(&|node| node.bend[1]),
-            bend_excess: [0, 2].map(|c| gather(&|node| node.bend[c] - node.bend[1])),
+            shear: gather(&|node| node.stretch_stiffness[1]),
+            stretch_excess: [0, 2]
+                .map(|c| gather(&|node| node.stretch_stiffness[c] - node.stretch_stiffness[1])),
+            rest_force: [0, 1, 2]
+                .map(|c| gather(&|node| node.stretch_stiffness[c] * node.rest_length[c])),
+            bending_stiffness: gather(&|node| node.bending_stiffness[1]),
+            bend_excess: [0, 2]
+                .map(|c| gather(&|node| node.bending_stiffness[c] - node.bending_stiffness[1])),
             rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
-            rest_moment: [0, 1, 2].map(|c| gather(&|node| node.bend[c] * node.rest_turn[c])),
+            rest_moment: [0, 1, 2]
+                .map(|c| gather(&|node| node.bending_stiffness[c] * node.rest_turn[c])),
             mass: gather(&|node| node.mass),
-            per_mass: gather(&|node| node.per_mass),
-            per_inertia: gather(&|node| node.per_inertia),
-            per_spin: gather(&|node| node.per_spin),
-            weight: gather(&|node| node.weight),
-            coupled: [0, 1].map(|side| gather(&|node| node.coupled[side])),
+            inverse_mass: gather(&|node| node.inverse_mass),
+            inverse_inertia: gather(&|node| node.inverse_inertia),
+            inverse_spin_excess: gather(&|node| node.inverse_spin_excess),
+            load_length: gather(&|node| node.load_length),
+            coupling_weights: [0, 1].map(|side| gather(&|node| node.coupling_weights[side])),
         }
     }
 }
@@ -818,10 +858,14 @@ impl Material {
 /// The nodes of a pack in blocks. Blocks that equal the previous one, or the one
 /// at the same position in the pack before, are shared: they stay in the innermost
 /// cache, and most leaves have few that differ.
-pub fn blocks(nodes: &[Node], before: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
-    let mut blocks: Vec<Arc<Material>> = Vec::with_capacity(nodes.len().div_ceil(BLOCK));
-    for nodes in nodes.chunks(BLOCK) {
-        let material = Material::new(nodes);
+pub fn material_blocks(
+    nodes: &[NodeData],
+    before: Option<&[Arc<BlockMaterial>]>,
+) -> Vec<Arc<BlockMaterial>> {
+    let mut blocks: Vec<Arc<BlockMaterial>> =
+        Vec::with_capacity(nodes.len().div_ceil(NODES_PER_BLOCK));
+    for nodes in nodes.chunks(NODES_PER_BLOCK) {
+        let material = BlockMaterial::new(nodes);
         let above = before.and_then(|pack| pack.get(blocks.len()));
         let near = [blocks.last(), above].into_iter().flatten();
         let same = { near }.find(|other| ***other == material).cloned();

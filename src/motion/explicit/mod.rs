@@ -41,12 +41,15 @@ mod stable_step;
 mod tests;
 
 use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, State};
-use crate::motion::explicit::kernel::{Array, Block, Forces, Law, Layout, Step};
-use crate::motion::explicit::packs::{Pack, vector};
+use crate::motion::explicit::kernel::{
+    AlignedArray, BlockForces, PackForces, PackLayout, PackStep, StepLaw,
+};
+use crate::motion::explicit::packs::{Pack, vector_at};
 pub use crate::motion::explicit::stable_step::StableStep;
-use crate::motion::physics::{Physics, Wind};
+use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, measure, rates, resolved,
+    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, check_resolution,
+    measure, rate_weights,
 };
 use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;
@@ -57,10 +60,10 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 /// Part of the stable time step used.
-const SAFETY: f64 = 0.9;
+const STABLE_STEP_FRACTION: f64 = 0.9;
 
 /// Steps between normalisations of the quaternions.
-const NORMALISED: usize = 8;
+const NORMALISATION_INTERVAL: usize = 8;
 
 /// Number of segments from which rods are distributed to threads. Measured: below
 /// it waking the threads costs more than it saves.
@@ -76,27 +79,27 @@ pub struct Explicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     arch: Arch,
-    layout: Layout,
-    positions: [Array; 3],
+    layout: PackLayout,
+    positions: [AlignedArray; 3],
     /// Positions after the next step.
-    next: [Array; 3],
+    next: [AlignedArray; 3],
     packs: Vec<Pack>,
-    block: Block,
+    block: BlockForces,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
-    applied: Option<Applied>,
+    applied: Option<AppliedLoads>,
     /// The dead moments of a step.
-    moments: Moments,
+    moments: StepDeadMoments,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
-    tip_weight: f64,
+    tip_load_length: f64,
     step: f64,
     /// Time of the last step, and the time asked for, less than a step later.
-    stepped: f64,
+    last_step_time: f64,
     time: f64,
     steps: usize,
     /// Time and number of steps at the beginning of steps of the present length.
-    begin: (f64, usize),
+    equal_steps_begin: (f64, usize),
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     balance: EnergyBalance,
@@ -107,7 +110,7 @@ pub struct Explicit {
 
 /// A rigid rod, whose stiffness the method cannot handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rigid;
+pub struct RigidRodError;
 
 impl Explicit {
     /// A leaf at rest in `state`. Time steps are nine tenths of the stable one,
@@ -120,31 +123,31 @@ impl Explicit {
         physics: Physics,
         state: &State,
         step: Option<f64>,
-    ) -> Result<Self, Rigid> {
+    ) -> Result<Self, RigidRodError> {
         if leaf.least_compliance() == 0.0 {
-            return Err(Rigid);
+            return Err(RigidRodError);
         }
         let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
         let tip_mass = |j| physics.inertia(&leaf, j, last).mass;
-        let tip_weight = |j| leaf.grid.weight(last) * leaf.leaf.length(j);
+        let tip_weight = |j| leaf.grid.node_weight(last) * leaf.leaf.length(j);
         let layout = packs::layout(&leaf);
         let positions = packs::positions(&leaf, state, layout);
         let mut explicit = Explicit {
             arch: widest_arch(),
-            packs: packs::at_rest(&leaf, &physics, state, layout),
+            packs: packs::packs_at_rest(&leaf, &physics, state, layout),
             next: positions.clone(),
             positions,
             layout,
-            applied: Applied::new(&leaf, &physics, state, layout),
-            moments: Moments::default(),
-            block: Block::new(),
+            applied: AppliedLoads::new(&leaf, &physics, state, layout),
+            moments: StepDeadMoments::default(),
+            block: BlockForces::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
-            tip_weight: (0..count).map(tip_weight).sum(),
+            tip_load_length: (0..count).map(tip_weight).sum(),
             step: 0.0,
-            stepped: 0.0,
+            last_step_time: 0.0,
             time: 0.0,
             steps: 0,
-            begin: (0.0, 0),
+            equal_steps_begin: (0.0, 0),
             widths: [0.0; 2],
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
@@ -155,7 +158,7 @@ impl Explicit {
             leaf,
             physics,
         };
-        explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
+        explicit.step = step.unwrap_or_else(|| STABLE_STEP_FRACTION * explicit.stable_step().step);
         let start = explicit.snapshot();
         explicit.balance.begin(&start);
         Ok(explicit)
@@ -164,10 +167,10 @@ impl Explicit {
     /// The longest stable time step of the leaf in its present state.
     pub fn stable_step(&self) -> StableStep {
         let mut leaf = self.leaf.clone();
-        if self.physics.rest_differs() {
-            leaf.set_rest(self.physics.rest(self.stepped));
+        if self.physics.rest_curvature_differs() {
+            leaf.scale_rest_curvatures(self.physics.rest_curvature_factor(self.last_step_time));
         }
-        StableStep::of(&leaf, &self.physics, &self.state())
+        StableStep::for_leaf(&leaf, &self.physics, &self.state())
     }
 
     /// The length of time steps.
@@ -179,7 +182,12 @@ impl Explicit {
     /// fastest motions of all segments have equal frequencies. Time steps may then be as long
     /// as one, and the leaf is stopped.
     pub fn use_fictitious_masses(&mut self) {
-        let tip = stable_step::masses(&self.leaf, &self.physics, self.layout, &mut self.packs);
+        let tip = stable_step::set_fictitious_masses(
+            &self.leaf,
+            &self.physics,
+            self.layout,
+            &mut self.packs,
+        );
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
     }
@@ -205,19 +213,19 @@ impl Explicit {
         let (exchange, energy) = self.kick_and_drift(h);
         self.balance.add(exchange);
         self.steps += 1;
-        self.begin = (self.stepped, self.steps);
-        self.time = self.stepped;
+        self.equal_steps_begin = (self.last_step_time, self.steps);
+        self.time = self.last_step_time;
         energy
     }
 
     fn rotation(&self, j: usize, i: usize) -> DQuat {
-        let (p, at) = self.layout.place(j, i);
+        let (p, at) = self.layout.pack_position(j, i);
         self.packs[p].rotation(at)
     }
 
     /// Velocity and angular momentum of a node.
     fn moving(&self, j: usize, i: usize) -> (DVec3, DVec3) {
-        let (p, at) = self.layout.place(j, i);
+        let (p, at) = self.layout.pack_position(j, i);
         self.packs[p].moving(at)
     }
 
@@ -225,7 +233,7 @@ impl Explicit {
     /// 2 pi, since signs of quaternions are aligned.
     fn largest_turn(&self) -> f64 {
         let deltas = (0..self.layout.rods).flat_map(|j| {
-            let (p, base) = self.layout.place(j, 0);
+            let (p, base) = self.layout.pack_position(j, 0);
             let pack = &self.packs[p];
             (base..base + self.layout.segments)
                 .map(|at| (pack.quaternion(at + 1) - pack.quaternion(at)).length_squared())
@@ -234,7 +242,7 @@ impl Explicit {
     }
 
     /// Whether numbers are finite and bending is resolved.
-    fn trusted(&self) -> bool {
+    fn is_reliable(&self) -> bool {
         let finite = |pack: &Pack| pack.totals.twice_kinetic.is_finite();
         self.largest_turn() <= RESOLVED_TURN && self.packs.iter().all(finite)
     }
@@ -242,12 +250,12 @@ impl Explicit {
     fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
         let exchange = self.kick(0.5 * h, h, true);
         self.widths = [h, self.widths[0]];
-        self.stepped += h;
+        self.last_step_time += h;
         exchange
     }
 
     /// Time by which velocities lag behind positions: half a step, but zero at the start.
-    fn lag(&self) -> f64 {
+    fn velocity_lag(&self) -> f64 {
         0.5 * self.widths[0]
     }
 
@@ -256,15 +264,22 @@ impl Explicit {
     /// Strains are stored as those of the last step if `remember`. Also returns
     /// twice the kinetic energy in the middle of the kick.
     fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> (Exchange, f64) {
-        let length = self.lag() + ahead;
-        let [from, to] = [self.stepped - self.lag(), self.stepped + ahead];
+        let length = self.velocity_lag() + ahead;
+        let [from, to] = [
+            self.last_step_time - self.velocity_lag(),
+            self.last_step_time + ahead,
+        ];
         let loads = self.physics.mean_loads([from, to]);
-        let rest = self.physics.mean_rest([from, to]);
-        let before_kick = self.power(&loads);
+        let rest = self.physics.mean_rest_curvature_factor([from, to]);
+        let before_kick = self.excess_load_power(&loads);
         let mut work = 0.0;
         let last = self.leaf.segments();
         let before = self.moving(0, last).0;
-        (self.moments).begin(self.leaf.moments_of(loads), self.layout, &self.packs);
+        (self.moments).begin_step(
+            self.leaf.dead_moments_under(loads),
+            self.layout,
+            &self.packs,
+        );
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
             let ahead = if last > 0.0 {
@@ -277,27 +292,30 @@ impl Explicit {
         }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
-        self.step_packs(&loads, self.law(rest, remember), keep, kick, drift);
+        self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
             friction += self.physics.retardation * pack.totals.friction;
-            bent += pack.totals.rest;
+            bent += pack.totals.rest_factor_derivative;
         }
         if let Some(mass) = self.tip_mass {
-            let mut force = loads.tip_force + self.tip_weight * loads.gravity;
+            let mut force = loads.tip_force + self.tip_load_length * loads.gravity;
             for pack in &self.packs {
                 force -= DVec3::from(pack.totals.last_force);
             }
             if let Some(applied) = &self.applied {
-                force += applied.on_tips(self.layout);
+                force += applied.tip_force_sum(self.layout);
             }
             let after = keep * before + force * (kick / mass);
             energy += mass * (0.5 * (before + after)).length_squared();
-            let tip = vector(&self.next, self.layout.at(0, last)) + drift * after;
+            let tip = vector_at(&self.next, self.layout.node_index(0, last)) + drift * after;
             for (p, pack) in self.packs.iter_mut().enumerate() {
-                for (k, j) in self.layout.rods_of(p).enumerate() {
-                    let at = [k * self.layout.stride + last, self.layout.at(j, last)];
+                for (k, j) in self.layout.pack_rods(p).enumerate() {
+                    let at = [
+                        k * self.layout.stride + last,
+                        self.layout.node_index(j, last),
+                    ];
                     for c in 0..3 {
                         pack.motion.v[c][at[0]] = after[c];
                         self.positions[c][at[1]] = tip[c];
@@ -305,13 +323,15 @@ impl Explicit {
                 }
             }
         }
-        work += 0.5 * length * (before_kick + self.power(&loads));
+        work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
         }
-        work += length * self.moments.power(self.layout, &self.packs);
-        if self.physics.rest_changes() {
-            work += self.work.of_rest(rest, bent, length, self.widths[0]);
+        work += length * self.moments.excess_load_power(self.layout, &self.packs);
+        if self.physics.rest_curvature_varies() {
+            work += self
+                .work
+                .rest_curvature_work(rest, bent, length, self.widths[0]);
         }
         let exchange = Exchange {
             dissipated: length * (self.physics.damping * energy + friction),
@@ -320,36 +340,37 @@ impl Explicit {
         (exchange, energy)
     }
 
-    fn law(&self, rest: f64, remember: bool) -> Law {
-        let changes = self.physics.rest_changes();
-        Law {
+    fn law(&self, rest: f64, remember: bool) -> StepLaw {
+        let changes = self.physics.rest_curvature_varies();
+        StepLaw {
             damped: self.physics.retardation > 0.0,
-            changes,
-            rest: if changes { rest } else { 1.0 },
+            rest_varies: changes,
+            rest_curvature_factor: if changes { rest } else { 1.0 },
             retardation: self.physics.retardation,
-            rates: rates(self.widths[0], self.widths[1]),
-            remember,
+            strain_rate_weights: rate_weights(self.widths[0], self.widths[1]),
+            stores_strains: remember,
         }
     }
 
     /// Moves all nodes except a shared tip; the previous positions are left in `next`.
-    fn step_packs(&mut self, loads: &Loads, law: Law, keep: f64, kick: f64, drift: f64) {
+    fn move_packs(&mut self, loads: &Loads, law: StepLaw, keep: f64, kick: f64, drift: f64) {
         let (arch, layout) = (self.arch, self.layout);
         let mut loads = *loads;
         if self.tip_mass.is_some() {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
-        let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (positions, leaf, moments) = (&self.positions, &self.leaf, self.moments.all());
-        let applied = self.applied.as_ref().map(Applied::loads);
+        let normalise = self.steps.is_multiple_of(NORMALISATION_INTERVAL);
+        let (positions, leaf, moments) =
+            (&self.positions, &self.leaf, self.moments.nodal_moments());
+        let applied = self.applied.as_ref().map(AppliedLoads::loads);
         let coupled = leaf.coupled();
-        let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
+        let one = |block: &mut BlockForces, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
             // Those beyond the first and the last rod have no weight. The others of a pack are
             // alike.
             let coupling = |gap: usize| leaf.coupling(gap.min(layout.rods - 2)).to_array();
-            let rods = layout.rods_of(p);
-            let step = Step {
+            let rods = layout.pack_rods(p);
+            let step = PackStep {
                 layout,
                 pack: p,
                 positions,
@@ -362,7 +383,7 @@ impl Explicit {
                 law,
                 loads,
                 moments,
-                keep,
+                velocity_factor: keep,
                 kick,
                 drift,
                 normalise,
@@ -373,14 +394,14 @@ impl Explicit {
         let [x, y, z] = self
             .next
             .each_mut()
-            .map(|array| &mut array[layout.front()..]);
-        let length = layout.entries();
+            .map(|array| &mut array[layout.front_padding()..]);
+        let length = layout.pack_entries();
         if self.parallel {
             let next = (x.par_chunks_mut(length).zip(y.par_chunks_mut(length)))
                 .zip(z.par_chunks_mut(length));
             (self.packs.par_iter_mut().zip(next).enumerate())
                 .with_min_len(packs_per_task(layout.packs()))
-                .for_each_init(Block::new, |block, (p, (pack, ((x, y), z)))| {
+                .for_each_init(BlockForces::new, |block, (p, (pack, ((x, y), z)))| {
                     one(block, p, pack, [x, y, z]);
                 });
         } else {
@@ -394,24 +415,24 @@ impl Explicit {
 }
 
 /// Part of a step below which differences of time are rounding.
-const NO_TIME: f64 = 1e-9;
+const TIME_ROUNDING_FRACTION: f64 = 1e-9;
 
 /// Advice if energy grows, besides a shorter step.
-const OTHERWISE: &str = "the semi-implicit method";
+const ENERGY_GROWTH_ADVICE: &str = "the semi-implicit method";
 
 /// Steps between checks of the bending, which are free, and of the energy.
-const BENDING_CHECKED: usize = 200;
+const BENDING_CHECK_INTERVAL: usize = 200;
 
-const ENERGY_CHECKED: usize = 2000;
+const ENERGY_CHECK_INTERVAL: usize = 2000;
 
 impl Explicit {
     /// Positions, rotations and segment forces.
-    pub fn now(&mut self) -> State {
-        let rest = self.physics.rest(self.stepped);
+    pub fn present_state(&mut self) -> State {
+        let rest = self.physics.rest_curvature_factor(self.last_step_time);
         let (law, layout) = (self.law(rest, false), self.layout);
         let mut forces = Vec::with_capacity(layout.rods * layout.segments);
         for (p, pack) in self.packs.iter_mut().enumerate() {
-            self.arch.dispatch(Forces {
+            self.arch.dispatch(PackForces {
                 layout,
                 pack: p,
                 positions: &self.positions,
@@ -429,18 +450,24 @@ impl Explicit {
 
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
-        let nodes = || self.leaf.each(0..=n);
-        let x = nodes().map(|(j, i)| vector(&self.positions, self.layout.at(j, i)));
+        let nodes = || self.leaf.rod_index_pairs(0..=n);
+        let x = nodes().map(|(j, i)| vector_at(&self.positions, self.layout.node_index(j, i)));
         let q = nodes().map(|(j, i)| self.rotation(j, i));
         State::new(n, x.collect(), q.collect())
     }
 
     /// The present state, if the motion is reliable in it.
-    fn judged(&mut self) -> Result<Snapshot, Stopped> {
+    fn reliable_snapshot(&mut self) -> Result<Snapshot, Stopped> {
         let now = self.snapshot();
-        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
+        (self.balance).check_reliability(
+            &self.leaf,
+            &self.physics,
+            &now,
+            self.step,
+            ENERGY_GROWTH_ADVICE,
+        )?;
         // In the balance rotations are at most pi, as in space.
-        resolved(&self.leaf, self.time, self.largest_turn())?;
+        check_resolution(&self.leaf, self.time, self.largest_turn())?;
         Ok(now)
     }
 }
@@ -462,8 +489,9 @@ impl TimeIntegrator for Explicit {
         let h = self.step;
         loop {
             // Times are multiples of the step, so that rounding does not accumulate.
-            let next = self.begin.0 + h * (self.steps + 1 - self.begin.1) as f64;
-            if next > until + NO_TIME * h {
+            let next =
+                self.equal_steps_begin.0 + h * (self.steps + 1 - self.equal_steps_begin.1) as f64;
+            if next > until + TIME_ROUNDING_FRACTION * h {
                 break;
             }
             if self.limit.reached() {
@@ -472,51 +500,51 @@ impl TimeIntegrator for Explicit {
             let (exchange, _) = self.kick_and_drift(h);
             self.balance.add(exchange);
             self.steps += 1;
-            (self.stepped, self.time) = (next, next);
+            (self.last_step_time, self.time) = (next, next);
             let applied = self.applied.as_ref();
             if let Some(half_turn) = applied.and_then(|it| it.half_turn(&self.leaf)) {
                 let time = self.time;
                 return Err(Stopped::HalfTurn { time, half_turn });
             }
-            let suspect = self.steps.is_multiple_of(BENDING_CHECKED) && !self.trusted();
-            if suspect || self.steps.is_multiple_of(ENERGY_CHECKED) {
-                self.judged()?;
+            let suspect = self.steps.is_multiple_of(BENDING_CHECK_INTERVAL) && !self.is_reliable();
+            if suspect || self.steps.is_multiple_of(ENERGY_CHECK_INTERVAL) {
+                self.reliable_snapshot()?;
             }
         }
         self.time = until.max(self.time);
-        self.judged()
+        self.reliable_snapshot()
     }
 
     fn snapshot(&mut self) -> Snapshot {
         let packs = self.packs.iter();
         let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
-        let past = self.applied.as_ref().map(Applied::past);
+        let past = self.applied.as_ref().map(AppliedLoads::past_velocities);
         let path = (self.positions.clone(), moving);
-        let (time, widths, work) = (self.stepped, self.widths, self.work);
+        let (time, widths, work) = (self.last_step_time, self.widths, self.work);
         let mut exchange = Exchange::default();
-        let left = self.time - self.stepped;
-        if left > NO_TIME * self.step {
+        let left = self.time - self.last_step_time;
+        if left > TIME_ROUNDING_FRACTION * self.step {
             exchange += self.kick_and_drift(left).0;
         }
-        self.stepped = self.time;
+        self.last_step_time = self.time;
         exchange += self.kick(0.0, 0.0, false).0;
-        exchange.work += self.work_now();
-        let state = self.now();
-        let places = self.leaf.each(0..=self.leaf.segments());
-        let places = places.map(|(j, i)| self.layout.place(j, i));
+        exchange.work += self.excess_potential();
+        let state = self.present_state();
+        let places = self.leaf.rod_index_pairs(0..=self.leaf.segments());
+        let places = places.map(|(j, i)| self.layout.pack_position(j, i));
         let velocity: Vec<Velocity> = places.map(|(p, at)| self.packs[p].velocity(at)).collect();
         self.positions = path.0;
         for (pack, moving) in self.packs.iter_mut().zip(path.1) {
             (pack.motion, pack.past) = moving;
         }
         if let (Some(applied), Some(past)) = (&mut self.applied, past) {
-            applied.set_past(past);
+            applied.set_past_velocities(past);
         }
-        (self.stepped, self.widths, self.work) = (time, widths, work);
+        (self.last_step_time, self.widths, self.work) = (time, widths, work);
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {
             time: self.time,
-            energy: self.balance.complete(energy, exchange),
+            energy: self.balance.present_energy(energy, exchange),
             state,
             velocity,
         }
@@ -524,63 +552,64 @@ impl TimeIntegrator for Explicit {
 }
 
 /// The moments and forces at an instant.
-pub struct Applied {
+pub struct AppliedLoads {
     state: State,
     /// Those of the tissue's strips at the start.
     alignments: Vec<bool>,
     nodes: Vec<[DVec3; 2]>,
     /// Moments and forces, laid out as positions.
-    loads: [[Array; 3]; 2],
-    blown: Option<Blown>,
+    loads: [[AlignedArray; 3]; 2],
+    nodes_in_wind: Option<NodesInWind>,
 }
 
 /// Nodes in wind.
-struct Blown {
-    wind: Wind,
+struct NodesInWind {
+    wind: WindDrag,
     forces: Vec<DVec3>,
     /// Velocities before the last kick, and before the one before it.
     velocity: Vec<DVec3>,
-    earlier: Vec<DVec3>,
+    earlier_velocity: Vec<DVec3>,
 }
 
-impl Applied {
+impl AppliedLoads {
     /// Of a leaf that moves from the state `start`; `None` if nothing acts on the nodes besides.
     pub fn new(
         leaf: &DiscreteLeaf,
         physics: &Physics,
         start: &State,
-        layout: Layout,
+        layout: PackLayout,
     ) -> Option<Self> {
-        let wind = Wind::new(leaf, physics);
-        if !leaf.tied() && leaf.loads.own == 0.0 && wind.is_none() {
+        let wind = WindDrag::new(leaf, physics);
+        if !leaf.has_tissue() && leaf.loads.rod_load_factor == 0.0 && wind.is_none() {
             return None;
         }
-        let array = || Array::zeros(layout.lengths()[0]);
+        let array = || AlignedArray::zeros(layout.array_lengths()[0]);
         let vectors = || std::array::from_fn(|_| array());
-        let state = leaf.natural();
+        let state = leaf.stress_free_state();
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
-        Some(Applied {
+        Some(AppliedLoads {
             nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
-            alignments: leaf.alignments(start),
+            alignments: leaf.strip_alignments(start),
             loads: [vectors(), vectors()],
-            blown: wind.map(|wind| Blown {
+            nodes_in_wind: wind.map(|wind| NodesInWind {
                 wind,
                 forces: at_rest(),
                 velocity: at_rest(),
-                earlier: at_rest(),
+                earlier_velocity: at_rest(),
             }),
             state,
         })
     }
 
     /// Moments and forces, laid out as positions.
-    pub fn loads(&self) -> &[[Array; 3]; 2] {
+    pub fn loads(&self) -> &[[AlignedArray; 3]; 2] {
         &self.loads
     }
 
     /// The sum of the forces on all tips.
-    pub fn on_tips(&self, layout: Layout) -> DVec3 {
-        let tips = (0..layout.rods).map(|j| vector(&self.loads[1], layout.at(j, layout.segments)));
+    pub fn tip_force_sum(&self, layout: PackLayout) -> DVec3 {
+        let tips = (0..layout.rods)
+            .map(|j| vector_at(&self.loads[1], layout.node_index(j, layout.segments)));
         tips.sum()
     }
 
@@ -589,32 +618,32 @@ impl Applied {
     pub fn update(
         &mut self,
         leaf: &DiscreteLeaf,
-        (layout, positions): (Layout, &[Array; 3]),
+        (layout, positions): (PackLayout, &[AlignedArray; 3]),
         packs: &[Pack],
         (air, ahead): (DVec3, f64),
     ) {
-        for (j, i) in leaf.each(0..=layout.segments) {
-            let ((p, at), k) = (layout.place(j, i), self.state.base(j) + i);
-            self.state.x[k] = vector(positions, layout.at(j, i));
+        for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
+            let ((p, at), k) = (layout.pack_position(j, i), self.state.base(j) + i);
+            self.state.x[k] = vector_at(positions, layout.node_index(j, i));
             self.state.q[k] = packs[p].rotation(at);
-            if let Some(blown) = &mut self.blown {
-                blown.earlier[k] = blown.velocity[k];
+            if let Some(blown) = &mut self.nodes_in_wind {
+                blown.earlier_velocity[k] = blown.velocity[k];
                 blown.velocity[k] = packs[p].moving(at).0;
             }
         }
         self.nodes.fill([DVec3::ZERO; 2]);
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
-        if let Some(blown) = &mut self.blown {
-            let (now, earlier) = (&blown.velocity, &blown.earlier);
+        if let Some(blown) = &mut self.nodes_in_wind {
+            let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);
             let velocity = |k: usize| now[k] + ahead * (now[k] - earlier[k]);
             (blown.wind).set_forces(&self.state, air, velocity, &mut blown.forces);
             for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
                 node[1] += *force;
             }
         }
-        for (j, i) in leaf.each(0..=layout.segments) {
-            let (at, node) = (layout.at(j, i), self.nodes[self.state.base(j) + i]);
+        for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
+            let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
             for (arrays, load) in self.loads.iter_mut().zip(node) {
                 for (c, array) in arrays.iter_mut().enumerate() {
                     array[at] = load[c];
@@ -630,7 +659,9 @@ impl Applied {
 
     /// Power of the wind at the mean of the velocities before the last kick and of these.
     pub fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
-        let Some(blown) = &self.blown else { return 0.0 };
+        let Some(blown) = &self.nodes_in_wind else {
+            return 0.0;
+        };
         let nodes = self.state.segments() + 1;
         let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
         let power = forces.map(|(k, (force, before))| {
@@ -640,13 +671,13 @@ impl Applied {
     }
 
     /// The velocities that further motion depends on.
-    pub fn past(&self) -> Vec<DVec3> {
-        (self.blown.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
+    pub fn past_velocities(&self) -> Vec<DVec3> {
+        (self.nodes_in_wind.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
     }
 
     /// Replaces these velocities.
-    pub fn set_past(&mut self, past: Vec<DVec3>) {
-        if let Some(blown) = &mut self.blown {
+    pub fn set_past_velocities(&mut self, past: Vec<DVec3>) {
+        if let Some(blown) = &mut self.nodes_in_wind {
             blown.velocity = past;
         }
     }
@@ -654,43 +685,44 @@ impl Applied {
 
 /// The dead moments of a step.
 #[derive(Default)]
-pub struct Moments {
+pub struct StepDeadMoments {
     /// Nodes and sizes.
-    all: Vec<(usize, DVec3)>,
+    nodal_moments: Vec<(usize, DVec3)>,
     /// Rotations and angular momenta of these nodes before the step.
-    before: Vec<(DQuat, DVec3)>,
+    motions_before: Vec<(DQuat, DVec3)>,
 }
 
-impl Moments {
+impl StepDeadMoments {
     /// Nodes and sizes.
-    pub fn all(&self) -> &[(usize, DVec3)] {
-        &self.all
+    pub fn nodal_moments(&self) -> &[(usize, DVec3)] {
+        &self.nodal_moments
     }
 
     /// Takes over those of a step that begins.
-    pub fn begin(
+    pub fn begin_step(
         &mut self,
         moments: impl Iterator<Item = (usize, DVec3)>,
-        layout: Layout,
+        layout: PackLayout,
         packs: &[Pack],
     ) {
-        self.all.clear();
-        self.all.extend(moments);
-        self.before.clear();
-        for (node, _) in &self.all {
-            let (p, at) = layout.place(0, *node);
+        self.nodal_moments.clear();
+        self.nodal_moments.extend(moments);
+        self.motions_before.clear();
+        for (node, _) in &self.nodal_moments {
+            let (p, at) = layout.pack_position(0, *node);
             let pack = &packs[p];
-            self.before.push((pack.rotation(at), pack.moving(at).1));
+            self.motions_before
+                .push((pack.rotation(at), pack.moving(at).1));
         }
     }
 
     /// Their power at the mean of the angular momenta before the step and of these.
-    pub fn power(&self, layout: Layout, packs: &[Pack]) -> f64 {
-        let nodes = self.all.iter().zip(&self.before);
+    pub fn excess_load_power(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
+        let nodes = self.nodal_moments.iter().zip(&self.motions_before);
         let power = nodes.map(|((node, moment), (rotation, before))| {
-            let (p, at) = layout.place(0, *node);
+            let (p, at) = layout.pack_position(0, *node);
             let momentum = 0.5 * (*before + packs[p].moving(at).1);
-            moment.dot(packs[p].spin(at, *rotation, momentum))
+            moment.dot(packs[p].angular_velocity(at, *rotation, momentum))
         });
         power.sum()
     }
@@ -701,13 +733,13 @@ impl Moments {
 pub(super) struct VaryingWork {
     /// Loads and factor of the rest curvatures at time 0.
     loads: Loads,
-    rest: f64,
+    rest_curvature_factor: f64,
     /// Twice the energy of bending from the rest curvatures to none.
-    straightening: f64,
+    twice_straightening_energy: f64,
     /// At the last kick: half the impulse of the factor's excess, and the sum of the
     /// rest curvatures times the moments without them.
     half_impulse: f64,
-    turned: f64,
+    rest_moment_sum: f64,
     /// Rate of that sum before the last kick.
     rate: f64,
 }
@@ -720,10 +752,10 @@ impl VaryingWork {
         });
         VaryingWork {
             loads: physics.loads(0.0),
-            rest: physics.rest(0.0),
-            straightening: straightening.sum(),
+            rest_curvature_factor: physics.rest_curvature_factor(0.0),
+            twice_straightening_energy: straightening.sum(),
             half_impulse: 0.0,
-            turned: 0.0,
+            rest_moment_sum: 0.0,
             rate: 0.0,
         }
     }
@@ -731,46 +763,54 @@ impl VaryingWork {
     /// Work since the last kick, `width` ago, by the mean factors of the rest curvatures in that
     /// kick and, over `length`, in this one; `bent` is the sum of the rest curvatures
     /// times the present moments.
-    pub(super) fn of_rest(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
-        let turned = bent + mean * self.straightening;
-        let half_impulse = 0.5 * length * (mean - self.rest);
+    pub(super) fn rest_curvature_work(
+        &mut self,
+        mean: f64,
+        bent: f64,
+        length: f64,
+        width: f64,
+    ) -> f64 {
+        let turned = bent + mean * self.twice_straightening_energy;
+        let half_impulse = 0.5 * length * (mean - self.rest_curvature_factor);
         self.rate = match width > 0.0 {
-            true => (turned - self.turned) / width,
+            true => (turned - self.rest_moment_sum) / width,
             false => 0.0,
         };
         let work = (self.half_impulse + half_impulse) * self.rate;
-        (self.half_impulse, self.turned) = (half_impulse, turned);
+        (self.half_impulse, self.rest_moment_sum) = (half_impulse, turned);
         work
     }
 }
 
 impl Explicit {
     /// Power of the excess of `loads` over those at time 0, at the present velocities.
-    pub(super) fn power(&self, loads: &Loads) -> f64 {
-        match self.physics.loads_change() {
-            true => self.excess(loads, |j, i| self.moving(j, i).0),
+    pub(super) fn excess_load_power(&self, loads: &Loads) -> f64 {
+        match self.physics.loads_vary() {
+            true => self.excess_load_sum(loads, |j, i| self.moving(j, i).0),
             false => 0.0,
         }
     }
 
     /// Present potential of the excess of loads and rest curvatures over those at time 0: it
     /// is in the energies, but does not come from the motion.
-    pub(super) fn work_now(&self) -> f64 {
+    pub(super) fn excess_potential(&self) -> f64 {
         let mut work = 0.0;
-        if self.physics.loads_change() {
+        if self.physics.loads_vary() {
             let loads = self.physics.loads(self.time);
-            work -= self.excess(&loads, |j, i| vector(&self.positions, self.layout.at(j, i)));
+            work -= self.excess_load_sum(&loads, |j, i| {
+                vector_at(&self.positions, self.layout.node_index(j, i))
+            });
         }
-        if self.physics.rest_changes() {
+        if self.physics.rest_curvature_varies() {
             let VaryingWork {
-                rest: first,
-                straightening,
+                rest_curvature_factor: first,
+                twice_straightening_energy: straightening,
                 half_impulse,
-                turned,
+                rest_moment_sum: turned,
                 rate,
                 ..
             } = self.work;
-            let rest = self.physics.rest(self.time);
+            let rest = self.physics.rest_curvature_factor(self.time);
             // The rate after the last kick is nearly that before it.
             work += half_impulse * rate;
             work += (first - rest) * turned;
@@ -780,13 +820,13 @@ impl Explicit {
     }
 
     /// Sum of the excess of `loads` over those at time 0, times vectors of the nodes.
-    fn excess(&self, loads: &Loads, vectors: impl Fn(usize, usize) -> DVec3) -> f64 {
+    fn excess_load_sum(&self, loads: &Loads, vectors: impl Fn(usize, usize) -> DVec3) -> f64 {
         let excess = *loads - self.work.loads;
         let mut sum = 0.0;
         for j in 0..self.layout.rods {
             for i in 0..=self.layout.segments {
-                let (p, at) = self.layout.place(j, i);
-                sum += self.packs[p].weight(at) * excess.gravity.dot(vectors(j, i));
+                let (p, at) = self.layout.pack_position(j, i);
+                sum += self.packs[p].load_length(at) * excess.gravity.dot(vectors(j, i));
             }
             if j == 0 || !self.leaf.leaf.joined() {
                 sum += excess.tip_force.dot(vectors(j, self.layout.segments));

@@ -34,9 +34,9 @@
 //! Methods for Transient Analysis, 1983).
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::explicit::kernel::{Layout, Node};
+use crate::motion::explicit::kernel::{NodeData, PackLayout};
 use crate::motion::explicit::packs::{Pack, materials, node_data};
-use crate::motion::physics::{Physics, Wind};
+use crate::motion::physics::{Physics, WindDrag};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;
 use std::array::from_fn;
@@ -52,9 +52,12 @@ pub struct StableStep {
 
 impl StableStep {
     /// For a leaf with these positions and rotations.
-    pub fn of(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
+    pub fn for_leaf(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
         let (strains, mut limit) = fastest_segment(leaf, physics, state);
-        let (coupling, tissue) = (coupling(leaf, physics), tissue(leaf, physics, state));
+        let (coupling, tissue) = (
+            coupling_frequency_bound(leaf, physics),
+            tissue_frequency_bound(leaf, physics, state),
+        );
         if coupling.max(tissue) > strains {
             limit = if tissue > coupling {
                 "tissue"
@@ -65,7 +68,8 @@ impl StableStep {
         let coupling = coupling + tissue;
         let all = strains + coupling;
         let friction = physics.retardation * strains;
-        let drag = Wind::new(leaf, physics).map_or(0.0, |wind| wind.fastest_decay(leaf, physics));
+        let drag =
+            WindDrag::new(leaf, physics).map_or(0.0, |wind| wind.fastest_decay(leaf, physics));
         let damping = friction + drag;
         if damping * damping > all {
             limit = if drag > friction {
@@ -83,25 +87,25 @@ impl StableStep {
 
 /// Stiffness of a segment, between the displacements of its left and its right end, and
 /// the rotations of both.
-type Stiffness = [[DMat3; 4]; 4];
+type SegmentStiffness = [[DMat3; 4]; 4];
 
 /// Stiffness with which a node is held: for displacements along its directors, and for rotations
 /// about them.
-type Hold = [DVec3; 2];
+type NodeStiffness = [DVec3; 2];
 
 /// Least stiffness of a hold in any direction, as a part of its largest component.
-const LEAST_HOLD: f64 = 0.01;
+const MIN_STIFFNESS_FRACTION: f64 = 0.01;
 
 /// Largest squared frequency of any single segment, and the motion it belongs to.
 fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
     let (rods, n) = (leaf.rods(), leaf.segments());
     let joined = leaf.leaf.joined() && rods > 1;
-    let mut held: Vec<Hold> = vec![[DVec3::ZERO; 2]; state.x.len()];
-    for (j, i) in leaf.each(0..n) {
+    let mut held: Vec<NodeStiffness> = vec![[DVec3::ZERO; 2]; state.x.len()];
+    for (j, i) in leaf.rod_index_pairs(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
         for end in 0..2 {
             let node = state.base(j) + i + end;
-            let hold = hold(&stiffness, end, state.q[node]);
+            let hold = node_stiffness(&stiffness, end, state.q[node]);
             for c in 0..2 {
                 held[node][c] += hold[c];
             }
@@ -113,12 +117,12 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
     let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
     let tip_mass: f64 = tip_mass.sum();
     let (mut largest, mut fastest) = (0.0, None);
-    for (j, i) in leaf.each(0..n) {
+    for (j, i) in leaf.rod_index_pairs(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
         // Inverse square root of the masses of an end, along the lab axes.
         let root = |end: usize| {
             let free = match i + end == 0 && physics.clamped() {
-                true => leaf.moves(j, 0),
+                true => leaf.allows_rotation_and_displacement(j, 0),
                 false => [true; 2],
             };
             if free == [false; 2] {
@@ -126,7 +130,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
             }
             let node = state.base(j) + i + end;
             let inertia = physics.inertia(leaf, j, i + end);
-            let [shift, turn] = hold(&stiffness, end, state.q[node]);
+            let [shift, turn] = node_stiffness(&stiffness, end, state.q[node]);
             let moving = match joined && i + end == n {
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
                 false => inertia.mass * shift / held[node][0],
@@ -144,7 +148,8 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
         };
         let (left, right) = (root(0), root(1));
         let roots = [left[0], right[0], left[1], right[1]];
-        let scaled: Stiffness = from_fn(|r| from_fn(|c| roots[r] * stiffness[r][c] * roots[c]));
+        let scaled: SegmentStiffness =
+            from_fn(|r| from_fn(|c| roots[r] * stiffness[r][c] * roots[c]));
         let matrix = SMatrix::<f64, 12, 12>::from_fn(|r, c| scaled[r / 3][c / 3].col(c % 3)[r % 3]);
         let squared = matrix.symmetric_eigenvalues().max();
         if squared > largest {
@@ -157,12 +162,12 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
     let eigen = matrix.symmetric_eigen();
     let mode = eigen.eigenvectors.column(eigen.eigenvalues.imax());
     let motion = from_fn(|k| roots[k] * DVec3::from_slice(&mode.as_slice()[3 * k..3 * k + 3]));
-    (largest, name(leaf, state, (j, i), motion))
+    (largest, motion_kind_name(leaf, state, (j, i), motion))
 }
 
 /// Stiffness of a segment that carries the force of its strain.
-fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffness {
-    let section = leaf.section(j, i).condense(f64::INFINITY);
+fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> SegmentStiffness {
+    let section = leaf.section(j, i).limit_condensing_stiffness(f64::INFINITY);
     let k = leaf.strained_segment(state, j, i).hessian(&section);
     [
         [k.xx, -k.xx, -k.xa, -k.xb],
@@ -173,17 +178,17 @@ fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffnes
 }
 
 /// Stiffness with which a segment holds the node of rotation `q` at its left or right end.
-fn hold(stiffness: &Stiffness, end: usize, q: DQuat) -> Hold {
+fn node_stiffness(stiffness: &SegmentStiffness, end: usize, q: DQuat) -> NodeStiffness {
     let frame = DMat3::from_quat(q);
     [end, 2 + end].map(|c| {
         let seen = frame.transpose() * stiffness[c][c] * frame;
         let hold = DVec3::new(seen.x_axis.x, seen.y_axis.y, seen.z_axis.z);
-        hold.max(DVec3::splat(LEAST_HOLD * hold.max_element()))
+        hold.max(DVec3::splat(MIN_STIFFNESS_FRACTION * hold.max_element()))
     })
 }
 
 /// The dominant kind of a motion of a segment, given by displacements and rotations of its ends.
-fn name(
+fn motion_kind_name(
     leaf: &DiscreteLeaf,
     state: &State,
     (j, i): (usize, usize),
@@ -210,17 +215,17 @@ fn name(
 /// coupled nodes, the largest sum of the stiffness that couples each, over its
 /// mass. (The same bound for the Laplacian of a graph: W. N. Anderson and
 /// T. D. Morley, Linear and Multilinear Algebra 18, 1985.)
-fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
+fn coupling_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
     let mut largest = 0.0_f64;
     for i in 1..=leaf.segments() {
         let of = |j: usize| {
             let gaps = [j.wrapping_sub(1), j];
             let inside = gaps.into_iter().filter(|&g| g < leaf.rods() - 1);
-            let springs: DVec3 = inside.map(|g| leaf.spring(g, i)).sum();
+            let springs: DVec3 = inside.map(|g| leaf.node_coupling(g, i)).sum();
             springs / physics.inertia(leaf, j, i).mass
         };
         for gap in 0..leaf.rods() - 1 {
-            let tied = leaf.spring(gap, i).cmpgt(DVec3::ZERO);
+            let tied = leaf.node_coupling(gap, i).cmpgt(DVec3::ZERO);
             let sum = DVec3::select(tied, of(gap) + of(gap + 1), DVec3::ZERO);
             largest = largest.max(sum.max_element());
         }
@@ -230,7 +235,7 @@ fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
 
 /// Upper bound on the contribution of the tissue to the squared frequency: the largest of any single
 /// strip, half of the masses of a node belonging to either of its two gaps.
-fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
+fn tissue_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
     let mut largest = 0.0_f64;
     for (g, i, stiffness) in leaf.tissue_stiffness(state) {
         let inverse = |rod: usize| {
@@ -239,7 +244,7 @@ fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
             let share = if ends { 1.0 } else { 0.5 };
             // Bases that are held do not move.
             let [turns, shifts] = match i == 0 && physics.clamped() {
-                true => leaf.moves(rod, 0),
+                true => leaf.allows_rotation_and_displacement(rod, 0),
                 false => [true; 2],
             };
             let part = |free: bool| if free { 1.0 / share } else { 0.0 };
@@ -258,49 +263,63 @@ fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
 /// Part of the squared frequency 4 of a segment that is due to the rotations of its
 /// ends, the rest being due to their translations. Slow motions are mostly translations:
 /// rotations get the smaller part of the frequency, hence larger masses.
-const ROTATING: f64 = 0.5;
+const ROTATION_FREQUENCY_FRACTION: f64 = 0.5;
 
 /// Sets the masses of the rods; returns that of a shared tip.
-pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout, packs: &mut [Pack]) -> f64 {
+pub fn set_fictitious_masses(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    layout: PackLayout,
+    packs: &mut [Pack],
+) -> f64 {
     let (n, count) = (leaf.segments(), leaf.rods());
     let mut tip = 0.0;
-    let mut rods: Vec<Vec<Node>> = Vec::with_capacity(count);
+    let mut rods: Vec<Vec<NodeData>> = Vec::with_capacity(count);
     for j in 0..count {
-        let old: Vec<Node> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
+        let old: Vec<NodeData> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
         let mut new = old.clone();
         for i in 0..=n {
             let (mut mass, mut inertia) = (0.0, 0.0);
             let before = i.checked_sub(1).map(|before| &old[before]);
             for segment in before.into_iter().chain([&old[i]]) {
-                let stretch = segment.stretch.into_iter().fold(0.0_f64, f64::max);
-                let bend = segment.bend.into_iter().fold(0.0_f64, f64::max);
+                let stretch = segment
+                    .stretch_stiffness
+                    .into_iter()
+                    .fold(0.0_f64, f64::max);
+                let bend = segment
+                    .bending_stiffness
+                    .into_iter()
+                    .fold(0.0_f64, f64::max);
                 let arm = 0.5 * segment.rest_length[0];
-                mass += 2.0 * stretch / (4.0 - ROTATING);
-                inertia += 2.0 * (bend + stretch * arm * arm) / ROTATING;
+                mass += 2.0 * stretch / (4.0 - ROTATION_FREQUENCY_FRACTION);
+                inertia += 2.0 * (bend + stretch * arm * arm) / ROTATION_FREQUENCY_FRACTION;
             }
             let node = &mut new[i];
             // Both neighbours pull on a node, and may move as much as it does.
-            for (gap, coupled) in [j.wrapping_sub(1), j].into_iter().zip(node.coupled) {
+            for (gap, coupled) in [j.wrapping_sub(1), j]
+                .into_iter()
+                .zip(node.coupling_weights)
+            {
                 if gap < count - 1 {
                     mass += 0.5 * (leaf.leaf.coupling(gap) * coupled).max_element();
                 }
             }
-            for (stiffness, fold, width) in leaf.tissue_at(j, i) {
+            for (stiffness, fold, width) in leaf.adjacent_tissue_stiffness(j, i) {
                 let arm = 0.5 * width;
-                mass += 2.0 * stiffness / (4.0 - ROTATING);
-                inertia += 2.0 * (fold + stiffness * arm * arm) / ROTATING;
+                mass += 2.0 * stiffness / (4.0 - ROTATION_FREQUENCY_FRACTION);
+                inertia += 2.0 * (fold + stiffness * arm * arm) / ROTATION_FREQUENCY_FRACTION;
             }
             if i == n {
                 tip += mass;
             }
-            node.per_spin = 0.0;
+            node.inverse_spin_excess = 0.0;
             // Zero for a held node, and for a shared tip.
-            if node.per_inertia != 0.0 {
-                node.per_inertia = 1.0 / inertia;
+            if node.inverse_inertia != 0.0 {
+                node.inverse_inertia = 1.0 / inertia;
             }
-            if node.per_mass != 0.0 {
+            if node.inverse_mass != 0.0 {
                 node.mass = mass;
-                node.per_mass = 1.0 / mass;
+                node.inverse_mass = 1.0 / mass;
             }
         }
         rods.push(new);

@@ -1,7 +1,7 @@
 use crate::leaf::{Grid, Leaf};
+use crate::motion::check_resolution;
 use crate::motion::explicit::*;
-use crate::motion::resolved;
-use crate::relax::start;
+use crate::relax::initial_state;
 use crate::scenario::Scenario;
 use std::collections::HashSet;
 
@@ -29,8 +29,8 @@ const SEGMENTS: [usize; 9] = [1, 2, 3, 4, 100, 222, 223, 224, 250];
 
 /// Curved and twisted, and strained by some percent.
 fn bent(leaf: &DiscreteLeaf) -> State {
-    let (mut state, n) = (start(leaf), leaf.segments());
-    for (j, i) in leaf.each(1..=n) {
+    let (mut state, n) = (initial_state(leaf), leaf.segments());
+    for (j, i) in leaf.rod_index_pairs(1..=n) {
         let s = i as f64 / n as f64;
         let tip = if i == n { 0 } else { j };
         let phase = 5.0 * s + tip as f64;
@@ -39,15 +39,15 @@ fn bent(leaf: &DiscreteLeaf) -> State {
         // No segment is bent by more than a grid resolves.
         let turn = turn * (n as f64 / 8.0).min(1.0);
         let increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-        state.advance(state.base(j) + i, &increment, 1.0);
+        state.advance_node(state.base(j) + i, &increment, 1.0);
     }
     state
 }
 
 /// Force and moment on every node from the gradient of the element's energy.
-fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
+fn element_node_loads(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
-    for (j, i) in leaf.each(0..=leaf.segments()) {
+    for (j, i) in leaf.rod_index_pairs(0..=leaf.segments()) {
         let k = state.base(j) + i;
         let load = leaf.load(state, j, i);
         all[k] = (all[k].0 + load.force, all[k].1 + load.moment);
@@ -84,11 +84,11 @@ fn forces_are_those_of_the_element() {
     }
     let explicit = |toml: &str| {
         let leaf = discrete(toml, 100);
-        let state = start(&leaf);
+        let state = initial_state(&leaf);
         explicit(leaf, &state)
     };
     assert_eq!(
-        [LEAF, &alike].map(|toml| explicit(toml).layout.pack),
+        [LEAF, &alike].map(|toml| explicit(toml).layout.rods_per_pack),
         [1, 2]
     );
     let is_round = |toml: &str| explicit(toml).packs[0].material[0].round;
@@ -97,7 +97,7 @@ fn forces_are_those_of_the_element() {
 
 fn forces_are_those(leaf: &DiscreteLeaf) {
     let (n, state) = (leaf.segments(), bent(leaf));
-    let expected = by_element(leaf, &state);
+    let expected = element_node_loads(leaf, &state);
     let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
     // Of many segments, differences of larger forces are left.
     let rounding = 1e-14 * n.max(100) as f64;
@@ -114,7 +114,7 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
         let h = 1e-6;
         explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
-        for (j, i) in leaf.each(1..=n) {
+        for (j, i) in leaf.rod_index_pairs(1..=n) {
             let (v, p) = explicit.moving(j, i);
             let (force, moment) = expected[state.base(j) + i];
             let moment_error = (p / (0.5 * h) - moment).length();
@@ -122,8 +122,8 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
             if i == n {
                 tip += force;
             } else {
-                let (pack, at) = explicit.layout.place(j, i);
-                let (material, at) = explicit.packs[pack].block(at);
+                let (pack, at) = explicit.layout.pack_position(j, i);
+                let (material, at) = explicit.packs[pack].node_material(at);
                 let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
                 assert!(error < allowed, "{j} {i}: {error}");
             }
@@ -146,7 +146,7 @@ fn like_blocks_are_shared() {
             line => format!("{}\n", line.replace("[1.0, 2.0, 0.5]", "1.0")),
         });
         let leaf = discrete(&toml.collect::<String>(), segments);
-        let state = start(&leaf);
+        let state = initial_state(&leaf);
         let explicit = explicit(leaf, &state);
         let blocks = explicit.packs.iter().flat_map(|pack| &pack.material);
         let places: Vec<_> = blocks.map(std::sync::Arc::as_ptr).collect();
@@ -169,7 +169,7 @@ fn a_constant_factor_of_the_rest_curvature_counts() {
         for _ in 0..100 {
             explicit.step(1e-4);
         }
-        explicit.now()
+        explicit.present_state()
     };
     let half = LEAF.replace(
         "rest = {",
@@ -192,12 +192,12 @@ fn what_is_not_a_number_is_not_trusted() {
     let trusted = |state: &State| {
         let physics = Physics::new(&leaf.leaf);
         let explicit = Explicit::new(leaf.clone(), physics, state, Some(1e-3));
-        explicit.unwrap().trusted()
+        explicit.unwrap().is_reliable()
     };
-    let mut state = start(&leaf);
+    let mut state = initial_state(&leaf);
     assert!(trusted(&state));
     state.q[3] = DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0);
     assert!(!trusted(&state));
-    assert!(resolved(&leaf, 0.0, 0.1).is_ok());
-    assert!(resolved(&leaf, 0.0, f64::NAN).is_err());
+    assert!(check_resolution(&leaf, 0.0, 0.1).is_ok());
+    assert!(check_resolution(&leaf, 0.0, f64::NAN).is_err());
 }

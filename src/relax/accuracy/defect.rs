@@ -18,53 +18,53 @@
 //! The steps of the integration along the veins in defect correction, and their error.
 
 use crate::leaf::{
-    DiscreteLeaf, Factorised, Field, Flow, Grid, Jump, RodFields, Slice, Solved, State, System,
-    Tangent, shift, turn,
+    DefiniteFactors, DiscreteLeaf, FieldJump, Grid, LinearSolveOutcome, NodalField, RodFields,
+    RodIntegrator, SegmentTangent, State, StationFields, System, displacement_part, rotation_part,
 };
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::numbers::larger;
-use crate::relax::accuracy::Level;
-use crate::relax::accuracy::fields::nodes;
+use crate::relax::accuracy::GridLevel;
+use crate::relax::accuracy::fields::extrapolated_node_fields;
 use crate::rotation;
 use glam::DVec3;
 
 /// The linear equations are those of the grid this many levels below the finest, but not of
 /// the coarsest.
-const COARSER: usize = 2;
+const LINEARIZATION_COARSENING_LEVELS: usize = 2;
 
 /// The part of the error assumed to remain after a correction before it has been measured: on
 /// a grid of n segments the first number over n^2, but no less than the second; and the largest
 /// measured part with which corrections continue.
-const CONTRACTION: (f64, f64) = (0.64, 0.01);
+const EXPECTED_CORRECTION_CONTRACTION: (f64, f64) = (0.64, 0.01);
 
-const SLOWEST: f64 = 0.2;
+const LARGEST_CORRECTION_CONTRACTION: f64 = 0.2;
 
 /// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
 /// jumps there tell nothing of the errors at the nodes.
-const MOST_GROWTH: f64 = 2.0;
+const MAX_PERTURBATION_GROWTH: f64 = 2.0;
 
 /// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
 /// of that of the positions (dimensionless): as they are in an extrapolated one.
-const TURNS: f64 = 10.0;
+const ROTATION_ERROR_MULTIPLE: f64 = 10.0;
 
-const FORCES: f64 = 50.0;
+const FORCE_ERROR_MULTIPLE: f64 = 50.0;
 
 /// The factorised equations of one of the grids.
-pub struct Linear {
-    grid: usize,
+pub struct FactorizedLevel {
+    level_number: usize,
     pub system: System,
-    factors: Factorised,
+    factors: DefiniteFactors,
 }
 
-impl Linear {
+impl FactorizedLevel {
     /// The number of the grid.
     pub fn grid(&self) -> usize {
-        self.grid
+        self.level_number
     }
 }
 
 /// A leaf on one grid or several, with its error estimated from the equilibrium equations.
-pub struct Estimate {
+pub struct DefectEstimate {
     /// The largest error of a position at the nodes from which the leaf was integrated.
     pub at_nodes: f64,
     /// The largest error on either side of the midpoints between them.
@@ -77,14 +77,14 @@ pub struct Estimate {
     pub energy_error: f64,
     /// The errors of the fields along the lab axes, at the nodes from which the leaf was
     /// integrated and at the midpoints between them, rod after rod.
-    pub errors: Vec<Vec<Change>>,
+    pub errors: Vec<Vec<FieldChange>>,
     /// The finest grid or, for a corrected leaf, one with as many segments as its accuracy needs.
     pub grid: Grid,
     /// Number of corrections.
     pub corrections: usize,
 }
 
-impl Estimate {
+impl DefectEstimate {
     /// The largest error of a position.
     pub fn largest(&self) -> f64 {
         larger(self.at_nodes, self.between)
@@ -100,46 +100,57 @@ impl Estimate {
 /// are not pairs of equal ones. The equations are factorised, if it fits in `spare`, unless
 /// `linear` has them already.
 pub fn estimate(
-    levels: &[Level],
+    levels: &[GridLevel],
     columns: usize,
     (enough, most): (f64, usize),
-    (linear, spare): (&mut Option<Linear>, &mut Option<System>),
-    work: &mut Work,
-) -> Option<Estimate> {
+    (linear, spare): (&mut Option<FactorizedLevel>, &mut Option<System>),
+    work: &mut SolverCounts,
+) -> Option<DefectEstimate> {
     let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
     // The linear equations need two segments between nodes.
     let (parts, grid) = match last {
         0 => (first.grid.coarsened()?, 0),
-        _ => (first.grid.clone(), last.saturating_sub(COARSER).max(1)),
+        _ => (
+            first.grid.clone(),
+            last.saturating_sub(LINEARIZATION_COARSENING_LEVELS).max(1),
+        ),
     };
-    let widths = (0..parts.segments()).map(|i| parts.width(i));
-    let unstable = first.growth(0.5 * widths.fold(0.0, larger)) > MOST_GROWTH;
+    let widths = (0..parts.segments()).map(|i| parts.segment_width(i));
+    let unstable =
+        first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > MAX_PERTURBATION_GROWTH;
     if unstable || first.has_grips() {
         return None;
     }
-    if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
+    if linear
+        .as_ref()
+        .is_none_or(|linear| linear.level_number != grid)
+    {
         let (system, factors) = factorized(&levels[grid], spare.take(), work)?;
-        *linear = Some(Linear {
-            grid,
+        *linear = Some(FactorizedLevel {
+            level_number: grid,
             system,
             factors,
         });
     }
     let level = &levels[grid];
-    let Linear {
+    let FactorizedLevel {
         system, factors, ..
     } = linear.as_mut()?;
     let (finest, count) = (&levels[last].leaf.grid, parts.segments());
-    let (mut known, mut flow) = (nodes(levels, columns, count), Flow::new(first));
+    let (mut known, mut flow) = (
+        extrapolated_node_fields(levels, columns, count),
+        RodIntegrator::new(first),
+    );
     let mut tangents = Tangents::new(level, count);
     let n = level.leaf.segments() as f64;
-    let assumed = (CONTRACTION.0 / (n * n)).max(CONTRACTION.1);
+    let assumed =
+        (EXPECTED_CORRECTION_CONTRACTION.0 / (n * n)).max(EXPECTED_CORRECTION_CONTRACTION.1);
     let mut uncorrected = None;
     let mut before = 0.0;
-    let mut steps = Steps::new(finest.segments() / count / 2, last == 0);
+    let mut steps = IntegrationSteps::new(finest.segments() / count / 2, last == 0);
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
-        let integrated = integrated((first, &parts), &mut flow, &known, steps.count);
+        let integrated = integrate_to_midpoints((first, &parts), &mut flow, &known, steps.count);
         let Some(response) = tangents.response((system, factors), &integrated.jumps) else {
             break;
         };
@@ -151,7 +162,7 @@ pub fn estimate(
             true => assumed,
             false => largest / before,
         };
-        if !largest.is_finite() || contraction > SLOWEST {
+        if !largest.is_finite() || contraction > LARGEST_CORRECTION_CONTRACTION {
             break;
         }
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
@@ -168,14 +179,18 @@ pub fn estimate(
             uncorrected = Some(estimate);
         } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
-            if larger(turn / TURNS, stress / FORCES) <= enough {
+            if larger(
+                turn / ROTATION_ERROR_MULTIPLE,
+                stress / FORCE_ERROR_MULTIPLE,
+            ) <= enough
+            {
                 let errors = response.largest.map(|error| error + steps.error);
                 let mut forces = known
                     .iter()
                     .flatten()
                     .map(|it| it.n.length() + it.m.length());
                 let largest = forces.by_ref().fold(0.0, larger);
-                return Some(Estimate {
+                return Some(DefectEstimate {
                     corrections,
                     energy_error: energy_error(first, &changes, &integrated.jumps)
                         + steps.error * largest,
@@ -183,7 +198,7 @@ pub fn estimate(
                 });
             }
         }
-        apply(&changes, &mut known);
+        apply_changes(&changes, &mut known);
         before = largest;
         steps.choose(largest * contraction, enough);
     }
@@ -193,46 +208,50 @@ pub fn estimate(
 /// Assembled anew at rest: the equations of the last Newton step have the forces before it,
 /// which differ where rods are rigid.
 fn factorized(
-    level: &Level,
+    level: &GridLevel,
     spare: Option<System>,
-    work: &mut Work,
-) -> Option<(System, Factorised)> {
-    let mut system = System::reused(spare, &level.leaf);
+    work: &mut SolverCounts,
+) -> Option<(System, DefiniteFactors)> {
+    let mut system = System::new_in_memory(spare, &level.leaf);
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
-    level.leaf.hold_turn(&level.state, &mut system);
+    level.leaf.add_phase_conditions(&level.state, &mut system);
     let factors = match level.leaf.rods() {
-        1 => Factorised::of_single_rod(&mut system)?,
-        _ => Factorised::new(&mut system, 0.0)?,
+        1 => DefiniteFactors::indefinite_single_rod(&mut system)?,
+        _ => DefiniteFactors::new(&mut system, 0.0)?,
     };
     Some((system, factors))
 }
 
 /// A leaf integrated along its rods.
-struct Integrated {
+struct IntegratedLeaf {
     /// After every step from the two ends of a part to its midpoint, part after part.
-    slices: Vec<[Vec<Slice>; 2]>,
-    jumps: Vec<Vec<Jump>>,
+    slices: Vec<[Vec<StationFields>; 2]>,
+    jumps: Vec<Vec<FieldJump>>,
     energy: f64,
 }
 
 /// The leaf `known` at the nodes of `parts`, integrated from there to the midpoints between
 /// them in `steps` steps, and the jumps there.
-fn integrated(
+fn integrate_to_midpoints(
     (leaf, parts): (&DiscreteLeaf, &Grid),
-    flow: &mut Flow,
+    flow: &mut RodIntegrator,
     known: &[Vec<RodFields>],
     steps: usize,
-) -> Integrated {
+) -> IntegratedLeaf {
     let n = parts.segments();
-    let mut slices = vec![[(); 2].map(|()| vec![Slice::default(); steps]); n];
+    let mut slices = vec![[(); 2].map(|()| vec![StationFields::default(); steps]); n];
     let mut jumps = vec![Vec::with_capacity(n); leaf.rods()];
     let mut energy = 0.0;
     for (i, ends) in slices.iter_mut().enumerate() {
         let [before, behind] = &mut *ends;
         for (k, after, sign) in [(i, before, 1.0), (i + 1, behind, -1.0)] {
-            flow.integrate(|j| known[j][k], [parts.sigma()[k], parts.middle(i)], after);
+            flow.integrate(
+                |j| known[j][k],
+                [parts.sigma()[k], parts.segment_midpoint(i)],
+                after,
+            );
             energy += sign * flow.energy();
         }
         for (j, jumps) in jumps.iter_mut().enumerate() {
@@ -246,10 +265,10 @@ fn integrated(
     for (j, known) in known.iter().enumerate() {
         energy -= known.last().map_or(0.0, |tip| leaf.tip_force(j).dot(tip.x));
         let nodes = parts.sigma()[..n].iter().zip(known);
-        let work = nodes.map(|(&sigma, node)| leaf.force_on_points(j, sigma).dot(node.x));
+        let work = nodes.map(|(&sigma, node)| leaf.point_force_at(j, sigma).dot(node.x));
         energy -= work.sum::<f64>();
     }
-    Integrated {
+    IntegratedLeaf {
         slices,
         jumps,
         energy,
@@ -257,27 +276,27 @@ fn integrated(
 }
 
 /// Rod `j` at the midpoint of a part, integrated from either end.
-fn at_midpoint(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
+fn at_midpoint(ends: &[Vec<StationFields>; 2], j: usize) -> [RodFields; 2] {
     ends.each_ref()
         .map(|slices| slices.last().expect("a step at least").rod(j))
 }
 
-impl Integrated {
+impl IntegratedLeaf {
     /// An uncorrected leaf with its largest errors at the nodes from which it was integrated and
     /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
     fn estimate(
         &self,
         (leaf, finest): (&DiscreteLeaf, &Grid),
         known: &[Vec<RodFields>],
-        changes: &[Vec<Change>],
+        changes: &[Vec<FieldChange>],
         [at_nodes, between]: [f64; 2],
-    ) -> Estimate {
+    ) -> DefectEstimate {
         let rods = self.rods(known);
         let mut grid = finest.clone();
         while grid.segments() + 1 < rods[0].len() {
             grid = grid.refined();
         }
-        Estimate {
+        DefectEstimate {
             at_nodes,
             between,
             rods,
@@ -311,8 +330,8 @@ impl Integrated {
 
 /// Changes at the nodes, and at the midpoints between them on the side where they are larger: half
 /// of the jump is added to their mean.
-fn with_midpoints(changes: &[Vec<Change>], jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
-    let rod = |(nodes, jumps): (&Vec<Change>, &Vec<Jump>)| {
+fn with_midpoints(changes: &[Vec<FieldChange>], jumps: &[Vec<FieldJump>]) -> Vec<Vec<FieldChange>> {
+    let rod = |(nodes, jumps): (&Vec<FieldChange>, &Vec<FieldJump>)| {
         let mut all = Vec::with_capacity(nodes.len() + jumps.len());
         for (pair, jump) in nodes.windows(2).zip(jumps) {
             all.push(pair[0]);
@@ -334,7 +353,11 @@ fn with_midpoints(changes: &[Vec<Change>], jumps: &[Vec<Jump>]) -> Vec<Vec<Chang
 /// energy half of [n] e_x - e_n [x], with the same of moments and rotations: it is of second order, and
 /// bounded by the size of every term. A dead moment has no potential: the energy is not
 /// stationary, and changes by its work in the rotation e of the node on which it acts.
-fn energy_error(leaf: &DiscreteLeaf, changes: &[Vec<Change>], jumps: &[Vec<Jump>]) -> f64 {
+fn energy_error(
+    leaf: &DiscreteLeaf,
+    changes: &[Vec<FieldChange>],
+    jumps: &[Vec<FieldJump>],
+) -> f64 {
     let mut error = 0.0;
     for (nodes, jumps) in changes.iter().zip(jumps) {
         for (pair, [x, turn, n, m]) in nodes.windows(2).zip(jumps) {
@@ -344,7 +367,7 @@ fn energy_error(leaf: &DiscreteLeaf, changes: &[Vec<Change>], jumps: &[Vec<Jump>
         }
     }
     let [turned, _] = largest_rotation_and_stress(changes);
-    let moments = leaf.moments().map(|(_, moment)| moment.length());
+    let moments = leaf.dead_moments().map(|(_, moment)| moment.length());
     error + turned * moments.sum::<f64>()
 }
 
@@ -353,7 +376,7 @@ fn energy_error(leaf: &DiscreteLeaf, changes: &[Vec<Change>], jumps: &[Vec<Jump>
 /// plane the components that would move it out of the plane are set to zero.
 fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
     for (j, rod) in known.iter_mut().enumerate() {
-        for node in rod.iter_mut().filter(|_| leaf.leaf.in_plane(j)) {
+        for node in rod.iter_mut().filter(|_| leaf.leaf.is_halved_midrib(j)) {
             node.n.y = 0.0;
             (node.m.x, node.m.z) = (0.0, 0.0);
         }
@@ -362,13 +385,13 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
         rod[0].m = DVec3::ZERO;
     }
     let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
-    let held = leaf.leaf.held.as_ref();
+    let held = leaf.leaf.tip_support.as_ref();
     let clamped = held.is_some_and(|held| held.clamps.is_some());
     let share = 1.0 / tips.len() as f64;
     let mut missing: DVec3 = (tips.iter().enumerate())
         .map(|(j, tip)| share * (leaf.tip_force(j) - tip.n))
         .sum();
-    if leaf.leaf.in_half() {
+    if leaf.leaf.is_mirror_half() {
         // The mirror image balances the component across the plane.
         missing.y = 0.0;
     }
@@ -379,12 +402,12 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
             None => tip.n = leaf.tip_force(j),
         }
         if !clamped {
-            tip.m = leaf.moment_at(1.0);
+            tip.m = leaf.dead_moment_at(1.0);
         }
     }
 }
 
-fn jump(a: &RodFields, b: &RodFields) -> Jump {
+fn jump(a: &RodFields, b: &RodFields) -> FieldJump {
     let turn = rotation::log(a.q * b.q.conjugate());
     [a.x - b.x, turn, a.n - b.n, a.m - b.m]
 }
@@ -403,23 +426,23 @@ fn mean(a: &RodFields, b: &RodFields) -> RodFields {
 const ACCURACY: f64 = 1e-6;
 
 /// Changes of position, rotation, force and moment.
-pub type Change = [DVec3; 4];
+pub type FieldChange = [DVec3; 4];
 
 /// The linearised equations of a leaf on a grid that is divided into equal parts of `part`
 /// segments; its fields may jump at their midpoints.
 pub struct Tangents<'a> {
-    level: &'a Level,
+    level: &'a GridLevel,
     part: usize,
     /// The segments just beyond the midpoints, rod after rod.
-    behind: Vec<Vec<Tangent>>,
+    behind: Vec<Vec<SegmentTangent>>,
     /// The first segment and the last of every part; computed on first use.
-    at_ends: Vec<Vec<Tangent>>,
+    at_ends: Vec<Vec<SegmentTangent>>,
 }
 
 /// The first-order response to jumps.
-pub struct Response {
+pub struct JumpResponse {
     /// Displacements and rotations of all nodes from the `first` on.
-    solution: Field,
+    solution: NodalField,
     first: usize,
     /// The largest displacements at the ends of the parts, and on either side of the midpoints.
     pub largest: [f64; 2],
@@ -427,8 +450,8 @@ pub struct Response {
 
 impl<'a> Tangents<'a> {
     /// Of the leaf of `level`, divided into `parts` parts.
-    pub fn new(level: &'a Level, parts: usize) -> Self {
-        let Level { leaf, state } = level;
+    pub fn new(level: &'a GridLevel, parts: usize) -> Self {
+        let GridLevel { leaf, state } = level;
         let part = leaf.segments() / parts;
         let middles = |j: usize| {
             let segments = (0..parts).map(|k| k * part + part / 2);
@@ -446,12 +469,12 @@ impl<'a> Tangents<'a> {
     /// cannot be solved.
     pub fn response(
         &self,
-        (system, factors): (&mut System, &mut Factorised),
-        jumps: &[Vec<Jump>],
-    ) -> Option<Response> {
+        (system, factors): (&mut System, &mut DefiniteFactors),
+        jumps: &[Vec<FieldJump>],
+    ) -> Option<JumpResponse> {
         let leaf = &self.level.leaf;
-        leaf.assemble_jumps(&self.behind, jumps, system);
-        let Solved::Yes(_) = factors.solve(system, ACCURACY) else {
+        leaf.assemble_jump_correction(&self.behind, jumps, system);
+        let LinearSolveOutcome::Converged(_) = factors.solve(system, ACCURACY) else {
             return None;
         };
         let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);
@@ -460,13 +483,13 @@ impl<'a> Tangents<'a> {
             // The ends of parts, without the bases.
             let nodes = &rod[1 - system.first()..];
             for (nodes, jump) in nodes.chunks(self.part).zip(jumps) {
-                let before = shift(&nodes[self.part / 2 - 1]);
+                let before = displacement_part(&nodes[self.part / 2 - 1]);
                 let middle = larger(before.length(), (before + jump[0]).length());
                 between = larger(between, middle);
-                at_ends = larger(at_ends, shift(&nodes[self.part - 1]).length());
+                at_ends = larger(at_ends, displacement_part(&nodes[self.part - 1]).length());
             }
         }
-        Some(Response {
+        Some(JumpResponse {
             solution,
             first: system.first(),
             largest: [at_ends, between],
@@ -474,8 +497,12 @@ impl<'a> Tangents<'a> {
     }
 
     /// The changes of all fields in a response, at the ends of the parts.
-    pub fn changes(&mut self, response: &Response, jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
-        let Level { leaf, state } = self.level;
+    pub fn changes(
+        &mut self,
+        response: &JumpResponse,
+        jumps: &[Vec<FieldJump>],
+    ) -> Vec<Vec<FieldChange>> {
+        let GridLevel { leaf, state } = self.level;
         if self.at_ends.is_empty() {
             let ends = |j: usize| {
                 let segments = (0..=jumps[0].len()).map(|k| (k * self.part).saturating_sub(1));
@@ -483,8 +510,8 @@ impl<'a> Tangents<'a> {
             };
             self.at_ends = (0..leaf.rods()).map(ends).collect();
         }
-        let moved = moved(state, response);
-        let ends = |(j, jumps): (usize, &Vec<Jump>)| {
+        let moved = displace_state(state, response);
+        let ends = |(j, jumps): (usize, &Vec<FieldJump>)| {
             let end = |k: usize| self.change(response, &moved, (j, jumps), k);
             (0..=jumps.len()).map(end).collect()
         };
@@ -495,12 +522,12 @@ impl<'a> Tangents<'a> {
     /// forces and moments: from the segment before it.
     fn change(
         &self,
-        response: &Response,
+        response: &JumpResponse,
         moved: &State,
-        (j, jumps): (usize, &[Jump]),
+        (j, jumps): (usize, &[FieldJump]),
         k: usize,
-    ) -> Change {
-        let Level { leaf, state } = self.level;
+    ) -> FieldChange {
+        let GridLevel { leaf, state } = self.level;
         let (n, i) = (leaf.segments(), k * self.part);
         let s = i.saturating_sub(1);
         let ([begin, mut a], [end, b]) = (response.at(j, s), response.at(j, s + 1));
@@ -529,8 +556,12 @@ impl<'a> Tangents<'a> {
             ];
         }
         let moment = second.xb.transpose() * across + second.ab.transpose() * a + second.bb * b;
-        let left = leaf.grid.width(i - 1);
-        let right = if i < n { leaf.grid.width(i) } else { 0.0 };
+        let left = leaf.grid.segment_width(i - 1);
+        let right = if i < n {
+            leaf.grid.segment_width(i)
+        } else {
+            0.0
+        };
         let [before, after] = [state, moved].map(|state| leaf.load(state, j, i));
         let part = left / (left + right);
         [
@@ -542,19 +573,21 @@ impl<'a> Tangents<'a> {
     }
 }
 
-impl Response {
+impl JumpResponse {
     /// Displacement and rotation of node `i` of rod `j`.
     fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
         match i < self.first {
             true => [DVec3::ZERO; 2],
-            false => [shift, turn].map(|of| of(&self.solution[j][i - self.first])),
+            false => {
+                [displacement_part, rotation_part].map(|of| of(&self.solution[j][i - self.first]))
+            }
         }
     }
 }
 
 /// The largest rotation, and the largest change of a force or moment.
-pub fn largest_rotation_and_stress(changes: &[Vec<Change>]) -> [f64; 2] {
-    let most = |of: fn(&Change) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
+pub fn largest_rotation_and_stress(changes: &[Vec<FieldChange>]) -> [f64; 2] {
+    let most = |of: fn(&FieldChange) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
     [
         most(|[_, turn, ..]| turn.length()),
         most(|[.., force, moment]| larger(force.length(), moment.length())),
@@ -562,7 +595,7 @@ pub fn largest_rotation_and_stress(changes: &[Vec<Change>]) -> [f64; 2] {
 }
 
 /// Applies the changes.
-pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
+pub fn apply_changes(changes: &[Vec<FieldChange>], known: &mut [Vec<RodFields>]) {
     let changes = changes.iter().flatten();
     for (node, [shift, turn, force, moment]) in known.iter_mut().flatten().zip(changes) {
         node.x += shift;
@@ -573,7 +606,7 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
 }
 
 /// The state with its nodes displaced and rotated.
-fn moved(state: &State, response: &Response) -> State {
+fn displace_state(state: &State, response: &JumpResponse) -> State {
     let mut moved = state.clone();
     for j in 0..state.rods() {
         for i in 0..=state.segments() {
@@ -587,10 +620,10 @@ fn moved(state: &State, response: &Response) -> State {
 
 /// The part of the integration error that remains with halved steps, or less: with order 8 it
 /// is a 256th.
-const HALVED: f64 = 1.0 / 16.0;
+const HALVED_STEP_ERROR_RATIO: f64 = 1.0 / 16.0;
 
 /// The steps of the integration from a node to a midpoint.
-pub struct Steps {
+pub struct IntegrationSteps {
     pub count: usize,
     /// Whether they are half of those of the round before.
     pub halved: bool,
@@ -600,9 +633,9 @@ pub struct Steps {
     alone: bool,
 }
 
-impl Steps {
+impl IntegrationSteps {
     pub fn new(count: usize, alone: bool) -> Self {
-        Steps {
+        IntegrationSteps {
             count,
             halved: false,
             error: f64::INFINITY,
@@ -614,7 +647,7 @@ impl Steps {
     /// error, and so bounds that of the halved steps.
     pub fn measure(&mut self, largest: f64) {
         self.error = match (self.halved, self.alone) {
-            (true, true) => HALVED * largest,
+            (true, true) => HALVED_STEP_ERROR_RATIO * largest,
             (true, false) => 0.0,
             (false, true) => self.error,
             (false, false) => f64::INFINITY,
@@ -657,7 +690,7 @@ mod tests {
                 ..Options::default()
             };
             let (_, found) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
-            let (mut linear, mut work) = (None, Work::default());
+            let (mut linear, mut work) = (None, SolverCounts::default());
             let mut estimated = |enough, most| {
                 let systems = (&mut linear, &mut None);
                 estimate(&found.levels, 1, (enough, most), systems, &mut work).unwrap()

@@ -4,39 +4,43 @@
 //!
 //! A leaf at rest at other stations.
 
-use crate::leaf::{DiscreteLeaf, Flow, Grid, Leaf, RodFields, Slice};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator, StationFields};
 use crate::numbers::larger;
 use crate::relax::accuracy::richardson::{Richardson, distance};
 use crate::relax::accuracy::transfer::Stencil;
-use crate::relax::accuracy::{Level, positions, transfer};
+use crate::relax::accuracy::{GridLevel, positions, transfer};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Equilibrium, Outcome, Shape};
 use crate::scenario::Scenario;
-use crate::shape::{SAME_STATION, equally_spaced};
+use crate::shape::{STATION_TOLERANCE, equally_spaced};
 use glam::{DQuat, DVec3};
 
 /// A node's values that are extrapolated: position, quaternion, n and m along the directors.
-type Node = [f64; 13];
+type PackedNode = [f64; 13];
 
 /// Nodes of the interpolation of lower order.
-const LOWER: usize = 5;
+const LOWER_ORDER_NODES: usize = 5;
 
 /// The leaf's fields after `columns` extrapolations at the ends of `parts` equal parts of its
 /// grids, rod after rod, dimensionless.
-pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodFields>> {
+pub fn extrapolated_node_fields(
+    levels: &[GridLevel],
+    columns: usize,
+    parts: usize,
+) -> Vec<Vec<RodFields>> {
     let finest = &levels[levels.len() - 1];
     let rods = 0..finest.leaf.rods();
     if columns == 0 {
         return rods.map(|j| on_grid(finest, j, parts)).collect();
     }
     let used = &levels[levels.len() - 1 - columns..];
-    let rod = |j: usize| unpacked(&extrapolated(used, &rotations(finest, j), j, parts));
+    let rod = |j: usize| unpack_nodes(&extrapolated(used, &rotations(finest, j), j, parts));
     rods.map(rod).collect()
 }
 
 /// The fields of a rod on one grid.
-fn on_grid(level: &Level, j: usize, parts: usize) -> Vec<RodFields> {
-    let Level { leaf, state } = level;
+fn on_grid(level: &GridLevel, j: usize, parts: usize) -> Vec<RodFields> {
+    let GridLevel { leaf, state } = level;
     let stride = leaf.segments() / parts;
     let node = |(i, q): (usize, DQuat)| {
         let [n, m] = transfer::resultants(leaf, state, j, i).map(|vector| q * vector);
@@ -55,7 +59,7 @@ fn on_grid(level: &Level, j: usize, parts: usize) -> Vec<RodFields> {
 /// that of the coarser grids, which is small and smooth, interpolated between their nodes. The
 /// error of the interpolation is estimated by the largest difference from one of lower order.
 pub fn finer_nodes(
-    levels: &[Level],
+    levels: &[GridLevel],
     columns: usize,
     wanted: usize,
     [known, allowed]: [f64; 2],
@@ -68,14 +72,14 @@ pub fn finer_nodes(
         let segments = levels[k].leaf.segments();
         extrapolated(&levels[k.max(used)..], &signs[j], j, segments)
     };
-    let mut reached: Vec<Vec<Node>> = rods.clone().map(|j| on(0, j)).collect();
+    let mut reached: Vec<Vec<PackedNode>> = rods.clone().map(|j| on(0, j)).collect();
     let (mut grid, mut between) = (0, 0.0);
     for k in 1..wanted {
         let mut excess = match k {
             1 => known * (layer_ratio(levels) - 1.0),
             _ => 0.0,
         };
-        let mut nodes: Vec<Vec<Node>> = rods.clone().map(|j| on(k, j)).collect();
+        let mut nodes: Vec<Vec<PackedNode>> = rods.clone().map(|j| on(k, j)).collect();
         excess += add_remainder(&mut nodes, &reached, [&levels[k - 1].leaf, &levels[k].leaf]);
         if !excess.is_finite() || between + excess > allowed {
             break;
@@ -84,7 +88,7 @@ pub fn finer_nodes(
     }
     (
         grid,
-        reached.iter().map(|rod| unpacked(rod)).collect(),
+        reached.iter().map(|rod| unpack_nodes(rod)).collect(),
         between,
     )
 }
@@ -92,22 +96,24 @@ pub fn finer_nodes(
 /// Adds to the `nodes` of a grid what those of the `coarser` one have more, interpolated between
 /// them; returns the error of that.
 fn add_remainder(
-    nodes: &mut [Vec<Node>],
-    known: &[Vec<Node>],
+    nodes: &mut [Vec<PackedNode>],
+    known: &[Vec<PackedNode>],
     [coarser, finer]: [&DiscreteLeaf; 2],
 ) -> f64 {
     let stride = finer.segments() / coarser.segments();
     let stencil = |&at: &f64| {
-        let [stencil, _] = <Stencil>::at(coarser, at);
-        let [lower, _] = Stencil::<LOWER>::at(coarser, at);
+        let [stencil, _] = <Stencil>::value_and_derivative_stencils(coarser, at);
+        let [lower, _] = Stencil::<LOWER_ORDER_NODES>::value_and_derivative_stencils(coarser, at);
         (stencil, lower)
     };
     let stencils: Vec<_> = finer.grid.sigma().iter().map(stencil).collect();
     let mut error = 0.0_f64;
     for (nodes, known) in nodes.iter_mut().zip(known) {
         let own = nodes.iter().step_by(stride);
-        let remainder = |(a, b): (&Node, &Node)| -> Node { std::array::from_fn(|k| a[k] - b[k]) };
-        let remainders: Vec<Node> = known.iter().zip(own).map(remainder).collect();
+        let remainder = |(a, b): (&PackedNode, &PackedNode)| -> PackedNode {
+            std::array::from_fn(|k| a[k] - b[k])
+        };
+        let remainders: Vec<PackedNode> = known.iter().zip(own).map(remainder).collect();
         let position = |i: usize| DVec3::from_slice(&remainders[i]);
         for (node, (stencil, lower)) in nodes.iter_mut().zip(&stencils) {
             let difference = stencil.value(position) - lower.value(position);
@@ -123,7 +129,7 @@ fn add_remainder(
 /// Ratio of the largest changes of positions by the last grid at the nodes of the grid before and
 /// at those of the first: errors may be larger by it, as with a boundary layer between the nodes
 /// of the first grid.
-fn layer_ratio(levels: &[Level]) -> f64 {
+fn layer_ratio(levels: &[GridLevel]) -> f64 {
     let [first, .., before, finest] = levels else {
         return 1.0;
     };
@@ -144,14 +150,14 @@ fn ratio(change: f64, part: f64) -> f64 {
 
 /// The values of a rod extrapolated over `levels` at the ends of so many parts; its quaternions on
 /// the finest grid are `signs`.
-fn extrapolated(levels: &[Level], signs: &[DQuat], j: usize, parts: usize) -> Vec<Node> {
-    let on = |Level { leaf, state }: &Level| {
+fn extrapolated(levels: &[GridLevel], signs: &[DQuat], j: usize, parts: usize) -> Vec<PackedNode> {
+    let on = |GridLevel { leaf, state }: &GridLevel| {
         let stride = leaf.segments() / parts;
-        let node = |i: usize| -> Node {
+        let node = |i: usize| -> PackedNode {
             let k = state.base(j) + i * stride;
             let [n, m] = transfer::resultants(leaf, state, j, i * stride);
             // q and -q are the same rotation: all grids must use the same sign.
-            let q = with_sign_of(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
+            let q = align_quaternion_sign(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
             let x = state.x[k];
             [
                 x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
@@ -164,8 +170,8 @@ fn extrapolated(levels: &[Level], signs: &[DQuat], j: usize, parts: usize) -> Ve
 }
 
 /// The fields with these values.
-fn unpacked(rod: &[Node]) -> Vec<RodFields> {
-    let fields = |node: &Node| {
+fn unpack_nodes(rod: &[PackedNode]) -> Vec<RodFields> {
+    let fields = |node: &PackedNode| {
         let vector = |k: usize| DVec3::from_slice(&node[k..]);
         let q = DQuat::from_slice(&node[3..]).normalize();
         RodFields {
@@ -179,11 +185,11 @@ fn unpacked(rod: &[Node]) -> Vec<RodFields> {
 }
 
 /// Quaternions of rod `j` at all nodes, continuous in sign.
-fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
+fn rotations(level: &GridLevel, j: usize) -> Vec<DQuat> {
     let base = level.state.base(j);
     let mut before = level.state.q[base];
     let same = |q: &DQuat| {
-        before = with_sign_of(*q, before);
+        before = align_quaternion_sign(*q, before);
         before
     };
     let rotations = level.state.q[base..=base + level.leaf.segments()].iter();
@@ -191,7 +197,7 @@ fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
 }
 
 /// Of q and -q the one nearer to `other`.
-pub fn with_sign_of(q: DQuat, other: DQuat) -> DQuat {
+pub fn align_quaternion_sign(q: DQuat, other: DQuat) -> DQuat {
     if q.dot(other) < 0.0 { -q } else { q }
 }
 
@@ -202,7 +208,7 @@ const STEP: f64 = 1.0 / 64.0;
 const SAFETY: f64 = 2.0;
 
 /// All rods at one sigma.
-pub type Section = Vec<RodFields>;
+pub type LeafSection = Vec<RodFields>;
 
 /// A leaf at rest at `points` between two stations, given the sections there, and the largest
 /// error of a position in addition to those at the stations: the mean of what is integrated from
@@ -211,16 +217,16 @@ pub type Section = Vec<RodFields>;
 ///
 /// Let a and b be the vectors by which the two miss. Errors that grow linearly from either
 /// station have a + b = 0 if the mean is free of them; otherwise its error is at most |a + b|/4.
-pub fn integrated_between(
-    flow: &mut Flow,
+pub fn integrate_between_stations(
+    flow: &mut RodIntegrator,
     kinks: &[f64],
-    [(from, begin), (to, end)]: [(f64, &Section); 2],
+    [(from, begin), (to, end)]: [(f64, &LeafSection); 2],
     points: &[f64],
-) -> Option<(Vec<Section>, f64)> {
+) -> Option<(Vec<LeafSection>, f64)> {
     let forward = points.iter().copied().chain([to]);
-    let mut before = integrated(flow, kinks, (from, begin), forward);
+    let mut before = integrate_from_section(flow, kinks, (from, begin), forward);
     let backward = points.iter().rev().copied().chain([from]);
-    let mut behind = integrated(flow, kinks, (to, end), backward);
+    let mut behind = integrate_from_section(flow, kinks, (to, end), backward);
     let (there, here) = (before.pop()?, behind.pop()?);
     let mut error = 0.0_f64;
     for j in 0..begin.len() {
@@ -234,12 +240,13 @@ pub fn integrated_between(
     }
     behind.reverse();
     let sections = before.iter().zip(&behind).zip(points);
-    let sections = sections.map(|((a, b), at)| mean([a, b], (at - from) / (to - from)));
+    let sections =
+        sections.map(|((a, b), at)| weighted_mean_section([a, b], (at - from) / (to - from)));
     Some((sections.collect(), SAFETY * error))
 }
 
 /// The mean of two sections, the second with this weight.
-pub fn mean([a, b]: [&Section; 2], weight: f64) -> Section {
+pub fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: f64) -> LeafSection {
     let rod = |(a, b): (&RodFields, &RodFields)| RodFields {
         x: a.x.lerp(b.x, weight),
         q: a.q.lerp(b.q, weight),
@@ -251,12 +258,12 @@ pub fn mean([a, b]: [&Section; 2], weight: f64) -> Section {
 
 /// The sections at `points`, one after the other, integrated from one section; no step reaches
 /// across a kink.
-fn integrated(
-    flow: &mut Flow,
+fn integrate_from_section(
+    flow: &mut RodIntegrator,
     kinks: &[f64],
-    (mut at, begin): (f64, &Section),
+    (mut at, begin): (f64, &LeafSection),
     points: impl Iterator<Item = f64>,
-) -> Vec<Section> {
+) -> Vec<LeafSection> {
     let mut section = begin.clone();
     let mut integrate_to = |point: f64| {
         let inside = |kink: &&f64| (**kink - at) * (**kink - point) < 0.0;
@@ -266,7 +273,7 @@ fn integrated(
         }
         for stop in stops.into_iter().chain([point]) {
             let steps = ((stop - at).abs() / STEP).ceil().max(1.0);
-            let mut after = vec![Slice::default(); steps as usize];
+            let mut after = vec![StationFields::default(); steps as usize];
             flow.integrate(|j| section[j], [at, stop], &mut after);
             if let Some(last) = after.last() {
                 section = (0..section.len()).map(|j| last.rod(j)).collect();
@@ -279,10 +286,10 @@ fn integrated(
 }
 
 /// Smallest number of parts into which the stations of a result divide a vein.
-const PARTS: usize = 16;
+const MIN_STATION_PARTS: usize = 16;
 
 /// Advice if interpolated stations are less accurate than the tolerance.
-const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
+const INTERPOLATION_ADVICE: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
     stations between: ask for a smaller tolerance, or for other stations";
 
 impl Equilibrium {
@@ -298,12 +305,12 @@ impl Equilibrium {
     pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
         let to = match parts {
             Some(parts) => equally_spaced(parts),
-            None => finest(&self.shape),
+            None => finest_grid_stations(&self.shape),
         };
         if to == self.shape.stations {
             return self;
         }
-        let mut there = self.clone().interpolated(scenario, to);
+        let mut there = self.clone().interpolated_to_stations(scenario, to);
         if there.keeps_tolerance() || !self.keeps_tolerance() {
             return there;
         }
@@ -312,7 +319,7 @@ impl Equilibrium {
         }
         if there.outcome.is_success() {
             there.outcome = Outcome::ToleranceNotReached;
-            there.remark = Some(BETWEEN.into());
+            there.remark = Some(INTERPOLATION_ADVICE.into());
         }
         there
     }
@@ -320,7 +327,10 @@ impl Equilibrium {
     /// Whether the tolerance, if it is kept at the stations of the solution, is kept at the ends
     /// of so many equal `parts`, too.
     pub(in crate::relax) fn keeps_tolerance_at(&self, scenario: &Scenario, parts: usize) -> bool {
-        let there = || self.clone().interpolated(scenario, equally_spaced(parts));
+        let there = || {
+            self.clone()
+                .interpolated_to_stations(scenario, equally_spaced(parts))
+        };
         !self.keeps_tolerance() || there().keeps_tolerance()
     }
 
@@ -330,18 +340,18 @@ impl Equilibrium {
     }
 
     /// The same at these stations.
-    fn interpolated(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
+    fn interpolated_to_stations(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
         let at_rest = !matches!(
             self.outcome,
             Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
         );
         let leaf = Leaf::new(scenario);
         let discrete = DiscreteLeaf::new(&leaf, Grid::new(1, leaf.kinks()));
-        let mut flow = Flow::new(&discrete);
+        let mut flow = RodIntegrator::new(&discrete);
         let (stations, known) = (&self.shape.stations, &self.shape.rods);
-        let section = |i: usize| -> Section {
+        let section = |i: usize| -> LeafSection {
             let rods = known.iter();
-            rods.map(|rod| transfer::fields(&leaf, &rod.nodes[i]))
+            rods.map(|rod| transfer::fields_from_node_state(&leaf, &rod.nodes[i]))
                 .collect()
         };
         let mut between = 0.0_f64;
@@ -350,7 +360,7 @@ impl Equilibrium {
         for (i, &station) in stations.iter().enumerate() {
             if rest
                 .first()
-                .is_some_and(|at| (at - station).abs() < SAME_STATION)
+                .is_some_and(|at| (at - station).abs() < STATION_TOLERANCE)
             {
                 for (rod, known) in rods.iter_mut().zip(known) {
                     rod.push(known.nodes[i]);
@@ -359,7 +369,7 @@ impl Equilibrium {
             }
             let next = stations.get(i + 1).copied().unwrap_or(1.0);
             let (points, others) =
-                rest.split_at(rest.partition_point(|at| *at < next - SAME_STATION));
+                rest.split_at(rest.partition_point(|at| *at < next - STATION_TOLERANCE));
             rest = others;
             if points.is_empty() {
                 continue;
@@ -367,19 +377,19 @@ impl Equilibrium {
             let [begin, end] = [i, i + 1].map(section);
             let ends = [(station, &begin), (next, &end)];
             let found = match at_rest {
-                true => integrated_between(&mut flow, leaf.kinks(), ends, points),
+                true => integrate_between_stations(&mut flow, leaf.kinks(), ends, points),
                 false => None,
             };
             let (sections, error) = found.unwrap_or_else(|| {
                 let weight = |at: &f64| (at - station) / (next - station);
-                let mean = |at: &f64| mean([&begin, &end], weight(at));
+                let mean = |at: &f64| weighted_mean_section([&begin, &end], weight(at));
                 let error = if at_rest { next - station } else { 0.0 };
                 (points.iter().map(mean).collect(), error)
             });
             between = larger(between, error * leaf.scale.length);
             for (&at, section) in points.iter().zip(&sections) {
                 for (j, fields) in section.iter().enumerate() {
-                    rods[j].push(transfer::node_of(&leaf, (j, at), fields));
+                    rods[j].push(transfer::node_state_from_fields(&leaf, (j, at), fields));
                 }
             }
         }
@@ -401,9 +411,9 @@ impl Equilibrium {
 }
 
 /// Nodes of the finest grid, with all segments halved until there are enough.
-fn finest(shape: &Shape) -> Vec<f64> {
+fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
     let mut stations = shape.curve_stations.clone();
-    while (2..=PARTS).contains(&stations.len()) {
+    while (2..=MIN_STATION_PARTS).contains(&stations.len()) {
         let middles = stations
             .windows(2)
             .flat_map(|w| [0.5 * (w[0] + w[1]), w[1]]);
@@ -452,7 +462,7 @@ mod stations_tests {
             let there = found.clone().at_stations(&scenario, None);
             let finest = found.shape.curves[0].len();
             let count = there.shape.stations.len();
-            assert!(count > PARTS && count >= finest);
+            assert!(count > MIN_STATION_PARTS && count >= finest);
             let within = there.accuracy.error_estimate.unwrap();
             assert!(within <= tolerance * found.shape.longest());
             let sharp = sharp.clone().at_stations(&scenario, Some(40));
@@ -485,6 +495,6 @@ mod stations_tests {
             }
         }
         let nodes = there.shape.curves[0].len();
-        assert_eq!(there.shape.stations.len(), nodes.max(PARTS + 1));
+        assert_eq!(there.shape.stations.len(), nodes.max(MIN_STATION_PARTS + 1));
     }
 }

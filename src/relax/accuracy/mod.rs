@@ -18,18 +18,19 @@ pub(crate) mod richardson;
 pub(crate) mod transfer;
 
 use crate::leaf::{
-    DiscreteLeaf, Grid, Leaf, RodFields, State, System, whole_changes, whole_fields, whole_of,
+    DiscreteLeaf, Grid, Leaf, RodFields, State, System, whole_leaf_changes, whole_leaf_fields,
+    whole_state,
 };
 use crate::memory;
-use crate::newton::{Contraction, Stop, Work};
+use crate::newton::{Contraction, EquilibriumFailure, SolverCounts};
 use crate::numbers::larger;
-use crate::relax::accuracy::defect::{Estimate, Linear};
+use crate::relax::accuracy::defect::{DefectEstimate, FactorizedLevel};
 use crate::relax::accuracy::fields::finer_nodes;
 use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::accuracy::transfer::{Stencil, weights};
 use crate::relax::path::Path;
 use crate::relax::request::MAX_NODES;
-use crate::relax::rest::{COARSEST, Problem};
+use crate::relax::rest::{COARSEST, RelaxationProblem};
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
 
@@ -46,9 +47,9 @@ const ENERGY_GRIDS: usize = 4;
 /// A leaf at rest on nested grids.
 pub struct NestedEquilibrium {
     /// The leaf on each grid, from coarse to fine. Where it failed the last is that of the failure.
-    pub levels: Vec<Level>,
+    pub levels: Vec<GridLevel>,
     /// The positions on all grids.
-    pub table: Richardson,
+    pub convergence_table: Richardson,
     /// Weight of each grid in the extrapolated values.
     pub weights: Vec<f64>,
     /// The error of the table's best column where the energy converges otherwise than its order
@@ -57,8 +58,8 @@ pub struct NestedEquilibrium {
     unresolved: f64,
     /// The error estimated from the defect of the extrapolated values, if it is known, and the
     /// linear equations for it.
-    pub estimate: Option<Estimate>,
-    pub linear: Option<Linear>,
+    pub estimate: Option<DefectEstimate>,
+    pub factorized_level: Option<FactorizedLevel>,
     /// Whether its error is within the tolerance; always on a fixed grid.
     pub keeps_tolerance: bool,
     /// Negative eigenvalues, as counted on the finest grid.
@@ -66,10 +67,10 @@ pub struct NestedEquilibrium {
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly_stable: bool,
     /// Factor on the error estimate of a leaf that is beside a bifurcation: see
-    /// [`Lowest::softening`](crate::relax::eigenvalues::Lowest::softening).
-    pub softening: f64,
+    /// [`LowestModes::softening`](crate::relax::eigenvalues::Lowest::softening).
+    pub bifurcation_error_factor: f64,
     /// Rods solved for.
-    pub solved: usize,
+    pub solved_rods: usize,
     /// Whether a grid was added for the nodes of the finest one.
     pub added_for_nodes: bool,
     /// Whether the leaf moved far from its start, and to no equilibrium on two grids.
@@ -79,11 +80,11 @@ pub struct NestedEquilibrium {
     /// How it came to rest on its grids.
     pub history: History,
     /// The work for it.
-    pub work: Work,
+    pub work: SolverCounts,
     /// The tolerance to which it is meant.
     tolerance: f64,
     /// Whether its grid is a requested one.
-    fixed: bool,
+    has_fixed_grid: bool,
 }
 
 /// How a leaf came to rest on its grids so far.
@@ -92,14 +93,14 @@ pub struct History {
     /// The last saddle that it left.
     pub saddle: Option<Saddle>,
     /// Displacements that would follow from neglecting shear, and stretch.
-    pub effects: [Option<f64>; 2],
+    pub shear_stretch_effects: [Option<f64>; 2],
     /// Largest remaining iteration error on any grid.
-    pub remaining: f64,
+    pub iteration_error: f64,
     /// Convergence of Newton's method on the grids so far.
     pub contraction: Contraction,
     /// Number of pushes off saddles at which the iteration had converged (found by their Morse
     /// index).
-    pub pushes: i32,
+    pub saddle_escapes: i32,
     /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
     /// led there.
     pub from_start: Option<(f64, usize)>,
@@ -108,83 +109,83 @@ pub struct History {
 }
 
 /// Where a leaf was when it failed to come to rest, and why.
-pub struct Failure {
+pub struct RelaxationFailure {
     pub at: NestedEquilibrium,
-    pub stop: Stop,
+    pub stop: EquilibriumFailure,
 }
 
 /// An equilibrium, or where none was found.
-pub type Found = Result<NestedEquilibrium, Box<Failure>>;
+pub type RelaxationResult = Result<NestedEquilibrium, Box<RelaxationFailure>>;
 
-impl Failure {
+impl RelaxationFailure {
     /// On this path.
-    pub fn along(self, path: Option<Path>) -> Self {
-        let at = self.at.along(path);
-        Failure { at, ..self }
+    pub fn with_path(self, path: Option<Path>) -> Self {
+        let at = self.at.with_path(path);
+        RelaxationFailure { at, ..self }
     }
 }
 
 /// What was found on this path, or, without one, on its own.
-pub fn along(found: Found, path: Option<Path>) -> Found {
+pub fn result_with_path(found: RelaxationResult, path: Option<Path>) -> RelaxationResult {
     match found {
         found if path.is_none() => found,
-        Ok(found) => Ok(found.along(path)),
-        Err(failure) => Err(Box::new(failure.along(path))),
+        Ok(found) => Ok(found.with_path(path)),
+        Err(failure) => Err(Box::new(failure.with_path(path))),
     }
 }
 
 impl NestedEquilibrium {
     /// On no grid so far.
-    pub fn begun(problem: &Problem) -> Self {
+    pub fn without_grids(problem: &RelaxationProblem) -> Self {
         NestedEquilibrium {
             levels: Vec::new(),
-            table: Richardson::default(),
+            convergence_table: Richardson::default(),
             weights: Vec::new(),
             unresolved: 0.0,
             estimate: None,
-            linear: None,
+            factorized_level: None,
             keeps_tolerance: true,
             index: None,
             clearly_stable: false,
-            softening: 1.0,
-            solved: problem.leaf.rods(),
+            bifurcation_error_factor: 1.0,
+            solved_rods: problem.leaf.rods(),
             added_for_nodes: false,
             unconfirmed: false,
             path: None,
             history: History::default(),
-            work: Work::default(),
+            work: SolverCounts::default(),
             tolerance: problem.tolerance,
-            fixed: problem.segments().is_some(),
+            has_fixed_grid: problem.segments().is_some(),
         }
     }
 
     /// With the next finer grid.
-    pub fn with(mut self, finest: Level) -> Self {
+    pub fn with_finer_level(mut self, finest: GridLevel) -> Self {
         self.levels.push(finest);
-        self.tabulated()
+        self.with_convergence_table()
     }
 
     /// On these grids in place of its own, without estimates so far.
-    pub fn on(self, levels: Vec<Level>) -> Self {
-        NestedEquilibrium { levels, ..self }.tabulated()
+    pub fn with_levels(self, levels: Vec<GridLevel>) -> Self {
+        NestedEquilibrium { levels, ..self }.with_convergence_table()
     }
 
     /// On all grids but the finest, and that one.
-    pub fn split(mut self) -> (Self, Level) {
+    pub fn split(mut self) -> (Self, GridLevel) {
         let finest = self.levels.pop().expect("the leaf has settled");
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
         (self, finest)
     }
 
     /// With that finest grid again.
-    pub fn joined(mut self, finest: Level) -> Self {
+    pub fn rejoin_finest(mut self, finest: GridLevel) -> Self {
         self.levels.push(finest);
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
         self
     }
 
     /// With its negative eigenvalues counted.
-    pub fn counted(self, clearly_stable: bool, index: Option<usize>) -> Self {
+    pub fn with_index(self, clearly_stable: bool, index: Option<usize>) -> Self {
         NestedEquilibrium {
             clearly_stable,
             index,
@@ -193,38 +194,40 @@ impl NestedEquilibrium {
     }
 
     /// Tabulates the positions on all grids, and discards earlier estimates.
-    fn tabulated(mut self) -> Self {
+    fn with_convergence_table(mut self) -> Self {
         let segments: Vec<usize> = (self.levels.iter())
             .map(|level| level.leaf.segments())
             .collect();
-        let on = |level: &Level| {
+        let on = |level: &GridLevel| {
             let own = level.leaf.segments();
             (own, positions(level, own / segments[0]))
         };
-        self.table = self.levels.iter().map(on).collect();
-        let ordered = energies(&self.levels).ordered();
-        self.unresolved = self.table.change_beyond(ordered);
-        let first = segments.len().saturating_sub(1 + self.table.columns());
+        self.convergence_table = self.levels.iter().map(on).collect();
+        let ordered = energies(&self.levels).proven_columns();
+        self.unresolved = self.convergence_table.change_beyond(ordered);
+        let first = segments
+            .len()
+            .saturating_sub(1 + self.convergence_table.best_column_number());
         self.weights = vec![0.0; first];
         self.weights
             .extend(weights(&segments[first..], f64::INFINITY));
         self.estimate = None;
         if self.levels.len() < 2 {
-            self.linear = None;
+            self.factorized_level = None;
         }
         self.history.coarsest = segments.first().copied();
         self
     }
 
     /// The same leaf on the same grids, without estimates and their equations.
-    pub fn grids(&self) -> Self {
+    pub fn without_estimates(&self) -> Self {
         NestedEquilibrium {
             levels: self.levels.clone(),
-            table: self.table.clone(),
+            convergence_table: self.convergence_table.clone(),
             weights: self.weights.clone(),
             estimate: None,
-            linear: None,
-            softening: 1.0,
+            factorized_level: None,
+            bifurcation_error_factor: 1.0,
             path: self.path.clone(),
             ..*self
         }
@@ -232,37 +235,43 @@ impl NestedEquilibrium {
 
     /// The same on the coarsest `count` grids alone; `None` unless each of them halves the
     /// segments of the one before.
-    pub fn coarsest(&self, count: usize) -> Option<Self> {
+    pub fn on_coarsest_grids(&self, count: usize) -> Option<Self> {
         let levels = self.levels.get(..count)?;
-        let halved = |pair: &[Level]| pair[1].leaf.segments() == 2 * pair[0].leaf.segments();
+        let halved = |pair: &[GridLevel]| pair[1].leaf.segments() == 2 * pair[0].leaf.segments();
         let nested = levels.windows(2).all(halved);
-        nested.then(|| self.grids().on(levels.to_vec()))
+        nested.then(|| self.without_estimates().with_levels(levels.to_vec()))
     }
 
     /// That of the whole leaf, where the problem was one of its half.
-    pub fn completed(mut self, problem: &Problem) -> Self {
-        let Some(whole) = problem.whole else {
+    pub fn mirrored_to_whole(mut self, problem: &RelaxationProblem) -> Self {
+        let Some(whole) = problem.whole_leaf else {
             return self;
         };
         let reduced = problem.leaf;
-        let complete = |level: &Level| complete(reduced, whole, level);
+        let complete = |level: &GridLevel| mirror_level(reduced, whole, level);
         let levels = self.levels.iter().map(complete).collect();
-        let estimate = self.estimate.take().map(|half| completed(half, reduced));
+        let estimate = self
+            .estimate
+            .take()
+            .map(|half| mirror_estimate(half, reduced));
         // The equations are those of the reduced leaf.
-        self.linear = None;
+        self.factorized_level = None;
         NestedEquilibrium {
             estimate,
-            ..self.on(levels)
+            ..self.with_levels(levels)
         }
     }
 
     /// With a bar that is larger by this factor.
-    pub fn softened(self, softening: f64) -> Self {
-        NestedEquilibrium { softening, ..self }
+    pub fn with_bifurcation_factor(self, softening: f64) -> Self {
+        NestedEquilibrium {
+            bifurcation_error_factor: softening,
+            ..self
+        }
     }
 
     /// At the end of refinement, within the tolerance or not.
-    pub fn ended(self, keeps_tolerance: bool) -> Self {
+    pub fn with_tolerance_kept(self, keeps_tolerance: bool) -> Self {
         NestedEquilibrium {
             keeps_tolerance,
             ..self
@@ -270,22 +279,22 @@ impl NestedEquilibrium {
     }
 
     /// On this path.
-    pub fn along(self, path: Option<Path>) -> Self {
+    pub fn with_path(self, path: Option<Path>) -> Self {
         NestedEquilibrium { path, ..self }
     }
 
     /// As a result: after this work, and without the equations of its estimate.
-    pub fn after(self, work: Work) -> Self {
+    pub fn with_work(self, work: SolverCounts) -> Self {
         NestedEquilibrium {
             work,
-            linear: None,
+            factorized_level: None,
             ..self
         }
     }
 
     /// A failure here.
-    pub fn failed<T>(self, stop: Stop) -> Result<T, Box<Failure>> {
-        Err(Box::new(Failure { at: self, stop }))
+    pub fn into_failure<T>(self, stop: EquilibriumFailure) -> Result<T, Box<RelaxationFailure>> {
+        Err(Box::new(RelaxationFailure { at: self, stop }))
     }
 
     /// Whether no eigenvalue is negative.
@@ -295,14 +304,14 @@ impl NestedEquilibrium {
 
     /// The next finer grid, if the limits on its size allow it and rounding leaves something
     /// to gain.
-    pub fn finer(&self) -> Option<Grid> {
+    pub fn next_finer_grid(&self) -> Option<Grid> {
         let leaf = &self.levels.last()?.leaf;
         let grid = leaf.grid.refined();
         let (rods, segments) = (leaf.rods(), grid.segments());
-        let allowed = !self.fixed
+        let allowed = !self.has_fixed_grid
             && segments <= FINEST
             && rods * segments <= MAX_NODES
-            && memory::grid(rods, segments).is_ok()
+            && memory::check_grid_memory(rods, segments).is_ok()
             && !self.beyond_rounding(segments);
         allowed.then_some(grid)
     }
@@ -315,19 +324,21 @@ impl NestedEquilibrium {
             true => self.tolerance - error,
             false => f64::INFINITY,
         };
-        let columns = self.table.columns();
+        let columns = self.convergence_table.best_column_number();
         finer_nodes(&self.levels, columns, wanted, [error, allowed])
     }
 
     /// The levels from which the next one is predicted: those of the extrapolation, but at
     /// least the finest two where there are two.
-    pub fn levels_for_prediction(&self) -> Vec<&Level> {
-        let count = (self.table.columns() + 1).max(2).min(self.levels.len());
+    pub fn levels_for_prediction(&self) -> Vec<&GridLevel> {
+        let count = (self.convergence_table.best_column_number() + 1)
+            .max(2)
+            .min(self.levels.len());
         self.levels[self.levels.len() - count..].iter().collect()
     }
 
     /// The extrapolated value of a quantity given by `on` on each grid.
-    pub fn best(&self, on: impl Fn(usize, &Level) -> DVec3) -> DVec3 {
+    pub fn extrapolated_value(&self, on: impl Fn(usize, &GridLevel) -> DVec3) -> DVec3 {
         let levels = self.levels.iter().zip(&self.weights).enumerate();
         let known = levels.filter(|(_, (_, weight))| **weight != 0.0);
         known
@@ -338,7 +349,7 @@ impl NestedEquilibrium {
     /// Interpolation stencils of each grid at the fraction `sigma`, of values and of their
     /// derivatives; extrapolation beyond the ends is linear.
     pub fn stencils(&self, sigma: f64) -> Vec<[Stencil; 2]> {
-        let on = |level: &Level| Stencil::at(&level.leaf, sigma);
+        let on = |level: &GridLevel| Stencil::value_and_derivative_stencils(&level.leaf, sigma);
         self.levels.iter().map(on).collect()
     }
 
@@ -350,8 +361,11 @@ impl NestedEquilibrium {
             return (estimate.energy, Some(self.energy_error(estimate)));
         }
         let finest = &self.levels[self.levels.len().saturating_sub(ENERGY_GRIDS)..];
-        let (table, columns) = (energies(finest), self.table.columns());
-        let Some(best) = table.error_of_few() else {
+        let (table, columns) = (
+            energies(finest),
+            self.convergence_table.best_column_number(),
+        );
+        let Some(best) = table.few_values_error() else {
             return (table.column(columns)[0], None);
         };
         let energy = table.column(columns.min(best.columns))[0];
@@ -361,20 +375,20 @@ impl NestedEquilibrium {
 }
 
 /// The estimate of a whole leaf from that of its half.
-fn completed(half: Estimate, reduced: &Leaf) -> Estimate {
-    let both = if reduced.in_half() { 2.0 } else { 1.0 };
-    Estimate {
-        rods: whole_fields(reduced, half.rods),
+fn mirror_estimate(half: DefectEstimate, reduced: &Leaf) -> DefectEstimate {
+    let both = if reduced.is_mirror_half() { 2.0 } else { 1.0 };
+    DefectEstimate {
+        rods: whole_leaf_fields(reduced, half.rods),
         energy: half.energy * both,
         energy_error: half.energy_error * both,
-        errors: whole_changes(reduced, half.errors),
+        errors: whole_leaf_changes(reduced, half.errors),
         ..half
     }
 }
 
 /// The potential energies on all grids.
-fn energies(levels: &[Level]) -> Richardson {
-    let on = |level: &Level| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
+fn energies(levels: &[GridLevel]) -> Richardson {
+    let on = |level: &GridLevel| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
     let largest = (levels.iter()).map(|level| level.leaf.energy(&level.state).abs());
     let noise = ENERGY_NOISE * largest.fold(1.0, larger);
     levels
@@ -386,7 +400,7 @@ fn energies(levels: &[Level]) -> Richardson {
 
 /// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
 /// absolute values.
-const EXTRAPOLATED: f64 = 2.0;
+const EXTRAPOLATION_ERROR_AMPLIFICATION: f64 = 2.0;
 
 /// Safety factor on the error estimated from the defect of the extrapolated leaf.
 const SAFETY: f64 = 2.0;
@@ -398,18 +412,18 @@ const ENERGY_SAFETY: f64 = 3.0;
 /// The least part of the largest error between the nodes of the coarsest grid that is taken
 /// for the error at these nodes: where layers are thinner than its segments the linear
 /// equations of a coarse grid are wrong by so much.
-const LAYERS: f64 = 0.1;
+const LAYER_ERROR_FRACTION: f64 = 0.1;
 
 /// Upper bound of that estimate in units of the error estimated from the last extrapolation:
 /// the response of a neutral mode to rounding is not an error.
-const LARGEST: f64 = 10.0;
+const LARGEST_ESTIMATE_RATIO: f64 = 10.0;
 
 /// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
 /// not computed: it would hardly be small enough.
-const OUT_OF_REACH: f64 = 3e3;
+const UNREACHABLE_TOLERANCE_FACTOR: f64 = 3e3;
 
 /// The part of the error that each correction leaves at best.
-const CORRECTED: f64 = 1e-2;
+const CORRECTION_REMAINDER: f64 = 1e-2;
 
 /// For leaves with more nodes than this no equations are kept while others are solved, which
 /// saves memory at the cost of another factorisation on a coarse grid.
@@ -426,7 +440,7 @@ pub fn is_large(leaf: &DiscreteLeaf) -> bool {
 impl NestedEquilibrium {
     /// Segments of the grid whose linear equations tell the error; of the finest if none do.
     pub fn segments_of_estimate(&self) -> Option<usize> {
-        let level = match (&self.estimate, &self.linear) {
+        let level = match (&self.estimate, &self.factorized_level) {
             (Some(_), Some(linear)) => self.levels.get(linear.grid()),
             _ => self.levels.last(),
         };
@@ -435,16 +449,17 @@ impl NestedEquilibrium {
 
     /// Error estimate relative to the leaf's length: grids, unfinished iterations and rounding.
     pub fn error(&self) -> Option<f64> {
-        self.error_of_linear().map(|error| self.softening * error)
+        self.linearized_error_bound()
+            .map(|error| self.bifurcation_error_factor * error)
     }
 
     /// The error estimate as the linear equations of a grid tell it.
-    fn error_of_linear(&self) -> Option<f64> {
+    fn linearized_error_bound(&self) -> Option<f64> {
         let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
-        let best = self.table.best();
+        let best = self.convergence_table.best();
         let best = best.map(|best| larger(best.error, self.unresolved));
-        let most = best.map_or(f64::INFINITY, |best| LARGEST * best);
-        let too_coarse = !self.fixed && segments[0] < COARSEST;
+        let most = best.map_or(f64::INFINITY, |best| LARGEST_ESTIMATE_RATIO * best);
+        let too_coarse = !self.has_fixed_grid && segments[0] < COARSEST;
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
@@ -455,52 +470,55 @@ impl NestedEquilibrium {
                 (SAFETY * estimate.largest()).min(most)
             }
             Some(estimate) => {
-                let at_nodes = estimate.at_nodes.max(LAYERS * estimate.between);
+                let at_nodes = estimate
+                    .at_nodes
+                    .max(LAYER_ERROR_FRACTION * estimate.between);
                 (SAFETY * at_nodes).min(most)
             }
             None => best?,
         };
-        Some(extrapolation + self.unfinished(segments[1]))
+        Some(extrapolation + self.iteration_rounding_error(segments[1]))
     }
 
     /// Error by unfinished iterations and rounding on a grid of `segments` segments.
-    fn unfinished(&self, segments: usize) -> f64 {
-        EXTRAPOLATED * self.history.remaining + ROUNDING * segments as f64
+    fn iteration_rounding_error(&self, segments: usize) -> f64 {
+        EXTRAPOLATION_ERROR_AMPLIFICATION * self.history.iteration_error
+            + ROUNDING * segments as f64
     }
 
     /// Error of the energy of an integrated leaf: that of grids, and rounding of what is summed along
     /// the rods.
-    pub(super) fn energy_error(&self, estimate: &Estimate) -> f64 {
+    pub(super) fn energy_error(&self, estimate: &DefectEstimate) -> f64 {
         let segments = estimate.grid.segments() * estimate.rods.len();
         let rounding = ROUNDING * segments as f64 * larger(1.0, estimate.energy.abs());
-        self.softening * ENERGY_SAFETY * estimate.energy_error + rounding
+        self.bifurcation_error_factor * ENERGY_SAFETY * estimate.energy_error + rounding
     }
 
     /// The leaf integrated along its rods, with bounds on the errors of its fields, along the lab axes,
     /// at equally many places of each rod.
-    pub fn field_errors(&self) -> Option<(&Estimate, f64)> {
+    pub fn field_errors(&self) -> Option<(&DefectEstimate, f64)> {
         let estimate = self.estimate.as_ref()?;
-        Some((estimate, self.softening * SAFETY))
+        Some((estimate, self.bifurcation_error_factor * SAFETY))
     }
 
     /// Whether the error is within the tolerance; always true on a fixed grid.
     pub fn is_accurate(&self) -> bool {
-        self.fixed || self.error().is_some_and(|error| error <= self.tolerance)
+        self.has_fixed_grid || self.error().is_some_and(|error| error <= self.tolerance)
     }
 
     /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
     /// corrected, and its error, if that is within the tolerance or the leaf was corrected.
-    pub fn integrated(&self) -> Option<(&Estimate, f64)> {
+    pub fn integrated_leaf(&self) -> Option<(&DefectEstimate, f64)> {
         let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
         let error = match estimate.corrections {
-            0 => SAFETY * estimate.largest() + self.unfinished(segments),
+            0 => SAFETY * estimate.largest() + self.iteration_rounding_error(segments),
             _ => self.error()?,
         };
         (error <= self.tolerance || estimate.corrections > 0).then_some((estimate, error))
     }
 
     /// The integrated leaf, if its error was corrected.
-    pub fn corrected(&self) -> Option<&Estimate> {
+    pub fn corrected_estimate(&self) -> Option<&DefectEstimate> {
         self.estimate
             .as_ref()
             .filter(|estimate| estimate.corrections > 0)
@@ -509,30 +527,34 @@ impl NestedEquilibrium {
     /// The same with the error of the values on its only grid or of the extrapolated values
     /// estimated from their defect, and corrected if that makes them accurate enough. The
     /// equations take the place of the `spare` ones.
-    pub fn estimated(
+    pub fn with_error_estimate(
         mut self,
-        problem: &Problem,
+        problem: &RelaxationProblem,
         spare: &mut Option<System>,
-        work: &mut Work,
+        work: &mut SolverCounts,
     ) -> Self {
         let most = problem.corrections();
-        let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
+        let farthest = UNREACHABLE_TOLERANCE_FACTOR
+            * CORRECTION_REMAINDER.powi(-(most as i32))
+            * self.tolerance;
         // A leaf that can turn is the same one of its circle on every grid: the response to a defect
         // leaves where on the circle it is as it was, with the error of that.
-        let turns = |level: &Level| !level.leaf.turns(&level.state).is_empty();
+        let turns = |level: &GridLevel| !level.leaf.zero_energy_fields(&level.state).is_empty();
         // The defect is that of dead loads.
-        let columns = match self.table.best() {
+        let columns = match self.convergence_table.best() {
             _ if problem.leaf.in_wind() || self.levels.last().is_some_and(turns) => None,
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
-            None => (problem.may_be_alone() && self.history.pushes == 0).then_some(0),
+            None => {
+                (problem.may_use_single_grid() && self.history.saddle_escapes == 0).then_some(0)
+            }
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let (levels, systems) = (&self.levels, (&mut self.linear, spare));
+        let (levels, systems) = (&self.levels, (&mut self.factorized_level, spare));
         self.estimate =
             columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
-            self.linear = None;
+            self.factorized_level = None;
         }
         self
     }
@@ -541,36 +563,36 @@ impl NestedEquilibrium {
     /// grid of `segments` segments and are already at least half of the present error:
     /// refinement does not help then.
     pub fn beyond_rounding(&self, segments: usize) -> bool {
-        let floor = self.unfinished(segments);
+        let floor = self.iteration_rounding_error(segments);
         floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
 }
 
 /// A leaf settled on one grid.
 #[derive(Clone)]
-pub struct Level {
+pub struct GridLevel {
     pub leaf: DiscreteLeaf,
     pub state: State,
 }
 
 /// The level of the whole leaf from that of its half, or from its own.
-pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
-    if !reduced.in_half() {
+pub fn mirror_level(reduced: &Leaf, whole: &Leaf, level: &GridLevel) -> GridLevel {
+    if !reduced.is_mirror_half() {
         return level.clone();
     }
-    Level {
+    GridLevel {
         leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
-        state: whole_of(reduced, &level.state),
+        state: whole_state(reduced, &level.state),
     }
 }
 
 /// Whether all nodes lie in the plane z = 0.
-pub fn flat(level: &Level) -> bool {
+pub fn is_planar_level(level: &GridLevel) -> bool {
     level.state.x.iter().all(|x| x.z == 0.0)
 }
 
 /// Positions of all rods at every `stride`-th node, dimensionless.
-pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
+pub fn positions(level: &GridLevel, stride: usize) -> Vec<f64> {
     let n = level.leaf.segments();
     let nodes = |j: usize| {
         (0..=n)

@@ -8,32 +8,32 @@ const ORDER_SLACK: f64 = 1.5;
 
 /// Changes of the first column that shrink to less than this part of what its
 /// order indicates are not those of a ds^2 series either.
-const LEAST_RATIO: f64 = 0.68;
+const SMALLEST_FIRST_RATIO: f64 = 0.68;
 
 /// A further column is rejected if it changes the values by more than this part of the change
 /// by the column before it: it has nothing left to remove.
-const WORTHLESS: f64 = 0.1;
+const USELESS_COLUMN_RATIO: f64 = 0.1;
 
 /// Safety factor on the last change of a column without a proven order.
-const UNORDERED: f64 = 3.0;
+const UNPROVEN_ORDER_SAFETY: f64 = 3.0;
 
 /// Changes below this, relative to the leaf's length, are rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// The safety factor: its slope over the root of the ratio of the last two
 /// corrections, and its bounds.
-const SLOPE: f64 = 30.0;
+const SAFETY_RATIO_SLOPE: f64 = 30.0;
 
-const SAFETY: (f64, f64) = (1.3, 10.0);
+const SAFETY_FACTOR_BOUNDS: (f64, f64) = (1.3, 10.0);
 
 /// Safety factor on the corrections of few numbers, and the part of each that those after it
 /// must reach: of 1,800 forces, moments and energies of random leaves the largest error was 4.6 times
 /// the largest of the corrections so weighted.
-const FEW: (f64, f64) = (5.0, 1.0 / 32.0);
+const FEW_VALUES_SAFETY: (f64, f64) = (5.0, 1.0 / 32.0);
 
 /// The selected column of a table, and its error estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Best {
+pub struct BestColumn {
     /// Terms of the ds^2 series removed.
     pub columns: usize,
     /// Estimate of the largest error of any value.
@@ -98,32 +98,36 @@ impl Richardson {
     /// textbook problems, boundary layers. Where the first column is not of second order (the
     /// grids do not resolve the solution yet) the finest grid itself is returned, its last
     /// change as error.
-    pub fn best(&self) -> Option<Best> {
+    pub fn best(&self) -> Option<BestColumn> {
         let row = self.table.last()?;
         let before = &self.table[self.table.len().checked_sub(2)?];
         let last = row.len() - 1;
         let correction = |m: usize| self.correction(m);
-        let mut columns = self.ordered();
+        let mut columns = self.proven_columns();
         if columns == 0 {
-            return Some(Best {
+            return Some(BestColumn {
                 columns,
                 error: distance(&row[0], &before[0]),
             });
         }
-        while columns > 1 && correction(columns) > WORTHLESS * correction(columns - 1) {
+        while columns > 1 && correction(columns) > USELESS_COLUMN_RATIO * correction(columns - 1) {
             columns -= 1;
         }
         if columns < last {
             // Its order is not confirmed: the error estimate is its last change.
             let change = distance(&row[columns], &before[columns]);
-            let error = larger(UNORDERED * change, SAFETY.1 * correction(columns));
-            return Some(Best { columns, error });
+            let error = larger(
+                UNPROVEN_ORDER_SAFETY * change,
+                SAFETY_FACTOR_BOUNDS.1 * correction(columns),
+            );
+            return Some(BestColumn { columns, error });
         }
         // With two grids the only reference is the size of the leaf, one.
         let previous = if last > 1 { correction(last - 1) } else { 1.0 };
         let ratio = correction(last) / previous.max(ROUNDING);
-        let safety = (SLOPE * ratio.sqrt()).clamp(SAFETY.0, SAFETY.1);
-        Some(Best {
+        let safety = (SAFETY_RATIO_SLOPE * ratio.sqrt())
+            .clamp(SAFETY_FACTOR_BOUNDS.0, SAFETY_FACTOR_BOUNDS.1);
+        Some(BestColumn {
             columns,
             error: larger(0.0, safety * correction(last)),
         })
@@ -134,13 +138,14 @@ impl Richardson {
     /// column may be those of other nodes. Of a clean series the last correction is
     /// some twenty times the error; a single one may be small by chance, but then a part of those before
     /// it is not.
-    pub fn error_of_few(&self) -> Option<Best> {
+    pub fn few_values_error(&self) -> Option<BestColumn> {
         let best = self.best()?;
         if best.columns == 0 || best.columns + 1 < self.table.len() {
             return Some(best);
         }
-        let error = FEW.0 * self.largest_correction(best.columns, FEW.1);
-        Some(Best { error, ..best })
+        let error =
+            FEW_VALUES_SAFETY.0 * self.largest_correction(best.columns, FEW_VALUES_SAFETY.1);
+        Some(BestColumn { error, ..best })
     }
 
     /// The largest of the corrections on the finest grid by the first so many `columns`, of each
@@ -152,15 +157,15 @@ impl Richardson {
 
     /// Terms of the series that may be removed, as the changes from grid to grid of all columns
     /// before show their orders.
-    pub fn ordered(&self) -> usize {
+    pub fn proven_columns(&self) -> usize {
         let Some(last) = self.table.len().checked_sub(1) else {
             return 0;
         };
         let shows_none = |m: &usize| {
             let change = self.change(*m);
             let before = distance(&self.table[last - 1][*m], &self.table[last - 2][*m]);
-            let (ratio, order) = (change / before, self.order(*m));
-            let least = LEAST_RATIO * order;
+            let (ratio, order) = (change / before, self.expected_change_ratio(*m));
+            let least = SMALLEST_FIRST_RATIO * order;
             change > self.noise.max(ROUNDING)
                 && (ratio > ORDER_SLACK * order || *m == 0 && ratio < least)
         };
@@ -176,20 +181,20 @@ impl Richardson {
     /// The last change of the column with so many terms removed, if the best one has more; else
     /// zero.
     pub fn change_beyond(&self, columns: usize) -> f64 {
-        match columns < self.columns() {
+        match columns < self.best_column_number() {
             true => self.change(columns),
             false => 0.0,
         }
     }
 
     /// Terms of the series that the best column has removed; none before there are two grids.
-    pub fn columns(&self) -> usize {
+    pub fn best_column_number(&self) -> usize {
         self.best().map_or(0, |best| best.columns)
     }
 
     /// The values of the best column.
     pub fn extrapolated(&self) -> &[f64] {
-        self.column(self.columns())
+        self.column(self.best_column_number())
     }
 
     /// The change by column `m`, from 1, on the finest grid.
@@ -210,7 +215,7 @@ impl Richardson {
     /// Expected ratio of the last two changes of column `m` from grid to grid, if its error is
     /// proportional to the first remaining term: to the product of ds^2 of the grids it
     /// combines.
-    fn order(&self, m: usize) -> f64 {
+    fn expected_change_ratio(&self, m: usize) -> f64 {
         let last = self.segments.len() - 1;
         let unit = self.segments[last] as f64;
         let error = |grid: usize| -> f64 {

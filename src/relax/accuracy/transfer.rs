@@ -7,7 +7,7 @@
 //! Strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State};
-use crate::relax::accuracy::Level;
+use crate::relax::accuracy::GridLevel;
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
@@ -20,7 +20,7 @@ const SEGMENTS: usize = 4;
 /// nested `levels`, from coarse to fine. Interpolation along the panels between kinks is
 /// polynomial as well; in panels of few segments the finest grid contributes `state`, its
 /// prolongation.
-pub fn predict(levels: &[&Level], state: &mut State) {
+pub fn predict_on_finer_grid(levels: &[&GridLevel], state: &mut State) {
     let [coarser @ .., finest] = levels else {
         return;
     };
@@ -275,13 +275,13 @@ pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
     let n = leaf.segments();
     let stencils: Vec<Stencil> = (grid.sigma().iter())
         .map(|sigma| {
-            let [value, _] = Stencil::at(leaf, *sigma);
+            let [value, _] = Stencil::value_and_derivative_stencils(leaf, *sigma);
             value
         })
         .collect();
     let middle = |i: usize| {
         let i = i.min(n - 1);
-        leaf.grid.middle(i)
+        leaf.grid.segment_midpoint(i)
     };
     // The segment whose middle is before a place, and the weight of the next.
     let between = |sigma: f64| {
@@ -299,7 +299,7 @@ pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
         (before, next, weight.clamp(0.0, 1.0))
     };
     let places: Vec<_> = (0..grid.segments())
-        .map(|i| between(grid.middle(i)))
+        .map(|i| between(grid.segment_midpoint(i)))
         .collect();
     let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..leaf.rods() {
@@ -393,7 +393,7 @@ impl<const MOST: usize> Stencil<MOST> {
 
     /// Of the value at a fraction of the length, and of its derivative with sigma, of values at
     /// nodes numbered from 0; linear extrapolation beyond the ends of the rod.
-    pub fn at(leaf: &DiscreteLeaf, sigma: f64) -> [Self; 2] {
+    pub fn value_and_derivative_stencils(leaf: &DiscreteLeaf, sigma: f64) -> [Self; 2] {
         let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
         let nodes = leaf.grid.sigma();
         // A polynomial does not reach across a kink.
@@ -437,7 +437,7 @@ fn lagrange(count: usize, a: usize, t: f64) -> (f64, f64) {
 /// The state of rod `j` at `sigma`, from its dimensionless position and rotation and its stress
 /// resultants along the directors, in the units of the scenario: strains follow from these by
 /// eqs (5) and (6).
-pub fn node(
+pub fn node_state(
     leaf: &Leaf,
     (j, sigma): (usize, f64),
     (position, rotation): (DVec3, DQuat),
@@ -456,13 +456,13 @@ pub fn node(
 }
 
 /// The same from dimensionless fields along the lab axes.
-pub fn node_of(leaf: &Leaf, at: (usize, f64), fields: &RodFields) -> NodeState {
+pub fn node_state_from_fields(leaf: &Leaf, at: (usize, f64), fields: &RodFields) -> NodeState {
     let &RodFields { x, q, n, m } = fields;
-    node(leaf, at, (x, q), [n, m].map(|vector| q.inverse() * vector))
+    node_state(leaf, at, (x, q), [n, m].map(|vector| q.inverse() * vector))
 }
 
 /// The dimensionless fields, along the lab axes, of a state in the units of the scenario.
-pub fn fields(leaf: &Leaf, node: &NodeState) -> RodFields {
+pub fn fields_from_node_state(leaf: &Leaf, node: &NodeState) -> RodFields {
     let (q, scale) = (node.rotation, leaf.scale);
     RodFields {
         x: node.position / scale.length,
@@ -473,12 +473,12 @@ pub fn fields(leaf: &Leaf, node: &NodeState) -> RodFields {
 }
 
 /// All rods of a state in the units of the scenario.
-pub fn rods(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
+pub fn rod_shapes(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
     let rod = |j: usize| {
         let nodes = leaf.grid.sigma().iter().enumerate().map(|(i, sigma)| {
             let k = state.base(j) + i;
             let resultants = resultants(leaf, state, j, i);
-            node(
+            node_state(
                 &leaf.leaf,
                 (j, *sigma),
                 (state.x[k], state.q[k]),
@@ -509,12 +509,16 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         (carried(0) + load.force, load.moment - segment(0).1)
     } else {
         // The part of the nodal load that belongs to the left half-cell.
-        let left = leaf.grid.width(i - 1);
-        let right = if i < n { leaf.grid.width(i) } else { 0.0 };
+        let left = leaf.grid.segment_width(i - 1);
+        let right = if i < n {
+            leaf.grid.segment_width(i)
+        } else {
+            0.0
+        };
         let mut load = leaf.load(state, j, i);
         load.force -= match i == n {
             true => leaf.tip_force(j),
-            false => leaf.force_on_points(j, leaf.grid.sigma()[i]),
+            false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
         };
         let before = left / (left + right);
         let force = carried(i - 1) - before * load.force;

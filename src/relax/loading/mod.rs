@@ -9,8 +9,10 @@ pub(super) mod arrival;
 
 use crate::homotopy::Homotopy;
 use crate::leaf::{DiscreteLeaf, State, System};
-use crate::newton::{Definite, Equations, Newton, Stop, Work};
-use crate::relax::path::{Event, Happening, Stage};
+use crate::newton::{
+    DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration, SolverCounts,
+};
+use crate::relax::path::{Event, StabilityLoss, Stage};
 use crate::relax::saddle;
 use crate::rod::Section;
 use crate::rotation;
@@ -29,7 +31,7 @@ const LONGEST_STEP: f64 = 0.5;
 const GROWTH: f64 = 2.5;
 
 /// Factor on a step that failed.
-const SHORTENED: f64 = 0.25;
+const FAILED_STEP_FACTOR: f64 = 0.25;
 
 /// The distance of a state from its prediction (lengths, radians) that steps are made for, and
 /// the largest accepted.
@@ -42,20 +44,20 @@ const LARGEST_DRIFT: f64 = 0.3;
 const LARGEST_INCREMENT: f64 = 2.0;
 
 /// Accuracy of states on the way, at its end, and where the index is in doubt.
-const ON_THE_WAY: f64 = 1e-3;
+const INTERMEDIATE_STATE_ACCURACY: f64 = 1e-3;
 
-const AT_THE_END: f64 = 1e-4;
+const FINAL_STATE_ACCURACY: f64 = 1e-4;
 
-const EXACT: f64 = 1e-10;
+const INDEX_STATE_ACCURACY: f64 = 1e-10;
 
 /// Newton iterations of a step.
 const ITERATIONS: usize = 8;
 
 /// Towards an equilibrium of any index so many iterations at a time are made, in which the leaf moves
 /// by less than this part of what it moved in those before, or none is near.
-const ITERATIONS_AT_A_TIME: usize = 4;
+const ITERATIONS_PER_BATCH: usize = 4;
 
-const APPROACHING: f64 = 0.25;
+const BATCH_CONTRACTION_LIMIT: f64 = 0.25;
 
 /// Relative accuracy of the first solutions with conjugate gradients.
 const CG_TOLERANCE: f64 = 1e-3;
@@ -64,108 +66,116 @@ const CG_TOLERANCE: f64 = 1e-3;
 const PREDICTED_THROUGH: usize = 3;
 
 /// A walk on one grid.
-pub struct Walk<'w> {
-    pub loading: Loading<'w>,
+pub struct LoadPath<'w> {
+    pub loading: LoadedLeaf<'w>,
     pub system: System,
-    pub work: &'w mut Work,
+    pub work: &'w mut SolverCounts,
     pub limit: &'w Limit,
     pub progress: &'w mut dyn FnMut(usize, f64),
     /// Count of force evaluations at which it ends without success.
     pub most_evaluations: usize,
-    pub solver: Definite,
+    pub solver: DefiniteSolver,
     /// The last states at rest, with their parts of the loading.
-    known: Vec<(f64, State)>,
+    previous_states: Vec<(f64, State)>,
     /// The next one.
     pub next: State,
     pub events: Vec<Event>,
     /// Where it is.
     pub stage: Stage,
-    pub part: f64,
+    pub lambda: f64,
     /// Towards which a leaf turns aside that may turn to either side: a force on all nodes.
-    pub leaning: DVec3,
+    pub bias_direction: DVec3,
 }
 
 /// What a step came to.
-enum Step {
+enum LoadStepOutcome {
     /// A stable equilibrium so far from its prediction.
     Stable(f64),
     /// An equilibrium with negative eigenvalues.
     Unstable,
     /// Newton's method fails, or leads far away.
-    Lost(Stop),
+    Lost(EquilibriumFailure),
 }
 
-impl<'w> Walk<'w> {
+impl<'w> LoadPath<'w> {
     /// At the natural leaf.
     pub fn new(
         whole: &'w DiscreteLeaf,
-        (work, progress): (&'w mut Work, &'w mut dyn FnMut(usize, f64)),
+        (work, progress): (&'w mut SolverCounts, &'w mut dyn FnMut(usize, f64)),
         (limit, most_evaluations): (&'w Limit, usize),
     ) -> Self {
-        let (loading, natural) = Loading::new(whole);
-        Walk {
+        let (loading, natural) = LoadedLeaf::new(whole);
+        LoadPath {
             system: System::new(&loading.leaf),
             work,
             limit,
             progress,
             most_evaluations,
-            solver: Definite::default(),
+            solver: DefiniteSolver::default(),
             next: natural.clone(),
-            known: vec![(0.0, natural)],
+            previous_states: vec![(0.0, natural)],
             events: Vec::new(),
-            stage: Stage::Loading,
-            part: 0.0,
+            stage: Stage::LoadedLeaf,
+            lambda: 0.0,
             loading,
-            leaning: DVec3::ZERO,
+            bias_direction: DVec3::ZERO,
         }
     }
 
     /// Walks to the end of a stage, if it can; the last state and what happened on the way are kept.
-    pub fn run(&mut self, last: Stage) -> Result<(), Stop> {
+    pub fn run(&mut self, last: Stage) -> Result<(), EquilibriumFailure> {
         for stage in self.loading.stages() {
-            if stage == Stage::Joining && last == Stage::Loading {
+            if stage == Stage::Joining && last == Stage::LoadedLeaf {
                 break;
             }
-            let (_, state) = self.known.pop().expect("the last state");
+            let (_, state) = self.previous_states.pop().expect("the last state");
             self.loading.begin(stage, &state);
             if stage == Stage::Joining {
                 // Its tips move together, and its veins will be coupled.
                 self.system = System::new(self.loading.whole);
-                self.solver = Definite::default();
+                self.solver = DefiniteSolver::default();
             }
-            self.known.clear();
-            self.known.push((0.0, state));
-            (self.stage, self.part) = (stage, 0.0);
-            self.walk_stage()?;
+            self.previous_states.clear();
+            self.previous_states.push((0.0, state));
+            (self.stage, self.lambda) = (stage, 0.0);
+            self.follow_stage()?;
         }
         Ok(())
     }
 
     /// The state in which it ended.
     pub fn last(self) -> State {
-        let last = self.known.into_iter().next_back();
+        let last = self.previous_states.into_iter().next_back();
         last.map_or(self.next, |(_, state)| state)
     }
 
-    fn walk_stage(&mut self) -> Result<(), Stop> {
+    fn follow_stage(&mut self) -> Result<(), EquilibriumFailure> {
         let mut path = Homotopy::new(FIRST_STEP, [SHORTEST_STEP, LONGEST_STEP]);
-        while self.part < 1.0 {
+        while self.lambda < 1.0 {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
-                return Err(Stop::StepLimit);
+                return Err(EquilibriumFailure::StepLimit);
             }
-            let part = path.next();
+            let part = path.next_lambda();
             match self.step_to(part, path.is_shortest()) {
-                Step::Stable(drift) => {
+                LoadStepOutcome::Stable(drift) => {
                     self.accept(part);
-                    path.advance(path.length() * (WANTED_DRIFT / drift).sqrt().min(GROWTH));
+                    path.advance(
+                        path.next_step_length() * (WANTED_DRIFT / drift).sqrt().min(GROWTH),
+                    );
                     continue;
                 }
-                Step::Lost(Stop::Unresolved) => return Err(Stop::Unresolved),
-                Step::Unstable | Step::Lost(_) if path.shorten(SHORTENED) => continue,
-                Step::Unstable => self.turn_aside(part)?,
-                Step::Lost(_) => self.snap(part)?,
+                LoadStepOutcome::Lost(EquilibriumFailure::Unresolved) => {
+                    return Err(EquilibriumFailure::Unresolved);
+                }
+                LoadStepOutcome::Unstable | LoadStepOutcome::Lost(_)
+                    if path.shorten(FAILED_STEP_FACTOR) =>
+                {
+                    continue;
+                }
+                LoadStepOutcome::Unstable => self.branch_aside(part)?,
+                LoadStepOutcome::Lost(_) => self.snap_through(part)?,
             }
-            self.known.clear();
+            self.previous_states.clear();
             self.accept(part);
             path.advance(FIRST_STEP);
         }
@@ -174,36 +184,36 @@ impl<'w> Walk<'w> {
 
     /// Takes the next state as known.
     fn accept(&mut self, part: f64) {
-        self.part = part;
-        if self.known.len() == PREDICTED_THROUGH {
-            self.known.rotate_left(1);
-            let last = self.known.last_mut().expect("states");
+        self.lambda = part;
+        if self.previous_states.len() == PREDICTED_THROUGH {
+            self.previous_states.rotate_left(1);
+            let last = self.previous_states.last_mut().expect("states");
             last.0 = part;
             last.1.clone_from(&self.next);
         } else {
-            self.known.push((part, self.next.clone()));
+            self.previous_states.push((part, self.next.clone()));
         }
     }
 
     /// Carries the last state at rest to another part.
     pub fn carry_last(&mut self, part: f64) {
-        let (at, last) = self.known.last().expect("states");
+        let (at, last) = self.previous_states.last().expect("states");
         self.next.clone_from(last);
-        self.loading.carry([*at, part], &mut self.next);
+        self.loading.carry_to_lambda([*at, part], &mut self.next);
         self.system.set_coupling(&self.loading.leaf);
     }
 
     /// Predicts the state at another part.
     fn predict(&mut self, part: f64) {
         self.carry_last(part);
-        if self.known.len() < 2 {
+        if self.previous_states.len() < 2 {
             return;
         }
-        let count = self.known.len();
+        let count = self.previous_states.len();
         let weight = |k: usize| {
             let others = (0..count).filter(|other| *other != k);
             let part = others.map(|other| {
-                let [own, other] = [k, other].map(|k| self.known[k].0);
+                let [own, other] = [k, other].map(|k| self.previous_states[k].0);
                 (part - other) / (own - other)
             });
             part.product()
@@ -211,8 +221,8 @@ impl<'w> Walk<'w> {
         // The last one, which the others change, has the rest of the weight.
         let mut weights = [0.0; PREDICTED_THROUGH];
         (0..count - 1).for_each(|k| weights[k] = weight(k));
-        let (_, last) = &self.known[count - 1];
-        let others = || self.known[..count - 1].iter().zip(weights);
+        let (_, last) = &self.previous_states[count - 1];
+        let others = || self.previous_states[..count - 1].iter().zip(weights);
         for k in 0..last.x.len() {
             let mut shift = DVec3::ZERO;
             let mut turn = DVec3::ZERO;
@@ -246,65 +256,76 @@ impl<'w> Walk<'w> {
     /// Predicts and corrects the equilibrium at another part. Where none is found that is surely
     /// stable, one of any index is looked for if `any_sign` (more expensive), and converged to
     /// rounding: a neutral mode, as that of a buckled round column, is not unstable.
-    fn step_to(&mut self, part: f64, any_sign: bool) -> Step {
+    fn step_to(&mut self, part: f64, any_sign: bool) -> LoadStepOutcome {
         self.predict(part);
         let predicted = self.next.clone();
-        let accuracy = if part < 1.0 { ON_THE_WAY } else { AT_THE_END };
-        let stable =
-            (self.correct(accuracy, ITERATIONS, definite)).and_then(|_| self.check(&predicted));
+        let accuracy = if part < 1.0 {
+            INTERMEDIATE_STATE_ACCURACY
+        } else {
+            FINAL_STATE_ACCURACY
+        };
+        let stable = (self.correct(accuracy, ITERATIONS, positive_definite_equations))
+            .and_then(|_| self.index_and_drift(&predicted));
         match stable {
-            Ok((0, drift)) => return Step::Stable(drift),
-            Err(stop) if !any_sign => return Step::Lost(stop),
+            Ok((0, drift)) => return LoadStepOutcome::Stable(drift),
+            Err(stop) if !any_sign => return LoadStepOutcome::Lost(stop),
             Err(_) => {}
             Ok(_) => {
                 // Forces of stiff rods that are not converged may be compressive.
-                let again = self.correct(EXACT, ITERATIONS, definite);
-                match again.and_then(|_| self.check(&predicted)) {
-                    Ok((0, drift)) => return Step::Stable(drift),
-                    _ if !any_sign => return Step::Unstable,
+                let again = self.correct(
+                    INDEX_STATE_ACCURACY,
+                    ITERATIONS,
+                    positive_definite_equations,
+                );
+                match again.and_then(|_| self.index_and_drift(&predicted)) {
+                    Ok((0, drift)) => return LoadStepOutcome::Stable(drift),
+                    _ if !any_sign => return LoadStepOutcome::Unstable,
                     _ => {}
                 }
             }
         }
         self.next.clone_from(&predicted);
-        match (self.correct_to_any(&predicted)).and_then(|_| self.check(&predicted)) {
-            Ok((0, drift)) => Step::Stable(drift),
-            Ok(_) => Step::Unstable,
-            Err(stop) => Step::Lost(stop),
+        match (self.correct_to_any_index(&predicted)).and_then(|_| self.index_and_drift(&predicted))
+        {
+            Ok((0, drift)) => LoadStepOutcome::Stable(drift),
+            Ok(_) => LoadStepOutcome::Unstable,
+            Err(stop) => LoadStepOutcome::Lost(stop),
         }
     }
 
     /// The Morse index of the next state, and its distance from the one predicted, if it is
     /// near that.
-    fn check(&mut self, predicted: &State) -> Result<(usize, f64), Stop> {
+    fn index_and_drift(&mut self, predicted: &State) -> Result<(usize, f64), EquilibriumFailure> {
         let drift = self.next.distance(predicted);
-        if self.known.len() > 1 && drift > LARGEST_DRIFT {
-            return Err(Stop::Stuck);
+        if self.previous_states.len() > 1 && drift > LARGEST_DRIFT {
+            return Err(EquilibriumFailure::NoDescent);
         }
         let leaf = &self.loading.leaf;
         let shift = leaf.neutral_shift();
         let index = saddle::index(leaf, &self.next, &mut self.system, shift, self.work);
-        Ok((index.ok_or(Stop::Stuck)?, drift))
+        Ok((index.ok_or(EquilibriumFailure::NoDescent)?, drift))
     }
 
     /// Newton's method from the predicted state to an equilibrium of any index nearby: beyond a fold
     /// there is none, and the iteration would wander.
-    fn correct_to_any(&mut self, predicted: &State) -> Result<f64, Stop> {
+    fn correct_to_any_index(&mut self, predicted: &State) -> Result<f64, EquilibriumFailure> {
         let mut moved = f64::INFINITY;
-        for _ in 0..2 * ITERATIONS / ITERATIONS_AT_A_TIME {
+        for _ in 0..2 * ITERATIONS / ITERATIONS_PER_BATCH {
             let from = self.next.clone();
-            match self.correct(EXACT, ITERATIONS_AT_A_TIME, |_| saddle::ANY_SIGN) {
-                Err(Stop::StepLimit) => {}
+            match self.correct(INDEX_STATE_ACCURACY, ITERATIONS_PER_BATCH, |_| {
+                saddle::INDEFINITE_NEWTON_EQUATIONS
+            }) {
+                Err(EquilibriumFailure::StepLimit) => {}
                 end => return end,
             }
             let moves = from.distance(&self.next);
-            let approaches = moves <= APPROACHING * moved;
+            let approaches = moves <= BATCH_CONTRACTION_LIMIT * moved;
             if !approaches || self.next.distance(predicted) > LARGEST_DRIFT {
-                return Err(Stop::Stuck);
+                return Err(EquilibriumFailure::NoDescent);
             }
             moved = moves;
         }
-        Err(Stop::StepLimit)
+        Err(EquilibriumFailure::StepLimit)
     }
 
     /// Newton's method from the next state.
@@ -312,9 +333,9 @@ impl<'w> Walk<'w> {
         &'s mut self,
         accuracy: f64,
         iterations: usize,
-        equations: impl FnOnce(&'s mut Definite) -> Equations<'s>,
-    ) -> Result<f64, Stop> {
-        let newton = Newton {
+        equations: impl FnOnce(&'s mut DefiniteSolver) -> NewtonEquations<'s>,
+    ) -> Result<f64, EquilibriumFailure> {
+        let newton = NewtonIteration {
             accuracy,
             iterations,
             work: self.work,
@@ -330,7 +351,7 @@ impl<'w> Walk<'w> {
     }
 
     /// Notes what happened at a part of the loading.
-    pub fn note(&mut self, part: f64, happening: Happening) {
+    pub fn record_event(&mut self, part: f64, happening: StabilityLoss) {
         let stage = self.stage;
         self.events.push(Event {
             stage,
@@ -341,8 +362,8 @@ impl<'w> Walk<'w> {
 }
 
 /// Newton's equations in a convex valley.
-fn definite(solver: &mut Definite) -> Equations<'_> {
-    Equations::Definite {
+fn positive_definite_equations(solver: &mut DefiniteSolver) -> NewtonEquations<'_> {
+    NewtonEquations::Definite {
         solver,
         largest: LARGEST_INCREMENT,
         shifted: false,
@@ -353,29 +374,29 @@ fn definite(solver: &mut Definite) -> Equations<'_> {
 /// A leaf on its path. The natural leaf has every vein in its rest shape, apart and unloaded.
 /// First the loads are put on the veins apart, then the tips are moved together and the coupling of
 /// the veins is put on; in both stages in proportion to a part from 0 to 1.
-pub struct Loading<'a> {
+pub struct LoadedLeaf<'a> {
     /// The leaf at the end of the path.
     pub whole: &'a DiscreteLeaf,
     /// The leaf at the present part: its veins are apart in the first stage.
     pub leaf: DiscreteLeaf,
-    tips: Tips,
+    tips: TipMotion,
     stage: Stage,
-    part: f64,
+    lambda: f64,
 }
 
 /// How tips are moved.
-enum Tips {
+enum TipMotion {
     /// They are free, or a single one.
     Free,
     /// Together.
-    Joining(Vec<Offset>),
+    Joining(Vec<TipJoiningPath>),
 }
 
 /// What a tip is apart from the common one: on its way its line from the base turns into the
 /// direction of that, for a fan the mean direction of all, uniformly, while its distance changes to the mean of all quadratically.
 /// So does that of a bent vein: a straight one that was compressed in proportion would buckle
 /// at once, to either side.
-struct Offset {
+struct TipJoiningPath {
     base: DVec3,
     from: DVec3,
     /// Rotation into the common direction.
@@ -384,9 +405,9 @@ struct Offset {
     to: DVec3,
 }
 
-impl Offset {
+impl TipJoiningPath {
     /// Of all tips.
-    fn all(bases: &[DVec3], tips: &[DVec3]) -> Vec<Offset> {
+    fn joining_paths(bases: &[DVec3], tips: &[DVec3]) -> Vec<TipJoiningPath> {
         let mean = |value: &dyn Fn(DVec3) -> DVec3| {
             tips.iter().map(|tip| value(*tip)).sum::<DVec3>() / tips.len() as f64
         };
@@ -406,7 +427,7 @@ impl Offset {
             };
             let axis = from.normalize_or_zero().cross(direction);
             let angle = axis.length().atan2(from.normalize_or_zero().dot(direction));
-            Offset {
+            TipJoiningPath {
                 base: *base,
                 from,
                 turn: angle * axis.normalize_or_zero(),
@@ -416,28 +437,28 @@ impl Offset {
         bases.iter().zip(tips).map(of).collect()
     }
 
-    fn at(&self, part: f64) -> DVec3 {
+    fn tip_offset(&self, part: f64) -> DVec3 {
         let turned = |part: f64| rotation::exp(part * self.turn) * self.from;
         self.base + turned(part) + part * part * (self.to - turned(1.0))
     }
 }
 
-impl<'a> Loading<'a> {
+impl<'a> LoadedLeaf<'a> {
     /// The natural leaf, and its state.
     pub fn new(whole: &'a DiscreteLeaf) -> (Self, State) {
-        let natural = whole.natural();
+        let natural = whole.stress_free_state();
         let tips = match whole.tips_move_together() {
-            true => Tips::Joining(Vec::new()),
-            false => Tips::Free,
+            true => TipMotion::Joining(Vec::new()),
+            false => TipMotion::Free,
         };
-        let mut leaf = whole.apart();
+        let mut leaf = whole.decoupled_leaf();
         leaf.load_factor = 0.0;
-        let loading = Loading {
+        let loading = LoadedLeaf {
             whole,
             leaf,
             tips,
-            stage: Stage::Loading,
-            part: 0.0,
+            stage: Stage::LoadedLeaf,
+            lambda: 0.0,
         };
         (loading, natural)
     }
@@ -445,9 +466,10 @@ impl<'a> Loading<'a> {
     /// The stages in which anything happens.
     pub fn stages(&self) -> impl Iterator<Item = Stage> + use<> {
         let loads = &self.whole.leaf.loads;
-        let loaded = [loads.gravity, loads.tip_force] != [DVec3::ZERO; 2] || loads.own != 0.0;
-        let joined = !matches!(self.tips, Tips::Free) || self.whole.coupled();
-        let stages = [(loaded, Stage::Loading), (joined, Stage::Joining)];
+        let loaded =
+            [loads.gravity, loads.tip_force] != [DVec3::ZERO; 2] || loads.rod_load_factor != 0.0;
+        let joined = !matches!(self.tips, TipMotion::Free) || self.whole.coupled();
+        let stages = [(loaded, Stage::LoadedLeaf), (joined, Stage::Joining)];
         stages
             .into_iter()
             .filter(|(any, _)| *any)
@@ -456,44 +478,44 @@ impl<'a> Loading<'a> {
 
     /// Begins a stage in a state.
     pub fn begin(&mut self, stage: Stage, state: &State) {
-        (self.stage, self.part) = (stage, 0.0);
-        if stage == Stage::Loading {
+        (self.stage, self.lambda) = (stage, 0.0);
+        if stage == Stage::LoadedLeaf {
             return;
         }
         self.leaf = self.whole.clone();
-        self.leaf.load_in_part(self.whole, [1.0, 0.0]);
-        if let Tips::Joining(offsets) = &mut self.tips {
+        self.leaf.set_load_factors(self.whole, [1.0, 0.0]);
+        if let TipMotion::Joining(offsets) = &mut self.tips {
             let tips: Vec<DVec3> = state.tips().collect();
             let bases: Vec<DVec3> = (0..state.rods()).map(|j| state.x[state.base(j)]).collect();
-            *offsets = Offset::all(&bases, &tips);
+            *offsets = TipJoiningPath::joining_paths(&bases, &tips);
         }
     }
 
     /// Goes to a part of the stage, with the tips of a `state` that is in equilibrium at the part
     /// `from`.
-    pub fn carry(&mut self, [from, part]: [f64; 2], state: &mut State) {
+    pub fn carry_to_lambda(&mut self, [from, part]: [f64; 2], state: &mut State) {
         let shares = match self.stage {
-            Stage::Loading => [part, 0.0],
+            Stage::LoadedLeaf => [part, 0.0],
             Stage::Joining | Stage::Moving => [1.0, part],
         };
-        self.leaf.load_in_part(self.whole, shares);
-        self.part = part;
-        if let (Tips::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
+        self.leaf.set_load_factors(self.whole, shares);
+        self.lambda = part;
+        if let (TipMotion::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
             for (j, offset) in offsets.iter().enumerate() {
                 let tip = state.base(j) + state.segments();
-                state.x[tip] += offset.at(part) - offset.at(from);
+                state.x[tip] += offset.tip_offset(part) - offset.tip_offset(from);
             }
         }
     }
 
     /// Puts the tips of a state predicted for the present part where they are exactly.
     pub fn place_tips(&self, state: &mut State) {
-        if let (Tips::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
-            let common = |j: usize| state.tip(j) - offsets[j].at(self.part);
+        if let (TipMotion::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
+            let common = |j: usize| state.tip(j) - offsets[j].tip_offset(self.lambda);
             let mean = (0..offsets.len()).map(common).sum::<DVec3>() / offsets.len() as f64;
             for (j, offset) in offsets.iter().enumerate() {
                 let tip = state.base(j) + state.segments();
-                state.x[tip] = mean + offset.at(self.part);
+                state.x[tip] = mean + offset.tip_offset(self.lambda);
             }
         }
     }
@@ -501,7 +523,7 @@ impl<'a> Loading<'a> {
 
 /// The part of its bending energy that is set against the moments of a vein in
 /// [`veins_cannot_buckle`]: about the best where the bound decides.
-const AGAINST_MOMENTS: f64 = 0.3;
+const MOMENT_ENERGY_FRACTION: f64 = 0.3;
 
 /// Factor on the loads there, and the largest strain of stretch or shear by these: the bound is that
 /// of rods that neither stretch nor shear.
@@ -532,8 +554,8 @@ pub fn veins_cannot_buckle(leaf: &DiscreteLeaf) -> bool {
             let length = section.ds * section.rest_strain.length();
             moment += force * length;
             let stiffness = section.couple_stiffness.min_element();
-            let against = force + moment * moment / (4.0 * AGAINST_MOMENTS * stiffness);
-            segments.push([length, (1.0 - AGAINST_MOMENTS) * stiffness, against]);
+            let against = force + moment * moment / (4.0 * MOMENT_ENERGY_FRACTION * stiffness);
+            segments.push([length, (1.0 - MOMENT_ENERGY_FRACTION) * stiffness, against]);
         }
         // y and (1 - a) B y', half of a segment each in turn.
         let (mut y, mut z) = (0.0, 1.0);
@@ -552,12 +574,13 @@ pub fn veins_cannot_buckle(leaf: &DiscreteLeaf) -> bool {
 
 /// The largest P ds^2 / B of a segment with the stiffness B that carries the force P, as a vein
 /// bends within sqrt(B/P): where it is larger, critical loads are wrong by several per cent.
-const RESOLVED: f64 = 0.5;
+const RESOLVED_FORCE_RATIO: f64 = 0.5;
 
 /// Whether the segments of a leaf are short enough for the forces of the veins apart.
 pub fn resolves_loads(leaf: &DiscreteLeaf) -> bool {
     let short = |(section, carried): (&Section, f64)| {
-        carried * section.ds * section.ds <= RESOLVED * section.couple_stiffness.min_element()
+        carried * section.ds * section.ds
+            <= RESOLVED_FORCE_RATIO * section.couple_stiffness.min_element()
     };
     (0..leaf.rods()).all(|j| carried_forces(leaf, j).all(short))
 }
@@ -573,7 +596,7 @@ fn carried_forces(leaf: &DiscreteLeaf, j: usize) -> impl Iterator<Item = (&Secti
     let weight = leaf.leaf.length(j) * share * leaf.loads.gravity;
     let mut carried = leaf.loads.tip_force * (share / tips);
     (0..n).rev().map(move |i| {
-        carried += leaf.grid.weight(i + 1) * weight + leaf.own_load(j, i + 1);
+        carried += leaf.grid.node_weight(i + 1) * weight + leaf.own_load_on_node(j, i + 1);
         (leaf.section(j, i), carried.length())
     })
 }

@@ -4,11 +4,11 @@
 
 use crate::leaf::{DiscreteLeaf, Scale};
 use crate::numbers::{larger, largest};
-use crate::relax::accuracy::defect::Estimate;
+use crate::relax::accuracy::defect::DefectEstimate;
 use crate::relax::accuracy::richardson::Richardson;
-use crate::relax::accuracy::{Level, NestedEquilibrium, transfer};
-use crate::scenario::{Grip, Hold, Moduli, Scenario, Stress};
-use crate::shape::{RodShape, SAME_STATION};
+use crate::relax::accuracy::{GridLevel, NestedEquilibrium, transfer};
+use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
+use crate::shape::{RodShape, STATION_TOLERANCE};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -61,9 +61,9 @@ const GRIDS: usize = 4;
 /// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows, with
 /// the error; `relative` is that of each of them by unfinished iterations, `rounding` that by
 /// rounding. The error is unknown on a single grid.
-pub(in crate::relax) fn extrapolated(
-    levels: &[Level],
-    on: impl Fn(&Level) -> Vec<DVec3>,
+pub(in crate::relax) fn extrapolate_vectors(
+    levels: &[GridLevel],
+    on: impl Fn(&GridLevel) -> Vec<DVec3>,
     [relative, rounding]: [f64; 2],
 ) -> (Vec<DVec3>, Option<f64>) {
     let levels = &levels[levels.len().saturating_sub(GRIDS)..];
@@ -79,7 +79,7 @@ pub(in crate::relax) fn extrapolated(
         })
         .collect();
     let table = table.with_noise(rounding / scale);
-    let best = table.error_of_few();
+    let best = table.few_values_error();
     let found = table.column(best.map_or(0, |best| best.columns));
     let error = best.map(|best| (best.error + relative) * scale + rounding);
     let vectors = found.chunks(3).map(|it| DVec3::from_slice(it) * scale);
@@ -89,25 +89,29 @@ pub(in crate::relax) fn extrapolated(
 impl NestedEquilibrium {
     /// The part of forces by which unfinished iterations, and the size by which rounding of
     /// positions, may change them.
-    pub fn unfinished_forces(&self) -> [f64; 2] {
+    pub fn force_iteration_errors(&self) -> [f64; 2] {
         let rounding = |leaf: &DiscreteLeaf| {
             STRAIN_ROUNDING * leaf.segments() as f64 * leaf.largest_finite_stiffness()
         };
-        let held = self.levels.last().filter(|level| level.leaf.leaf.is_held());
+        let held = self
+            .levels
+            .last()
+            .filter(|level| level.leaf.leaf.has_placed_supports());
         let rounding = held.map_or(0.0, |level| rounding(&level.leaf));
-        [self.history.remaining, rounding]
+        [self.history.iteration_error, rounding]
     }
 
     /// The reaction at a held tip.
     pub fn reaction(&self) -> Option<Reaction> {
         let leaf = &self.levels[0].leaf.leaf;
-        let held = leaf.held.as_ref()?;
-        let unfinished = self.unfinished_forces();
+        let held = leaf.tip_support.as_ref()?;
+        let unfinished = self.force_iteration_errors();
         let clamped = held.clamps.is_some();
-        let force = |level: &Level| vec![level.leaf.reaction(&level.state).0];
-        let moments = |level: &Level| level.leaf.reaction(&level.state).1;
-        let (forces, mut error) = extrapolated(&self.levels, force, unfinished);
-        let (mut moments, mut moments_error) = extrapolated(&self.levels, moments, unfinished);
+        let force = |level: &GridLevel| vec![level.leaf.reaction(&level.state).0];
+        let moments = |level: &GridLevel| level.leaf.reaction(&level.state).1;
+        let (forces, mut error) = extrapolate_vectors(&self.levels, force, unfinished);
+        let (mut moments, mut moments_error) =
+            extrapolate_vectors(&self.levels, moments, unfinished);
         let mut force = forces[0];
         if let Some((estimate, safety)) = self.field_errors() {
             let tips = || estimate.rods.iter().filter_map(|rod| rod.last());
@@ -127,7 +131,9 @@ impl NestedEquilibrium {
                 error = Some(own);
             }
             if moments_error.is_none_or(|error| own_of_moments < error) {
-                moments = tips().map(|tip| level.moment_at(1.0) - tip.m).collect();
+                moments = tips()
+                    .map(|tip| level.dead_moment_at(1.0) - tip.m)
+                    .collect();
                 moments_error = Some(own_of_moments);
             }
         }
@@ -148,19 +154,19 @@ impl NestedEquilibrium {
         if !leaf.has_grips() {
             return Vec::new();
         }
-        let unfinished = self.unfinished_forces();
+        let unfinished = self.force_iteration_errors();
         let on = |which: usize| {
-            move |level: &Level| -> Vec<DVec3> {
+            move |level: &GridLevel| -> Vec<DVec3> {
                 let reactions = level.leaf.grip_reactions(&level.state);
                 reactions.iter().map(|it| it[which]).collect()
             }
         };
-        let (forces, error) = extrapolated(&self.levels, on(0), unfinished);
-        let (moments, moment_error) = extrapolated(&self.levels, on(1), unfinished);
+        let (forces, error) = extrapolate_vectors(&self.levels, on(0), unfinished);
+        let (moments, moment_error) = extrapolate_vectors(&self.levels, on(1), unfinished);
         let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
         let both = forces.iter().zip(&moments).zip(&scenario.grips);
         let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
-            let clamped = grip.held == Hold::Clamped;
+            let clamped = grip.held == SupportKind::Clamped;
             GripReaction {
                 force: *force * scale.force(),
                 error: error.map(|error| error * scale.force()),
@@ -227,7 +233,7 @@ impl Stresses {
     }
 
     /// With the error by those of forces and moments anywhere: a stress is a norm of both.
-    pub fn within(self, scenario: &Scenario, errors: Option<[f64; 2]>) -> Self {
+    pub fn with_field_errors(self, scenario: &Scenario, errors: Option<[f64; 2]>) -> Self {
         let Some([force, moment]) = errors else {
             return self;
         };
@@ -242,14 +248,14 @@ impl Stresses {
     fn integrated(
         self,
         (scenario, stations): (&Scenario, &[f64]),
-        (estimate, safety): (&Estimate, f64),
+        (estimate, safety): (&DefectEstimate, f64),
         scale: Scale,
     ) -> Self {
         let places = estimate.errors[0].len() - 1;
         let (nodes, sigma) = (estimate.grid.segments(), estimate.grid.sigma());
         let error = |j: usize, station: f64| -> Option<f64> {
             let i = sigma
-                .partition_point(|at| *at < station - SAME_STATION)
+                .partition_point(|at| *at < station - STATION_TOLERANCE)
                 .min(nodes);
             let fields = &estimate.rods[j][i];
             let along = |it: DVec3| fields.q.conjugate() * it;
@@ -280,7 +286,7 @@ impl Stresses {
 
     /// With the error of a leaf on nested grids at these stations: where it was not integrated that of
     /// the stresses at the nodes of the coarsest, and the distance of these from their extrapolation.
-    pub(in crate::relax) fn on_grids(
+    pub(in crate::relax) fn with_grid_error(
         self,
         scenario: &Scenario,
         stations: &[f64],
@@ -289,7 +295,7 @@ impl Stresses {
         let scale = found.levels[0].leaf.leaf.scale;
         if let Some(errors) = found
             .field_errors()
-            .filter(|_| found.integrated().is_some())
+            .filter(|_| found.integrated_leaf().is_some())
         {
             return self.integrated((scenario, stations), errors, scale);
         }
@@ -306,7 +312,7 @@ impl Stresses {
             DVec3::new(stress.normal, stress.shear, stress.equivalent)
         };
         let nodes = || (0..rods).flat_map(|j| (0..sigma.len()).map(move |i| (j, i)));
-        let on = |level: &Level| -> Vec<DVec3> {
+        let on = |level: &GridLevel| -> Vec<DVec3> {
             let stride = level.leaf.segments() / (sigma.len() - 1);
             let resultants =
                 |(j, i)| transfer::resultants(&level.leaf, &level.state, j, i * stride);
@@ -315,7 +321,8 @@ impl Stresses {
                 .map(|(k, at)| stress(k, resultants(at)))
                 .collect()
         };
-        let (extrapolated, error) = extrapolated(&found.levels, on, [found.history.remaining, 0.0]);
+        let (extrapolated, error) =
+            extrapolate_vectors(&found.levels, on, [found.history.iteration_error, 0.0]);
         let told = self.largest.equivalent;
         let peak = largest(extrapolated.iter().map(|it| it.z));
         // Between the nodes of the coarsest grid stresses may be larger, but not those at a node.

@@ -9,7 +9,7 @@
 pub(super) mod forces;
 pub(super) mod report;
 
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::relax::path::Path;
 use crate::relax::request::Method;
 use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
@@ -166,7 +166,7 @@ pub struct Accuracy {
     pub tolerance: f64,
     /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L (A: the leaf's mean
     /// bending stiffness, L: largest rod length). For shooting: the largest defect
-    /// ([`crate::shooting::Solution::defect`]), if it found a solution.
+    /// ([`crate::shooting::ShootingSolution::defect`]), if it found a solution.
     pub residual: Option<f64>,
     /// Bound on the error of the positions, in units of length; `None` on a single grid.
     pub error_estimate: Option<f64>,
@@ -334,7 +334,7 @@ pub struct Equilibrium {
     #[serde(flatten)]
     pub model: Model,
     /// Work done.
-    pub work: Work,
+    pub work: SolverCounts,
     /// Time of the solve alone, in seconds.
     pub wall_seconds: f64,
     /// The shape.
@@ -398,7 +398,7 @@ pub struct Margin {
     pub largest_push: Option<f64>,
     /// Pushes at the tip, along the axes and against them, the least first; none for a held
     /// tip.
-    pub pushes: Vec<Push>,
+    pub pushes: Vec<CriticalTipForce>,
     /// The lowest energy barrier to another equilibrium, of those found.
     pub barrier: Option<Barrier>,
     /// Number of starting points of the search for saddles.
@@ -422,17 +422,17 @@ impl Margin {
 
 /// A direction along a lab axis, or against it. As text: `-z`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Direction {
+pub struct AxisDirection {
     /// 0, 1, 2 for x, y, z.
     pub axis: usize,
     /// Whether against it.
     pub negative: bool,
 }
 
-impl Direction {
+impl AxisDirection {
     /// All six.
-    pub fn all() -> impl Iterator<Item = Direction> {
-        (0..3).flat_map(|axis| [false, true].map(|negative| Direction { axis, negative }))
+    pub fn all() -> impl Iterator<Item = AxisDirection> {
+        (0..3).flat_map(|axis| [false, true].map(|negative| AxisDirection { axis, negative }))
     }
 
     /// Its sign.
@@ -441,22 +441,22 @@ impl Direction {
     }
 
     /// The opposite direction.
-    pub fn opposite(self) -> Direction {
-        Direction {
+    pub fn opposite(self) -> AxisDirection {
+        AxisDirection {
             negative: !self.negative,
             ..self
         }
     }
 }
 
-impl fmt::Display for Direction {
+impl fmt::Display for AxisDirection {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let sign = if self.negative { '-' } else { '+' };
         write!(f, "{sign}{}", ['x', 'y', 'z'][self.axis])
     }
 }
 
-impl Serialize for Direction {
+impl Serialize for AxisDirection {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -464,12 +464,12 @@ impl Serialize for Direction {
 
 /// The effect of a dead force at the tip that grows from zero in one direction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Push {
+pub struct CriticalTipForce {
     /// The direction.
     #[serde(rename = "axis")]
-    pub direction: Direction,
+    pub direction: AxisDirection,
     /// What ends the stability.
-    pub kind: Loss,
+    pub kind: InstabilityKind,
     /// The force at which stability is lost.
     pub force: Option<f64>,
     /// Bound on its error.
@@ -479,7 +479,7 @@ pub struct Push {
     /// If no loss was found, the force up to which the leaf is stable.
     pub more_than: Option<f64>,
     /// What the leaf does when stability is lost.
-    pub then: Option<Fate>,
+    pub then: Option<PostcriticalBehavior>,
     /// The equilibrium it reaches under this force, if it snaps at a fold.
     pub neighbour: Option<Neighbour>,
     /// Positions of the tips then.
@@ -495,7 +495,7 @@ pub struct Push {
 /// How stability is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Loss {
+pub enum InstabilityKind {
     /// The equilibrium meets an unstable one, and both end.
     Fold,
     /// Other branches cross.
@@ -510,7 +510,7 @@ pub enum Loss {
 /// The behaviour of a leaf that has lost its stability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Fate {
+pub enum PostcriticalBehavior {
     /// It jumps to another equilibrium.
     Snaps,
     /// It bends aside continuously as the force grows, to a stable shape close to the unstable

@@ -3,22 +3,24 @@
 //! Plausibility checks of a leaf at rest: remarks on results that indicate wrong input.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields};
-use crate::newton::Stop;
-use crate::numbers::two_digits;
-use crate::relax::accuracy::fields::with_sign_of;
-use crate::relax::accuracy::{Level, NestedEquilibrium, flat, transfer};
-use crate::relax::path::{Event, Happening, Path, Stage};
+use crate::newton::EquilibriumFailure;
+use crate::numbers::format_two_digits;
+use crate::relax::accuracy::fields::align_quaternion_sign;
+use crate::relax::accuracy::{GridLevel, NestedEquilibrium, is_planar_level, transfer};
+use crate::relax::path::{Event, Path, StabilityLoss, Stage};
 use crate::relax::request::Method;
-use crate::relax::rest::Problem;
+use crate::relax::rest::RelaxationProblem;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::scenario::{STRETCHED, Scenario, obstacle, out_of_reach, slips};
+use crate::scenario::{
+    LARGEST_PLAUSIBLE_STRETCH, Scenario, obstacle, out_of_reach, plausibility_warnings,
+};
 use crate::shape::{Centerline, RodShape, Undulation};
 use glam::DVec3;
 
 /// Assembles the result.
 pub fn equilibrium(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     (outcome, remark): (Outcome, Option<String>),
     wall_seconds: f64,
@@ -29,7 +31,7 @@ pub fn equilibrium(
         .expect("the grid it failed on, at least");
     let (scenario, scale) = (problem.leaf.scenario(), problem.leaf.scale);
     let error = found.error();
-    let (stations, rods, between) = fields(problem, found, error.unwrap_or(0.0));
+    let (stations, rods, between) = station_fields(problem, found, error.unwrap_or(0.0));
     let joined = problem.leaf.joined();
     debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
@@ -63,21 +65,28 @@ pub fn equilibrium(
             mode_shapes: problem.options.mode_shapes,
             saddle: found.history.saddle,
         },
-        path: path(problem.leaf, found),
+        path: path_to_equilibrium(problem.leaf, found),
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
         stress: Stresses::of(scenario, &stations, &rods)
-            .map(|it| it.on_grids(scenario, &stations, found)),
-        undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
+            .map(|it| it.with_grid_error(scenario, &stations, found)),
+        undulation: Undulation::from_centerlines(
+            scenario,
+            &lines,
+            &stations,
+            &rods,
+            error_estimate,
+        ),
         model: Model::new(
             rods.len(),
             (
-                found.solved,
-                problem.planar && found.index == Some(0) && flat(finest),
+                found.solved_rods,
+                problem.planar && found.index == Some(0) && is_planar_level(finest),
             ),
             &segments,
-            (found.history.effects).map(|effect| effect.map(|effect| effect * scale.length)),
+            (found.history.shear_stretch_effects)
+                .map(|effect| effect.map(|effect| effect * scale.length)),
         ),
         accuracy: Accuracy {
             segments,
@@ -109,19 +118,19 @@ pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
 
 /// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
 /// belongs to it.
-fn path(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
+fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     let mut path = found.path.clone()?;
     if let Path::Loaded { events, .. } | Path::Held { events } = &mut path
         && found.history.saddle.is_some()
     {
         events.push(Event {
             stage: match leaf.joined() && leaf.rods() > 1 {
-                _ if leaf.is_held() => Stage::Moving,
+                _ if leaf.has_placed_supports() => Stage::Moving,
                 true => Stage::Joining,
-                false => Stage::Loading,
+                false => Stage::LoadedLeaf,
             },
             part: 1.0,
-            happening: Happening::Branched {
+            happening: StabilityLoss::Branched {
                 equally_open: false,
             },
         });
@@ -137,8 +146,8 @@ const STATIONS: usize = 8;
 /// are few, those of the next grid, and all if every node is requested: of a leaf that was
 /// integrated to the tolerance those of the integration, otherwise those of the finest grid that
 /// keeps the tolerance between the nodes of the coarsest.
-fn fields(
-    problem: &Problem,
+fn station_fields(
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     error: f64,
 ) -> (Vec<f64>, Vec<RodShape>, f64) {
@@ -147,7 +156,7 @@ fn fields(
         &found.levels[found.levels.len() - 1],
     );
     let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
-    let (grid, rods, between) = match found.integrated() {
+    let (grid, rods, between) = match found.integrated_leaf() {
         Some((estimate, integrated)) => {
             let grid = match every_node {
                 true => estimate.grid.clone(),
@@ -159,7 +168,7 @@ fn fields(
                 // Quaternions have the signs of the finest grid.
                 let mut q = finest.state.q[finest.state.base(j)];
                 let node = |node: &RodFields| {
-                    q = with_sign_of(node.q, q);
+                    q = align_quaternion_sign(node.q, q);
                     RodFields {
                         q: q.normalize(),
                         ..*node
@@ -182,7 +191,8 @@ fn fields(
     let leaf = problem.leaf;
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let nodes = rod.iter().zip(grid.sigma());
-        let nodes = nodes.map(|(fields, sigma)| transfer::node_of(leaf, (j, *sigma), fields));
+        let nodes = nodes
+            .map(|(fields, sigma)| transfer::node_state_from_fields(leaf, (j, *sigma), fields));
         RodShape {
             length: leaf.length(j) * leaf.scale.length,
             nodes: nodes.collect(),
@@ -194,9 +204,12 @@ fn fields(
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
 /// the integration, in units of the scenario.
-fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f Level) -> (&'f Grid, Vec<Centerline>) {
+fn centerlines<'f>(
+    found: &'f NestedEquilibrium,
+    finest: &'f GridLevel,
+) -> (&'f Grid, Vec<Centerline>) {
     let length = finest.leaf.leaf.scale.length;
-    if let Some(estimate) = found.corrected() {
+    if let Some(estimate) = found.corrected_estimate() {
         let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
         return (&estimate.grid, estimate.rods.iter().map(line).collect());
     }
@@ -210,9 +223,9 @@ fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f Level) -> (&'f Grid
 /// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
 /// of advice where one helps.
 pub fn outcome(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    stopped: Option<Stop>,
+    stopped: Option<EquilibriumFailure>,
     reached: Option<(Stage, f64)>,
 ) -> (Outcome, Option<String>) {
     let advice = || advice(problem, found, reached);
@@ -242,7 +255,7 @@ pub fn outcome(
                 ),
             }),
         ),
-        Some(Stop::Stuck) => (
+        Some(EquilibriumFailure::NoDescent) => (
             Outcome::Diverged,
             Some(format!(
                 "no step lowers the energy on {finest} segments{}",
@@ -252,20 +265,20 @@ pub fn outcome(
         Some(stop) => (
             Outcome::NotAtRest,
             Some(match stop {
-                Stop::StepLimit if problem.out_of_time() => format!(
+                EquilibriumFailure::StepLimit if problem.out_of_time() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
-                Stop::StepLimit if explicit => format!(
+                EquilibriumFailure::StepLimit if explicit => format!(
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
-                Stop::Memory => format!(
+                EquilibriumFailure::Memory => format!(
                     "the factorised matrix of the leaf on {finest} segments does not fit into the memory that is allowed: use fewer rods or segments, or raise the limit on memory"
                 ),
-                Stop::Unresolved => format!(
+                EquilibriumFailure::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments{}",
                     advice()
                 ),
-                Stop::StepLimit if problem.keeps_unstable() => format!(
+                EquilibriumFailure::StepLimit if problem.keeps_unstable() => format!(
                     "Newton's method leads to no equilibrium from this start on {finest} segments: let the leaf relax, which moves it to a stable one"
                 ),
                 _ => format!(
@@ -279,23 +292,23 @@ pub fn outcome(
 
 /// Part of its length by which the distance between two holders of an inextensible span is smaller
 /// where the span is straight, for all that rounding tells.
-const STRAIGHT: f64 = 1e-9;
+const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 
 /// An inextensible vein that two holders, neighbours along it, keep straight. What pulls it aside
 /// would need infinite forces along it, and any force along it is in balance.
-fn taut_span(leaf: &DiscreteLeaf) -> Option<String> {
+fn taut_span_remark(leaf: &DiscreteLeaf) -> Option<String> {
     let n = leaf.segments();
     let holders = |j: usize| {
         let base = [("its base".to_owned(), 0, leaf.leaf.base(j).0)];
-        let grips = leaf.grips_of(j).map(|held| {
-            let sigma = two_digits(leaf.grid.sigma()[held.node]);
+        let grips = leaf.rod_grips(j).map(|held| {
+            let sigma = format_two_digits(leaf.grid.sigma()[held.node]);
             (
                 format!("the grip at {sigma} of its length"),
                 held.node,
                 held.position,
             )
         });
-        let tip = leaf.leaf.held.as_ref();
+        let tip = leaf.leaf.tip_support.as_ref();
         let tip = tip.map(|held| ("its tip".to_owned(), n, held.position));
         base.into_iter().chain(grips).chain(tip).collect::<Vec<_>>()
     };
@@ -305,7 +318,7 @@ fn taut_span(leaf: &DiscreteLeaf) -> Option<String> {
         // Within a stretch that a grip holds every node is held.
         to > from + 1
             && sections().all(|it| it.compliance.x == 0.0)
-            && distance >= length * (1.0 - STRAIGHT)
+            && distance >= length * (1.0 - STRAIGHT_SPAN_TOLERANCE)
     };
     (0..leaf.rods()).find_map(|j| {
         let holders = holders(j);
@@ -324,11 +337,15 @@ fn taut_span(leaf: &DiscreteLeaf) -> Option<String> {
 }
 
 /// Loads that advice names, as a part of the largest.
-const COUNTS: f64 = 0.1;
+const NAMED_LOAD_FRACTION: f64 = 0.1;
 
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
-fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, f64)>) -> String {
+fn advice(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    reached: Option<(Stage, f64)>,
+) -> String {
     if let Some(slip) = obstacle(problem.leaf.scenario()) {
         return format!(": {slip}");
     }
@@ -338,7 +355,7 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
     if let Some(half_turn) = level.leaf.half_turn_near(&level.state) {
         return format!(": {}", half_turn.sentence());
     }
-    if let Some(taut) = taut_span(&level.leaf) {
+    if let Some(taut) = taut_span_remark(&level.leaf) {
         return format!(": {taut}");
     }
     let bends = |j: usize| {
@@ -356,7 +373,7 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
     let loads = problem.leaf.loads;
     let [weight, tip] = [loads.gravity, loads.tip_force].map(|load| load.length());
-    let moment = problem.leaf.moments().map(|(_, moment)| moment);
+    let moment = problem.leaf.dead_moments().map(|(_, moment)| moment);
     let moment = moment.max_by(|a, b| a.length().total_cmp(&b.length()));
     // Along the directors at the base a moment shows what it turns; forces turn by their arms.
     let base = level.state.q[level.state.base(vein)];
@@ -369,10 +386,10 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
         (weight * problem.leaf.rods() as f64, "load.gravity"),
         (tip, "load.tip_force"),
         (loads.tip_moment.length(), "load.tip_moment"),
-        (problem.leaf.largest_on_points(), "load.point.moment"),
+        (problem.leaf.largest_point_moment(), "load.point.moment"),
     ];
     let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
-    let counts = |(size, _): &&(f64, _)| *size > COUNTS * largest;
+    let counts = |(size, _): &&(f64, _)| *size > NAMED_LOAD_FRACTION * largest;
     let loads: Vec<&str> = named.iter().filter(counts).map(|(_, name)| *name).collect();
     let load = match loads.is_empty() {
         true => "the curvatures at rest".to_owned(),
@@ -384,7 +401,7 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
         }
         _ => String::new(),
     };
-    let otherwise = match moment.is_some() && problem.leaf.held.is_none() {
+    let otherwise = match moment.is_some() && problem.leaf.tip_support.is_none() {
         true => ", or try the method shooting",
         false => "",
     };
@@ -396,21 +413,21 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
 
 /// The implausible properties of a leaf at rest, one short sentence each; first those of its
 /// scenario.
-pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
+pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
     if !leaf.outcome.is_at_rest() {
         return Vec::new();
     }
     let (rods, stations) = (&leaf.shape.rods, &leaf.shape.stations);
-    let mut all = slips(scenario);
+    let mut all = plausibility_warnings(scenario);
     if out_of_reach(scenario).is_none() {
-        let strained = || stretched(strains(scenario, rods, stations));
-        all.extend(inverted(rods, stations).or_else(strained));
+        let strained = || stretch_doubt(excess_stretches(scenario, rods, stations));
+        all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
     all
 }
 
 /// Relative stretch beyond the rest stretch, with the vein and the fraction of its length.
-fn strains<'l>(
+fn excess_stretches<'l>(
     scenario: &'l Scenario,
     rods: &'l [RodShape],
     stations: &'l [f64],
@@ -423,9 +440,9 @@ fn strains<'l>(
     rods.iter().enumerate().flat_map(of)
 }
 
-fn stretched(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String> {
+fn stretch_doubt(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String> {
     let (strain, j, at) = strains.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (strain > STRETCHED).then(|| {
+    (strain > LARGEST_PLAUSIBLE_STRETCH).then(|| {
         format!(
             "vein {} is stretched by {:.0} % at {at:.2} of its length: few materials follow a linear law so far",
             j + 1,
@@ -435,7 +452,7 @@ fn stretched(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String>
 }
 
 /// A vein with inverted elements (non-positive stretch).
-fn inverted(rods: &[RodShape], stations: &[f64]) -> Option<String> {
+fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<String> {
     let backwards = |rod: &RodShape| rod.nodes.iter().position(|node| node.v.x <= 0.0);
     let mut rods = rods.iter().enumerate();
     rods.find_map(|(j, rod)| {

@@ -13,10 +13,10 @@
 
 use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::motion::{Explicit, Physics, Snapshot, Stopped, TimeIntegrator};
-use crate::newton::{Stop, Work};
+use crate::newton::{EquilibriumFailure, SolverCounts};
 use crate::relax::request::RelaxError;
 use crate::relax::saddle;
-use crate::relax::solve_on_grid::Relaxation;
+use crate::relax::solve_on_grid::GridRelaxation;
 use crate::run::{Limit, RefusedOption};
 use crate::scenario::Rod;
 
@@ -25,9 +25,9 @@ const CHECK_INTERVAL: f64 = 0.25;
 
 /// It is in a valley if its energy is convex in this many consecutive checks and its kinetic
 /// energy is at most this part of the maximum.
-const CONVEX: usize = 3;
+const MIN_CONVEX_CHECKS: usize = 3;
 
-const SLOW: f64 = 1e-2;
+const SMALL_KINETIC_FRACTION: f64 = 1e-2;
 
 /// Time after which the descent begins in any case: soft modes take longer to decide.
 const LONGEST_MOTION: f64 = 100.0;
@@ -39,10 +39,10 @@ const STEP: f64 = 0.95;
 const STEPS_PER_CHECK: usize = 200;
 
 /// Steps of the motion into the valley between checks of the time limit.
-const STEPS_PER_PIECE: f64 = 2000.0;
+const STEPS_BETWEEN_LIMIT_CHECKS: f64 = 2000.0;
 
 /// Limit on nodes times steps in between: a tenth of a second.
-const NODES_PER_PIECE: f64 = 5e6;
+const NODE_STEPS_BETWEEN_CHECKS: f64 = 5e6;
 
 /// Best accuracy that rounding allows.
 const LEAST_ACCURACY: f64 = 1e-10;
@@ -54,15 +54,15 @@ const FIRST_BALANCE: f64 = 0.1;
 /// is no longer than this.
 const STAGNATION: usize = 50;
 
-const LONGEST_REMAINING: f64 = 1e-6;
+const LARGEST_STAGNANT_DISTANCE: f64 = 1e-6;
 
 /// Limit on nodes times steps: some ten seconds.
 const BUDGET: usize = 600_000_000;
 
-const RIGID: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
+const RIGID_RODS_REFUSAL: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
 
-const FOLLOWS: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
+const DEAD_MOMENT_REFUSAL: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
      need not come to rest; use semi-implicit, or shooting";
 
 /// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
@@ -74,23 +74,23 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
         stiffest.is_infinite()
     };
     if leaf.scenario().rods.iter().any(rigid) {
-        return refuse(RIGID);
+        return refuse(RIGID_RODS_REFUSAL);
     }
     if leaf.loads.has_moments() {
-        return refuse(FOLLOWS);
+        return refuse(DEAD_MOMENT_REFUSAL);
     }
     Ok(())
 }
 
 /// Lets the leaf come to rest.
-pub fn settle(
+pub fn relax_explicitly(
     leaf: &DiscreteLeaf,
     system: &mut System,
-    request: &mut Relaxation,
-) -> Result<f64, Stop> {
-    let physics = Physics::at_rest(&leaf.leaf);
+    request: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
+    let physics = Physics::for_relaxation(&leaf.leaf);
     let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
-    let mut motion = motion.map_err(|_| Stop::Stuck)?;
+    let mut motion = motion.map_err(|_| EquilibriumFailure::NoDescent)?;
     let most_steps = BUDGET / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
         true => Ok(()),
@@ -99,7 +99,7 @@ pub fn settle(
     let settled = settled.and_then(|()| descend(leaf, &mut motion, system, most_steps, request));
     request.work.steps += motion.steps();
     request.work.force_evaluations += motion.steps();
-    request.state = motion.now();
+    request.state = motion.present_state();
     settled
 }
 
@@ -109,22 +109,22 @@ fn find_valley(
     motion: &mut Explicit,
     system: &mut System,
     most_steps: usize,
-    request: &mut Relaxation,
-) -> Result<(), Stop> {
+    request: &mut GridRelaxation,
+) -> Result<(), EquilibriumFailure> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
         let now = move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
         fastest = fastest.max(now.energy.kinetic);
-        let slow = now.energy.kinetic <= SLOW * fastest;
+        let slow = now.energy.kinetic <= SMALL_KINETIC_FRACTION * fastest;
         let shift = leaf.neutral_shift();
         let valley = saddle::index(leaf, &now.state, system, shift, request.work) == Some(0);
         convex = if valley { convex + 1 } else { 0 };
-        request.moved |= !valley;
-        if slow && convex >= CONVEX {
+        request.left_convex_valley |= !valley;
+        if slow && convex >= MIN_CONVEX_CHECKS {
             break;
         }
         if motion.steps() > most_steps || request.limit.reached() {
-            return Err(Stop::StepLimit);
+            return Err(EquilibriumFailure::StepLimit);
         }
         (request.progress)(motion.steps(), leaf.residual(&now.state));
     }
@@ -137,9 +137,9 @@ fn move_to_next_check(
     motion: &mut Explicit,
     nodes: usize,
     limit: &Limit,
-) -> Result<Snapshot, Stop> {
+) -> Result<Snapshot, EquilibriumFailure> {
     let begin = motion.time();
-    let steps = STEPS_PER_PIECE.min((NODES_PER_PIECE / nodes as f64).max(1.0));
+    let steps = STEPS_BETWEEN_LIMIT_CHECKS.min((NODE_STEPS_BETWEEN_CHECKS / nodes as f64).max(1.0));
     let pieces = match limit.is_none() {
         false => (CHECK_INTERVAL / (steps * motion.longest_step())).ceil(),
         true => 1.0,
@@ -150,11 +150,11 @@ fn move_to_next_check(
         let now = motion
             .advance(begin + CHECK_INTERVAL * (piece / pieces))
             .map_err(|stopped| match stopped {
-                Stopped::Unresolved { .. } => Stop::Unresolved,
-                _ => Stop::Stuck,
+                Stopped::Unresolved { .. } => EquilibriumFailure::Unresolved,
+                _ => EquilibriumFailure::NoDescent,
             })?;
         if limit.reached() {
-            return Err(Stop::StepLimit);
+            return Err(EquilibriumFailure::StepLimit);
         }
         if piece >= pieces {
             return Ok(now);
@@ -168,10 +168,11 @@ fn descend(
     motion: &mut Explicit,
     system: &mut System,
     most_steps: usize,
-    request: &mut Relaxation,
-) -> Result<f64, Stop> {
+    request: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
     let accuracy = request.accuracy.max(LEAST_ACCURACY);
-    let large = (leaf.rods() * leaf.segments()) as f64 > NODES_PER_PIECE / STEPS_PER_PIECE;
+    let large = (leaf.rods() * leaf.segments()) as f64
+        > NODE_STEPS_BETWEEN_CHECKS / STEPS_BETWEEN_LIMIT_CHECKS;
     motion.use_fictitious_masses();
     let mut balanced = FIRST_BALANCE * accuracy;
     let (mut since, mut before) = (0, 0.0);
@@ -179,7 +180,7 @@ fn descend(
     loop {
         for _ in 0..STEPS_PER_CHECK {
             if large && request.limit.reached() {
-                return Err(Stop::StepLimit);
+                return Err(EquilibriumFailure::StepLimit);
             }
             let rate = 3.0 / (STEP * (since + 2) as f64);
             motion.set_damping(rate);
@@ -192,10 +193,10 @@ fn descend(
                 (since, before) = (0, 0.0);
             }
         }
-        let state = motion.now();
+        let state = motion.present_state();
         let residual = leaf.residual(&state);
         if !(residual.is_finite() && state.x.iter().all(|x| x.is_finite())) {
-            return Err(Stop::Stuck);
+            return Err(EquilibriumFailure::NoDescent);
         }
         (request.progress)(motion.steps(), residual);
         checks_since_best += 1;
@@ -203,26 +204,31 @@ fn descend(
             (best, checks_since_best) = (residual, 0);
         }
         if residual <= balanced || checks_since_best > STAGNATION {
-            let remaining = remaining(leaf, &state, system, request.work);
+            let remaining = distance_to_equilibrium(leaf, &state, system, request.work);
             let stagnates = checks_since_best > STAGNATION;
-            if remaining <= accuracy || stagnates && remaining <= LONGEST_REMAINING {
+            if remaining <= accuracy || stagnates && remaining <= LARGEST_STAGNANT_DISTANCE {
                 return Ok(remaining);
             }
             if stagnates {
-                return Err(Stop::StepLimit);
+                return Err(EquilibriumFailure::StepLimit);
             }
             balanced *= (0.5 * accuracy / remaining).max(1e-3);
         }
         if motion.steps() > most_steps || request.limit.reached() {
-            return Err(Stop::StepLimit);
+            return Err(EquilibriumFailure::StepLimit);
         }
     }
 }
 
 /// Distance to equilibrium, measured by a Newton step that is not taken.
-fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> f64 {
+fn distance_to_equilibrium(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut SolverCounts,
+) -> f64 {
     leaf.assemble(state, system);
-    leaf.hold_turn(state, system);
+    leaf.add_phase_conditions(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
     let Ok(pattern) = DirectSolver::new(system) else {
@@ -232,6 +238,6 @@ fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut
         return f64::INFINITY;
     };
     factor.solve(system, None);
-    let (turn, shift) = system.largest();
+    let (turn, shift) = system.largest_increment();
     turn.max(shift)
 }

@@ -7,26 +7,26 @@
 //! shortest does not help, the leaf has lost its stability.
 
 use crate::homotopy::Homotopy;
-use crate::leaf::{DiscreteLeaf, Gripped, State, System};
-use crate::newton::{Definite, Equations, Newton, Stop};
-use crate::relax::path::{Event, Happening, Stage};
-use crate::relax::rest::{Effort, Problem};
+use crate::leaf::{DiscreteLeaf, GrippedNode, State, System};
+use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
+use crate::relax::path::{Event, StabilityLoss, Stage};
+use crate::relax::rest::{RelaxationProblem, WorkLog};
 use crate::relax::saddle;
-use crate::relax::solve_on_grid::{FAR_FROM_REST, Relaxation};
+use crate::relax::solve_on_grid::{FAR_FROM_REST, GridRelaxation};
 use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// Largest displacement (lengths) and rotation (radians) of the grips in a step.
-const SHIFT: f64 = 0.1;
+const LARGEST_GRIP_DISPLACEMENT: f64 = 0.1;
 
-const TURN: f64 = 0.4;
+const LARGEST_GRIP_ROTATION: f64 = 0.4;
 
 /// The shortest step, as a part of the longest; the factor on a step that failed, and that on one
 /// after a step that did not.
 const SHORTEST: f64 = 1.0 / 32.0;
 
-const SHORTENED: f64 = 0.25;
+const FAILED_STEP_FACTOR: f64 = 0.25;
 
 const GROWTH: f64 = 2.0;
 
@@ -45,110 +45,117 @@ const ITERATIONS: usize = 8;
 const LARGEST_INCREMENT: f64 = 1.0;
 
 /// Saddles that are left in a step.
-const PUSHES: i32 = 3;
+const MAX_SADDLE_ESCAPES: i32 = 3;
 
 /// How a leaf came to where it is held.
-pub struct Moved {
+pub struct HeldState {
     pub state: State,
     /// Whether it rests there.
     pub near_rest: bool,
     /// Whether its energy was not convex along the path.
-    pub moved: bool,
+    pub left_convex_valley: bool,
     /// Where the path lost its stability.
     pub events: Vec<Event>,
 }
 
 /// Moves tips and other nodes from their positions in `state` to those where they are held.
 pub fn move_grips(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     leaf: &DiscreteLeaf,
     state: State,
-    effort: &mut Effort,
-) -> Moved {
-    let holders = Holders {
-        tips: paths(leaf, &state).unwrap_or_default(),
+    effort: &mut WorkLog,
+) -> HeldState {
+    let holders = SupportPaths {
+        tips: tip_paths(leaf, &state).unwrap_or_default(),
         grips: (0..leaf.rods())
-            .flat_map(|j| leaf.grips_of(j).map(|held| GripPath::of(*held, &state)))
+            .flat_map(|j| {
+                leaf.rod_grips(j)
+                    .map(|held| GripPath::from_start(*held, &state))
+            })
             .collect(),
     };
     let longest = 1.0 / holders.steps();
     let mut path = Homotopy::new(longest, [SHORTEST * longest, longest]);
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
-    let mut walk = HeldWalk {
+    let mut walk = SupportContinuation {
         leaf,
         system: System::new(leaf),
-        held: Relaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit),
+        held: GridRelaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit),
         keeps_unstable: problem.keeps_unstable(),
         events: Vec::new(),
     };
-    walk.begin(&holders);
-    while path.part < 1.0 && !limit.reached() {
-        if walk.step(&holders, path.next(), path.is_shortest()) {
-            path.advance(GROWTH * path.length());
+    walk.relax_held_leaf(&holders);
+    while path.lambda < 1.0 && !limit.reached() {
+        if walk.step(&holders, path.next_lambda(), path.is_shortest()) {
+            path.advance(GROWTH * path.next_step_length());
         } else {
-            path.shorten(SHORTENED);
+            path.shorten(FAILED_STEP_FACTOR);
         }
     }
-    let HeldWalk { held, events, .. } = walk;
-    let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
-    effort.spent += leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
-    leaf.hold(&mut state);
-    Moved {
+    let SupportContinuation { held, events, .. } = walk;
+    let (mut state, near_rest, moved) = (held.state, held.near_rest, held.left_convex_valley);
+    effort.node_evaluations +=
+        leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
+    leaf.place_held_nodes(&mut state);
+    HeldState {
         state,
         near_rest,
-        moved: moved || !events.is_empty(),
+        left_convex_valley: moved || !events.is_empty(),
         events,
     }
 }
 
 /// A leaf at rest while its holders are moved.
-struct HeldWalk<'a> {
+struct SupportContinuation<'a> {
     leaf: &'a DiscreteLeaf,
     system: System,
-    held: Relaxation<'a>,
+    held: GridRelaxation<'a>,
     keeps_unstable: bool,
     events: Vec<Event>,
 }
 
-impl HeldWalk<'_> {
+impl SupportContinuation<'_> {
     /// Brings the leaf to rest where its holders take it.
-    fn begin(&mut self, holders: &Holders) {
-        holders.carry(self.leaf, 0.0, &mut self.held.state);
-        let rest = self.settle();
+    fn relax_held_leaf(&mut self, holders: &SupportPaths) {
+        holders.carry_to_lambda(self.leaf, 0.0, &mut self.held.state);
+        let rest = self.relax_roughly();
         self.held.near_rest = match rest {
-            Err(Stop::Saddle) if !self.keeps_unstable => self.turn_aside(0.0).is_ok(),
+            Err(EquilibriumFailure::Saddle) if !self.keeps_unstable => {
+                self.branch_aside(0.0).is_ok()
+            }
             _ => rest.is_ok(),
         };
     }
 
     /// Makes a step to a part of the path. False, with the leaf as it was, if it should be shorter, as
     /// no equilibrium near the last one was found; the `shortest` is made in any case.
-    fn step(&mut self, holders: &Holders, part: f64, shortest: bool) -> bool {
+    fn step(&mut self, holders: &SupportPaths, part: f64, shortest: bool) -> bool {
         let (before, moved, near_rest) = (
             self.held.state.clone(),
-            self.held.moved,
+            self.held.left_convex_valley,
             self.held.near_rest,
         );
-        holders.carry(self.leaf, part, &mut self.held.state);
+        holders.carry_to_lambda(self.leaf, part, &mut self.held.state);
         let carried = self.held.state.clone();
-        self.held.moved = false;
+        self.held.left_convex_valley = false;
         let rest = match shortest || !near_rest {
-            true => self.settle(),
+            true => self.relax_roughly(),
             false => self.correct(),
         };
         let drift = carried.distance(&self.held.state);
-        let jumped = drift > LARGEST_DRIFT || self.held.moved && drift > LARGEST_DRIFT_OUTSIDE;
+        let jumped =
+            drift > LARGEST_DRIFT || self.held.left_convex_valley && drift > LARGEST_DRIFT_OUTSIDE;
         if !shortest && near_rest && (rest.is_err() || jumped) {
-            (self.held.state, self.held.moved) = (before, moved);
+            (self.held.state, self.held.left_convex_valley) = (before, moved);
             return false;
         }
-        self.held.moved |= moved;
+        self.held.left_convex_valley |= moved;
         let rest = match rest {
-            Err(Stop::Saddle) if !self.keeps_unstable => self.turn_aside(part),
+            Err(EquilibriumFailure::Saddle) if !self.keeps_unstable => self.branch_aside(part),
             rest => {
                 if jumped && near_rest {
-                    self.note(part, Happening::Snapped);
+                    self.record_event(part, StabilityLoss::Snapped);
                 }
                 rest.map(|_| ())
             }
@@ -158,11 +165,11 @@ impl HeldWalk<'_> {
     }
 
     /// From the saddle to which the leaf came it turns to one of its sides.
-    fn turn_aside(&mut self, part: f64) -> Result<(), Stop> {
+    fn branch_aside(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
         let (leaf, saddle) = (self.leaf, self.held.state.clone());
         let system = &mut self.system;
         if !saddle::find_unstable_mode(leaf, &saddle, system, DVec3::ZERO, self.held.work) {
-            return Err(Stop::Saddle);
+            return Err(EquilibriumFailure::Saddle);
         }
         let mode = self.system.solution();
         let sides = [1.0, -1.0].map(|sign| {
@@ -172,38 +179,39 @@ impl HeldWalk<'_> {
             self.leave_saddles().ok()?;
             Some((leaf.energy(&self.held.state), self.held.state.clone()))
         });
-        let (state, equally_open) = saddle::lower_side(sides).ok_or(Stop::Saddle)?;
+        let (state, equally_open) =
+            saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
         self.held.state = state;
-        self.note(part, Happening::Branched { equally_open });
+        self.record_event(part, StabilityLoss::Branched { equally_open });
         Ok(())
     }
 
     /// Brings a leaf that was pushed off a saddle to rest, off others, too.
-    fn leave_saddles(&mut self) -> Result<f64, Stop> {
-        for pushes in 1..PUSHES {
-            self.held.pushes = pushes;
-            let rest = self.settle();
-            self.held.pushes = 0;
-            if rest != Err(Stop::Saddle) {
+    fn leave_saddles(&mut self) -> Result<f64, EquilibriumFailure> {
+        for pushes in 1..MAX_SADDLE_ESCAPES {
+            self.held.saddle_escapes = pushes;
+            let rest = self.relax_roughly();
+            self.held.saddle_escapes = 0;
+            if rest != Err(EquilibriumFailure::Saddle) {
                 return rest;
             }
             let (system, state) = (&mut self.system, &mut self.held.state);
-            saddle::push_off(self.leaf, state, system, DVec3::ZERO, self.held.work);
+            saddle::escape_saddle(self.leaf, state, system, DVec3::ZERO, self.held.work);
         }
-        Err(Stop::Saddle)
+        Err(EquilibriumFailure::Saddle)
     }
 
     /// Newton's method from where the leaf was carried to the equilibrium nearby, through convex states
     /// only.
-    fn correct(&mut self) -> Result<f64, Stop> {
-        let newton = Newton {
+    fn correct(&mut self) -> Result<f64, EquilibriumFailure> {
+        let newton = NewtonIteration {
             accuracy: ACCURACY,
             iterations: ITERATIONS,
             work: self.held.work,
             progress: self.held.progress,
         };
-        self.held.solver = Definite::default();
-        let equations = Equations::Definite {
+        self.held.solver = DefiniteSolver::default();
+        let equations = NewtonEquations::Definite {
             solver: &mut self.held.solver,
             largest: LARGEST_INCREMENT,
             shifted: false,
@@ -215,17 +223,17 @@ impl HeldWalk<'_> {
         let shift = leaf.neutral_shift();
         match saddle::index(leaf, state, system, shift, self.held.work) {
             Some(0) => Ok(rest),
-            _ => Err(Stop::Saddle),
+            _ => Err(EquilibriumFailure::Saddle),
         }
     }
 
     /// Brings the leaf roughly to rest with its holders fixed.
-    fn settle(&mut self) -> Result<f64, Stop> {
-        self.held.solver = Definite::default();
-        self.held.settle(self.leaf, &mut self.system)
+    fn relax_roughly(&mut self) -> Result<f64, EquilibriumFailure> {
+        self.held.solver = DefiniteSolver::default();
+        self.held.relax_semi_implicitly(self.leaf, &mut self.system)
     }
 
-    fn note(&mut self, part: f64, happening: Happening) {
+    fn record_event(&mut self, part: f64, happening: StabilityLoss) {
         self.events.push(Event {
             stage: Stage::Moving,
             part,
@@ -235,30 +243,30 @@ impl HeldWalk<'_> {
 }
 
 /// The paths of all that is held.
-struct Holders {
-    tips: Vec<Path>,
+struct SupportPaths {
+    tips: Vec<TipPath>,
     grips: Vec<GripPath>,
 }
 
-impl Holders {
+impl SupportPaths {
     /// The number of the longest steps along the path, at least one.
     fn steps(&self) -> f64 {
-        let tips = self.tips.iter().map(Path::steps);
+        let tips = self.tips.iter().map(TipPath::steps);
         tips.chain(self.grips.iter().map(GripPath::steps))
             .fold(1.0, f64::max)
     }
 
     /// Carries what is held to a part of the path, and the nodes between in proportion.
-    fn carry(&self, leaf: &DiscreteLeaf, part: f64, state: &mut State) {
+    fn carry_to_lambda(&self, leaf: &DiscreteLeaf, part: f64, state: &mut State) {
         for (j, path) in self.tips.iter().enumerate() {
             path.move_tip(leaf, j, part, state);
         }
-        carry(leaf, &self.grips, part, state);
+        carry_gripped_nodes(leaf, &self.grips, part, state);
     }
 }
 
 /// The path of the tip of a rod from a free start to its holder.
-struct Path {
+struct TipPath {
     from: DVec3,
     to: DVec3,
     /// Of a clamp: the angle of d1 about e3 at both ends, the final twist about d1, and the
@@ -267,9 +275,9 @@ struct Path {
 }
 
 /// The paths of all tips; `None` if they are free.
-fn paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<Path>> {
-    let held = leaf.leaf.held.as_ref()?;
-    let path = |j: usize| Path {
+fn tip_paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<TipPath>> {
+    let held = leaf.leaf.tip_support.as_ref()?;
+    let path = |j: usize| TipPath {
         from: start.tip(j),
         to: held.position,
         clamp: held.clamps.as_ref().map(|clamps| {
@@ -301,14 +309,14 @@ fn heading(rod: &[DQuat]) -> f64 {
     angle(&rod[0]) + turns.sum::<f64>()
 }
 
-impl Path {
+impl TipPath {
     /// The number of steps along the path.
     fn steps(&self) -> f64 {
         let turn = self.clamp.map_or(0.0, |([from, to], twist, other)| {
             (to - from).abs() + twist.abs() + other.length()
         });
-        (self.from.distance(self.to) / SHIFT)
-            .max(turn / TURN)
+        (self.from.distance(self.to) / LARGEST_GRIP_DISPLACEMENT)
+            .max(turn / LARGEST_GRIP_ROTATION)
             .ceil()
     }
 
@@ -336,13 +344,13 @@ impl Path {
 
 /// The path of a node from where it is to where a grip holds it.
 struct GripPath {
-    held: Gripped,
+    held: GrippedNode,
     from: DVec3,
     turn: DVec3,
 }
 
 impl GripPath {
-    fn of(held: Gripped, start: &State) -> Self {
+    fn from_start(held: GrippedNode, start: &State) -> Self {
         let k = start.base(held.rod) + held.node;
         let turn = |to: DQuat| rotation::log(to * start.q[k].conjugate());
         GripPath {
@@ -355,22 +363,24 @@ impl GripPath {
     /// The number of steps along the path.
     fn steps(&self) -> f64 {
         let distance = self.from.distance(self.held.position);
-        (distance / SHIFT).max(self.turn.length() / TURN).ceil()
+        (distance / LARGEST_GRIP_DISPLACEMENT)
+            .max(self.turn.length() / LARGEST_GRIP_ROTATION)
+            .ceil()
     }
 }
 
 /// Carries gripped nodes to the fraction `part` of their paths. The nodes between two of them, or
 /// one and the end of the vein, are displaced in proportion to their distances.
-fn carry(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) {
+fn carry_gripped_nodes(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) {
     let (n, sigma) = (leaf.segments(), leaf.grid.sigma());
     for j in 0..leaf.rods() {
         let (base, mut before) = (state.base(j), (0, DVec3::ZERO));
-        let fixed_tip = leaf.leaf.held.is_some() || leaf.tips_move_together();
+        let fixed_tip = leaf.leaf.tip_support.is_some() || leaf.tips_move_together();
         let of_rod: Vec<&GripPath> = paths.iter().filter(|path| path.held.rod == j).collect();
         for path in &of_rod {
             let node = path.held.node;
             let shift = path.from.lerp(path.held.position, part) - state.x[base + node];
-            between(sigma, [before, (node, shift)], |i, shift| {
+            interpolate_displacements(sigma, [before, (node, shift)], |i, shift| {
                 state.x[base + i] += shift
             });
             state.x[base + node] += shift;
@@ -382,7 +392,7 @@ fn carry(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) 
         }
         if !of_rod.is_empty() && before.0 < n {
             let end = if fixed_tip { DVec3::ZERO } else { before.1 };
-            between(sigma, [before, (n, end)], |i, shift| {
+            interpolate_displacements(sigma, [before, (n, end)], |i, shift| {
                 state.x[base + i] += shift
             });
             if !fixed_tip {
@@ -393,7 +403,7 @@ fn carry(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) 
 }
 
 /// Passes the nodes between two nodes, with their displacements interpolated.
-fn between(
+fn interpolate_displacements(
     sigma: &[f64],
     [(a, from), (b, to)]: [(usize, DVec3); 2],
     mut each: impl FnMut(usize, DVec3),

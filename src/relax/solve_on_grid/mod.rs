@@ -17,20 +17,20 @@ pub(crate) mod no_potential;
 pub(crate) mod semi_implicit;
 pub(crate) mod start;
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, Solved, State, System, half_of};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, State, System, half_state};
 use crate::memory;
-use crate::newton::{Definite, Newton, Stop, Work};
+use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::relax::accuracy::{
-    FINEST, Failure, History, Level, NestedEquilibrium, complete, is_large,
+    FINEST, GridLevel, History, NestedEquilibrium, RelaxationFailure, is_large, mirror_level,
 };
 use crate::relax::path::Event;
 use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
-use crate::relax::rest::{BUDGET, COARSEST, Effort, Problem};
+use crate::relax::rest::{BUDGET, COARSEST, RelaxationProblem, WorkLog};
 use crate::relax::saddle;
-use crate::relax::saddle::saddle_of;
+use crate::relax::saddle::saddle_at_state;
 use crate::relax::solve_on_grid::grips::move_grips;
 pub use crate::relax::solve_on_grid::semi_implicit::softens;
-use crate::relax::solve_on_grid::start::{disturb, start};
+use crate::relax::solve_on_grid::start::{disturb, initial_state};
 use crate::run::{Limit, RefusedOption};
 use glam::DVec3;
 
@@ -48,9 +48,9 @@ const FIXED_ACCURACY: f64 = 1e-12;
 
 /// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
 /// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
-const LEAST_EVALUATIONS: (usize, usize) = (600, 100);
+const GUARANTEED_EVALUATIONS: (usize, usize) = (600, 100);
 
-const COARSE: usize = 64;
+const COARSE_GRID_SEGMENTS: usize = 64;
 
 /// Newton iterations towards an equilibrium of any kind.
 const MAX_ITERATIONS: usize = 200;
@@ -75,42 +75,42 @@ pub enum InitialGuess {
 }
 
 /// The end of the iteration on a grid, converged or not.
-pub struct Settled {
-    pub level: Level,
+pub struct GridSolution {
+    pub level: GridLevel,
     /// The remaining iteration error.
-    pub rest: Result<f64, Stop>,
+    pub iteration_error: Result<f64, EquilibriumFailure>,
     /// Whether it had to move through states of non-convex energy, instead of settling in the
     /// valley of the initial guess.
-    pub moved: bool,
+    pub left_convex_valley: bool,
     /// Where a leaf that was moved to its holders lost its stability; `None` if it was not.
     pub events: Option<Vec<Event>>,
 }
 
 /// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
 /// resistance leans down. The `history` is that on the grids before, and goes on here.
-pub fn settle(
-    problem: &Problem,
+pub fn find_grid_equilibrium(
+    problem: &RelaxationProblem,
     history: &mut History,
     (grid, guess): (Grid, InitialGuess),
-    effort: &mut Effort,
-) -> Settled {
-    let mut settled = settle_upright(problem, history, (grid, guess), effort);
-    let Level { leaf, state } = &mut settled.level;
-    leaf.lean_down(state);
+    effort: &mut WorkLog,
+) -> GridSolution {
+    let mut settled = find_unleaned_equilibrium(problem, history, (grid, guess), effort);
+    let GridLevel { leaf, state } = &mut settled.level;
+    leaf.rotate_to_representative(state);
     settled
 }
 
 /// The same without leaning.
-fn settle_upright(
-    problem: &Problem,
+fn find_unleaned_equilibrium(
+    problem: &RelaxationProblem,
     history: &mut History,
     (grid, guess): (Grid, InitialGuess),
-    effort: &mut Effort,
-) -> Settled {
+    effort: &mut WorkLog,
+) -> GridSolution {
     let mut leaf = DiscreteLeaf::new(problem.leaf, grid);
     let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
     let from_start = matches!(guess, InitialGuess::Start);
-    let grip = leaf.leaf.is_held() && from_start;
+    let grip = leaf.leaf.has_placed_supports() && from_start;
     let cg_tolerance = match guess {
         InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
         InitialGuess::Coarser(_) => 1e-4,
@@ -119,7 +119,7 @@ fn settle_upright(
         InitialGuess::Predicted(_) => 1e-8,
     };
     let mut state = match guess {
-        InitialGuess::Start => start_of(problem, &leaf),
+        InitialGuess::Start => scenario_start_state(problem, &leaf),
         InitialGuess::Coarser(state)
         | InitialGuess::Predicted(state)
         | InitialGuess::Pushed(state) => state,
@@ -133,11 +133,11 @@ fn settle_upright(
             true => move_grips(problem, &leaf.without_moments(), state, effort),
             false => move_grips(problem, &leaf, state, effort),
         };
-        (state, moved) = (held.state, held.moved);
+        (state, moved) = (held.state, held.left_convex_valley);
         near_rest = held.near_rest && !dead_moment;
         events = Some(held.events).filter(|_| leaf.leaf.has_potential());
     } else {
-        leaf.hold(&mut state);
+        leaf.place_held_nodes(&mut state);
     }
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     let windy = leaf.leaf.in_wind();
@@ -150,14 +150,14 @@ fn settle_upright(
         let mut system = System::new(&leaf);
         let begun = from_start.then(|| (state.clone(), effort.work.steps));
         let settled =
-            settle_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
+            solve_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
         if let Some((begun, steps)) = begun {
             let distance = begun.distance(&settled.level.state);
             history.from_start = Some((distance, effort.work.steps - steps));
         }
         effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
-        return Settled {
-            moved: moved || settled.moved,
+        return GridSolution {
+            left_convex_valley: moved || settled.left_convex_valley,
             events,
             ..settled
         };
@@ -166,48 +166,55 @@ fn settle_upright(
     let mut system = System::new(&leaf);
     let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
     let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
-    let mut relaxation = Relaxation {
+    let mut relaxation = GridRelaxation {
         near_rest,
-        moved,
-        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+        left_convex_valley: moved,
+        ..GridRelaxation::new(state, accuracy, out, &problem.options.limit)
     };
     let rest = match (explicit, dead_moment) {
-        _ if windy => no_potential::settle_in_wind(&mut leaf, &mut system, &mut relaxation),
-        (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
-        (_, true) => {
-            no_potential::settle_with_dead_moments(&mut leaf, &mut system, &mut relaxation)
-        }
+        _ if windy => no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation),
+        (true, _) => explicit::relax_explicitly(&leaf, &mut system, &mut relaxation),
+        (_, true) => no_potential::solve_with_dead_moments(&mut leaf, &mut system, &mut relaxation),
         // To the next equilibrium, stable or not.
         _ => {
-            let newton = Newton {
+            let newton = NewtonIteration {
                 accuracy,
                 iterations: MAX_ITERATIONS,
                 work: relaxation.work,
                 progress: relaxation.progress,
             };
-            newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
+            newton.solve(
+                &leaf,
+                &mut relaxation.state,
+                &mut system,
+                saddle::INDEFINITE_NEWTON_EQUATIONS,
+            )
         }
     };
-    let Relaxation { state, moved, .. } = relaxation;
+    let GridRelaxation {
+        state,
+        left_convex_valley: moved,
+        ..
+    } = relaxation;
     if explicit || windy {
-        history.remaining = history.remaining.max(rest.unwrap_or(0.0));
+        history.iteration_error = history.iteration_error.max(rest.unwrap_or(0.0));
     }
-    let level = Level { leaf, state };
-    Settled {
+    let level = GridLevel { leaf, state };
+    GridSolution {
         level,
-        rest,
-        moved,
+        iteration_error: rest,
+        left_convex_valley: moved,
         events,
     }
 }
 
 /// The start of a leaf without an initial guess.
-pub(super) fn start_of(problem: &Problem, leaf: &DiscreteLeaf) -> State {
-    if let Some(whole) = problem.whole {
+pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteLeaf) -> State {
+    if let Some(whole) = problem.whole_leaf {
         let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
-        return half_of(problem.leaf, &start(&whole));
+        return half_state(problem.leaf, &initial_state(&whole));
     }
-    let mut state = start(leaf);
+    let mut state = initial_state(leaf);
     if let Method::SemiImplicit(SemiImplicit {
         disturbance: Some(number),
         ..
@@ -219,12 +226,12 @@ pub(super) fn start_of(problem: &Problem, leaf: &DiscreteLeaf) -> State {
 }
 
 /// Iteration error allowed on a grid.
-fn accuracy(problem: &Problem, history: &History, leaf: &DiscreteLeaf) -> f64 {
+fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf) -> f64 {
     let first = history.coarsest.unwrap_or(leaf.segments());
     match problem.segments() {
         Some(_) => FIXED_ACCURACY,
         None if problem.too_coarse(first) => {
-            match history.coarsest.is_none() && problem.may_be_alone() {
+            match history.coarsest.is_none() && problem.may_use_single_grid() {
                 true => ITERATION_PART_ALONE * problem.tolerance,
                 false => ITERATION_PART_FROM_COARSE * problem.tolerance,
             }
@@ -234,70 +241,75 @@ fn accuracy(problem: &Problem, history: &History, leaf: &DiscreteLeaf) -> f64 {
 }
 
 /// Settles by the semi-implicit method.
-fn settle_semi_implicit(
-    (problem, history): (&Problem, &mut History),
+fn solve_semi_implicit(
+    (problem, history): (&RelaxationProblem, &mut History),
     (leaf, state): (DiscreteLeaf, State),
     system: &mut System,
     (near_rest, cg_tolerance): (bool, f64),
-    effort: &mut Effort,
-) -> Settled {
+    effort: &mut WorkLog,
+) -> GridSolution {
     let accuracy = accuracy(problem, history, &leaf);
-    let convex_only =
-        problem.whole.is_some() || problem.stays_in_valley || problem.too_coarse(leaf.segments());
+    let convex_only = problem.whole_leaf.is_some()
+        || problem.stays_in_valley
+        || problem.too_coarse(leaf.segments());
     let nodes = leaf.rods() * leaf.segments();
-    let (most, least) = LEAST_EVALUATIONS;
-    let granted = (most * COARSE / leaf.segments()).clamp(least, most);
-    let allowed = (BUDGET.saturating_sub(effort.spent) / nodes).max(granted);
+    let (most, least) = GUARANTEED_EVALUATIONS;
+    let granted = (most * COARSE_GRID_SEGMENTS / leaf.segments()).clamp(least, most);
+    let allowed = (BUDGET.saturating_sub(effort.node_evaluations) / nodes).max(granted);
     let most_evaluations = effort.work.force_evaluations + allowed;
     let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
     let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
-    let mut relaxation = Relaxation {
+    let mut relaxation = GridRelaxation {
         near_rest,
         cg_tolerance,
-        solver: Definite::after(history.contraction),
+        solver: DefiniteSolver::with_contraction(history.contraction),
         most_evaluations,
         convex_only,
-        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+        ..GridRelaxation::new(state, accuracy, out, &problem.options.limit)
     };
-    let mut rest = Err(Stop::StepLimit);
+    let mut rest = Err(EquilibriumFailure::StepLimit);
     // After earlier pushes off saddles at rest, the softened leaf returned to one.
-    for pushes in history.pushes..history.pushes + MAX_SADDLES {
-        relaxation.pushes = pushes;
+    for pushes in history.saddle_escapes..history.saddle_escapes + MAX_SADDLES {
+        relaxation.saddle_escapes = pushes;
         let before = relaxation.work.force_evaluations;
-        let settled = relaxation.settle(&leaf, system);
-        effort.spent += nodes * (relaxation.work.force_evaluations - before);
+        let settled = relaxation.relax_semi_implicitly(&leaf, system);
+        effort.node_evaluations += nodes * (relaxation.work.force_evaluations - before);
         if let Ok(remaining) = settled {
-            history.remaining = history.remaining.max(remaining);
-            if history.coarsest.is_none() && relaxation.solver.direct.is_none() {
-                history.effects = effects(&leaf, &relaxation.state, system);
+            history.iteration_error = history.iteration_error.max(remaining);
+            if history.coarsest.is_none() && relaxation.solver.direct_solver.is_none() {
+                history.shear_stretch_effects = strain_effects(&leaf, &relaxation.state, system);
             }
         }
-        if settled != Err(Stop::Saddle) || convex_only {
+        if settled != Err(EquilibriumFailure::Saddle) || convex_only {
             rest = settled;
             break;
         }
         let state = &mut relaxation.state;
-        match saddle::polish(&leaf, state, system, relaxation.work) {
+        match saddle::converge_saddle(&leaf, state, system, relaxation.work) {
             Some(0) => {
                 rest = Ok(accuracy);
                 break;
             }
-            Some(index) => history.saddle = Some(saddle_of(&leaf, state, index)),
+            Some(index) => history.saddle = Some(saddle_at_state(&leaf, state, index)),
             None => {}
         }
-        let leaning = problem.options.leaning;
-        saddle::push_off(&leaf, state, system, leaning, relaxation.work);
+        let leaning = problem.options.bias_direction;
+        saddle::escape_saddle(&leaf, state, system, leaning, relaxation.work);
         relaxation.near_rest = false;
         relaxation.cg_tolerance = FAR_FROM_REST;
-        relaxation.solver.direct = None;
+        relaxation.solver.direct_solver = None;
     }
-    let Relaxation { state, moved, .. } = relaxation;
+    let GridRelaxation {
+        state,
+        left_convex_valley: moved,
+        ..
+    } = relaxation;
     history.contraction = relaxation.solver.contraction;
-    let level = Level { leaf, state };
-    Settled {
+    let level = GridLevel { leaf, state };
+    GridSolution {
         level,
-        rest,
-        moved,
+        iteration_error: rest,
+        left_convex_valley: moved,
         events: None,
     }
 }
@@ -318,14 +330,14 @@ fn step_reporter(
 
 /// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
 /// factorisation of the last iteration.
-fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
-    if system.tied() {
+fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    if system.has_tissue() {
         return [None; 2];
     }
     [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {
-            Solved::Yes(_) => Some(system.largest().1),
+            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().1),
             _ => None,
         }
     })
@@ -342,13 +354,13 @@ struct Count {
 /// Counts the negative eigenvalues on one grid, and whether the leaf is clearly stable. If
 /// it is not and will be `compared` with another grid nothing is counted.
 fn count_negative(
-    problem: &Problem,
-    level: &Level,
+    problem: &RelaxationProblem,
+    level: &GridLevel,
     system: &mut System,
     compared: bool,
-    work: &mut Work,
+    work: &mut SolverCounts,
 ) -> Count {
-    let Level { leaf, state } = level;
+    let GridLevel { leaf, state } = level;
     let clearly_stable = saddle::clearly_stable(leaf, state, system, work);
     let index = match clearly_stable {
         true => Some(0),
@@ -358,7 +370,7 @@ fn count_negative(
                 index: None,
             };
         }
-        false if leaf.neutral_shift() > saddle::NOISY => {
+        false if leaf.neutral_shift() > saddle::NOISY_EIGENVALUE_THRESHOLD => {
             let within = saddle::index_within_rounding(leaf, state, system, work);
             // Whatever is unstable is pushed off, however many its unstable modes.
             let known = |&[least, most]: &[usize; 2]| {
@@ -380,26 +392,26 @@ fn count_negative(
 /// equilibrium reached. Returns whether stability is known, as far as possible: if not,
 /// finer grids are needed.
 pub fn check_stability(
-    problem: &Problem,
+    problem: &RelaxationProblem,
     found: NestedEquilibrium,
     last: bool,
-    effort: &mut Effort,
-) -> Result<(NestedEquilibrium, bool), Box<Failure>> {
+    effort: &mut WorkLog,
+) -> Result<(NestedEquilibrium, bool), Box<RelaxationFailure>> {
     let level = found.levels.last().expect("the leaf has settled");
     if !level.leaf.leaf.has_potential() {
         return Ok((found, true));
     }
     let compared = !last && found.levels.len() == 1 && problem.segments().is_none();
-    if let Some(whole) = problem.whole {
-        let level = complete(problem.leaf, whole, level);
+    if let Some(whole) = problem.whole_leaf {
+        let level = mirror_level(problem.leaf, whole, level);
         let mut system = System::new(&level.leaf);
         let count = count_negative(problem, &level, &mut system, compared, &mut effort.work);
         let index = count.index.unwrap_or(found.index);
-        let found = found.counted(count.clearly_stable, index);
+        let found = found.with_index(count.clearly_stable, index);
         return match (count.index, found.index) {
             (None, _) => Ok((found, false)),
             (_, Some(0)) => Ok((found, true)),
-            _ => found.failed(Stop::Saddle),
+            _ => found.into_failure(EquilibriumFailure::Saddle),
         };
     }
     let before = found.index;
@@ -407,40 +419,48 @@ pub fn check_stability(
     let mut spare = effort.spare_system.take();
     if spare.is_none() && found.levels.is_empty() {
         // Further grids have equations of their own.
-        spare = found.linear.take().map(|linear| linear.system);
+        spare = found.factorized_level.take().map(|linear| linear.system);
     }
-    let mut system = System::reused(spare, &level.leaf);
+    let mut system = System::new_in_memory(spare, &level.leaf);
     let work = &mut effort.work;
     let mut count = count_negative(problem, &level, &mut system, compared, work);
     if matches!(count.index, Some(Some(1..))) && !problem.keeps_unstable() {
-        let Level { leaf, state } = &mut level;
-        let exact = saddle::polish(leaf, state, &mut system, work);
+        let GridLevel { leaf, state } = &mut level;
+        let exact = saddle::converge_saddle(leaf, state, &mut system, work);
         count.index = exact.map(Some).or(count.index);
     }
-    found = found.counted(count.clearly_stable, count.index.unwrap_or(before));
+    found = found.with_index(count.clearly_stable, count.index.unwrap_or(before));
     let Some(Some(index @ 1..)) = count.index else {
-        return Ok((found.joined(level), count.index.is_some()));
+        return Ok((found.rejoin_finest(level), count.index.is_some()));
     };
     if problem.keeps_unstable() {
         let known = before == found.index || problem.segments().is_some();
-        return Ok((found.joined(level), known));
+        return Ok((found.rejoin_finest(level), known));
     }
     if problem.stays_in_valley {
-        return found.joined(level).failed(Stop::Saddle);
+        return found
+            .rejoin_finest(level)
+            .into_failure(EquilibriumFailure::Saddle);
     }
-    found.history.saddle = Some(saddle_of(&level.leaf, &level.state, index));
-    found.history.pushes += 1;
-    if found.history.pushes > MAX_SADDLES {
-        return found.joined(level).failed(Stop::StepLimit);
+    found.history.saddle = Some(saddle_at_state(&level.leaf, &level.state, index));
+    found.history.saddle_escapes += 1;
+    if found.history.saddle_escapes > MAX_SADDLES {
+        return found
+            .rejoin_finest(level)
+            .into_failure(EquilibriumFailure::StepLimit);
     }
-    let Level { leaf, mut state } = level;
-    let leaning = problem.options.leaning;
-    saddle::push_off(&leaf, &mut state, &mut system, leaning, work);
+    let GridLevel { leaf, mut state } = level;
+    let leaning = problem.options.bias_direction;
+    saddle::escape_saddle(&leaf, &mut state, &mut system, leaning, work);
     let pushed = (leaf.grid, InitialGuess::Pushed(state));
-    let Settled { level, rest, .. } = settle(problem, &mut found.history, pushed, effort);
-    let found = found.on(vec![level]);
+    let GridSolution {
+        level,
+        iteration_error: rest,
+        ..
+    } = find_grid_equilibrium(problem, &mut found.history, pushed, effort);
+    let found = found.with_levels(vec![level]);
     match (rest, problem.segments()) {
-        (Err(stop), _) => found.failed(stop),
+        (Err(stop), _) => found.into_failure(stop),
         (Ok(_), Some(_)) => check_stability(problem, found, last, effort),
         (Ok(_), None) => Ok((found, false)),
     }
@@ -451,19 +471,19 @@ const TOLERANCE: f64 = 1e-6;
 
 /// The stable equilibrium that a leaf reaches from a state on a grid without initial velocity:
 /// saddles are left. `None` if it does not come to rest.
-pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
+pub fn relax_from_state(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
     let options = Options {
         limit: limit.clone(),
         ..Options::default()
     };
-    let problem = Problem::new(leaf, &options, TOLERANCE);
+    let problem = RelaxationProblem::new(leaf, &options, TOLERANCE);
     let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-    let mut effort = Effort::new(ignored);
-    let mut found = NestedEquilibrium::begun(&problem);
+    let mut effort = WorkLog::new(ignored);
+    let mut found = NestedEquilibrium::without_grids(&problem);
     let from = (grid.clone(), InitialGuess::Pushed(state));
-    let settled = settle(&problem, &mut found.history, from, &mut effort);
-    settled.rest.ok()?;
-    found = found.with(settled.level);
+    let settled = find_grid_equilibrium(&problem, &mut found.history, from, &mut effort);
+    settled.iteration_error.ok()?;
+    found = found.with_finer_level(settled.level);
     let mut known = false;
     while !known {
         (found, known) = check_stability(&problem, found, true, &mut effort).ok()?;
@@ -474,13 +494,13 @@ pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Opt
 /// Segments of the coarsest grid for a loose tolerance: if it is at least [`LOOSE`] or only
 /// the shape is requested (forces and eigenvalues have larger errors), and the leaf settles in
 /// the valley it starts in.
-const COARSEST_OF_LOOSE: usize = 4;
+const COARSEST_LOOSE_GRID: usize = 4;
 
-const LOOSE: f64 = 1e-3;
+const LOOSE_TOLERANCE: f64 = 1e-3;
 
 /// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
 /// of 86 were too low by a factor of two.
-const COARSEST_OF_BLADES: usize = 16;
+const COARSEST_BLADE_GRID: usize = 16;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
 /// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
@@ -489,21 +509,20 @@ pub const COARSEST_TURN: f64 = 0.8;
 
 /// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
 /// saddles, and not disturbed.
-fn settles_where_it_starts(method: Method) -> bool {
+fn may_keep_start_valley(method: Method) -> bool {
     matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
 }
 
 /// Whether half of a leaf may be solved in place of the whole.
-pub fn reducible(method: Method) -> bool {
-    settles_where_it_starts(method)
-        && matches!(method, Method::SemiImplicit(how) if !how.full_model)
+pub fn may_solve_half(method: Method) -> bool {
+    may_keep_start_valley(method) && matches!(method, Method::SemiImplicit(how) if !how.full_model)
 }
 
 /// Segments of the coarsest grid, unless a leaf needs more.
-pub fn least(method: Method, tolerance: f64, shape_alone: bool) -> usize {
-    let loose = shape_alone || tolerance >= LOOSE;
-    match settles_where_it_starts(method) && loose {
-        true => COARSEST_OF_LOOSE,
+pub fn least_segments(method: Method, tolerance: f64, shape_alone: bool) -> usize {
+    let loose = shape_alone || tolerance >= LOOSE_TOLERANCE;
+    match may_keep_start_valley(method) && loose {
+        true => COARSEST_LOOSE_GRID,
         false => COARSEST,
     }
 }
@@ -532,24 +551,24 @@ pub fn check_segments(
             nodes,
         });
     }
-    memory::grid(rods, segments)?;
+    memory::check_grid_memory(rods, segments)?;
     Ok(segments)
 }
 
 /// Segments of the coarsest grid.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
-    let moment = leaf.integral_of_moments();
+    let moment = leaf.moment_integral_bound();
     let turn = |j: usize| {
         let section = leaf.section(j, 0.5, 1.0);
         let bending = moment / section.couple_stiffness.min_element();
         (section.rest_curvature.length() + bending) * leaf.length(j)
     };
-    let turn = match no_potential::turning(leaf, FINEST) {
+    let turn = match no_potential::moment_curvature(leaf, FINEST) {
         Some(rate) => rate * leaf.length(0),
         None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
     };
     let mut segments = match leaf.scenario().blade {
-        Some(_) => least.max(COARSEST_OF_BLADES),
+        Some(_) => least.max(COARSEST_BLADE_GRID),
         None => least,
     };
     while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
@@ -562,11 +581,11 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
 pub const FAR_FROM_REST: f64 = 1e-2;
 
 /// A relaxation on one grid: its state and its parameters.
-pub struct Relaxation<'a> {
+pub struct GridRelaxation<'a> {
     pub state: State,
     /// Of positions and rotations.
     pub accuracy: f64,
-    pub work: &'a mut Work,
+    pub work: &'a mut SolverCounts,
     /// Receives the size of every step or, with the explicit method, the largest unbalanced
     /// force or moment.
     pub progress: &'a mut dyn FnMut(usize, f64),
@@ -574,38 +593,38 @@ pub struct Relaxation<'a> {
     /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
     pub near_rest: bool,
     /// Whether the leaf moved through states of non-convex energy.
-    pub moved: bool,
+    pub left_convex_valley: bool,
     /// Relative accuracy of the conjugate gradients in the first step.
     pub cg_tolerance: f64,
     /// How often it was pushed off saddles before: each time it is softened less, since a
     /// softened leaf may return to the saddle.
-    pub pushes: i32,
-    pub solver: Definite,
+    pub saddle_escapes: i32,
+    pub solver: DefiniteSolver,
     /// Count of force evaluations at which the iteration ends without success.
     pub most_evaluations: usize,
     /// Whether to fail at once where the energy is not convex.
     pub convex_only: bool,
 }
 
-impl<'a> Relaxation<'a> {
+impl<'a> GridRelaxation<'a> {
     /// From a state far from rest, without a limit on its work but `limit`.
     pub fn new(
         state: State,
         accuracy: f64,
-        (work, progress): (&'a mut Work, &'a mut dyn FnMut(usize, f64)),
+        (work, progress): (&'a mut SolverCounts, &'a mut dyn FnMut(usize, f64)),
         limit: &'a Limit,
     ) -> Self {
-        Relaxation {
+        GridRelaxation {
             state,
             accuracy,
             work,
             progress,
             limit,
             near_rest: false,
-            moved: false,
+            left_convex_valley: false,
             cg_tolerance: FAR_FROM_REST,
-            pushes: 0,
-            solver: Definite::default(),
+            saddle_escapes: 0,
+            solver: DefiniteSolver::default(),
             most_evaluations: usize::MAX,
             convex_only: false,
         }

@@ -20,11 +20,13 @@
 //! stable as that motion is.
 
 use crate::homotopy::Homotopy;
-use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, Loads, State, System, add, shift};
-use crate::motion::{Drag, Physics, SemiImplicit, Steps, TimeIntegrator, Wind};
-use crate::newton::{Equations, Following, Newton, Stop};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Leaf, Loads, NodalField, State, System, add_to_increment, displacement_part,
+};
+use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegrator, WindDrag};
+use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
-use crate::relax::solve_on_grid::Relaxation;
+use crate::relax::solve_on_grid::GridRelaxation;
 use crate::rod::{RESOLVED_TURN, Section};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
@@ -43,11 +45,11 @@ const SMALLEST_STEP: f64 = 1e-6;
 
 /// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
 /// grid.
-const COARSE: f64 = 0.5 * RESOLVED_TURN;
+const COARSE_SEGMENT_BENDING: f64 = 0.5 * RESOLVED_TURN;
 
 /// Rotation (radians) beyond which the moments on a free rod are not applied in steps, and the
 /// largest number of steps of the other loads in that case; and of the moments on a held rod.
-const LARGEST_BY_STEPS: f64 = 250.0;
+const LARGEST_STEPPED_ROTATION: f64 = 250.0;
 
 const MAX_STEPS: usize = 100;
 
@@ -62,7 +64,7 @@ const SEGMENT_ACCURACY: f64 = 1e-13;
 const DIFFERENCE: f64 = 1e-7;
 
 /// Squared half rotation below which series replace quotients that tend to 0/0.
-const SMALL: f64 = 1e-5;
+const SERIES_ROTATION_THRESHOLD: f64 = 1e-5;
 
 /// The parts of the moments and of the other loads that are applied after a part of the loading.
 type Order = fn(f64) -> [f64; 2];
@@ -75,34 +77,34 @@ const ORDERS: [Order; 3] = [
 ];
 
 /// That of a held rod, which the other loads act on from the beginning.
-const HELD: Order = |part| [part, 1.0];
+const HELD_ROD_LOADING: Order = |part| [part, 1.0];
 
 /// Loads the rod from its rest shape, or corrects a state near rest.
-pub fn settle_with_dead_moments(
+pub fn solve_with_dead_moments(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
-    rod: &mut Relaxation,
-) -> Result<f64, Stop> {
+    rod: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
     if rod.near_rest {
         return newton(leaf, system, rod, rod.accuracy);
     }
-    if is_wound(&leaf.leaf) {
+    if is_strongly_wound(&leaf.leaf) {
         shape_by_moment(leaf, &mut rod.state)?;
-        return load(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
+        return apply_loads(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
     }
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
-    let turn = leaf.leaf.integral_of_moments() * leaf.leaf.length(0) / softest;
+    let turn = leaf.leaf.moment_integral_bound() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
-    if leaf.leaf.is_held() {
-        return load(leaf, system, rod, HELD, (step, MAX_STEPS_HELD));
+    if leaf.leaf.has_placed_supports() {
+        return apply_loads(leaf, system, rod, HELD_ROD_LOADING, (step, MAX_STEPS_HELD));
     }
     let unloaded = rod.state.clone();
-    let mut end = Err(Stop::StepLimit);
+    let mut end = Err(EquilibriumFailure::StepLimit);
     for order in ORDERS {
         rod.state.clone_from(&unloaded);
-        end = load(leaf, system, rod, order, (step, usize::MAX));
-        if end.is_ok() || end == Err(Stop::Unresolved) || rod.limit.reached() {
+        end = apply_loads(leaf, system, rod, order, (step, usize::MAX));
+        if end.is_ok() || end == Err(EquilibriumFailure::Unresolved) || rod.limit.reached() {
             break;
         }
         // In the others the moments are applied in half of the loading.
@@ -114,40 +116,40 @@ pub fn settle_with_dead_moments(
 fn newton(
     leaf: &DiscreteLeaf,
     system: &mut System,
-    rod: &mut Relaxation,
+    rod: &mut GridRelaxation,
     accuracy: f64,
-) -> Result<f64, Stop> {
-    let newton = Newton {
+) -> Result<f64, EquilibriumFailure> {
+    let newton = NewtonIteration {
         accuracy,
         iterations: MAX_ITERATIONS,
         work: rod.work,
         progress: rod.progress,
     };
-    newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
+    newton.solve(leaf, &mut rod.state, system, NewtonEquations::Unsymmetric)
 }
 
 /// Applies the loads in a given order and at most so many steps of the given size, which is
-/// halved where Newton's method fails. [`Stop::Unresolved`]: the grid is too coarse.
-fn load(
+/// halved where Newton's method fails. [`EquilibriumFailure::Unresolved`]: the grid is too coarse.
+fn apply_loads(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
-    rod: &mut Relaxation,
+    rod: &mut GridRelaxation,
     order: Order,
     (step, mut steps): (f64, usize),
-) -> Result<f64, Stop> {
+) -> Result<f64, EquilibriumFailure> {
     let loads = leaf.loads;
     let mut path = Homotopy::new(step, [SMALLEST_STEP, 1.0]);
     let mut before = rod.state.clone();
     let end = loop {
         if steps == 0 || rod.limit.reached() {
-            break Err(Stop::StepLimit);
+            break Err(EquilibriumFailure::StepLimit);
         }
         steps -= 1;
-        let part = path.next();
+        let part = path.next_lambda();
         let [moments, others] = order(part).map(|part| part.clamp(0.0, 1.0));
         leaf.loads = Loads {
             tip_moment: moments * loads.tip_moment,
-            moments: moments * loads.moments,
+            dead_moment_factor: moments * loads.dead_moment_factor,
             ..loads * others
         };
         let wanted = match part < 1.0 {
@@ -157,16 +159,17 @@ fn load(
         match newton(leaf, system, rod, wanted) {
             Ok(remaining) if part == 1.0 => break Ok(remaining),
             Ok(_) => {
-                path.advance(path.length());
+                path.advance(path.next_step_length());
                 before.clone_from(&rod.state);
             }
             Err(stop) => {
                 rod.state.clone_from(&before);
-                let mut coarse = || leaf.assemble(&before, system).turn > COARSE;
-                if !path.shorten(0.5) || stop == Stop::Unresolved && coarse() {
+                let mut coarse =
+                    || leaf.assemble(&before, system).largest_turn > COARSE_SEGMENT_BENDING;
+                if !path.shorten(0.5) || stop == EquilibriumFailure::Unresolved && coarse() {
                     break Err(match coarse() {
-                        true => Stop::Unresolved,
-                        false => Stop::Stuck,
+                        true => EquilibriumFailure::Unresolved,
+                        false => EquilibriumFailure::NoDescent,
                     });
                 }
             }
@@ -178,23 +181,23 @@ fn load(
 
 /// Whether moments turn the tip of a free rod so far (at most, as if only the softest stiffness
 /// resisted them) that they are not applied in steps.
-fn is_wound(leaf: &Leaf) -> bool {
+fn is_strongly_wound(leaf: &Leaf) -> bool {
     let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
-    let turn = leaf.integral_of_moments() * leaf.length(0) / softest;
-    turn > LARGEST_BY_STEPS && !leaf.is_held()
+    let turn = leaf.moment_integral_bound() * leaf.length(0) / softest;
+    turn > LARGEST_STEPPED_ROTATION && !leaf.has_placed_supports()
 }
 
 /// The largest curvature (radians per length) of the rod under large moments alone; `None` if
 /// these are small, or too large for a grid of `segments` segments.
-pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
-    if !is_wound(leaf) {
+pub fn moment_curvature(leaf: &Leaf, segments: usize) -> Option<f64> {
+    if !is_strongly_wound(leaf) {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
     let (_, mut base) = leaf.leaf.base(0);
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for (i, section) in leaf.sections.iter().enumerate() {
-        turn = segment_turn(section, base, leaf.moment_beyond(i), turn)?;
+        turn = segment_turn(section, base, leaf.dead_moment_beyond(i), turn)?;
         largest = larger(largest, turn.length() / section.ds);
         base = (base * rotation::exp(turn)).normalize();
     }
@@ -202,11 +205,12 @@ pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
 }
 
 /// Sets the state to the shape under the moments alone.
-fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
+fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), EquilibriumFailure> {
     let mut turn = DVec3::ZERO;
     for (i, section) in leaf.sections.iter().enumerate() {
         let base = state.q[i];
-        turn = segment_turn(section, base, leaf.moment_beyond(i), turn).ok_or(Stop::Unresolved)?;
+        turn = segment_turn(section, base, leaf.dead_moment_beyond(i), turn)
+            .ok_or(EquilibriumFailure::Unresolved)?;
         let next = (base * rotation::exp(turn)).normalize();
         state.q[i + 1] = next;
         state.x[i + 1] =
@@ -218,10 +222,10 @@ fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
 
 /// S a, S being the derivative of the rotation vector psi half-way:
 /// s a + sigma y (y . a), with y = psi/2, s = |y|/sin |y|, sigma = (1 - s)/|y|^2.
-fn pulled_back(psi: DVec3, a: DVec3) -> DVec3 {
+fn pull_back_vector(psi: DVec3, a: DVec3) -> DVec3 {
     let y = 0.5 * psi;
     let squared = y.length_squared();
-    let (s, sigma) = match squared < SMALL {
+    let (s, sigma) = match squared < SERIES_ROTATION_THRESHOLD {
         true => (1.0 + squared / 6.0, -1.0 / 6.0 - 7.0 / 360.0 * squared),
         false => {
             let s = squared.sqrt() / squared.sqrt().sin();
@@ -237,7 +241,7 @@ fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> O
     let moment = base.conjugate() * moment;
     let unbalanced = |psi: DVec3| {
         let couple = section.couple_stiffness * (psi / section.ds - section.rest_curvature);
-        pulled_back(psi, couple) - rotation::exp(-0.5 * psi) * moment
+        pull_back_vector(psi, couple) - rotation::exp(-0.5 * psi) * moment
     };
     let mut psi = near;
     for _ in 0..SEGMENT_ITERATIONS {
@@ -261,7 +265,7 @@ fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> O
 const MOTION_ERROR: f64 = 1e-3;
 
 /// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
-const LOOK: f64 = 0.5;
+const REST_CHECK_INTERVAL: f64 = 0.5;
 
 const LONGEST_MOTION: f64 = 400.0;
 
@@ -269,66 +273,66 @@ const LONGEST_MOTION: f64 = 400.0;
 /// factor on it where Newton's method led elsewhere.
 const SLOW: f64 = 3e-2;
 
-const SLOWER: f64 = 0.1;
+const SLOW_VELOCITY_REDUCTION: f64 = 0.1;
 
 /// Farther from the moving leaf (lengths, radians) than this many times the way in a unit of time
 /// is elsewhere.
-const NEAR: f64 = 10.0;
+const NEARBY_DISTANCE_FACTOR: f64 = 10.0;
 
 /// Two balances no farther apart (lengths, radians) are one: a leaf that has come closer to it in
 /// between, however slowly, comes to rest there.
-const SAME: f64 = 1e-8;
+const SAME_BALANCE_DISTANCE: f64 = 1e-8;
 
 /// Newton iterations, their longest increment (radians, lengths), and their accuracy: forces are
 /// balanced to rounding, as nothing else shows that the leaf rests.
 const ITERATIONS: usize = 20;
 
-const LONGEST: f64 = 1.0;
+const LARGEST_BALANCE_INCREMENT: f64 = 1.0;
 
 const ACCURACY: f64 = 1e-13;
 
 /// Brings the leaf to rest. The drag then acts on its nodes as dead forces, in which all sums over
 /// the leaf are balanced.
-pub fn settle_in_wind(
+pub fn solve_in_wind(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
-    rest: &mut Relaxation,
-) -> Result<f64, Stop> {
-    let physics = Physics::at_rest(&leaf.leaf);
-    let air = Air::new(leaf, &physics).ok_or(Stop::Stuck)?;
+    rest: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
+    let physics = Physics::for_relaxation(&leaf.leaf);
+    let air = SteadyWind::new(leaf, &physics).ok_or(EquilibriumFailure::NoDescent)?;
     let remaining = match rest.near_rest {
-        true => balance(leaf, system, &air, rest)?,
-        false => move_to_rest(leaf, system, (physics, &air), rest)?,
+        true => balance_wind_forces(leaf, system, &air, rest)?,
+        false => approach_rest_in_wind(leaf, system, (physics, &air), rest)?,
     };
     let mut forces = vec![DVec3::ZERO; rest.state.x.len()];
     let still = |_| DVec3::ZERO;
     (air.wind).set_forces(&rest.state, air.velocity, still, &mut forces);
-    leaf.load_nodes(&forces);
+    leaf.add_nodal_loads(&forces);
     Ok(remaining)
 }
 
 /// Damped motion until Newton's method leads to rest nearby.
-fn move_to_rest(
+fn approach_rest_in_wind(
     leaf: &DiscreteLeaf,
     system: &mut System,
-    (physics, air): (Physics, &Air),
-    rest: &mut Relaxation,
-) -> Result<f64, Stop> {
-    let steps = Steps::Error(MOTION_ERROR);
+    (physics, air): (Physics, &SteadyWind),
+    rest: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
+    let steps = StepControl::LocalError(MOTION_ERROR);
     let mut motion = SemiImplicit::new(leaf.clone(), physics, &rest.state, steps);
-    let (mut slow, mut until) = (SLOW, LOOK);
-    let mut end = Err(Stop::StepLimit);
+    let (mut slow, mut until) = (SLOW, REST_CHECK_INTERVAL);
+    let mut end = Err(EquilibriumFailure::StepLimit);
     // Where forces are balanced, as found before, and how far from there the leaf was.
     let mut before: Option<(State, f64)> = None;
     while until < LONGEST_MOTION && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
-            end = Err(Stop::Stuck);
+            end = Err(EquilibriumFailure::NoDescent);
             break;
         }
         if motion.time() < until {
             continue;
         }
-        until += LOOK;
+        until += REST_CHECK_INTERVAL;
         let now = motion.snapshot();
         let speeds = (now.velocity.iter()).flat_map(|v| [v.linear.length(), v.angular.length()]);
         let speed = largest(speeds);
@@ -336,20 +340,21 @@ fn move_to_rest(
         rest.state = now.state;
         if speed < slow {
             let moving = rest.state.clone();
-            let balanced = balance(leaf, system, air, rest);
+            let balanced = balance_wind_forces(leaf, system, air, rest);
             if balanced.is_ok() {
                 let away = moving.distance(&rest.state);
                 let comes_closer = |(other, then): &(State, f64)| {
-                    away < *then && other.distance(&rest.state) < SAME
+                    away < *then && other.distance(&rest.state) < SAME_BALANCE_DISTANCE
                 };
-                if away < NEAR * slow || before.as_ref().is_some_and(comes_closer) {
+                if away < NEARBY_DISTANCE_FACTOR * slow || before.as_ref().is_some_and(comes_closer)
+                {
                     end = balanced;
                     break;
                 }
                 before = Some((rest.state.clone(), away));
             }
             rest.state = moving;
-            slow *= SLOWER;
+            slow *= SLOW_VELOCITY_REDUCTION;
         }
     }
     rest.work.steps += motion.steps();
@@ -359,28 +364,28 @@ fn move_to_rest(
 }
 
 /// Newton's method for the balance of forces.
-fn balance(
+fn balance_wind_forces(
     leaf: &DiscreteLeaf,
     system: &mut System,
-    air: &Air,
-    rest: &mut Relaxation,
-) -> Result<f64, Stop> {
-    let newton = Newton {
+    air: &SteadyWind,
+    rest: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
+    let newton = NewtonIteration {
         accuracy: ACCURACY,
         iterations: ITERATIONS,
         work: rest.work,
         progress: rest.progress,
     };
-    let equations = Equations::Following {
+    let equations = NewtonEquations::Following {
         forces: air,
-        largest: LONGEST,
+        largest: LARGEST_BALANCE_INCREMENT,
     };
     newton.solve(leaf, &mut rest.state, system, equations)
 }
 
 /// Steady wind on a leaf without velocity.
-struct Air {
-    wind: Wind,
+struct SteadyWind {
+    wind: WindDrag,
     velocity: DVec3,
     /// Whether each node may be displaced, rod after rod.
     free: Vec<bool>,
@@ -389,49 +394,52 @@ struct Air {
     first: usize,
 }
 
-impl Air {
+impl SteadyWind {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| leaf.moves(j, i)[1];
-        Some(Air {
-            wind: Wind::new(leaf, physics)?,
+        let free = |(j, i)| leaf.allows_rotation_and_displacement(j, i)[1];
+        Some(SteadyWind {
+            wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
-            free: leaf.each(0..segments + 1).map(free).collect(),
+            free: leaf.rod_index_pairs(0..segments + 1).map(free).collect(),
             segments,
             first: leaf.first_node(),
         })
     }
 
     /// Rod and number of every segment, and the drag on it.
-    fn drags<'a>(&'a self, state: &'a State) -> impl Iterator<Item = ((usize, usize), Drag)> + 'a {
+    fn drags<'a>(
+        &'a self,
+        state: &'a State,
+    ) -> impl Iterator<Item = ((usize, usize), SegmentDrag)> + 'a {
         self.wind.drags(state, self.velocity, |_| DVec3::ZERO)
     }
 
     /// The free ones among the ends of a segment.
-    fn ends(&self, j: usize, i: usize) -> impl Iterator<Item = usize> + '_ {
+    fn free_segment_ends(&self, j: usize, i: usize) -> impl Iterator<Item = usize> + '_ {
         let base = j * (self.segments + 1);
         [i, i + 1].into_iter().filter(move |i| self.free[base + i])
     }
 }
 
-impl Following for Air {
+impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
-            for node in self.ends(j, i) {
+            for node in self.free_segment_ends(j, i) {
                 system.add_load(j, node, [DVec3::ZERO, 0.5 * drag.force()]);
             }
         }
     }
 
-    fn add_change(&self, state: &State, increments: &Field, forces: &mut Field) {
+    fn add_derivative(&self, state: &State, increments: &NodalField, forces: &mut NodalField) {
         for ((j, i), drag) in self.drags(state) {
             let moved = |i: usize| match i.checked_sub(self.first) {
-                Some(i) => shift(&increments[j][i]),
+                Some(i) => displacement_part(&increments[j][i]),
                 None => DVec3::ZERO,
             };
-            let half = 0.5 * (drag.by_chord() * (moved(i + 1) - moved(i)));
-            for node in self.ends(j, i) {
-                add(&mut forces[j][node - self.first], DVec3::ZERO, half);
+            let half = 0.5 * (drag.chord_derivative() * (moved(i + 1) - moved(i)));
+            for node in self.free_segment_ends(j, i) {
+                add_to_increment(&mut forces[j][node - self.first], DVec3::ZERO, half);
             }
         }
     }

@@ -14,12 +14,12 @@
 //! The damped motion of the semi-implicit method: its velocities, and the choice of the next
 //! time step by the energy.
 
-use crate::leaf::{DiscreteLeaf, Field, Increment, Leaf, State, Sums, System};
+use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, Leaf, NodalField, State, System};
 use crate::newton::{
-    Equations, ForceProgress, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance,
-    converged, satisfies_lengths,
+    EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
+    SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
 };
-use crate::relax::solve_on_grid::Relaxation;
+use crate::relax::solve_on_grid::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
 
 /// Largest rotation of a node in one step, radians.
@@ -30,7 +30,7 @@ const MAX_SHIFT: f64 = 1.0;
 
 /// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
 /// without a test of the energy, whose change is below rounding.
-const SMALL: f64 = 1e-3;
+const NEGLIGIBLE_NEWTON_STEP: f64 = 1e-3;
 
 /// Largest number of steps on one grid.
 const MAX_STEPS: usize = 2000;
@@ -48,7 +48,7 @@ const SOFT_ACCURACY: f64 = 1e-1;
 
 /// Factor on the compliance of a softened leaf if Newton's method does not converge from it
 /// with the leaf's own stiffness, and its lower limit.
-const STIFFER: f64 = 0.1;
+const STIFFENING_FACTOR: f64 = 0.1;
 
 const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
@@ -67,11 +67,15 @@ pub fn softens(leaf: &Leaf) -> bool {
     compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
 }
 
-impl Relaxation<'_> {
+impl GridRelaxation<'_> {
     /// Lets the leaf come to rest.
-    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
+    pub fn relax_semi_implicitly(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+    ) -> Result<f64, EquilibriumFailure> {
         let stiffest = leaf.least_compliance();
-        let moving_compliance = moving_compliance(&leaf.leaf, self.pushes);
+        let moving_compliance = moving_compliance(&leaf.leaf, self.saddle_escapes);
         if stiffest >= moving_compliance {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
@@ -79,8 +83,8 @@ impl Relaxation<'_> {
         let mut soften = !self.near_rest;
         loop {
             if soften {
-                let soft = leaf.softened(compliance);
-                if self.pushes > 0 {
+                let soft = leaf.with_compliance_floor(compliance);
+                if self.saddle_escapes > 0 {
                     // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
@@ -88,17 +92,19 @@ impl Relaxation<'_> {
             }
             let before = self.state.clone();
             match self.newton(leaf, system, self.accuracy) {
-                Err(Stop::Stuck) if !(self.near_rest && self.convex_only) => self.state = before,
+                Err(EquilibriumFailure::NoDescent) if !(self.near_rest && self.convex_only) => {
+                    self.state = before
+                }
                 settled => return settled,
             }
             if soften {
                 // The leaf's own stiffness is too far from this one: stiffen the leaf in steps.
-                compliance *= STIFFER;
+                compliance *= STIFFENING_FACTOR;
                 if compliance <= stiffest {
                     return self.move_to_rest(leaf, system, self.accuracy);
                 }
                 if compliance < SMALLEST_MOVING_COMPLIANCE {
-                    return Err(Stop::Stuck);
+                    return Err(EquilibriumFailure::NoDescent);
                 }
             }
             soften = true;
@@ -111,14 +117,14 @@ impl Relaxation<'_> {
         leaf: &DiscreteLeaf,
         system: &mut System,
         accuracy: f64,
-    ) -> Result<f64, Stop> {
-        let newton = Newton {
+    ) -> Result<f64, EquilibriumFailure> {
+        let newton = NewtonIteration {
             accuracy,
             iterations: STIFF_ITERATIONS,
             work: self.work,
             progress: self.progress,
         };
-        let equations = Equations::Definite {
+        let equations = NewtonEquations::Definite {
             solver: &mut self.solver,
             largest: MAX_TURN.min(MAX_SHIFT),
             shifted: true,
@@ -133,49 +139,50 @@ impl Relaxation<'_> {
         leaf: &DiscreteLeaf,
         system: &mut System,
         accuracy: f64,
-    ) -> Result<f64, Stop> {
+    ) -> Result<f64, EquilibriumFailure> {
         let mut trial = self.state.clone();
         let mut motion = Motion::new(leaf);
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
-        let mut stalled = Stalled::default();
-        let mut forces = ForceProgress::new(leaf);
+        let mut stalled = StallCounter::default();
+        let mut forces = ForceConvergence::new(leaf);
         let mut sums = assembled(leaf, &self.state, system, self.work);
         for step in 0..MAX_STEPS {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 break;
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
-            self.solve_shortening(leaf, system, &mut motion, tolerance)?;
+            self.solve_shortening_step(leaf, system, &mut motion, tolerance)?;
             let (mut size, mut part) = step_size(system, &motion);
             leaf.advance(&self.state, system, part, &mut trial);
             if forces.law_lags(leaf, &self.state, &trial) {
                 let solver = &mut self.solver;
-                let again =
-                    &mut |system: &mut System, forces: &Field| solver.solve_again(system, forces);
+                let again = &mut |system: &mut System, forces: &NodalField| {
+                    solver.solve_again(system, forces)
+                };
                 system.complete_law(leaf, &self.state, again);
                 (size, part) = step_size(system, &motion);
                 leaf.advance(&self.state, system, part, &mut trial);
             }
-            forces.observe(size, &self.state, &trial);
+            forces.record_step(size, &self.state, &trial);
             let mut rest = None;
             if motion.is_newton() && part == 1.0 {
                 let contraction = &mut self.solver.contraction;
-                contraction.update(size, motion.newton);
-                motion.newton = size;
+                contraction.update(size, motion.newton_step_size);
+                motion.newton_step_size = size;
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
-                let rounding = stalled.rounding(leaf, &self.state, size);
-                rest = converged(size, previous, tolerances, (accuracy, rounding), first);
+                let rounding = stalled.increment_rounding(leaf, &self.state, size);
+                rest = remaining_error(size, previous, tolerances, (accuracy, rounding), first);
             } else {
-                motion.newton = f64::INFINITY;
+                motion.newton_step_size = f64::INFINITY;
             }
             if let Some(remaining) = rest
-                && size < SMALL
-                && forces.at_rest(accuracy)
+                && size < NEGLIGIBLE_NEWTON_STEP
+                && forces.has_converged(accuracy)
                 && satisfies_lengths(leaf, &trial, accuracy)
             {
-                if sums.turn > RESOLVED_TURN {
-                    return Err(Stop::Unresolved);
+                if sums.largest_turn > RESOLVED_TURN {
+                    return Err(EquilibriumFailure::Unresolved);
                 }
                 std::mem::swap(&mut self.state, &mut trial);
                 self.work.steps += 1;
@@ -186,19 +193,19 @@ impl Relaxation<'_> {
             (self.progress)(step, size);
             if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
                 if !motion.shorten() {
-                    return Err(Stop::Stuck);
+                    return Err(EquilibriumFailure::NoDescent);
                 }
                 sums = assembled(leaf, &self.state, system, self.work);
                 continue;
             }
-            if next.turn > RESOLVED_TURN {
-                return Err(Stop::Unresolved);
+            if next.largest_turn > RESOLVED_TURN {
+                return Err(EquilibriumFailure::Unresolved);
             }
             std::mem::swap(&mut self.state, &mut trial);
             sums = next;
             self.work.steps += 1;
             if let Some(remaining) = rest
-                && forces.at_rest(accuracy)
+                && forces.has_converged(accuracy)
                 && satisfies_lengths(leaf, &self.state, accuracy)
             {
                 return Ok(remaining);
@@ -206,7 +213,7 @@ impl Relaxation<'_> {
             match motion.is_newton() {
                 true => motion.accept_newton(),
                 false => {
-                    motion.accept(at_saddle(leaf, &self.state, size), part);
+                    motion.accept(is_at_saddle(leaf, &self.state, size), part);
                 }
             }
             previous = size;
@@ -214,39 +221,39 @@ impl Relaxation<'_> {
                 previous_tolerance = tolerance;
             }
         }
-        Err(Stop::StepLimit)
+        Err(EquilibriumFailure::StepLimit)
     }
 
     /// Factorises and solves for the next step, with as long a time step as makes the matrix
     /// positive definite. A small shift keeps modes that are neutral up to rounding from
     /// moving.
-    fn solve_shortening(
+    fn solve_shortening_step(
         &mut self,
         leaf: &DiscreteLeaf,
         system: &mut System,
         motion: &mut Motion,
         tolerance: f64,
-    ) -> Result<(), Stop> {
-        if motion.inertia().is_none() {
-            leaf.hold_turn(&self.state, system);
+    ) -> Result<(), EquilibriumFailure> {
+        if motion.mass_factors().is_none() {
+            leaf.add_phase_conditions(&self.state, system);
         }
         loop {
-            let (shift, inertia) = match motion.inertia() {
+            let (shift, inertia) = match motion.mass_factors() {
                 Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
                 None => (leaf.neutral_shift(), None),
             };
             let (solver, work) = (&mut self.solver, &mut *self.work);
             match solver.solve(system, shift, inertia, tolerance, work) {
                 Ok(()) => return Ok(()),
-                Err(Unsolved::Memory) => return Err(Stop::Memory),
-                Err(Unsolved::Indefinite) => {}
+                Err(LinearSolveFailure::Memory) => return Err(EquilibriumFailure::Memory),
+                Err(LinearSolveFailure::Indefinite) => {}
             }
-            if motion.resting {
-                return Err(Stop::Saddle);
+            if motion.was_stationary {
+                return Err(EquilibriumFailure::Saddle);
             }
-            self.moved = true;
+            self.left_convex_valley = true;
             if self.convex_only || !motion.shorten_in_time() {
-                return Err(Stop::Stuck);
+                return Err(EquilibriumFailure::NoDescent);
             }
         }
     }
@@ -254,13 +261,18 @@ impl Relaxation<'_> {
 
 /// The size of the next step, and the part of it that is taken.
 fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
-    let (turn, shift) = system.largest();
+    let (turn, shift) = system.largest_increment();
     let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
-    (turn.max(shift), part.min(motion.longest_part()))
+    (turn.max(shift), part.min(motion.largest_step_fraction()))
 }
 
 /// Assembles the equations in a state.
-fn assembled(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> Sums {
+fn assembled(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut SolverCounts,
+) -> AssemblyTotals {
     work.force_evaluations += 1;
     leaf.assemble(state, system)
 }
@@ -282,7 +294,7 @@ const LONGEST_STEP: f64 = 1e3;
 const MAX_GROWTH: f64 = 4.0;
 
 /// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
-const SMALLEST_PART: f64 = 1e-3;
+const SMALLEST_STEP_FRACTION: f64 = 1e-3;
 
 /// Relative growth of the energy that is attributed to rounding.
 const ENERGY_SLACK: f64 = 1e-9;
@@ -295,12 +307,12 @@ pub(in crate::relax) struct Motion {
     pub(in crate::relax) velocity: Vec<Vec<Increment>>,
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
-    pub(in crate::relax) newton: f64,
+    pub(in crate::relax) newton_step_size: f64,
     /// The part of Newton's step that the energy allows near rest: close to a bifurcation the
     /// whole step may leave a curved valley.
-    newton_part: f64,
+    newton_fraction: f64,
     /// Whether it was at a possible saddle, or at rest, before the next step of Newton's method.
-    pub(in crate::relax) resting: bool,
+    pub(in crate::relax) was_stationary: bool,
 }
 
 impl Motion {
@@ -312,9 +324,9 @@ impl Motion {
             growth: MAX_GROWTH,
             next_velocity: velocity.clone(),
             velocity,
-            newton: f64::INFINITY,
-            newton_part: 1.0,
-            resting: false,
+            newton_step_size: f64::INFINITY,
+            newton_fraction: 1.0,
+            was_stationary: false,
         }
     }
 
@@ -324,15 +336,15 @@ impl Motion {
 
     /// Factors (1/dt + c)/dt on the mass in the matrix of the next step, and 1/dt on the momenta;
     /// `None` if it is Newton's.
-    pub(in crate::relax) fn inertia(&self) -> Option<[f64; 2]> {
+    pub(in crate::relax) fn mass_factors(&self) -> Option<[f64; 2]> {
         let dt = self.dt;
         (!self.is_newton()).then_some([(1.0 / dt + DAMPING) / dt, 1.0 / dt])
     }
 
     /// The longest part of the next step that may be taken.
-    pub(in crate::relax) fn longest_part(&self) -> f64 {
+    pub(in crate::relax) fn largest_step_fraction(&self) -> f64 {
         if self.is_newton() {
-            self.newton_part
+            self.newton_fraction
         } else {
             1.0
         }
@@ -341,9 +353,9 @@ impl Motion {
     /// Shortens a step that raises the energy: near rest a part of Newton's step is taken,
     /// otherwise a shorter time step. False if there is none.
     pub(in crate::relax) fn shorten(&mut self) -> bool {
-        let near_rest = self.is_newton() && (self.resting || self.newton_part < 1.0);
-        if near_rest && self.newton_part > SMALLEST_PART {
-            self.newton_part /= 2.0;
+        let near_rest = self.is_newton() && (self.was_stationary || self.newton_fraction < 1.0);
+        if near_rest && self.newton_fraction > SMALLEST_STEP_FRACTION {
+            self.newton_fraction /= 2.0;
             return true;
         }
         self.shorten_in_time()
@@ -370,7 +382,7 @@ impl Motion {
         let [mut energy, mut next_energy] = potential;
         if !self.is_newton() {
             energy += system.kinetic_energy(&self.velocity);
-            system.velocity(part, self.dt, &mut self.next_velocity);
+            system.write_velocity(part, self.dt, &mut self.next_velocity);
             next_energy += system.kinetic_energy(&self.next_velocity);
         }
         let slack = ENERGY_SLACK * (1.0 + energy.abs());
@@ -382,7 +394,7 @@ impl Motion {
     /// leaf is at rest.
     pub(in crate::relax) fn accept(&mut self, at_saddle: bool, part: f64) {
         std::mem::swap(&mut self.velocity, &mut self.next_velocity);
-        self.resting |= at_saddle;
+        self.was_stationary |= at_saddle;
         if at_saddle {
             self.dt = f64::INFINITY;
         } else if part == 1.0 {
@@ -397,7 +409,7 @@ impl Motion {
 
     /// After an accepted step of Newton's method.
     pub(in crate::relax) fn accept_newton(&mut self) {
-        self.resting = false;
-        self.newton_part = (2.0 * self.newton_part).min(1.0);
+        self.was_stationary = false;
+        self.newton_fraction = (2.0 * self.newton_fraction).min(1.0);
     }
 }

@@ -5,16 +5,17 @@
 //! The side to which a leaf turns from a saddle, the same on all grids, in all units, and in
 //! whichever order its veins are numbered.
 
-use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, NodalField, State};
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::loading::arrival;
 use crate::relax::request::{
-    Method, Options, Progress, RelaxError, check_tolerance, points_somewhere, rests_in_wind,
+    Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
+    check_wind_options,
 };
-use crate::relax::rest::{Effort, Problem, decided, relax_on_grids};
+use crate::relax::rest::{RelaxationProblem, WorkLog, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
-use crate::relax::solve_on_grid::{check_segments, least};
-use crate::relax::stability::project;
+use crate::relax::solve_on_grid::{check_segments, least_segments};
+use crate::relax::stability::state_from_rod_shapes;
 use crate::rotation;
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::Scenario;
@@ -24,18 +25,18 @@ use std::f64::consts::PI;
 
 /// The initial state of a relaxation: circular arcs that leave the base in the directions of
 /// the fan and meet in a common tip; free rods start from their rest shapes.
-pub fn start(leaf: &DiscreteLeaf) -> State {
+pub fn initial_state(leaf: &DiscreteLeaf) -> State {
     match leaf.leaf.joined() && leaf.rods() > 1 {
-        true if leaf.tied() || !leaf.leaf.is_fan() => closed(leaf),
+        true if leaf.has_tissue() || !leaf.leaf.is_fan() => joined_natural_leaf(leaf),
         true => arcs(leaf),
-        false => leaf.natural(),
+        false => leaf.stress_free_state(),
     }
 }
 
 /// The natural leaf with its tips moved to their mean, and every node in proportion to its distance
 /// from the base.
-fn closed(leaf: &DiscreteLeaf) -> State {
-    let mut state = leaf.natural();
+fn joined_natural_leaf(leaf: &DiscreteLeaf) -> State {
+    let mut state = leaf.stress_free_state();
     let tips: DVec3 = state.tips().sum();
     let mean = tips / leaf.rods() as f64;
     for j in 0..leaf.rods() {
@@ -67,14 +68,14 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     };
     let sinc = |x: f64| if x.abs() < 1e-8 { 1.0 } else { x.sin() / x };
     let chords: f64 = (0..leaf.rods())
-        .map(|j| model.grown(j, 1.0) * sinc(opening(angles[j])))
+        .map(|j| model.grown_length(j, 1.0) * sinc(opening(angles[j])))
         .sum();
     let tip = towards(mean) * (chords / leaf.rods() as f64);
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for (j, &phi) in angles.iter().enumerate() {
-        let (delta, length) = (opening(phi), model.grown(j, 1.0));
+        let (delta, length) = (opening(phi), model.grown_length(j, 1.0));
         // The rotation is uniform over the grown length of the vein.
-        let part = |sigma: f64| model.grown(j, sigma) / length;
+        let part = |sigma: f64| model.grown_length(j, sigma) / length;
         let arc = |sigma: f64| {
             // A chord's direction is half-way between the tangents at its ends.
             towards(phi - delta * sigma) * (length * sigma * sinc(delta * sigma))
@@ -91,14 +92,14 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
 }
 
 /// Largest slope of a disturbance, and the number of amplitudes.
-const STEEPEST: f64 = 0.8;
+const LARGEST_DISTURBANCE_SLOPE: f64 = 0.8;
 
-const SIZES: usize = 4;
+const DISTURBANCE_AMPLITUDES: usize = 4;
 
 /// Waves of a disturbance along the rods and across the leaf.
-const ALONG: usize = 3;
+const DISTURBANCE_WAVES_ALONG: usize = 3;
 
-const ACROSS: usize = 3;
+const DISTURBANCE_WAVES_ACROSS: usize = 3;
 
 /// Lifts the nodes of an initial state out of the plane of the fan, and rotates them
 /// accordingly: a smooth pattern, the same on all grids, that differs for every second number,
@@ -107,7 +108,8 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     let (pattern, sign) = (number / 2, [1.0, -1.0][number % 2]);
     // Multiples of the golden ratio are equidistributed: a deterministic pseudo-random sequence.
     let golden = |k: usize| 2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0;
-    let size = sign * STEEPEST * (1 + pattern % SIZES) as f64 / SIZES as f64;
+    let size = sign * LARGEST_DISTURBANCE_SLOPE * (1 + pattern % DISTURBANCE_AMPLITUDES) as f64
+        / DISTURBANCE_AMPLITUDES as f64;
     let rods = leaf.rods();
     let joined = leaf.leaf.joined() && rods > 1;
     let longest = (0..rods).map(|j| leaf.leaf.length(j)).fold(0.0, f64::max);
@@ -125,9 +127,10 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
         let base = state.base(j);
         for (i, &sigma) in leaf.grid.sigma().iter().enumerate().skip(1) {
             let (mut lift, mut slope) = (0.0, 0.0);
-            for k in 1..=ALONG {
-                for l in 0..ACROSS {
-                    let part = golden(1 + 13 * pattern + ALONG * l + k) / (k * (l + 1)) as f64;
+            for k in 1..=DISTURBANCE_WAVES_ALONG {
+                for l in 0..DISTURBANCE_WAVES_ACROSS {
+                    let part = golden(1 + 13 * pattern + DISTURBANCE_WAVES_ALONG * l + k)
+                        / (k * (l + 1)) as f64;
                     let part = part * (PI * l as f64 * across).cos();
                     // Zero slope at the base; waves across the leaf vanish at a joint tip.
                     let (wave, k) = (PI * k as f64 * sigma, k as f64);
@@ -147,7 +150,7 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
 }
 
 /// Remark on a leaf that did not come to rest from the given shape.
-const ANEW: &str =
+const RELAXED_ANEW_REMARK: &str =
     "from the given start the leaf does not come to rest: it was relaxed as without one";
 
 /// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
@@ -165,8 +168,8 @@ pub fn relax_from(
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    rests_in_wind(scenario, options)?;
-    points_somewhere(scenario)?;
+    check_wind_options(scenario, options)?;
+    check_hinge_equilibrium(scenario)?;
     check_start(scenario, stations, rods)?;
     let method = options.method;
     let Method::SemiImplicit(how) = method else {
@@ -175,32 +178,36 @@ pub fn relax_from(
     };
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
-    let problem = Problem::new(&leaf, options, tolerance);
-    let segments = check_segments(&leaf, method.segments(), least(method, tolerance, false))?;
+    let problem = RelaxationProblem::new(&leaf, options, tolerance);
+    let segments = check_segments(
+        &leaf,
+        method.segments(),
+        least_segments(method, tolerance, false),
+    )?;
     let grid = Grid::new(segments, leaf.kinks());
     let discrete = DiscreteLeaf::new(&leaf, grid.clone());
     let there = (rods.iter())
-        .map(|rod| interpolated(stations, rod, grid.sigma()))
+        .map(|rod| interpolate_rod_shape(stations, rod, grid.sigma()))
         .collect::<Vec<_>>();
-    let mut state = project(&leaf, &discrete, &there);
+    let mut state = state_from_rod_shapes(&leaf, &discrete, &there);
     for j in 0..leaf.rods() {
         let base = state.base(j);
         (state.x[base], state.q[base]) = leaf.base(j);
     }
-    leaf.hold_tips(&mut state);
-    let mut effort = Effort::new(progress);
-    let begun = NestedEquilibrium::begun(&problem);
-    let found = arrival::follow(&problem, begun, vec![(grid, state)], &mut effort);
+    leaf.place_held_tips(&mut state);
+    let mut effort = WorkLog::new(progress);
+    let begun = NestedEquilibrium::without_grids(&problem);
+    let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
     let settled = match &found {
         Ok(found) => found.is_stable() || how.keep_unstable,
         Err(_) => problem.out_of_time(),
     };
     if settled {
-        return Ok(decided(&problem, found, clock, &mut effort).0);
+        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
     }
     drop(effort);
     let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
-    leaf.doubts.push(ANEW.to_owned());
+    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
     Ok(leaf)
 }
 
@@ -231,7 +238,7 @@ fn check_start(
 }
 
 /// A rod at other stations: on chords, with the directors turned evenly from node to node.
-fn interpolated(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
+fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
     let node = |&sigma: &f64| {
         let next = stations.partition_point(|&at| at < sigma);
         let next = next.clamp(1, stations.len() - 1);
@@ -254,7 +261,7 @@ fn interpolated(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
 }
 
 /// Weight of a given direction over that of the others.
-const GIVEN: f64 = 10.0;
+const GIVEN_BIAS_WEIGHT: f64 = 10.0;
 
 /// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
 /// sign that has most in common with them; of several modes of one eigenvalue, as of veins that
@@ -262,9 +269,9 @@ const GIVEN: f64 = 10.0;
 /// (along e2) and forward, in this order of importance, more so away from the base and, with
 /// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
 /// would turn out of any other on its way.
-pub fn preference(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> Field {
+pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
     let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
-    let given = GIVEN * leaning.normalize_or_zero();
+    let given = GIVEN_BIAS_WEIGHT * leaning.normalize_or_zero();
     let everywhere = given + down + 0.5 * left + 0.25 * forward;
     let leftwards = 0.31 * down + 0.17 * left + 0.11 * forward;
     let node = |j: usize, i: usize| {

@@ -29,11 +29,11 @@
 mod tests;
 mod veins;
 
+use crate::scenario::blade::veins::{BladeOutline, BladeVein, Spline};
 pub use crate::scenario::blade::veins::{BladePart, BladeProperty};
-use crate::scenario::blade::veins::{Outline, Spline, Vein};
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::Item;
+use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioResult;
 use crate::scenario::section::poisson;
 use crate::scenario::{Profile, Tissue};
@@ -46,12 +46,12 @@ const WIDTH_SAMPLES: usize = 500;
 /// A blade, from which the veins of a leaf and the tissue between them follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blade {
-    pub(super) outline: Arc<Outline>,
+    pub(super) outline: Arc<BladeOutline>,
     /// Whether the outermost veins are the margins.
     pub edges: bool,
     /// The angle by which it rises from the x-y plane as a whole, in radians.
     pub elevation: f64,
-    pub(super) materials: Vec<Material>,
+    pub(super) materials: Vec<BladeMaterial>,
 }
 
 impl Blade {
@@ -62,7 +62,7 @@ impl Blade {
 
     /// The width at the fraction `x` of the length.
     pub fn width(&self, x: f64) -> f64 {
-        self.outline.width.at(x)[0]
+        self.outline.width.value_and_derivatives(x)[0]
     }
 
     /// The width at the fraction `x` of the length from which stiffnesses follow: nowhere less than
@@ -72,16 +72,16 @@ impl Blade {
     }
 
     /// The least bearing width as a fraction of the largest width, wherever the blade is wider.
-    pub fn least_part(&self) -> f64 {
+    pub fn least_width_fraction(&self) -> f64 {
         self.outline.least
     }
 
     /// The least bearing width, if the blade is narrower somewhere.
     pub fn least_width(&self) -> Option<f64> {
-        let Outline {
+        let BladeOutline {
             least,
             largest,
-            narrows,
+            has_narrow_part: narrows,
             ..
         } = &*self.outline;
         narrows.then_some(least * largest)
@@ -95,8 +95,8 @@ impl Blade {
     }
 
     /// Where vein `j` lies: a fraction of the half width, negative to the right of the midrib.
-    pub fn place(&self, j: usize) -> f64 {
-        self.eta(j).0
+    pub fn vein_position(&self, j: usize) -> f64 {
+        self.vein_position_and_spacing(j).0
     }
 
     /// Whether all veins meet at the tip.
@@ -123,7 +123,7 @@ impl Blade {
     }
 
     /// The place of vein `j`, as a fraction of the half width, and how far neighbours are apart.
-    fn eta(&self, j: usize) -> (f64, f64) {
+    fn vein_position_and_spacing(&self, j: usize) -> (f64, f64) {
         let count = self.materials.len();
         let gaps = if self.edges { count.max(2) - 1 } else { count };
         let eta = (2.0 * j as f64 + 1.0 - count as f64) / gaps as f64;
@@ -131,21 +131,28 @@ impl Blade {
     }
 
     /// The veins and the tissue between them.
-    pub(super) fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> BladeParts {
         let count = self.materials.len();
-        let etas: Vec<f64> = (0..count).map(|j| self.eta(j).0).collect();
-        let (_, apart) = self.eta(0);
+        let etas: Vec<f64> = (0..count)
+            .map(|j| self.vein_position_and_spacing(j).0)
+            .collect();
+        let (_, apart) = self.vein_position_and_spacing(0);
         let alike = |one: usize, other: usize| self.materials[one] == self.materials[other];
         let vein = |j: usize| {
             let material = self.materials[j].clone();
-            Arc::new(Vein::new(&self.outline, etas[j].abs(), count, material))
+            Arc::new(BladeVein::new(
+                &self.outline,
+                etas[j].abs(),
+                count,
+                material,
+            ))
         };
-        let veins = with_images(count, alike, vein);
+        let veins = build_with_images(count, alike, vein);
         let gaps_alike = |g: usize, image: usize| alike(g, image + 1) && alike(g + 1, image);
-        let gap = |g: usize| BladePart::gap(&veins[g], &veins[g + 1], apart);
-        Parts {
-            gaps: with_images(count - 1, gaps_alike, gap),
-            parts: with_images(count, alike, |j| BladePart::vein(veins[j].clone())),
+        let gap = |g: usize| BladePart::from_gap(&veins[g], &veins[g + 1], apart);
+        BladeParts {
+            gaps: build_with_images(count - 1, gaps_alike, gap),
+            vein_parts: build_with_images(count, alike, |j| BladePart::from_vein(veins[j].clone())),
             half_width: 0.5 * self.width(0.0),
             veins,
             etas,
@@ -155,7 +162,7 @@ impl Blade {
 
 /// So many values, of which one that is `alike` to its image, counted from the other end, is the
 /// same.
-fn with_images<T>(
+fn build_with_images<T>(
     count: usize,
     alike: impl Fn(usize, usize) -> bool,
     make: impl Fn(usize) -> Arc<T>,
@@ -170,19 +177,19 @@ fn with_images<T>(
 }
 
 /// What follows from a blade: its veins, and the tissue between them.
-pub(super) struct Parts {
+pub(super) struct BladeParts {
     /// The places of the veins, as fractions of the half width.
     etas: Vec<f64>,
     half_width: f64,
-    veins: Vec<Arc<Vein>>,
-    parts: Vec<Arc<BladePart>>,
+    veins: Vec<Arc<BladeVein>>,
+    vein_parts: Vec<Arc<BladePart>>,
     gaps: Vec<Arc<BladePart>>,
 }
 
-impl Parts {
+impl BladeParts {
     /// A property of every vein, along it.
     pub(super) fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
-        let each = self.etas.iter().zip(&self.parts);
+        let each = self.etas.iter().zip(&self.vein_parts);
         each.map(|(eta, part)| part.profile(property, *eta < 0.0))
             .collect()
     }
@@ -208,7 +215,7 @@ impl Parts {
             } else {
                 vein.angle()
             };
-            tilted(angle, elevation)
+            tilt_direction(angle, elevation)
         })
         .collect()
     }
@@ -228,7 +235,7 @@ impl Parts {
 
 /// A direction at `angle` in a plane that is turned about -e2 by `elevation`: its own angle and
 /// elevation, and the turn about it that brings d2 into the plane.
-fn tilted(angle: f64, elevation: f64) -> [f64; 3] {
+fn tilt_direction(angle: f64, elevation: f64) -> [f64; 3] {
     if elevation == 0.0 {
         return [angle, 0.0, 0.0];
     }
@@ -242,7 +249,7 @@ fn tilted(angle: f64, elevation: f64) -> [f64; 3] {
 
 /// Thickness and material of a vein with its tissue.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Material {
+pub struct BladeMaterial {
     pub thickness: Profile,
     pub young: Profile,
     /// Left out: as along the veins.
@@ -255,19 +262,19 @@ pub struct Material {
 }
 
 /// Thickness and moduli at one place.
-pub struct Local {
+pub struct LocalMaterial {
     pub t: f64,
     pub young: f64,
     pub across: f64,
     pub shear: f64,
 }
 
-impl Material {
-    pub fn at(&self, sigma: f64) -> Local {
+impl BladeMaterial {
+    pub fn local_material(&self, sigma: f64) -> LocalMaterial {
         let young = self.young.at(sigma);
         let across = self.young_across.as_ref();
         let shear = self.shear_modulus.as_ref();
-        Local {
+        LocalMaterial {
             t: self.thickness.at(sigma),
             young,
             across: across.map_or(young, |it| it.at(sigma)),
@@ -296,28 +303,28 @@ const MOST_POINTS: usize = 1000;
 const SAMPLES: usize = 32;
 
 /// Largest least bearing width.
-const WIDEST: f64 = 0.5;
+const MAX_LEAST_WIDTH: f64 = 0.5;
 
 /// Least one: stiffnesses in the plane go with its third power.
-const NARROWEST: f64 = 1e-3;
+const MIN_LEAST_WIDTH: f64 = 1e-3;
 
 /// Reads `[blade]` of a leaf with so many veins; `None` if there is no such table.
 pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
-    let mut table = Key::all().filter(|key| key.parts().0 == "blade");
+    let mut table = Key::all().filter(|key| key.table_and_name().0 == "blade");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
     }
     if let Some(item) = Key::all()
         .filter(|key| key.follows_from_blade())
-        .find_map(|key| entries.given(key))
+        .find_map(|key| entries.given_value(key))
     {
         let why = "follows from [blade], which is given, too: leave one of them out";
-        return Err(item.refuse(why));
+        return Err(item.value_error(why));
     }
-    let quantity = |key| entries.item(key)?.quantity(rods);
+    let quantity = |key| entries.value_or_default(key)?.quantity(rods);
     let optional = |key| {
         entries
-            .given(key)
+            .given_value(key)
             .map(|item| item.quantity(rods))
             .transpose()
     };
@@ -325,10 +332,10 @@ pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Bla
     let young = quantity(Key::BladeYoung)?;
     let young_across = optional(Key::YoungAcross)?;
     let shear_modulus = optional(Key::ShearModulus)?;
-    let poisson = poisson(entries.item(Key::BladePoisson)?, rods)?;
+    let poisson = poisson(entries.value_or_default(Key::BladePoisson)?, rods)?;
     let mass_density = optional(Key::BladeMassDensity)?;
     let pick = |all: &Option<Vec<Profile>>, rod: usize| all.as_ref().map(|all| all[rod].clone());
-    let materials = (0..rods).map(|rod| Material {
+    let materials = (0..rods).map(|rod| BladeMaterial {
         thickness: thickness[rod].clone(),
         young: young[rod].clone(),
         young_across: pick(&young_across, rod),
@@ -336,25 +343,25 @@ pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Bla
         poisson: poisson[rod].clone(),
         mass_density: pick(&mass_density, rod),
     });
-    let elevation = entries.item(Key::Elevation)?;
+    let elevation = entries.value_or_default(Key::Elevation)?;
     let whole = "a blade rises as a whole: give one number";
-    elevation.ensure(!elevation.value.is_array(), whole)?;
+    elevation.refuse_unless(!elevation.value.is_array(), whole)?;
     Ok(Some(Blade {
         elevation: elevation.number()?,
         outline: Arc::new(outline(entries)?),
-        edges: entries.item(Key::Edges)?.switch()?,
+        edges: entries.value_or_default(Key::Edges)?.switch()?,
         materials: materials.collect(),
     }))
 }
 
-fn outline(entries: &Entries) -> ScenarioResult<Outline> {
-    let item = entries.item(Key::BladeWidth)?;
+fn outline(entries: &Entries) -> ScenarioResult<BladeOutline> {
+    let item = entries.value_or_default(Key::BladeWidth)?;
     let width = width(item)?;
-    let narrow = entries.item(Key::LeastWidth)?;
+    let narrow = entries.value_or_default(Key::LeastWidth)?;
     let least = narrow.number()?;
-    narrow.ensure(
-        (NARROWEST..=WIDEST).contains(&least),
-        format_args!("must be between {NARROWEST} and {WIDEST}: a fraction of the largest width"),
+    narrow.refuse_unless(
+        (MIN_LEAST_WIDTH..=MAX_LEAST_WIDTH).contains(&least),
+        format_args!("must be between {MIN_LEAST_WIDTH} and {MAX_LEAST_WIDTH}: a fraction of the largest width"),
     )?;
     let knots = width.knots().windows(2);
     let between = knots.flat_map(|pair| {
@@ -363,9 +370,9 @@ fn outline(entries: &Entries) -> ScenarioResult<Outline> {
     });
     let (mut largest, mut narrowest) = (0.0_f64, f64::INFINITY);
     for (x, k) in between {
-        let [value, ..] = width.at(x);
+        let [value, ..] = width.value_and_derivatives(x);
         let inside = k > 0 && k < SAMPLES;
-        item.ensure(
+        item.refuse_unless(
             !inside || value > 0.0,
             format_args!(
                 "the smoothest outline through these points crosses itself at {x:.3} of the length: \
@@ -374,9 +381,9 @@ fn outline(entries: &Entries) -> ScenarioResult<Outline> {
         )?;
         (largest, narrowest) = (largest.max(value), narrowest.min(value));
     }
-    Ok(Outline {
-        length: entries.item(Key::BladeLength)?.number()?,
-        narrows: narrowest < least * largest,
+    Ok(BladeOutline {
+        length: entries.value_or_default(Key::BladeLength)?.number()?,
+        has_narrow_part: narrowest < least * largest,
         width,
         least,
         largest,
@@ -386,10 +393,10 @@ fn outline(entries: &Entries) -> ScenarioResult<Outline> {
 
 /// The curvature of the surface at rest, over fractions of the length.
 fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
-    let Some(item) = entries.given(Key::RestBend2) else {
+    let Some(item) = entries.given_value(Key::RestBend2) else {
         return Ok(None);
     };
-    item.ensure(
+    item.refuse_unless(
         !item.value.is_array(),
         "a blade bends as a whole: give one number, or one profile",
     )?;
@@ -400,35 +407,35 @@ fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
     if value.iter().all(|value| *value == 0.0) {
         return Ok(None);
     }
-    if let Some(twist) = entries.given(Key::RestTwist) {
+    if let Some(twist) = entries.given_value(Key::RestTwist) {
         let why = "the veins of a blade that is curved (rest.bend_2) twist as its surface does: \
                    leave one of them out";
-        return Err(twist.refuse(why));
+        return Err(twist.value_error(why));
     }
     Ok(Some(Spline::through(at, value)))
 }
 
 /// The width over fractions of the length.
-fn width(item: Item) -> ScenarioResult<Spline> {
+fn width(item: EntryValue) -> ScenarioResult<Spline> {
     if !item.value.is_table() {
         let width = item.number()?;
-        item.ensure(width > 0.0, "must be greater than 0")?;
+        item.refuse_unless(width > 0.0, "must be greater than 0")?;
         return Ok(Spline::through(vec![0.0, 1.0], vec![width; 2]));
     }
     let (at, value) = item.knots()?;
     let last = at.len() - 1;
-    item.ensure(
+    item.refuse_unless(
         last < MOST_POINTS,
         format_args!("has more than {MOST_POINTS} points: an outline is smooth with far fewer"),
     )?;
     let list = item.list("value").unwrap_or(item);
     for (k, value) in value.iter().enumerate() {
-        list.entry(k).ensure(
+        list.entry(k).refuse_unless(
             *value > 0.0 || *value == 0.0 && (k == 0 || k == last),
             "must be greater than 0, and may be 0 at the base and at the tip",
         )?;
     }
-    list.ensure(
+    list.refuse_unless(
         last > 1 || value[0] + value[1] > 0.0,
         "must be greater than 0 somewhere",
     )?;

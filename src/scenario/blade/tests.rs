@@ -12,7 +12,7 @@ const BLADE: &str = r#"
     blade = { length = 20.0, width = { at = [0.0, 0.2, 0.5, 1.0], value = [0.8, 1.5, 1.7, 0.0] }, thickness = 0.04, young = 4e4, mass_density = 8e-6 }
 "#;
 
-fn given(overrides: &str) -> Result<Scenario, String> {
+fn blade_with_overrides(overrides: &str) -> Result<Scenario, String> {
     let overrides = overrides.split("; ").filter(|it| !it.is_empty());
     let overrides: Vec<String> = overrides.map(str::to_string).collect();
     let read = Scenario::from_toml_with(BLADE, "blade.toml", &overrides);
@@ -54,7 +54,7 @@ fn contradictions_and_impossible_outlines_are_refused() {
         blade.edge=true => did you mean blade.edges?
     ";
     for (overrides, said) in pairs(table) {
-        let refused = given(overrides).expect_err(overrides);
+        let refused = blade_with_overrides(overrides).expect_err(overrides);
         assert!(refused.contains(said), "{overrides}: {refused}");
     }
     let bare = BLADE.replace(", thickness = 0.04", "");
@@ -82,7 +82,7 @@ fn what_is_written_is_read_again_as_the_same() {
         "leaf.rods=1; rest.bend_2={at=[0, 0.5, 1], value=[0.1, 0.2, -0.1]}",
         "rest.bend_2=0; rest.twist=0.3",
     ] {
-        let leaf = given(overrides).unwrap();
+        let leaf = blade_with_overrides(overrides).unwrap();
         let written = serde_json::to_value(&leaf).unwrap();
         assert_eq!(
             Scenario::from_toml(&written.to_string()).unwrap(),
@@ -96,7 +96,7 @@ fn what_is_written_is_read_again_as_the_same() {
                     .is_none_or(|it| it.get("along").is_none())
         );
     }
-    let written = serde_json::to_value(given("").unwrap()).unwrap();
+    let written = serde_json::to_value(blade_with_overrides("").unwrap()).unwrap();
     assert_eq!(
         written["blade"]["width"]["value"],
         json!([0.8, 1.5, 1.7, 0.0])
@@ -109,20 +109,20 @@ fn what_is_written_is_read_again_as_the_same() {
 #[test]
 fn veins_lie_within_the_outline() {
     for (edges, outermost) in [(true, 1.0), (false, 0.8)] {
-        let scenario = given(&format!("blade.edges={edges}")).unwrap();
+        let scenario = blade_with_overrides(&format!("blade.edges={edges}")).unwrap();
         let (blade, natural) = (
             scenario.blade.as_ref().unwrap(),
             Natural::new(&scenario, true),
         );
-        assert!(scenario.joined && blade.place(4) == outermost);
+        assert!(scenario.joined && blade.vein_position(4) == outermost);
         for j in 0..5 {
             for k in 0..=10 {
-                let (x, q) = natural.at(j, k as f64 / 10.0);
-                let y = 0.5 * blade.place(j) * blade.width((x.x / 20.0).clamp(0.0, 1.0));
+                let (x, q) = natural.vein_pose(j, k as f64 / 10.0);
+                let y = 0.5 * blade.vein_position(j) * blade.width((x.x / 20.0).clamp(0.0, 1.0));
                 assert!((x.y - y).abs() < 1e-11 && x.z == 0.0, "{j} {k}: {x} {y}");
                 assert!((q * DVec3::Z).distance(DVec3::Z) < 1e-14);
             }
-            let (tip, _) = natural.at(j, 1.0);
+            let (tip, _) = natural.vein_pose(j, 1.0);
             assert!(tip.distance(20.0 * DVec3::X) < 1e-11, "{tip}");
         }
     }
@@ -135,22 +135,23 @@ fn veins_of_a_curved_blade_lie_on_a_cylinder() {
         (0.08, "0.08"),
         (0.0, "{at=[0, 0.4, 0.7, 1], value=[0.1, 0.05, -0.1, 0.2]}"),
     ] {
-        let scenario = given(&format!("rest.bend_2={bend}")).unwrap();
+        let scenario = blade_with_overrides(&format!("rest.bend_2={bend}")).unwrap();
         let (blade, natural) = (
             scenario.blade.as_ref().unwrap(),
             Natural::new(&scenario, true),
         );
-        let (middle, _) = natural.at(2, 1.0);
+        let (middle, _) = natural.vein_pose(2, 1.0);
         for j in 0..5 {
-            let (tip, _) = natural.at(j, 1.0);
+            let (tip, _) = natural.vein_pose(j, 1.0);
             assert!(tip.distance(middle) < 1e-10, "{}", tip.distance(middle));
             for k in (0..=10).filter(|_| curvature > 0.0) {
-                let (x, q) = natural.at(j, k as f64 / 10.0);
+                let (x, q) = natural.vein_pose(j, k as f64 / 10.0);
                 let angle = (x.x).atan2(x.z + 1.0 / curvature);
                 let radius = x.x.hypot(x.z + 1.0 / curvature);
                 assert!((radius * curvature - 1.0).abs() < 1e-11, "{radius}");
-                let y =
-                    0.5 * blade.place(j) * blade.width((angle / curvature / 20.0).clamp(0.0, 1.0));
+                let y = 0.5
+                    * blade.vein_position(j)
+                    * blade.width((angle / curvature / 20.0).clamp(0.0, 1.0));
                 assert!((x.y - y).abs() < 1e-10, "{j} {k}: {x} {y}");
                 let normal = DVec3::new(angle.sin(), 0.0, angle.cos());
                 assert!((q * DVec3::Z).distance(normal) < 1e-11);
@@ -162,9 +163,10 @@ fn veins_of_a_curved_blade_lie_on_a_cylinder() {
 /// Strips add up to the blade, and tissue fills the gaps.
 #[test]
 fn stiffnesses_are_those_of_strips_of_the_plate() {
-    let leaf =
-        given("blade.width=1.5; leaf.rods=4; blade.young_across=2e4; blade.shear_modulus=1e4")
-            .unwrap();
+    let leaf = blade_with_overrides(
+        "blade.width=1.5; leaf.rods=4; blade.young_across=2e4; blade.shear_modulus=1e4",
+    )
+    .unwrap();
     let (e, across, g, t, h, w) = (4e4, 2e4, 1e4, 0.04_f64, 1.5 / 4.0, 1.5 / 3.0);
     let constant = |wanted: f64, found: &Profile| {
         let Profile::Constant(found) = found else {
@@ -199,7 +201,7 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
         .for_each(|(wanted, found)| constant(wanted, found));
     constant(8e-6 * h * t, &leaf.dynamics.density[0]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.
-    let leaf = given("").unwrap();
+    let leaf = blade_with_overrides("").unwrap();
     let blade = leaf.blade.as_ref().unwrap();
     let mean = (0..2000)
         .map(|k| blade.width((k as f64 + 0.5) / 2000.0))
@@ -216,7 +218,7 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
 /// A profile that a blade determines is its own image on the other side, but for the curvature.
 #[test]
 fn veins_are_images_of_each_other() {
-    let leaf = given("").unwrap();
+    let leaf = blade_with_overrides("").unwrap();
     for (j, image) in [(0, 4), (1, 3)] {
         let [one, other] = [&leaf.rods[j], &leaf.rods[image]];
         assert_eq!(one.couple_stiffness, other.couple_stiffness);
@@ -230,9 +232,9 @@ fn veins_are_images_of_each_other() {
 /// Entries are replaced and scaled as those of other tables.
 #[test]
 fn numbers_of_a_blade_vary() {
-    let twice = given("scale:blade.width=2").unwrap();
+    let twice = blade_with_overrides("scale:blade.width=2").unwrap();
     assert!((twice.blade.as_ref().unwrap().width(0.5) - 3.4).abs() < 1e-14);
-    let entries = Entries::of_text(BLADE, "blade").unwrap();
+    let entries = Entries::from_text(BLADE, "blade").unwrap();
     for (part, problem) in [
         ("blade.width.value=2", "must be a list"),
         ("blade.width[0]=2", ""),

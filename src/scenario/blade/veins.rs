@@ -8,15 +8,15 @@
 //! four continuous derivatives. So the curvature of a margin has no corners, and three points lie on
 //! a parabola.
 
-use crate::scenario::blade::{Local, Material};
-use crate::scenario::profile::GAUSS;
-use crate::scenario::{Profile, Property, ascending};
+use crate::scenario::blade::{BladeMaterial, LocalMaterial};
+use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
+use crate::scenario::{Profile, Property, sorted_distinct};
 use glam::{DMat2, DVec2};
 use std::sync::Arc;
 
 /// Panels between which the place along the blade is interpolated, over a vein's length: x(s) is
 /// then right to rounding.
-const PANELS: usize = 64;
+const ARC_LENGTH_PANELS: usize = 64;
 
 /// The factor of transverse shear of a plate (E. Reissner, 1945).
 const SHEAR_FACTOR: f64 = 5.0 / 6.0;
@@ -50,7 +50,7 @@ impl From<Property> for BladeProperty {
 }
 
 /// Most properties that something has.
-const MOST: usize = 11;
+const MAX_PROPERTIES: usize = 11;
 
 impl BladeProperty {
     /// Its number among those of a vein, or of tissue.
@@ -68,7 +68,7 @@ impl BladeProperty {
 
 /// The outline of a blade: its width over the distance from the base.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
+pub struct BladeOutline {
     /// The length.
     pub length: f64,
     /// The width at fractions of the length.
@@ -78,18 +78,21 @@ pub struct Outline {
     /// The largest width.
     pub largest: f64,
     /// Whether the width falls below the least one.
-    pub narrows: bool,
+    pub has_narrow_part: bool,
     /// The curvature of its surface at rest about the y axis, downwards, at fractions of the length.
     pub curvature: Option<Spline>,
 }
 
-impl Outline {
+impl BladeOutline {
     /// The width at the fraction `x` of the length from which stiffnesses are computed: it
     /// is nowhere less than the least width, and smooth. It differs from a width w by the part
     /// (least/w)^4/4.
     pub fn bearing_width(&self, x: f64) -> f64 {
-        let ([width, ..], least) = (self.width.at(x), self.least * self.largest);
-        match self.narrows {
+        let ([width, ..], least) = (
+            self.width.value_and_derivatives(x),
+            self.least * self.largest,
+        );
+        match self.has_narrow_part {
             true => (width.powi(4) + least.powi(4)).sqrt().sqrt(),
             false => width,
         }
@@ -98,13 +101,13 @@ impl Outline {
 
 /// A vein of a blade, along y = eta W(x)/2.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Vein {
-    outline: Arc<Outline>,
+pub struct BladeVein {
+    outline: Arc<BladeOutline>,
     /// Its place, a fraction of the half width; not negative: its mirror image is the same vein.
     eta: f64,
     /// Its strip is the width of the blade over this.
-    count: f64,
-    material: Material,
+    strip_count: f64,
+    material: BladeMaterial,
     /// Its length.
     pub length: f64,
     /// x and its first and second derivative by sigma, at the ends of equal panels.
@@ -118,13 +121,18 @@ fn secant(slope: f64) -> f64 {
     (1.0 + slope * slope).sqrt()
 }
 
-impl Vein {
-    pub fn new(outline: &Arc<Outline>, eta: f64, count: usize, material: Material) -> Vein {
+impl BladeVein {
+    pub fn new(
+        outline: &Arc<BladeOutline>,
+        eta: f64,
+        count: usize,
+        material: BladeMaterial,
+    ) -> BladeVein {
         let (outline, count) = (outline.clone(), count as f64);
-        let mut vein = Vein {
+        let mut vein = BladeVein {
             outline,
             eta,
-            count,
+            strip_count: count,
             material,
             length: 0.0,
             places: Vec::new(),
@@ -136,60 +144,62 @@ impl Vein {
 
     /// The derivatives y' and y'' of y = eta W/2 by the distance from the base, at the fraction x
     /// of the length.
-    fn slopes(&self, x: f64) -> [f64; 2] {
-        let Outline { length, width, .. } = &*self.outline;
-        let [_, slope, second] = width.at(x);
+    fn lateral_derivatives(&self, x: f64) -> [f64; 2] {
+        let BladeOutline { length, width, .. } = &*self.outline;
+        let [_, slope, second] = width.value_and_derivatives(x);
         let half = 0.5 * self.eta;
         [half * slope / length, half * second / (length * length)]
     }
 
     /// The angle at its base.
     pub fn angle(&self) -> f64 {
-        self.slopes(0.0)[0].atan()
+        self.lateral_derivatives(0.0)[0].atan()
     }
 
     /// Arc length over the fraction `x` of the blade's length.
-    fn stretch(&self, x: f64) -> f64 {
-        self.outline.length * secant(self.slopes(x)[0])
+    fn arc_length_derivative(&self, x: f64) -> f64 {
+        self.outline.length * secant(self.lateral_derivatives(x)[0])
     }
 
     /// The arc length between two fractions, between which the outline is smooth.
-    fn arc(&self, from: f64, to: f64) -> f64 {
+    fn arc_length_between(&self, from: f64, to: f64) -> f64 {
         let width = to - from;
-        let part = |(x, weight): &(f64, f64)| width * weight * self.stretch(from + x * width);
-        GAUSS.iter().map(part).sum()
+        let part = |(x, weight): &(f64, f64)| {
+            width * weight * self.arc_length_derivative(from + x * width)
+        };
+        GAUSS_LEGENDRE_RULE.iter().map(part).sum()
     }
 
     /// Finds its length, and x at equal distances along it.
     fn measure(&mut self) {
-        let even = (0..=PANELS).map(|k| k as f64 / PANELS as f64);
+        let even = (0..=ARC_LENGTH_PANELS).map(|k| k as f64 / ARC_LENGTH_PANELS as f64);
         let outline = self.outline.clone();
         let curved = outline.curvature.iter().flat_map(Spline::knots);
-        let knots = ascending(outline.width.knots().iter().chain(curved).copied());
-        let edges = ascending(even.chain(knots.iter().copied()));
+        let knots = sorted_distinct(outline.width.knots().iter().chain(curved).copied());
+        let edges = sorted_distinct(even.chain(knots.iter().copied()));
         let mut reached = vec![0.0];
         for pair in edges.windows(2) {
             let before = reached[reached.len() - 1];
-            reached.push(before + self.arc(pair[0], pair[1]));
+            reached.push(before + self.arc_length_between(pair[0], pair[1]));
         }
         self.length = reached[reached.len() - 1];
         let place = |k: usize| {
-            let wanted = self.length * k as f64 / PANELS as f64;
+            let wanted = self.length * k as f64 / ARC_LENGTH_PANELS as f64;
             let panel = reached.partition_point(|&s| s < wanted).max(1) - 1;
             let mut x = edges[panel];
             // Newton's method, which converges quadratically; a panel is nearly straight.
             for _ in 0..6 {
-                let missing = wanted - reached[panel] - self.arc(edges[panel], x);
-                x = (x + missing / self.stretch(x)).clamp(0.0, 1.0);
+                let missing = wanted - reached[panel] - self.arc_length_between(edges[panel], x);
+                x = (x + missing / self.arc_length_derivative(x)).clamp(0.0, 1.0);
             }
-            let [slope, second] = self.slopes(x);
+            let [slope, second] = self.lateral_derivatives(x);
             // dx/ds = (1 + y'^2)^(-1/2) and its derivative, by sigma.
             let speed = self.length / (self.outline.length * secant(slope));
             let change = -slope * second / (1.0 + slope * slope) * self.outline.length;
             [x, speed, speed * speed * change]
         };
-        let mut places: Vec<_> = (0..=PANELS).map(place).collect();
-        (places[0][0], places[PANELS][0]) = (0.0, 1.0);
+        let mut places: Vec<_> = (0..=ARC_LENGTH_PANELS).map(place).collect();
+        (places[0][0], places[ARC_LENGTH_PANELS][0]) = (0.0, 1.0);
         self.places = places;
         let inner = |knot: &&f64| **knot > 0.0 && **knot < 1.0;
         let known = |knot: &f64| reached[edges.partition_point(|edge| edge < knot)] / self.length;
@@ -197,30 +207,31 @@ impl Vein {
     }
 
     /// The fraction x of the blade's length at the fraction sigma of its own.
-    fn place(&self, sigma: f64) -> f64 {
-        let scaled = sigma * PANELS as f64;
-        let k = (scaled as usize).min(PANELS - 1);
-        let (t, h) = (scaled - k as f64, 1.0 / PANELS as f64);
+    fn blade_fraction(&self, sigma: f64) -> f64 {
+        let scaled = sigma * ARC_LENGTH_PANELS as f64;
+        let k = (scaled as usize).min(ARC_LENGTH_PANELS - 1);
+        let (t, h) = (scaled - k as f64, 1.0 / ARC_LENGTH_PANELS as f64);
         let end = |[x, slope, second]: [f64; 3]| [x, h * slope, h * h * second];
-        let [x, ..] = quintic(t, end(self.places[k]), end(self.places[k + 1]));
+        let [x, ..] = quintic_hermite(t, end(self.places[k]), end(self.places[k + 1]));
         x.clamp(0.0, 1.0)
     }
 }
 
-impl Vein {
+impl BladeVein {
     /// u0 at the fraction `x` of the blade's length.
     fn rest_curvature(&self, x: f64) -> [f64; 3] {
-        let [slope, second] = self.slopes(x);
+        let [slope, second] = self.lateral_derivatives(x);
         // On a cylinder at the angle phi, tan(phi) = y', to its principal direction.
         let curvature = self.outline.curvature.as_ref();
-        let curvature = curvature.map_or(0.0, |of| of.at(x)[0]) / (1.0 + slope * slope);
+        let curvature =
+            curvature.map_or(0.0, |of| of.value_and_derivatives(x)[0]) / (1.0 + slope * slope);
         let sideways = second / secant(slope).powi(3);
         [curvature * slope, curvature, sideways]
     }
 
     /// A1, A2, A3, H1, H2 and H3 at a fraction of its length, where this material is.
-    fn stiffnesses(&self, sigma: f64, material: &Local) -> [f64; 6] {
-        let h = self.outline.bearing_width(self.place(sigma)) / self.count;
+    fn stiffnesses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 6] {
+        let h = self.outline.bearing_width(self.blade_fraction(sigma)) / self.strip_count;
         let (t, young, shear) = (material.t, material.young, material.shear);
         let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
         let [a1, a2, a3] = [
@@ -233,8 +244,13 @@ impl Vein {
     }
 
     /// The mass and the moment of inertia per length, those of the blade as it is.
-    fn masses(&self, sigma: f64, material: &Local) -> [f64; 2] {
-        let width = self.outline.width.at(self.place(sigma))[0].max(0.0) / self.count;
+    fn masses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
+        let width = self
+            .outline
+            .width
+            .value_and_derivatives(self.blade_fraction(sigma))[0]
+            .max(0.0)
+            / self.strip_count;
         let density = self.material.mass_density.as_ref();
         let density = density.map_or(0.0, |it| it.at(sigma));
         let (t, mass) = (material.t, density * width * material.t);
@@ -245,22 +261,24 @@ impl Vein {
     fn property(&self, property: BladeProperty, sigma: f64) -> f64 {
         match property {
             BladeProperty::Couple(_) | BladeProperty::Force(_) => {
-                self.stiffnesses(sigma, &self.material.at(sigma))[property.number()]
+                self.stiffnesses(sigma, &self.material.local_material(sigma))[property.number()]
             }
             // Natural leaves are integrated with these.
-            BladeProperty::Rest(axis) => self.rest_curvature(self.place(sigma))[axis],
-            BladeProperty::Density => self.masses(sigma, &self.material.at(sigma))[0],
-            BladeProperty::RotaryInertia => self.masses(sigma, &self.material.at(sigma))[1],
+            BladeProperty::Rest(axis) => self.rest_curvature(self.blade_fraction(sigma))[axis],
+            BladeProperty::Density => self.masses(sigma, &self.material.local_material(sigma))[0],
+            BladeProperty::RotaryInertia => {
+                self.masses(sigma, &self.material.local_material(sigma))[1]
+            }
             BladeProperty::Tissue(_) => 0.0,
         }
     }
 
     /// All properties at a fraction of its length, by their numbers.
-    fn properties(&self, sigma: f64) -> [f64; MOST] {
-        let material = self.material.at(sigma);
-        let mut all = [0.0; MOST];
+    fn properties(&self, sigma: f64) -> [f64; MAX_PROPERTIES] {
+        let material = self.material.local_material(sigma);
+        let mut all = [0.0; MAX_PROPERTIES];
         all[..6].copy_from_slice(&self.stiffnesses(sigma, &material));
-        all[6..9].copy_from_slice(&self.rest_curvature(self.place(sigma)));
+        all[6..9].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
         all[9..].copy_from_slice(&self.masses(sigma, &material));
         all
     }
@@ -268,52 +286,59 @@ impl Vein {
 
 /// What a profile of a blade follows from.
 #[derive(Clone, Debug, PartialEq)]
-enum Source {
+enum BladePartSource {
     /// A vein.
-    Vein(Arc<Vein>),
+    Vein(Arc<BladeVein>),
     /// The tissue between two veins, whose width is that of the blade times a factor.
-    Gap([Arc<Vein>; 2], f64),
+    Gap([Arc<BladeVein>; 2], f64),
 }
 
 /// A vein of a blade, or the tissue between two: what profiles along it are evaluated from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BladePart {
-    source: Source,
+    source: BladePartSource,
     kinks: Vec<f64>,
     /// The least and largest value of every property.
-    extremes: [[f64; 2]; MOST],
+    extremes: [[f64; 2]; MAX_PROPERTIES],
 }
 
 impl BladePart {
-    pub(super) fn vein(vein: Arc<Vein>) -> Arc<BladePart> {
-        BladePart::new(Source::Vein(vein))
+    pub(super) fn from_vein(vein: Arc<BladeVein>) -> Arc<BladePart> {
+        BladePart::new(BladePartSource::Vein(vein))
     }
 
     /// The tissue between two veins, `apart` being the difference of their fractions of the half
     /// width.
-    pub(super) fn gap(one: &Arc<Vein>, other: &Arc<Vein>, apart: f64) -> Arc<BladePart> {
+    pub(super) fn from_gap(
+        one: &Arc<BladeVein>,
+        other: &Arc<BladeVein>,
+        apart: f64,
+    ) -> Arc<BladePart> {
         // Its mirror image is the same.
         let (near, far) = if one.eta <= other.eta {
             (one, other)
         } else {
             (other, one)
         };
-        BladePart::new(Source::Gap([near.clone(), far.clone()], 0.5 * apart))
+        BladePart::new(BladePartSource::Gap(
+            [near.clone(), far.clone()],
+            0.5 * apart,
+        ))
     }
 
-    fn new(source: Source) -> Arc<BladePart> {
+    fn new(source: BladePartSource) -> Arc<BladePart> {
         let kinks = match &source {
-            Source::Vein(vein) => ascending(vein.material.kinks()),
-            Source::Gap([one, other], _) => {
-                ascending(one.material.kinks().chain(other.material.kinks()))
+            BladePartSource::Vein(vein) => sorted_distinct(vein.material.kinks()),
+            BladePartSource::Gap([one, other], _) => {
+                sorted_distinct(one.material.kinks().chain(other.material.kinks()))
             }
         };
         let mut part = BladePart {
             source,
             kinks,
-            extremes: [[f64::INFINITY, f64::NEG_INFINITY]; MOST],
+            extremes: [[f64::INFINITY, f64::NEG_INFINITY]; MAX_PROPERTIES],
         };
-        let even = (0..=2 * PANELS).map(|k| k as f64 / (2 * PANELS) as f64);
+        let even = (0..=2 * ARC_LENGTH_PANELS).map(|k| k as f64 / (2 * ARC_LENGTH_PANELS) as f64);
         for sigma in even.chain(part.kinks.clone()) {
             for (value, [least, most]) in part.properties(sigma).into_iter().zip(&mut part.extremes)
             {
@@ -323,18 +348,18 @@ impl BladePart {
         part.into()
     }
 
-    fn properties(&self, sigma: f64) -> [f64; MOST] {
+    fn properties(&self, sigma: f64) -> [f64; MAX_PROPERTIES] {
         match &self.source {
-            Source::Vein(vein) => vein.properties(sigma),
-            Source::Gap([one, other], factor) => {
-                let x = 0.5 * (one.place(sigma) + other.place(sigma));
+            BladePartSource::Vein(vein) => vein.properties(sigma),
+            BladePartSource::Gap([one, other], factor) => {
+                let x = 0.5 * (one.blade_fraction(sigma) + other.blade_fraction(sigma));
                 let w = factor * one.outline.bearing_width(x);
-                let [a, b] = [one, other].map(|vein| vein.material.at(sigma));
-                let mean = |of: fn(&Local) -> f64| 0.5 * (of(&a) + of(&b));
+                let [a, b] = [one, other].map(|vein| vein.material.local_material(sigma));
+                let mean = |of: fn(&LocalMaterial) -> f64| 0.5 * (of(&a) + of(&b));
                 let (t, across) = (mean(|it| it.t), mean(|it| it.across));
                 let along = mean(|it| it.shear) * t / w;
                 let fold = across * t.powi(3) / (12.0 * w);
-                let mut all = [0.0; MOST];
+                let mut all = [0.0; MAX_PROPERTIES];
                 all[..4].copy_from_slice(&[along, across * t / w, SHEAR_FACTOR * along, fold]);
                 all
             }
@@ -342,17 +367,17 @@ impl BladePart {
     }
 
     /// A property at a fraction of the length.
-    pub fn at(&self, property: BladeProperty, sigma: f64) -> f64 {
+    pub fn property_value(&self, property: BladeProperty, sigma: f64) -> f64 {
         match &self.source {
-            Source::Vein(vein) => vein.property(property, sigma),
-            Source::Gap(..) => self.properties(sigma)[property.number()],
+            BladePartSource::Vein(vein) => vein.property(property, sigma),
+            BladePartSource::Gap(..) => self.properties(sigma)[property.number()],
         }
     }
 
     /// Three properties of a vein at a fraction of its length, if they are of one kind.
     pub fn three(&self, properties: [BladeProperty; 3], sigma: f64) -> Option<[f64; 3]> {
         use BladeProperty::{Couple, Force, Rest};
-        let Source::Vein(vein) = &self.source else {
+        let BladePartSource::Vein(vein) = &self.source else {
             return None;
         };
         match properties {
@@ -361,11 +386,11 @@ impl BladePart {
                 Couple(_) | Force(_),
                 Couple(_) | Force(_),
             ] => {
-                let all = vein.stiffnesses(sigma, &vein.material.at(sigma));
+                let all = vein.stiffnesses(sigma, &vein.material.local_material(sigma));
                 Some(properties.map(|property| all[property.number()]))
             }
             [Rest(a), Rest(b), Rest(c)] => {
-                let all = vein.rest_curvature(vein.place(sigma));
+                let all = vein.rest_curvature(vein.blade_fraction(sigma));
                 Some([all[a], all[b], all[c]])
             }
             _ => None,
@@ -378,10 +403,10 @@ impl BladePart {
     }
 
     /// Fractions inside (0, 1) where the outline of a vein has its points.
-    pub(in crate::scenario) fn seams(&self) -> &[f64] {
+    pub(in crate::scenario) fn outline_points(&self) -> &[f64] {
         match &self.source {
-            Source::Vein(vein) => &vein.seams,
-            Source::Gap(..) => &[],
+            BladePartSource::Vein(vein) => &vein.seams,
+            BladePartSource::Gap(..) => &[],
         }
     }
 
@@ -420,7 +445,7 @@ impl Spline {
     pub fn through(at: Vec<f64>, value: Vec<f64>) -> Spline {
         let slopes = match at.len() {
             2 => vec![DVec2::new(value[1] - value[0], 0.0); 2],
-            _ => slopes(&at, &value),
+            _ => spline_derivatives(&at, &value),
         };
         Spline { at, value, slopes }
     }
@@ -436,7 +461,7 @@ impl Spline {
     }
 
     /// The value, and the first and second derivative at `x` in [0, 1].
-    pub fn at(&self, x: f64) -> [f64; 3] {
+    pub fn value_and_derivatives(&self, x: f64) -> [f64; 3] {
         let right = self.at.partition_point(|&knot| knot < x);
         let k = right.clamp(1, self.at.len() - 1) - 1;
         let width = self.at[k + 1] - self.at[k];
@@ -445,14 +470,14 @@ impl Spline {
             [self.value[k], width * x, width * width * y]
         };
         let t = (x - self.at[k]) / width;
-        let [value, slope, second] = quintic(t, end(k), end(k + 1));
+        let [value, slope, second] = quintic_hermite(t, end(k), end(k + 1));
         [value, slope / width, second / (width * width)]
     }
 }
 
 /// The polynomial of degree 5 with these values, first and second derivatives at 0 and at 1: its
 /// value and derivatives at `t`.
-pub(super) fn quintic(t: f64, [f0, d0, c0]: [f64; 3], [f1, d1, c1]: [f64; 3]) -> [f64; 3] {
+pub(super) fn quintic_hermite(t: f64, [f0, d0, c0]: [f64; 3], [f1, d1, c1]: [f64; 3]) -> [f64; 3] {
     if t == 1.0 {
         // The sums below would lose a small value next to large ones, or a zero.
         return [f1, d1, c1];
@@ -476,7 +501,7 @@ pub(super) fn quintic(t: f64, [f0, d0, c0]: [f64; 3], [f1, d1, c1]: [f64; 3]) ->
 ///
 /// at the first point, and likewise at the second; both are continuous, and zero at the ends. These
 /// equations for (d, c) are block tridiagonal.
-fn slopes(at: &[f64], value: &[f64]) -> Vec<DVec2> {
+fn spline_derivatives(at: &[f64], value: &[f64]) -> Vec<DVec2> {
     let last = at.len() - 1;
     // What the interval from point k adds to the equations of its ends: the rows are f''' and f''''.
     let first_end = |k: usize| {
@@ -533,13 +558,13 @@ mod tests {
     #[test]
     fn lines_and_parabolas_are_what_they_are() {
         let line = Spline::through(vec![0.0, 1.0], vec![2.0, -1.0]);
-        assert_eq!(line.at(0.25), [1.25, -3.0, 0.0]);
+        assert_eq!(line.value_and_derivatives(0.25), [1.25, -3.0, 0.0]);
         let parabola = |x: f64| 1.2 + x * (4.0 - 5.0 * x);
         for at in [vec![0.0, 0.3, 1.0], vec![0.0, 0.1, 0.2, 0.7, 0.9, 1.0]] {
             let value = at.iter().map(|&x| parabola(x)).collect();
             let spline = Spline::through(at, value);
             for x in [0.0, 0.05, 0.3, 0.65, 1.0] {
-                let [value, slope, second] = spline.at(x);
+                let [value, slope, second] = spline.value_and_derivatives(x);
                 close(value, parabola(x), 1e-13);
                 close(slope, 4.0 - 10.0 * x, 1e-11);
                 close(second, -10.0, 1e-10);
@@ -556,8 +581,9 @@ mod tests {
         // From the polynomial on one side of a knot.
         let third_and_fourth = |knot: f64, side: f64| {
             let h = 1e-3 * side;
-            let [_, _, c0] = spline.at(knot + 1e-14 * side);
-            let [c1, c2, c3] = [1.0, 2.0, 3.0].map(|k| spline.at(knot + k * h)[2]);
+            let [_, _, c0] = spline.value_and_derivatives(knot + 1e-14 * side);
+            let [c1, c2, c3] =
+                [1.0, 2.0, 3.0].map(|k| spline.value_and_derivatives(knot + k * h)[2]);
             let third = (-11.0 * c0 + 18.0 * c1 - 9.0 * c2 + 2.0 * c3) / (6.0 * h);
             [third, (2.0 * c0 - 5.0 * c1 + 4.0 * c2 - c3) / (h * h)]
         };

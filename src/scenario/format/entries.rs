@@ -9,10 +9,12 @@
 mod tests;
 
 use crate::scenario::format::source::{
-    Place, ScenarioError, ScenarioResult, Source, multiply, not_toml, number, parse, shorten,
-    span_of, value_of,
+    ScenarioError, ScenarioResult, ScenarioSource, SourceLocation, entry_span, multiply, number,
+    parse, shorten, toml_error_message, value_from_parsed,
 };
-use crate::scenario::format::{Form, Key, LeftOut, nearest, split, unknown};
+use crate::scenario::format::{
+    Key, MissingKeyRule, ValueSchema, nearest_key, split, unknown_key_message,
+};
 use std::fmt;
 use std::sync::{Arc, LazyLock};
 use toml::{Table, Value};
@@ -36,16 +38,16 @@ pub const MOST_RODS: usize = 100_000;
 pub struct Entries {
     /// The entries of each key: one, or one for each of its tables if there may be several.
     entries: [Vec<Option<Arc<Entry>>>; Key::COUNT],
-    /// How many there are of each table of [`Key::REPEATED`].
-    rows: [usize; Key::REPEATED.len()],
-    pub(in crate::scenario) source: Arc<Source>,
+    /// How many there are of each table of [`REPEATED_TABLES`].
+    rows: [usize; Key::REPEATED_TABLES.len()],
+    pub(in crate::scenario) source: Arc<ScenarioSource>,
 }
 
 #[derive(Debug)]
 struct Entry {
     value: Value,
     /// The override `KEY=VALUE` that it is from; `None`: from the source.
-    given: Option<String>,
+    override_text: Option<String>,
 }
 
 impl Entries {
@@ -53,23 +55,23 @@ impl Entries {
     ///
     /// # Errors
     /// If it cannot be parsed, or has an unknown key.
-    pub fn of_text(text: &str, file: &str) -> ScenarioResult<Self> {
-        let (source, table) = Source::parse(text, file)?;
-        Entries::of(source, table)
+    pub fn from_text(text: &str, file: &str) -> ScenarioResult<Self> {
+        let (source, table) = ScenarioSource::parse(text, file)?;
+        Entries::from_source(source, table)
     }
 
     /// The entries in a table of the same form, without a text.
     ///
     /// # Errors
     /// If it has an unknown key.
-    pub fn of_table(table: Table) -> ScenarioResult<Self> {
-        Entries::of(Source::default(), table)
+    pub fn from_table(table: Table) -> ScenarioResult<Self> {
+        Entries::from_source(ScenarioSource::default(), table)
     }
 
-    fn of(source: Source, table: Table) -> ScenarioResult<Self> {
+    fn from_source(source: ScenarioSource, table: Table) -> ScenarioResult<Self> {
         let mut entries = Entries {
             entries: [const { Vec::new() }; Key::COUNT],
-            rows: [0; Key::REPEATED.len()],
+            rows: [0; Key::REPEATED_TABLES.len()],
             source: source.into(),
         };
         let mut unknown = Vec::new();
@@ -78,7 +80,7 @@ impl Entries {
         match unknown.next() {
             None => Ok(entries),
             Some(first) => {
-                let others = unknown.chain(entries.mistakes()).collect();
+                let others = unknown.chain(entries.value_errors()).collect();
                 Err(ScenarioError { others, ..first })
             }
         }
@@ -94,7 +96,7 @@ impl Entries {
     ) {
         for (key, value) in table {
             if let Some(known) = Key::from_parts(name, &key) {
-                self.put(Part::of_row(known, row), value, None);
+                self.put_entry(EntryPath::whole_entry(known, row), value, None);
                 continue;
             }
             let path = [name, &key].join(".");
@@ -102,11 +104,11 @@ impl Entries {
             match Key::table(path) {
                 Some(inner) => self.add_inner(inner, value, errors),
                 None => {
-                    let meant = nearest(path).map(|key| format!(" (did you mean {key}?)"));
+                    let meant = nearest_key(path).map(|key| format!(" (did you mean {key}?)"));
                     let (path, meant) = (shorten(path), meant.unwrap_or_default());
                     let allowed = Key::allowed_in(name).join(", ");
                     let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
-                    errors.push(self.source.refuse_key((name, &key), row, problem));
+                    errors.push(self.source.unknown_key_error((name, &key), row, problem));
                 }
             }
         }
@@ -114,7 +116,7 @@ impl Entries {
 
     /// Adds a table, or all those of a name.
     fn add_inner(&mut self, name: &'static str, value: Value, errors: &mut Vec<ScenarioError>) {
-        let repeated = Key::REPEATED.iter().position(|table| *table == name);
+        let repeated = Key::REPEATED_TABLES.iter().position(|table| *table == name);
         match (repeated, value) {
             (None, Value::Table(table)) => self.add((name, 0), table, errors),
             (Some(which), Value::Array(list)) if list.iter().all(Value::is_table) => {
@@ -125,7 +127,7 @@ impl Entries {
                     }
                 }
             }
-            (_, value) => errors.push(self.source.refuse_value(name, &value)),
+            (_, value) => errors.push(self.source.misplaced_value_error(name, &value)),
         }
     }
 
@@ -138,7 +140,7 @@ impl Entries {
         let mut entries = self.clone();
         for given in overrides {
             let refuse = |problem: String| ScenarioError {
-                place: Place::Set {
+                place: SourceLocation::Set {
                     given: shorten(given),
                 },
                 key: None,
@@ -149,12 +151,12 @@ impl Entries {
                 let problem = "must be KEY=VALUE, as in load.gravity=[0,0,-0.5]";
                 return Err(refuse(problem.into()));
             };
-            let part = Part::parse(path).map_err(refuse)?;
+            let part = EntryPath::parse(path).map_err(refuse)?;
             entries.check_row(part).map_err(refuse)?;
             let text = text.trim();
-            let value = parse(text).map(|value| value_of(&value));
+            let value = parse(text).map(|value| value_from_parsed(&value));
             let value = match part.is_whole() {
-                true => value.map_err(|error| refuse(not_toml(&error, text)))?,
+                true => value.map_err(|error| refuse(toml_error_message(&error, text)))?,
                 false => {
                     let new = value.map_err(|_| format!("{} is no value", shorten(text)));
                     // What is too large for a number is shown as it was given.
@@ -163,14 +165,14 @@ impl Entries {
                         true => new,
                         false => text.into(),
                     });
-                    let whole = new.and_then(|new| entries.changed(part, new));
+                    let whole = new.and_then(|new| entries.replaced_value(part, new));
                     whole.map_err(|why| ScenarioError {
                         key: Some(part.key),
                         ..refuse(format!("{part}: {why}"))
                     })?
                 }
             };
-            entries.put(part, value, Some(given.clone()));
+            entries.put_entry(part, value, Some(given.clone()));
         }
         Ok(entries)
     }
@@ -184,10 +186,10 @@ impl Entries {
     pub(crate) fn to_toml(&self) -> String {
         let mut document = Table::new();
         for key in Key::all() {
-            let (table, name) = key.parts();
+            let (table, name) = key.table_and_name();
             for (row, entry) in self.entries[key as usize].iter().enumerate() {
                 let Some(entry) = entry else { continue };
-                let rows = self.rows(table);
+                let rows = self.table_count(table);
                 let inner = inner_table(&mut document, table, rows.map(|rows| (row, rows)));
                 if let Some(inner) = inner {
                     inner.insert(name.into(), entry.value.clone());
@@ -198,22 +200,24 @@ impl Entries {
     }
 
     /// How many there are of a table, if there may be several.
-    pub(in crate::scenario) fn rows(&self, table: &str) -> Option<usize> {
-        let which = Key::REPEATED.iter().position(|known| *known == table)?;
+    pub(in crate::scenario) fn table_count(&self, table: &str) -> Option<usize> {
+        let which = Key::REPEATED_TABLES
+            .iter()
+            .position(|known| *known == table)?;
         Some(self.rows[which])
     }
 
     /// The whole value of a key, in each of its tables.
-    pub(crate) fn parts(&self, key: Key) -> impl Iterator<Item = Part> {
-        let (table, _) = key.parts();
-        let rows = self.rows(table).unwrap_or(1);
-        (0..rows).map(move |row| Part::of_row(key, row))
+    pub(crate) fn parts(&self, key: Key) -> impl Iterator<Item = EntryPath> {
+        let (table, _) = key.table_and_name();
+        let rows = self.table_count(table).unwrap_or(1);
+        (0..rows).map(move |row| EntryPath::whole_entry(key, row))
     }
 
     /// Refuses a part of a table that is not there.
-    fn check_row(&self, part: Part) -> std::result::Result<(), String> {
-        let (table, _) = part.key.parts();
-        match self.rows(table) {
+    fn check_row(&self, part: EntryPath) -> std::result::Result<(), String> {
+        let (table, _) = part.key.table_and_name();
+        match self.table_count(table) {
             Some(rows) if part.row >= rows => Err(format!(
                 "{part}: there are {rows} of [[{table}]], counted from 0: write it first"
             )),
@@ -222,26 +226,32 @@ impl Entries {
     }
 
     /// Where a part of an entry is written, and how.
-    pub(in crate::scenario) fn place(&self, part: Part, value: &Value) -> (Place, String) {
+    pub(in crate::scenario) fn entry_location(
+        &self,
+        part: EntryPath,
+        value: &Value,
+    ) -> (SourceLocation, String) {
         let entry = self.entry(part.key, part.row);
-        let Some(given) = entry.and_then(|entry| entry.given.as_ref()) else {
-            let spans = self.source.find(part.key.parts(), part.row, Some(part));
-            let found = self.source.shown(spans.as_ref(), value);
+        let Some(given) = entry.and_then(|entry| entry.override_text.as_ref()) else {
+            let spans =
+                self.source
+                    .find_entry_spans(part.key.table_and_name(), part.row, Some(part));
+            let found = self.source.displayed_value(spans.as_ref(), value);
             return (
-                self.source.place(spans.map(|spans| spans.value.start)),
+                self.source.location(spans.map(|spans| spans.value.start)),
                 found,
             );
         };
         // The value of a part is not that of the whole entry.
         let whole = given.split_once('=').filter(|(path, _)| {
-            let overridden = Part::parse(path);
+            let overridden = EntryPath::parse(path);
             overridden.is_ok_and(|overridden| overridden.is_whole())
         });
         let text = whole.map(|(_, text)| text.trim());
-        let found = text.and_then(|text| text.get(span_of(&parse(text).ok()?, part)));
+        let found = text.and_then(|text| text.get(entry_span(&parse(text).ok()?, part)));
         let found = found.map_or_else(|| shorten(&value.to_string()), shorten);
         let given = shorten(given);
-        (Place::Set { given }, found)
+        (SourceLocation::Set { given }, found)
     }
 
     pub(in crate::scenario) fn is_given(&self, key: Key) -> bool {
@@ -255,36 +265,46 @@ impl Entries {
     /// The value of a key, or its default; in one of its tables if there may be several.
     pub(in crate::scenario) fn get(&self, key: Key, row: usize) -> Option<&Value> {
         let entry = self.entry(key, row);
-        entry.map(|entry| &entry.value).or_else(|| left_out(key))
+        entry
+            .map(|entry| &entry.value)
+            .or_else(|| default_value(key))
     }
 
-    fn put(&mut self, part: Part, value: Value, given: Option<String>) {
+    fn put_entry(&mut self, part: EntryPath, value: Value, given: Option<String>) {
         let rows = &mut self.entries[part.key as usize];
         if rows.len() <= part.row {
             rows.resize(part.row + 1, None);
         }
-        rows[part.row] = Some(Arc::new(Entry { value, given }));
+        rows[part.row] = Some(Arc::new(Entry {
+            value,
+            override_text: given,
+        }));
     }
 
     /// Replaces a key in each of its tables by this value, as TOML, or by none.
     pub(in crate::scenario) fn replace(&mut self, key: Key, value: Option<&str>) {
         self.entries[key as usize].clear();
         let value = value.and_then(|text| parse(text).ok());
-        if let Some(value) = value.map(|value| value_of(&value)) {
-            let parts: Vec<Part> = self.parts(key).collect();
+        if let Some(value) = value.map(|value| value_from_parsed(&value)) {
+            let parts: Vec<EntryPath> = self.parts(key).collect();
             for part in parts {
-                self.put(part, value.clone(), None);
+                self.put_entry(part, value.clone(), None);
             }
         }
     }
 
-    pub(crate) fn value_at(&self, part: Part) -> Option<&Value> {
+    pub(crate) fn value_at(&self, part: EntryPath) -> Option<&Value> {
         self.check_row(part).ok()?;
         let mut place = self.get(part.key, part.row)?;
         if let Some(list) = part.list {
             place = place.get(list)?;
         }
-        for index in part.indices.into_iter().flatten().skip(part.shared(place)) {
+        for index in part
+            .indices
+            .into_iter()
+            .flatten()
+            .skip(part.shared_indices(place))
+        {
             // A single number holds for all rods.
             if number(place).is_none() {
                 place = place.get(index)?;
@@ -294,7 +314,7 @@ impl Entries {
     }
 
     /// The number that a part is, if any; that of a scale is 1.
-    pub(crate) fn number_at(&self, part: Part) -> Option<f64> {
+    pub(crate) fn number_at(&self, part: EntryPath) -> Option<f64> {
         match part.scale {
             true => Some(1.0),
             false => number(self.value_at(part)?),
@@ -302,13 +322,13 @@ impl Entries {
     }
 
     /// Whether a factor changes any of its numbers, or is refused.
-    pub(crate) fn is_scalable(&self, part: Part) -> bool {
-        let times = |factor| self.changed(part, Value::Float(factor));
+    pub(crate) fn is_scalable(&self, part: EntryPath) -> bool {
+        let times = |factor| self.replaced_value(part, Value::Float(factor));
         times(1.0) != times(2.0) || times(1.0).is_err()
     }
 
     /// The whole value of a key after a part of it is replaced.
-    fn changed(&self, part: Part, new: Value) -> std::result::Result<Value, String> {
+    fn replaced_value(&self, part: EntryPath, new: Value) -> std::result::Result<Value, String> {
         let whole = self.get(part.key, part.row);
         let mut whole = whole
             .cloned()
@@ -318,7 +338,7 @@ impl Entries {
             let found = place.get_mut(list);
             place = found.ok_or(format!("the scenario has no {list} there: write it first"))?;
         } else if part.indices[0].is_some() {
-            self.spread(part, place)?;
+            self.expand_to_list(part, place)?;
         }
         for index in part.indices.into_iter().flatten() {
             let entries = place.as_array_mut().ok_or("is no list in the scenario")?;
@@ -341,14 +361,18 @@ impl Entries {
     }
 
     /// Turns a single number or vector for all rods, or gaps, into a list.
-    fn spread(&self, part: Part, place: &mut Value) -> std::result::Result<(), String> {
-        if number(place).is_some() || part.shared(place) > 0 {
+    fn expand_to_list(
+        &self,
+        part: EntryPath,
+        place: &mut Value,
+    ) -> std::result::Result<(), String> {
+        if number(place).is_some() || part.shared_indices(place) > 0 {
             let rods = self.get(Key::Rods, 0).and_then(Value::as_integer);
             let rods = rods.and_then(|rods| usize::try_from(rods).ok());
             let rods = rods.filter(|rods| *rods <= MOST_RODS);
             let rods = rods.ok_or("leaf.rods must say of how many")?;
             let count = match part.key.form() {
-                Form::PerGap(_) => rods.saturating_sub(1),
+                ValueSchema::PerGap(_) => rods.saturating_sub(1),
                 _ => rods,
             };
             *place = Value::Array(vec![place.clone(); count]);
@@ -358,10 +382,12 @@ impl Entries {
 }
 
 /// The default value of a key that is left out, if it has one.
-fn left_out(key: Key) -> Option<&'static Value> {
+fn default_value(key: Key) -> Option<&'static Value> {
     static VALUES: LazyLock<Vec<Option<Value>>> = LazyLock::new(|| {
-        let value = |key: Key| match key.left_out() {
-            LeftOut::Default(text) => parse(text).ok().map(|value| value_of(&value)),
+        let value = |key: Key| match key.missing_key_rule() {
+            MissingKeyRule::Default(text) => {
+                parse(text).ok().map(|value| value_from_parsed(&value))
+            }
             _ => None,
         };
         Key::all().map(value).collect()
@@ -392,14 +418,14 @@ fn inner_table<'d>(
 }
 
 /// Lists that a table can have.
-const LISTS: [&str; 3] = ["at", "value", "factor"];
+const LIST_NAMES: [&str; 3] = ["at", "value", "factor"];
 
-const COMPONENTS: &str = "x, y, z have the indices 0, 1, 2";
+const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
 
 /// The target of an override: an entry of a scenario, one of its lists, one entry of
 /// that, or all numbers of one of these, which are then multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct EntryPath {
     /// The key.
     pub key: Key,
     /// Which of its tables, counted from 0, if there may be several; else 0.
@@ -412,10 +438,10 @@ pub struct Part {
     pub(crate) scale: bool,
 }
 
-impl Part {
+impl EntryPath {
     /// The whole value of a key in one of its tables.
-    pub(in crate::scenario) fn of_row(key: Key, row: usize) -> Part {
-        Part {
+    pub(in crate::scenario) fn whole_entry(key: Key, row: usize) -> EntryPath {
+        EntryPath {
             key,
             row,
             list: None,
@@ -425,7 +451,7 @@ impl Part {
     }
 
     /// Parses a part; an error says what is wrong.
-    pub(crate) fn parse(text: &str) -> Result<Part, String> {
+    pub(crate) fn parse(text: &str) -> Result<EntryPath, String> {
         let (scale, rest) = match text.trim().strip_prefix("scale:") {
             Some(rest) => (true, rest.trim()),
             None => (false, text.trim()),
@@ -435,24 +461,24 @@ impl Part {
             Some(key) => (key, None),
             None => {
                 let list = path.rsplit_once('.').and_then(|(path, name)| {
-                    let list = LISTS.into_iter().find(|list| *list == name)?;
+                    let list = LIST_NAMES.into_iter().find(|list| *list == name)?;
                     Some((Key::from_path(path)?, Some(list)))
                 });
-                list.ok_or_else(|| unknown(&path))?
+                list.ok_or_else(|| unknown_key_message(&path))?
             }
         };
         let mut indices = [None; 3];
         for (place, index) in brackets.split_terminator(']').enumerate() {
             let index = index.trim().strip_prefix('[').ok_or_else(invalid_index)?;
-            *indices.get_mut(place).ok_or_else(invalid_index)? = Some(number_of(index)?);
+            *indices.get_mut(place).ok_or_else(invalid_index)? = Some(parse_index(index)?);
         }
-        if indices[2].is_some() && key.form() != Form::VectorQuantity {
+        if indices[2].is_some() && key.form() != ValueSchema::VectorQuantity {
             return Err(invalid_index());
         }
         if !brackets.is_empty() && !brackets.ends_with(']') {
             return Err(invalid_index());
         }
-        let part = Part {
+        let part = EntryPath {
             key,
             row: row.unwrap_or(0),
             list,
@@ -460,27 +486,38 @@ impl Part {
             scale,
         };
         if row.is_none() && key.is_repeated() {
-            let (table, name) = key.parts();
+            let (table, name) = key.table_and_name();
             return Err(format!("say which one, counted from 0: {table}[0].{name}"));
         }
-        part.check()?;
+        part.check_form()?;
         Ok(part)
     }
 
     /// Refuses parts that entries of this form do not have.
-    fn check(&self) -> Result<(), String> {
+    fn check_form(&self) -> Result<(), String> {
         let (form, path, index) = (self.key.form(), self.key.path(), self.indices[0]);
-        let single = matches!(form, Form::Text | Form::Switch | Form::Whole);
+        let single = matches!(
+            form,
+            ValueSchema::Text | ValueSchema::Switch | ValueSchema::Whole
+        );
         match form {
             _ if single && self.scale => Err("has no numbers that could be scaled".into()),
-            Form::Whole | Form::Number(_) if index.is_some() => {
+            ValueSchema::Whole | ValueSchema::Number(_) if index.is_some() => {
                 Err("is one number: leave the index out".into())
             }
-            Form::Text | Form::Switch if index.is_some() => Err("has no entries".into()),
-            Form::Vector if index > Some(2) => Err(COMPONENTS.into()),
-            Form::VectorPerRod if self.indices[1] > Some(2) => Err(COMPONENTS.into()),
-            Form::Quantity(_) | Form::Outline(_) | Form::VectorQuantity => Ok(()),
-            Form::VectorInTime | Form::VectorOrInTime | Form::FactorInTime => Ok(()),
+            ValueSchema::Text | ValueSchema::Switch if index.is_some() => {
+                Err("has no entries".into())
+            }
+            ValueSchema::Vector if index > Some(2) => Err(COMPONENT_INDICES_HINT.into()),
+            ValueSchema::VectorPerRod if self.indices[1] > Some(2) => {
+                Err(COMPONENT_INDICES_HINT.into())
+            }
+            ValueSchema::Quantity(_) | ValueSchema::Outline(_) | ValueSchema::VectorQuantity => {
+                Ok(())
+            }
+            ValueSchema::VectorInTime | ValueSchema::VectorOrInTime | ValueSchema::FactorInTime => {
+                Ok(())
+            }
             _ if self.list.is_some() => Err(format!("{path} has no lists within")),
             _ => Ok(()),
         }
@@ -495,21 +532,30 @@ impl Part {
         let list = || Err(format!("is a list: give an index, as in {within}[0]"));
         match self.key.form() {
             _ if self.scale => Ok(()),
-            Form::Text | Form::Switch => Err("takes no number that could vary".into()),
-            Form::VectorInTime | Form::FactorInTime if self.list.is_none() => Err(format!(
-                "takes no number that could vary; its entries do: {path}.at[0]"
-            )),
-            Form::Vector | Form::VectorOrInTime | Form::Fan | Form::Pixel
+            ValueSchema::Text | ValueSchema::Switch => {
+                Err("takes no number that could vary".into())
+            }
+            ValueSchema::VectorInTime | ValueSchema::FactorInTime if self.list.is_none() => Err(
+                format!("takes no number that could vary; its entries do: {path}.at[0]"),
+            ),
+            ValueSchema::Vector
+            | ValueSchema::VectorOrInTime
+            | ValueSchema::Fan
+            | ValueSchema::Pixel
                 if self.indices[0].is_none() =>
             {
                 list()
             }
-            Form::VectorPerRod | Form::VectorQuantity if self.indices[0].is_none() => list(),
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
+                if self.indices[0].is_none() =>
+            {
+                list()
+            }
             // One index is that of a component, two are those of a rod and a component.
-            Form::VectorPerRod | Form::VectorQuantity
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
                 if self.list.is_none() && self.indices[1].or(self.indices[0]) > Some(2) =>
             {
-                Err(COMPONENTS.into())
+                Err(COMPONENT_INDICES_HINT.into())
             }
             _ if self.list.is_some() && self.indices[0].is_none() => list(),
             _ => Ok(()),
@@ -522,13 +568,16 @@ impl Part {
     }
 
     /// Whether it is where nodes must be, on the way from the base to the tip.
-    pub(crate) fn is_place(&self) -> bool {
+    pub(crate) fn is_node_position(&self) -> bool {
         self.list == Some("at") || matches!(self.key, Key::PointAt | Key::GripAt)
     }
 
     /// Of a vector for each rod, how many of its indices are in vain where one value holds for all.
-    pub(in crate::scenario) fn shared(&self, value: &Value) -> usize {
-        let is_vector = matches!(self.key.form(), Form::VectorPerRod | Form::VectorQuantity);
+    pub(in crate::scenario) fn shared_indices(&self, value: &Value) -> usize {
+        let is_vector = matches!(
+            self.key.form(),
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
+        );
         if !is_vector || value.is_table() || self.list == Some("at") {
             return 0;
         }
@@ -539,7 +588,7 @@ impl Part {
 
     /// Splits it into parts that are numbers, given its value: every entry of a list or a
     /// profile.
-    pub(crate) fn numbers(self, value: &Value) -> Vec<Part> {
+    pub(crate) fn numbers(self, value: &Value) -> Vec<EntryPath> {
         let depth = self.indices.iter().flatten().count();
         match value {
             _ if self.scale => vec![self],
@@ -554,7 +603,7 @@ impl Part {
             Value::Table(table) if self.list.is_none() => match table.get("value") {
                 Some(value) => {
                     let list = Some("value");
-                    Part { list, ..self }.numbers(value)
+                    EntryPath { list, ..self }.numbers(value)
                 }
                 None => vec![self],
             },
@@ -563,7 +612,7 @@ impl Part {
     }
 
     /// Whether both contain some number.
-    pub(crate) fn overlaps(&self, other: &Part) -> bool {
+    pub(crate) fn overlaps(&self, other: &EntryPath) -> bool {
         let same =
             |one: Option<usize>, two: Option<usize>| one.is_none() || two.is_none() || one == two;
         let lists = self.list.is_none() || other.list.is_none() || self.list == other.list;
@@ -574,10 +623,10 @@ impl Part {
     }
 }
 
-impl fmt::Display for Part {
+impl fmt::Display for EntryPath {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let scale = if self.scale { "scale:" } else { "" };
-        match self.key.parts() {
+        match self.key.table_and_name() {
             (table, name) if self.key.is_repeated() => {
                 write!(f, "{scale}{table}[{}].{name}", self.row)?;
             }
@@ -595,12 +644,12 @@ fn split_row(text: &str) -> Result<(Option<usize>, String, &str), String> {
         let rest = text.strip_prefix(table)?.trim_start().strip_prefix('[')?;
         rest.split_once(']')
     };
-    let named = Key::REPEATED
+    let named = Key::REPEATED_TABLES
         .iter()
         .find_map(|table| Some((table, within(table)?)));
     let (row, outer, rest) = match named {
         Some((table, (row, rest))) => {
-            let row = number_of(row)?;
+            let row = parse_index(row)?;
             let Some(rest) = rest.trim_start().strip_prefix('.') else {
                 let names = Key::allowed_in(table).join(", ");
                 return Err(format!(
@@ -615,7 +664,7 @@ fn split_row(text: &str) -> Result<(Option<usize>, String, &str), String> {
     Ok((row, outer + path.trim(), brackets))
 }
 
-fn number_of(index: &str) -> Result<usize, String> {
+fn parse_index(index: &str) -> Result<usize, String> {
     index.trim().parse().map_err(|_| invalid_index())
 }
 

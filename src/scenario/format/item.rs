@@ -3,11 +3,11 @@
 //!
 //! Vectors, and places along a rod, as values of keys.
 
-use crate::scenario::format::entries::{Entries, Part};
+use crate::scenario::format::entries::{Entries, EntryPath};
 use crate::scenario::format::source::{
-    ScenarioError, ScenarioResult, number, number_meant, shorten,
+    ScenarioError, ScenarioResult, intended_number, number, shorten,
 };
-use crate::scenario::format::{Form, Key, LeftOut, Range};
+use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema};
 use crate::scenario::{Profile, Schedule};
 use std::fmt::Display;
 use std::str::FromStr;
@@ -28,47 +28,51 @@ pub(in crate::scenario) const ONE_PER_KNOT: &str = "one per entry of at";
 
 const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
 
-const PROFILE_IS: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const PROFILE_FORM: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
 
-const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
+const FACTOR_SCHEDULE_FORM: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
 
 /// The value of a key, or a part of it.
 #[derive(Clone, Copy)]
-pub(in crate::scenario) struct Item<'e> {
+pub(in crate::scenario) struct EntryValue<'e> {
     entries: &'e Entries,
-    part: Part,
+    part: EntryPath,
     pub value: &'e Value,
 }
 
 impl Entries {
     /// The value of a key, if it is given.
-    pub(in crate::scenario) fn given(&self, key: Key) -> Option<Item<'_>> {
+    pub(in crate::scenario) fn given_value(&self, key: Key) -> Option<EntryValue<'_>> {
         if self.is_given(key) {
-            self.item(key).ok()
+            self.value_or_default(key).ok()
         } else {
             None
         }
     }
 
     /// The value of a key as given, or its default.
-    pub(in crate::scenario) fn item(&self, key: Key) -> ScenarioResult<Item<'_>> {
-        self.item_of(key, 0)
+    pub(in crate::scenario) fn value_or_default(&self, key: Key) -> ScenarioResult<EntryValue<'_>> {
+        self.value_in_row(key, 0)
     }
 
     /// The same in one of its tables, if there may be several.
-    pub(in crate::scenario) fn item_of(&self, key: Key, row: usize) -> ScenarioResult<Item<'_>> {
+    pub(in crate::scenario) fn value_in_row(
+        &self,
+        key: Key,
+        row: usize,
+    ) -> ScenarioResult<EntryValue<'_>> {
         match self.get(key, row) {
-            Some(value) => Ok(Item {
+            Some(value) => Ok(EntryValue {
                 entries: self,
-                part: Part::of_row(key, row),
+                part: EntryPath::whole_entry(key, row),
                 value,
             }),
-            None => Err(self.missing(key, row)),
+            None => Err(self.missing_key_error(key, row)),
         }
     }
 
     /// An error about a key that has no place.
-    pub(in crate::scenario) fn refuse(&self, key: Key, problem: String) -> ScenarioError {
+    pub(in crate::scenario) fn key_error(&self, key: Key, problem: String) -> ScenarioError {
         ScenarioError {
             key: Some(key),
             ..ScenarioError::in_file(&self.source.file, None, problem)
@@ -76,11 +80,11 @@ impl Entries {
     }
 
     /// The error about a key that is required and left out.
-    fn missing(&self, key: Key, row: usize) -> ScenarioError {
+    fn missing_key_error(&self, key: Key, row: usize) -> ScenarioError {
         let has = |table: &str| self.source.tables.contains(&table);
-        let (table, name) = key.parts();
-        let example = match key.left_out() {
-            LeftOut::Required(example) => example,
+        let (table, name) = key.table_and_name();
+        let example = match key.missing_key_rule() {
+            MissingKeyRule::Required(example) => example,
             _ => "...",
         };
         let entry = format!("a line such as `{name} = {example}`");
@@ -91,35 +95,39 @@ impl Entries {
             _ => format!("add the table [{table}], and below it {entry}"),
         };
         // Stiffnesses are required unless sections are given.
-        let needed = |other: &Key| match other.parts().0 {
+        let needed = |other: &Key| match other.table_and_name().0 {
             _ if has("blade") && other.follows_from_blade() => false,
             "" | "leaf" => true,
             "stiffness" => !has("section") && !has("blade"),
             _ => false,
         };
         let others = Key::all().filter(|other| *other != key && !self.is_given(*other));
-        let others = others.filter(|other| matches!(other.left_out(), LeftOut::Required(_)));
+        let others =
+            others.filter(|other| matches!(other.missing_key_rule(), MissingKeyRule::Required(_)));
         let others: Vec<&str> = others.filter(needed).map(Key::path).collect();
         let also = match others.is_empty() {
             true => String::new(),
             false => format!("; also missing: {}", others.join(", ")),
         };
-        let problem = format!("{} is missing: {how}{also}", Part::of_row(key, row));
-        self.refuse(key, problem)
+        let problem = format!(
+            "{} is missing: {how}{also}",
+            EntryPath::whole_entry(key, row)
+        );
+        self.key_error(key, problem)
     }
 }
 
-impl<'e> Item<'e> {
+impl<'e> EntryValue<'e> {
     pub(in crate::scenario) fn key(&self) -> Key {
         self.part.key
     }
 
     /// One of the lists of a table, if this is a table that has it.
-    pub(in crate::scenario) fn list(&self, list: &'static str) -> Option<Item<'e>> {
+    pub(in crate::scenario) fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
         let value = self.value.get(list)?;
         let list = Some(list);
-        let part = Part { list, ..self.part };
-        Some(Item {
+        let part = EntryPath { list, ..self.part };
+        Some(EntryValue {
             part,
             value,
             ..*self
@@ -127,7 +135,7 @@ impl<'e> Item<'e> {
     }
 
     /// An entry of a list; the value itself if it is not a list or too short.
-    pub(in crate::scenario) fn entry(&self, index: usize) -> Item<'e> {
+    pub(in crate::scenario) fn entry(&self, index: usize) -> EntryValue<'e> {
         let Some(value) = self.value.get(index) else {
             return *self;
         };
@@ -135,7 +143,7 @@ impl<'e> Item<'e> {
         if let Some(free) = part.indices.iter_mut().find(|known| known.is_none()) {
             *free = Some(index);
         }
-        Item {
+        EntryValue {
             part,
             value,
             ..*self
@@ -148,43 +156,46 @@ impl<'e> Item<'e> {
         &self,
         other: &'static str,
         form: &str,
-    ) -> ScenarioResult<[Item<'e>; 2]> {
+    ) -> ScenarioResult<[EntryValue<'e>; 2]> {
         let Some(table) = self.value.as_table() else {
-            return Err(self.refuse(format_args!("must be a table: {form}")));
+            return Err(self.value_error(format_args!("must be a table: {form}")));
         };
         if let Some(key) = table.keys().find(|key| *key != "at" && *key != other) {
             let key = shorten(key);
-            return Err(self.refuse(format_args!("unknown key {key}: {form}")));
+            return Err(self.value_error(format_args!("unknown key {key}: {form}")));
         }
         let list = |name| {
             self.list(name)
-                .ok_or_else(|| self.refuse(format_args!("{name} is missing: {form}")))
+                .ok_or_else(|| self.value_error(format_args!("{name} is missing: {form}")))
         };
         Ok([list("at")?, list(other)?])
     }
 
     /// The value as it is written, shortened.
-    pub(in crate::scenario) fn shown(&self) -> String {
-        self.entries.place(self.part, self.value).1
+    pub(in crate::scenario) fn displayed_value(&self) -> String {
+        self.entries.entry_location(self.part, self.value).1
     }
 
     /// Refuses this value unless a condition `holds`.
-    pub(in crate::scenario) fn ensure(
+    pub(in crate::scenario) fn refuse_unless(
         &self,
         holds: bool,
         problem: impl Display,
     ) -> ScenarioResult<()> {
         match holds {
             true => Ok(()),
-            false => Err(self.refuse(problem)),
+            false => Err(self.value_error(problem)),
         }
     }
 
-    pub(in crate::scenario) fn refuse(&self, problem: impl Display) -> ScenarioError {
+    pub(in crate::scenario) fn value_error(&self, problem: impl Display) -> ScenarioError {
         let list = self.part.list.map(|list| format!(", {list}"));
         let components = matches!(
             self.key().form(),
-            Form::VectorInTime | Form::VectorOrInTime | Form::VectorPerRod | Form::VectorQuantity
+            ValueSchema::VectorInTime
+                | ValueSchema::VectorOrInTime
+                | ValueSchema::VectorPerRod
+                | ValueSchema::VectorQuantity
         );
         let entry = match self.part.indices.map(|index| index.map(|index| index + 1)) {
             [Some(i), Some(j), Some(k)] => format!(", list {i}, entry {j}, component {k}"),
@@ -193,9 +204,9 @@ impl<'e> Item<'e> {
             [Some(i), None, _] => format!(", entry {i}"),
             [None, ..] => String::new(),
         };
-        let path = Part::of_row(self.key(), self.part.row);
+        let path = EntryPath::whole_entry(self.key(), self.part.row);
         let part = list.unwrap_or_default() + &entry;
-        let (place, found) = self.entries.place(self.part, self.value);
+        let (place, found) = self.entries.entry_location(self.part, self.value);
         ScenarioError {
             place,
             key: Some(self.key()),
@@ -205,34 +216,34 @@ impl<'e> Item<'e> {
     }
 
     pub(in crate::scenario) fn text(&self) -> ScenarioResult<&'e str> {
-        (self.value.as_str()).ok_or_else(|| self.refuse("must be text in quotes"))
+        (self.value.as_str()).ok_or_else(|| self.value_error("must be text in quotes"))
     }
 
     /// One of the words that `allowed` names.
     pub(in crate::scenario) fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
         let word = self.value.as_str().and_then(|word| word.parse().ok());
-        word.ok_or_else(|| self.refuse(allowed))
+        word.ok_or_else(|| self.value_error(allowed))
     }
 
     pub(in crate::scenario) fn switch(&self) -> ScenarioResult<bool> {
-        (self.value.as_bool()).ok_or_else(|| self.refuse("must be true or false"))
+        (self.value.as_bool()).ok_or_else(|| self.value_error("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
-    pub(in crate::scenario) fn whole(&self, most: usize) -> ScenarioResult<usize> {
+    pub(in crate::scenario) fn whole_number(&self, most: usize) -> ScenarioResult<usize> {
         let whole = self.value.as_integer();
         let whole = whole.and_then(|whole| usize::try_from(whole).ok());
         let whole = whole.filter(|whole| (1..=most).contains(whole));
         whole.ok_or_else(|| {
-            self.refuse(format_args!(
+            self.value_error(format_args!(
                 "must be a whole number from 1 to {most}, without a decimal point"
             ))
         })
     }
 
     /// How a text is written as the number that it looks like.
-    fn number_meant(&self) -> Option<String> {
-        self.value.as_str().and_then(number_meant)
+    fn intended_number(&self) -> Option<String> {
+        self.value.as_str().and_then(intended_number)
     }
 
     /// A number in the range of its key.
@@ -240,71 +251,76 @@ impl<'e> Item<'e> {
         self.number_in(self.key().form().range())
     }
 
-    pub(in crate::scenario) fn number_in(&self, range: Range) -> ScenarioResult<f64> {
+    pub(in crate::scenario) fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
         let value = number(self.value);
-        let value = value.ok_or_else(|| match self.number_meant() {
-            Some(meant) => self.refuse(format_args!("must be a number: {meant}")),
-            None => self.refuse("must be a number"),
+        let value = value.ok_or_else(|| match self.intended_number() {
+            Some(meant) => self.value_error(format_args!("must be a number: {meant}")),
+            None => self.value_error("must be a number"),
         })?;
-        let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
+        let positive = matches!(
+            range,
+            NumberRange::Positive | NumberRange::PositiveOrInfinite
+        );
         let problem = match value {
-            _ if value.is_nan() && !self.shown().contains("nan") => {
+            _ if value.is_nan() && !self.displayed_value().contains("nan") => {
                 "is not a number a computer can hold (the largest is 1.8e308)"
             }
             _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
             _ if positive && value <= 0.0 => "must be greater than 0",
-            f64::INFINITY if range == Range::PositiveOrInfinite => return Ok(value),
+            f64::INFINITY if range == NumberRange::PositiveOrInfinite => return Ok(value),
             f64::INFINITY if positive => INFINITE,
             f64::INFINITY => "must be a finite number",
             _ if positive && !MAGNITUDES.contains(&value) => {
                 "must lie between 1e-50 and 1e50: choose other units"
             }
-            _ if range == Range::NotNegative && value < 0.0 => "must not be negative",
+            _ if range == NumberRange::NotNegative && value < 0.0 => "must not be negative",
             _ => return Ok(value),
         };
-        Err(self.refuse(problem))
+        Err(self.value_error(problem))
     }
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
-    pub(in crate::scenario) fn one_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
-        if number(self.value).is_some() || self.number_meant().is_some() {
+    pub(in crate::scenario) fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
+        if number(self.value).is_some() || self.intended_number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {
-            Form::PerGap(_) => ("gap between neighbouring rods", "leaf.rods - 1"),
+            ValueSchema::PerGap(_) => ("gap between neighbouring rods", "leaf.rods - 1"),
             _ => ("rod", "leaf.rods"),
         };
         let because = format!("one per {each} ({counted})");
         let needed = match self.key().form() {
-            Form::Quantity(_) => format!("a number, a list of {count} (one per rod), or {PROFILE}"),
+            ValueSchema::Quantity(_) => {
+                format!("a number, a list of {count} (one per rod), or {PROFILE}")
+            }
             _ => format!("a number or a list of {count} (one per {each})"),
         };
-        let list = self.list_of(count, &because, &needed)?;
+        let list = self.list_of_length(count, &because, &needed)?;
         list.map(|item| item.number()).collect()
     }
 
     /// A profile for each of `rods` rods.
     pub(in crate::scenario) fn quantity(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
         if !self.value.is_table() {
-            let numbers = self.one_each(rods)?;
+            let numbers = self.number_for_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
-        let [at, value] = self.pair("value", PROFILE_IS)?;
-        let at = at.increasing(true)?;
+        let [at, value] = self.pair("value", PROFILE_FORM)?;
+        let at = at.increasing_numbers(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
         if (list.next()).is_none_or(|first| !first.value.is_array()) {
-            return Ok(vec![value.linear(&at)?; rods]);
+            return Ok(vec![value.linear_profile(&at)?; rods]);
         }
-        let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
-        lists.map(|list| list.linear(&at)).collect()
+        let lists = value.list_of_length(rods, ONE_PER_ROD, &needed)?;
+        lists.map(|list| list.linear_profile(&at)).collect()
     }
 
     /// Knots and the numbers there, of a profile that is not one per rod.
     pub(in crate::scenario) fn knots(&self) -> ScenarioResult<(Vec<f64>, Vec<f64>)> {
-        let [at, value] = self.pair("value", PROFILE_IS)?;
-        let at = at.increasing(true)?;
-        let list = value.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let [at, value] = self.pair("value", PROFILE_FORM)?;
+        let at = at.increasing_numbers(true)?;
+        let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = list
             .map(|item| item.number())
             .collect::<ScenarioResult<_>>()?;
@@ -312,13 +328,13 @@ impl<'e> Item<'e> {
     }
 
     /// A profile that has these values at the knots `at`.
-    fn linear(&self, at: &[f64]) -> ScenarioResult<Profile> {
+    fn linear_profile(&self, at: &[f64]) -> ScenarioResult<Profile> {
         // Infinity cannot be interpolated between knots.
         let range = match self.key().form().range() {
-            Range::PositiveOrInfinite => Range::Positive,
+            NumberRange::PositiveOrInfinite => NumberRange::Positive,
             range => range,
         };
-        let values = self.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let values = self.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = values
             .map(|item| item.number_in(range))
             .collect::<ScenarioResult<_>>()?;
@@ -328,9 +344,9 @@ impl<'e> Item<'e> {
 
     /// A factor in time.
     pub(in crate::scenario) fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
-        let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
-        let at = at.increasing(false)?;
-        let value = factor.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let [at, factor] = self.pair("factor", FACTOR_SCHEDULE_FORM)?;
+        let at = at.increasing_numbers(false)?;
+        let value = factor.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = value
             .map(|item| item.number())
             .collect::<ScenarioResult<_>>()?;
@@ -338,7 +354,10 @@ impl<'e> Item<'e> {
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    pub(in crate::scenario) fn increasing(&self, fractions: bool) -> ScenarioResult<Vec<f64>> {
+    pub(in crate::scenario) fn increasing_numbers(
+        &self,
+        fractions: bool,
+    ) -> ScenarioResult<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -349,14 +368,14 @@ impl<'e> Item<'e> {
         };
         let list = self.array(LIST_OF_NUMBERS)?;
         let count = list.len();
-        self.ensure(count >= least, too_few)?;
+        self.refuse_unless(count >= least, too_few)?;
         let mut at: Vec<f64> = Vec::with_capacity(count);
         for item in list {
-            let next = item.number_in(Range::Finite)?;
+            let next = item.number_in(NumberRange::Finite)?;
             let starts = !fractions || !at.is_empty() || next == 0.0;
-            item.ensure(starts, "must start at 0 (the base)")?;
+            item.refuse_unless(starts, "must start at 0 (the base)")?;
             if let Some(before) = at.last() {
-                item.ensure(
+                item.refuse_unless(
                     next > *before,
                     format_args!(
                         "must be greater than the entry before it, {before}: \
@@ -366,7 +385,7 @@ impl<'e> Item<'e> {
             }
             at.push(next);
             let ends = !fractions || at.len() < count || next == 1.0;
-            item.ensure(ends, "must end at 1 (the tip)")?;
+            item.refuse_unless(ends, "must end at 1 (the tip)")?;
         }
         Ok(at)
     }
@@ -375,9 +394,9 @@ impl<'e> Item<'e> {
     pub(in crate::scenario) fn array(
         &self,
         needed: &str,
-    ) -> ScenarioResult<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+    ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
         let Some(list) = self.value.as_array() else {
-            return Err(self.refuse(format_args!("must be {needed}")));
+            return Err(self.value_error(format_args!("must be {needed}")));
         };
         let whole = *self;
         Ok((0..list.len()).map(move |index| whole.entry(index)))
@@ -385,15 +404,15 @@ impl<'e> Item<'e> {
 
     /// The entries of a list that must have `count` of them, `because` of what; `needed`
     /// describes the list in the error if it is not one.
-    pub(in crate::scenario) fn list_of(
+    pub(in crate::scenario) fn list_of_length(
         &self,
         count: usize,
         because: &str,
         needed: &str,
-    ) -> ScenarioResult<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+    ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
         let list = self.array(needed)?;
         let found = list.len();
-        self.ensure(
+        self.refuse_unless(
             found == count,
             format_args!("has {found} entries: must have {count}, {because}"),
         )?;
@@ -401,22 +420,22 @@ impl<'e> Item<'e> {
     }
 }
 
-const VECTOR_PROFILE_IS: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
+const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
      { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 
-const LOAD_IN_TIME: &str =
+const LOAD_SCHEDULE_FORM: &str =
     "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 
 const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
-impl Item<'_> {
+impl EntryValue<'_> {
     /// Three numbers.
     pub(in crate::scenario) fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
         let mut vector = [0.0; 3];
-        let components = self.list_of(3, "one per axis x, y, z", needed)?;
+        let components = self.list_of_length(3, "one per axis x, y, z", needed)?;
         for (component, item) in vector.iter_mut().zip(components) {
-            *component = item.number_in(Range::Finite)?;
+            *component = item.number_in(NumberRange::Finite)?;
         }
         Ok(vector)
     }
@@ -424,10 +443,10 @@ impl Item<'_> {
     /// A vector for each of `rods` rods: one for all, or a list.
     pub(in crate::scenario) fn vectors(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {
-            let each = self.list_of(rods, ONE_PER_ROD, VECTORS)?;
+            let each = self.list_of_length(rods, ONE_PER_ROD, VECTORS)?;
             return each.map(|item| item.vector()).collect();
         }
-        self.ensure(
+        self.refuse_unless(
             self.value.is_array(),
             format_args!(
                 "must be a list of three numbers [x, y, z], or a list of {rods} of them (one per rod)"
@@ -445,10 +464,10 @@ impl Item<'_> {
             let each = self.vectors(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
-        let [at, value] = self.pair("value", VECTOR_PROFILE_IS)?;
-        let at = at.increasing(true)?;
-        let profiles = |list: Item| -> ScenarioResult<[Profile; 3]> {
-            let each = list.list_of(at.len(), ONE_PER_KNOT, VECTORS)?;
+        let [at, value] = self.pair("value", VECTOR_PROFILE_FORM)?;
+        let at = at.increasing_numbers(true)?;
+        let profiles = |list: EntryValue| -> ScenarioResult<[Profile; 3]> {
+            let each = list.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
             let each: Vec<[f64; 3]> = each
                 .map(|item| item.vector())
                 .collect::<ScenarioResult<_>>()?;
@@ -460,7 +479,7 @@ impl Item<'_> {
         let vector = value.value.get(0).and_then(|first| first.get(0));
         match vector.is_some_and(|component| component.is_array()) {
             true => {
-                let each = value.list_of(rods, ONE_PER_ROD, VECTORS)?;
+                let each = value.list_of_length(rods, ONE_PER_ROD, VECTORS)?;
                 each.map(profiles).collect()
             }
             false => Ok(vec![profiles(value)?; rods]),
@@ -469,12 +488,12 @@ impl Item<'_> {
 
     /// A load in time; of some keys, or one that is always the same.
     pub(in crate::scenario) fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
-        if self.key().form() == Form::VectorOrInTime && self.value.is_array() {
+        if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
-        let [at, value] = self.pair("value", LOAD_IN_TIME)?;
-        let at = at.increasing(false)?;
-        let value = value.list_of(at.len(), ONE_PER_KNOT, VECTORS)?;
+        let [at, value] = self.pair("value", LOAD_SCHEDULE_FORM)?;
+        let at = at.increasing_numbers(false)?;
+        let value = value.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
         let value = value
             .map(|item| item.vector())
             .collect::<ScenarioResult<_>>()?;
@@ -483,8 +502,8 @@ impl Item<'_> {
 
     /// A fraction of the length behind the base.
     pub(in crate::scenario) fn fraction(&self) -> ScenarioResult<f64> {
-        let at = self.number_in(Range::Finite)?;
-        self.ensure(
+        let at = self.number_in(NumberRange::Finite)?;
+        self.refuse_unless(
             at > 0.0 && at <= 1.0,
             "must be greater than 0 (the base) and at most 1 (the tip): a fraction of the length",
         )?;
@@ -492,15 +511,15 @@ impl Item<'_> {
     }
 
     /// A stretch of a rod, `[from, to]`, or one point of it.
-    pub(in crate::scenario) fn stretch(&self) -> ScenarioResult<[f64; 2]> {
+    pub(in crate::scenario) fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
         if number(self.value).is_some() {
             return Ok([self.fraction()?; 2]);
         }
         let needed = "a fraction of the length, or a list [from, to] of two";
-        let mut ends = self.list_of(2, "where the stretch begins and ends", needed)?;
+        let mut ends = self.list_of_length(2, "where the stretch begins and ends", needed)?;
         let mut next = || ends.next().map_or(Ok(0.0), |item| item.fraction());
         let [from, to] = [next()?, next()?];
-        self.ensure(from < to, "must rise from the base to the tip")?;
+        self.refuse_unless(from < to, "must rise from the base to the tip")?;
         Ok([from, to])
     }
 }

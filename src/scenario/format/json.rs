@@ -5,16 +5,18 @@
 mod tests;
 
 use crate::scenario::format::split;
-use crate::scenario::outline::Outline;
-use crate::scenario::photo::axis_of;
-use crate::scenario::section::{Hollow, Property, Section};
-use crate::scenario::{Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, ascending};
+use crate::scenario::outline::SectionOutline;
+use crate::scenario::photo::axis_name;
+use crate::scenario::section::{HollowSection, Property, Section};
+use crate::scenario::{
+    Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, sorted_distinct,
+};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// The sections of a scenario, and what else is theirs.
-struct Sections<'a> {
+struct SerializedSections<'a> {
     sections: &'a [Arc<Section>],
     density: bool,
     rotary_inertia: bool,
@@ -29,18 +31,18 @@ impl Serialize for Scenario {
         let entry = |key: Key| match key {
             // All tables of a name stand where the first of its keys does.
             Key::PointVein | Key::GripVein => {
-                let (table, _) = key.parts();
-                Some((split(table), self.rows(key)?))
+                let (table, _) = key.table_and_name();
+                Some((split(table), self.table_rows(key)?))
             }
             _ if key.is_repeated() => None,
-            _ => Some((key.parts(), self.written(key, sections.as_ref())?)),
+            _ => Some((key.table_and_name(), self.written(key, sections.as_ref())?)),
         };
         let entries: Vec<_> = Key::all().filter_map(entry).collect();
         let mut top = serializer.serialize_map(None)?;
         for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
             match &entries[0] {
                 (("", name), value) => top.serialize_entry(name, value)?,
-                ((table, _), _) => top.serialize_entry(table, &Table(entries))?,
+                ((table, _), _) => top.serialize_entry(table, &SerializedTable(entries))?,
             }
         }
         top.end()
@@ -48,9 +50,9 @@ impl Serialize for Scenario {
 }
 
 /// The entries of a table, in the order of the format.
-struct Table<'e>(&'e [((&'static str, &'static str), Value)]);
+struct SerializedTable<'e>(&'e [((&'static str, &'static str), Value)]);
 
-impl Serialize for Table<'_> {
+impl Serialize for SerializedTable<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|((_, name), value)| (name, value)))
     }
@@ -58,7 +60,7 @@ impl Serialize for Table<'_> {
 
 impl Scenario {
     /// All points that are loaded, or all grips, by the first of their keys.
-    fn rows(&self, first: Key) -> Option<Value> {
+    fn table_rows(&self, first: Key) -> Option<Value> {
         let point = |point: &PointLoad| {
             json!({
                 "vein": point.vein + 1, "at": point.at, "mass": point.mass,
@@ -80,7 +82,7 @@ impl Scenario {
     }
 
     /// The value of a key; `None` if other keys determine it.
-    fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
+    fn written(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         if let Some(blade) = &self.blade {
             match (key, blade.curvature()) {
                 _ if key.follows_from_blade() => return None,
@@ -89,7 +91,7 @@ impl Scenario {
                 _ => {}
             }
         }
-        match key.parts().0 {
+        match key.table_and_name().0 {
             "blade" => return self.of_blade(key),
             "section" => return sections?.written(key),
             "stiffness" if sections.is_some() => return None,
@@ -107,7 +109,7 @@ impl Scenario {
         let triples: [([Key; 3], Triple); 3] = [
             (Key::COUPLE, |rod| &rod.couple_stiffness),
             (Key::FORCE, |rod| &rod.force_stiffness),
-            (Key::REST, |rod| &rod.rest_curvature),
+            (Key::REST_CURVATURE, |rod| &rod.rest_curvature),
         ];
         for (keys, of) in triples {
             if let Some(which) = keys.iter().position(|one| *one == key) {
@@ -164,12 +166,14 @@ impl Scenario {
             Key::BladeWidth => along(at, value),
             Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
             Key::BladeYoung => quantity(materials.map(|of| &of.young)),
-            Key::YoungAcross => optional(materials.map(|of| of.young_across.as_ref()))?,
-            Key::ShearModulus => optional(materials.map(|of| of.shear_modulus.as_ref()))?,
+            Key::YoungAcross => optional_quantity(materials.map(|of| of.young_across.as_ref()))?,
+            Key::ShearModulus => optional_quantity(materials.map(|of| of.shear_modulus.as_ref()))?,
             Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
-            Key::BladeMassDensity => optional(materials.map(|of| of.mass_density.as_ref()))?,
+            Key::BladeMassDensity => {
+                optional_quantity(materials.map(|of| of.mass_density.as_ref()))?
+            }
             Key::Edges => json!(blade.edges),
-            _ => number(blade.least_part()),
+            _ => number(blade.least_width_fraction()),
         })
     }
 
@@ -197,8 +201,8 @@ impl Scenario {
             Key::PhotoX => Some(number(photo.origin[0])),
             Key::PhotoY => Some(number(photo.origin[1])),
             Key::PhotoRotation => Some(number(photo.rotation)),
-            Key::PhotoRight => Some(json!(axis_of(photo.right))),
-            Key::PhotoUp => Some(json!(axis_of(photo.up))),
+            Key::PhotoRight => Some(json!(axis_name(photo.right))),
+            Key::PhotoUp => Some(json!(axis_name(photo.up))),
             _ => None,
         }
     }
@@ -215,7 +219,7 @@ impl Scenario {
         })
     }
 
-    fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
+    fn of_dynamics(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
             Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
@@ -231,16 +235,22 @@ impl Scenario {
             Key::OutputInterval => number(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
             Key::Start => json!(dynamics.start),
-            Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
-            Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
-            Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
-            Key::RestInTime => in_time(&dynamics.rest, 1.0, "factor", number)?,
+            Key::GravityInTime => {
+                schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list)?
+            }
+            Key::TipForceInTime => {
+                schedule_unless_constant(&dynamics.tip_force, self.tip_force, "value", list)?
+            }
+            Key::TipMomentInTime => {
+                schedule_unless_constant(&dynamics.tip_moment, self.tip_moment, "value", list)?
+            }
+            Key::RestInTime => schedule_unless_constant(&dynamics.rest, 1.0, "factor", number)?,
             _ => return None,
         })
     }
 
     /// The sections, if they give the stiffnesses.
-    fn sections(&self) -> Option<Sections<'_>> {
+    fn sections(&self) -> Option<SerializedSections<'_>> {
         let sections = self.radii.sections();
         let gives = |(rod, section): (&Rod, &Arc<Section>)| {
             (0..3).all(|axis| {
@@ -257,7 +267,7 @@ impl Scenario {
         };
         let density = give(&self.dynamics.density, Property::Density);
         let inertia = give(&self.dynamics.rotary_inertia, Property::RotaryInertia);
-        Some(Sections {
+        Some(SerializedSections {
             sections,
             density,
             rotary_inertia: density && inertia,
@@ -265,7 +275,7 @@ impl Scenario {
     }
 }
 
-impl Sections<'_> {
+impl SerializedSections<'_> {
     fn written(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {
@@ -273,19 +283,19 @@ impl Sections<'_> {
         };
         Some(match key {
             Key::SectionShape => json!(outline),
-            Key::Diameter if outline == Outline::Circle => of(|section| &section.width),
-            Key::Width | Key::Thickness if outline == Outline::Circle => return None,
+            Key::Diameter if outline == SectionOutline::Circle => of(|section| &section.width),
+            Key::Width | Key::Thickness if outline == SectionOutline::Circle => return None,
             Key::Width => of(|section| &section.width),
             Key::Thickness => of(|section| &section.thickness),
             Key::InnerDiameter | Key::Wall => {
                 let hollow = |section: &'_ Arc<Section>| section.hollow.clone();
-                let hollow: Vec<Hollow> =
+                let hollow: Vec<HollowSection> =
                     self.sections.iter().map(hollow).collect::<Option<_>>()?;
-                let is_bore = matches!(hollow.first()?, Hollow::Bore(_));
+                let is_bore = matches!(hollow.first()?, HollowSection::Bore(_));
                 if is_bore != (key == Key::InnerDiameter) {
                     return None;
                 }
-                quantity(hollow.iter().map(Hollow::profile))
+                quantity(hollow.iter().map(HollowSection::profile))
             }
             Key::Young => of(|section| &section.young),
             Key::Poisson => of(|section| &section.poisson),
@@ -334,7 +344,7 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
         return vector_or_list(rods.iter().map(constant));
     }
     let kinks = rods.iter().flatten().flat_map(Profile::kinks);
-    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
     let values = |rod: &[Profile; 3]| -> Value {
         let knot = |&sigma: &f64| list(rod.each_ref().map(|profile| profile.at(sigma)));
         at.iter().map(knot).collect()
@@ -353,7 +363,7 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
-    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
     let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
@@ -371,13 +381,13 @@ fn along(at: &[f64], value: &[f64]) -> Value {
 }
 
 /// A quantity of all rods; `None` if it is left out.
-fn optional<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
+fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
     let profiles: Option<Vec<&Profile>> = profiles.collect();
     Some(quantity(profiles?.into_iter()))
 }
 
 /// A quantity in time; `None` if it is always the one at rest.
-fn in_time<T: Copy + PartialEq>(
+fn schedule_unless_constant<T: Copy + PartialEq>(
     schedule: &Schedule<T>,
     at_rest: T,
     name: &str,

@@ -16,17 +16,17 @@ pub mod units;
 
 use crate::scenario::format::source::shorten;
 use crate::scenario::format::units::Dimension;
-use Form::*;
-use LeftOut::*;
-use Range::*;
+use MissingKeyRule::*;
+use NumberRange::*;
+use ValueSchema::*;
 
-struct Row {
+struct KeyRow {
     key: Key,
     path: &'static str,
     description: &'static str,
-    form: Form,
+    form: ValueSchema,
     dimension: Dimension,
-    left_out: LeftOut,
+    left_out: MissingKeyRule,
 }
 
 /// Rows of the form `Key "path": form, [exponents of length, force, time], left out;`,
@@ -39,7 +39,7 @@ macro_rules! keys {
             $(#[doc = concat!("`", $path, "`:", $($doc),+)] $key,)+
         }
 
-        const FORMAT: &[Row] = &[$(Row {
+        const FORMAT: &[KeyRow] = &[$(KeyRow {
             key: Key::$key,
             path: $path,
             description: concat!($($doc),+),
@@ -245,7 +245,7 @@ impl Key {
     pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
     /// Stiffnesses in stretch and shear.
     pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
-    pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
+    pub(super) const REST_CURVATURE: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
     pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
     /// k1, k2 and k3 of the tissue, and its c1.
     pub(super) const TISSUE: [Key; 4] = [
@@ -255,9 +255,9 @@ impl Key {
         Key::TissueFold,
     ];
     /// Tables that a scenario may have several times.
-    pub(super) const REPEATED: [&str; 2] = ["load.point", "grip"];
+    pub(super) const REPEATED_TABLES: [&str; 2] = ["load.point", "grip"];
 
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static KeyRow {
         &FORMAT[self as usize]
     }
 
@@ -272,7 +272,7 @@ impl Key {
     }
 
     /// The form of its value.
-    pub(crate) fn form(self) -> Form {
+    pub(crate) fn form(self) -> ValueSchema {
         self.row().form
     }
 
@@ -282,7 +282,7 @@ impl Key {
     }
 
     /// What applies if it is left out.
-    pub(crate) fn left_out(self) -> LeftOut {
+    pub(crate) fn missing_key_rule(self) -> MissingKeyRule {
         self.row().left_out
     }
 
@@ -293,7 +293,7 @@ impl Key {
 
     /// Whether the quantities of the leaf are proportional to its numbers.
     pub(crate) fn is_linear(self) -> bool {
-        !matches!(self.parts().0, "section" | "blade" | "photo")
+        !matches!(self.table_and_name().0, "section" | "blade" | "photo")
     }
 
     /// Whether a blade determines its value.
@@ -301,18 +301,18 @@ impl Key {
         match self {
             Key::Length | Key::Fan | Key::Base | Key::RestBend3 => true,
             _ if Key::TISSUE.contains(&self) => true,
-            _ => matches!(self.parts().0, "stiffness" | "section"),
+            _ => matches!(self.table_and_name().0, "stiffness" | "section"),
         }
     }
 
     /// Its table, empty at the top, and its name within that.
-    pub(super) fn parts(self) -> (&'static str, &'static str) {
+    pub(super) fn table_and_name(self) -> (&'static str, &'static str) {
         split(self.path())
     }
 
     /// Whether its table may be there several times.
     pub(crate) fn is_repeated(self) -> bool {
-        Key::REPEATED.contains(&self.parts().0)
+        Key::REPEATED_TABLES.contains(&self.table_and_name().0)
     }
 
     /// All keys of the format, by tables.
@@ -329,7 +329,7 @@ impl Key {
     pub(super) fn from_parts(table: &str, name: &str) -> Option<Key> {
         let length = name.len() + if table.is_empty() { 0 } else { table.len() + 1 };
         let mut long = FORMAT.iter().filter(|row| row.path.len() == length);
-        let row = long.find(|row| row.key.parts() == (table, name))?;
+        let row = long.find(|row| row.key.table_and_name() == (table, name))?;
         Some(row.key)
     }
 
@@ -344,7 +344,7 @@ impl Key {
 
     /// The tables of the format, in its order.
     pub(super) fn tables() -> Vec<&'static str> {
-        let mut tables: Vec<_> = Key::all().map(|key| key.parts().0).collect();
+        let mut tables: Vec<_> = Key::all().map(|key| key.table_and_name().0).collect();
         tables.dedup();
         tables.retain(|table| !table.is_empty());
         tables
@@ -352,7 +352,9 @@ impl Key {
 
     /// The names allowed in `table`, which is empty at the top, also those of tables in it.
     pub(super) fn allowed_in(table: &str) -> Vec<&'static str> {
-        let keys = Key::all().map(Key::parts).filter(|parts| parts.0 == table);
+        let keys = Key::all()
+            .map(Key::table_and_name)
+            .filter(|parts| parts.0 == table);
         let tables = Key::tables().into_iter().map(split);
         let tables = tables.filter(|parts| parts.0 == table);
         keys.chain(tables).map(|parts| parts.1).collect()
@@ -366,21 +368,21 @@ pub(super) fn split(path: &str) -> (&str, &str) {
 
 /// The form of a key's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
+pub(crate) enum ValueSchema {
     Text,
     /// `true` or `false`.
     Switch,
     /// A whole number from 1.
     Whole,
-    Number(Range),
+    Number(NumberRange),
     /// A number for all rods, or a list with one for each.
-    PerRod(Range),
+    PerRod(NumberRange),
     /// A number for all rods, a list with one for each, or a profile along the rods.
-    Quantity(Range),
+    Quantity(NumberRange),
     /// A number, or a profile along the leaf.
-    Outline(Range),
+    Outline(NumberRange),
     /// A number for all gaps between neighbouring rods, or a list.
-    PerGap(Range),
+    PerGap(NumberRange),
     /// x, y, z.
     Vector,
     /// x, y, z for all rods, or a list with one such vector for each.
@@ -403,7 +405,7 @@ pub(crate) enum Form {
 
 /// Which numbers a key allows; never NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Range {
+pub(crate) enum NumberRange {
     Finite,
     NotNegative,
     Positive,
@@ -412,7 +414,7 @@ pub(crate) enum Range {
 
 /// What applies if a key is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LeftOut {
+pub(crate) enum MissingKeyRule {
     /// It is required; the message gives this example of a value.
     Required(&'static str),
     /// This default value.
@@ -421,26 +423,26 @@ pub(crate) enum LeftOut {
     Derived,
 }
 
-impl Form {
+impl ValueSchema {
     /// The range of its numbers.
-    pub(super) fn range(self) -> Range {
+    pub(super) fn range(self) -> NumberRange {
         match self {
-            Form::Number(range)
-            | Form::PerRod(range)
-            | Form::Quantity(range)
-            | Form::Outline(range)
-            | Form::PerGap(range) => range,
-            _ => Range::Finite,
+            ValueSchema::Number(range)
+            | ValueSchema::PerRod(range)
+            | ValueSchema::Quantity(range)
+            | ValueSchema::Outline(range)
+            | ValueSchema::PerGap(range) => range,
+            _ => NumberRange::Finite,
         }
     }
 }
 
 /// The key or table that was probably meant by `path`: the same name in
 /// another table, or the nearest spelling.
-pub(crate) fn nearest(path: &str) -> Option<&'static str> {
+pub(crate) fn nearest_key(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
     // The name of a unit is none of a number.
-    let of_numbers = |key: &Key| key.parts().1 == name && !path.starts_with("units.");
+    let of_numbers = |key: &Key| key.table_and_name().1 == name && !path.starts_with("units.");
     if let Some(key) = Key::all().find(of_numbers) {
         return Some(key.path());
     }
@@ -454,9 +456,9 @@ pub(crate) fn nearest(path: &str) -> Option<&'static str> {
 }
 
 /// The message for an unknown key, with what was probably meant.
-pub(super) fn unknown(path: &str) -> String {
+pub(super) fn unknown_key_message(path: &str) -> String {
     let found = shorten(path);
-    match nearest(path) {
+    match nearest_key(path) {
         Some(meant) if meant != path => {
             return format!("unknown key {found} (did you mean {meant}?)");
         }
@@ -470,7 +472,7 @@ pub(super) fn unknown(path: &str) -> String {
     match tables.iter().rfind(|known| inside(known)) {
         Some(table) => {
             let allowed = Key::allowed_in(table).join(", ");
-            let (open, close) = brackets(table);
+            let (open, close) = table_brackets(table);
             format!("unknown key {found}: {open}{table}{close} has {allowed}")
         }
         None => {
@@ -484,8 +486,8 @@ pub(super) fn unknown(path: &str) -> String {
 }
 
 /// What stands around the name of a table.
-pub(super) fn brackets(table: &str) -> (&'static str, &'static str) {
-    match Key::REPEATED.contains(&table) {
+pub(super) fn table_brackets(table: &str) -> (&'static str, &'static str) {
+    match Key::REPEATED_TABLES.contains(&table) {
         true => ("[[", "]]"),
         false => ("[", "]"),
     }
@@ -499,7 +501,7 @@ mod tests {
     fn every_key_is_found_by_its_path() {
         for key in Key::all() {
             assert_eq!(Key::from_path(key.path()), Some(key));
-            let (table, name) = key.parts();
+            let (table, name) = key.table_and_name();
             assert_eq!(Key::from_parts(table, name), Some(key));
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
@@ -526,7 +528,7 @@ mod spelling_tests {
             ("units.mass", None),
             ("monsoon", None),
         ] {
-            assert_eq!(nearest(misspelt), key);
+            assert_eq!(nearest_key(misspelt), key);
         }
     }
 }

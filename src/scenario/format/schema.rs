@@ -1,6 +1,6 @@
 //! The JSON schema of scenarios, generated from the table of keys.
 
-use crate::scenario::format::{Form, Key, LeftOut, Range, split};
+use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema, split};
 use serde_json::{Map, Value, json};
 
 /// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
@@ -15,12 +15,12 @@ pub fn schema() -> Value {
 /// The schema of a table, which has no name at the top, with those in it.
 fn table(name: &str) -> Value {
     let (mut properties, mut required) = (Map::new(), Vec::new());
-    for key in Key::all().filter(|key| key.parts().0 == name) {
-        let (_, within) = key.parts();
+    for key in Key::all().filter(|key| key.table_and_name().0 == name) {
+        let (_, within) = key.table_and_name();
         properties.insert(within.into(), entry(key));
         // Alternatives, such as stiffnesses, sections and blades, are not required here.
         let alone = matches!(name, "" | "leaf") && !key.follows_from_blade() || key.is_repeated();
-        if alone && matches!(key.left_out(), LeftOut::Required(_)) {
+        if alone && matches!(key.missing_key_rule(), MissingKeyRule::Required(_)) {
             required.push(within);
         }
     }
@@ -30,7 +30,7 @@ fn table(name: &str) -> Value {
             continue;
         }
         let one = table(inner);
-        let repeated = Key::REPEATED.contains(&inner);
+        let repeated = Key::REPEATED_TABLES.contains(&inner);
         if !repeated && !one["required"].is_null() {
             required.push(within);
         }
@@ -48,14 +48,14 @@ fn table(name: &str) -> Value {
 /// The schema of a key's value, with its description.
 fn entry(key: Key) -> Value {
     let mut entry = match key.form() {
-        Form::Text => json!({ "type": "string" }),
-        Form::Switch => json!({ "type": "boolean" }),
-        Form::Whole => json!({ "type": "integer", "minimum": 1 }),
-        Form::Number(range) => number(range),
-        Form::PerRod(range) | Form::PerGap(range) => {
+        ValueSchema::Text => json!({ "type": "string" }),
+        ValueSchema::Switch => json!({ "type": "boolean" }),
+        ValueSchema::Whole => json!({ "type": "integer", "minimum": 1 }),
+        ValueSchema::Number(range) => number(range),
+        ValueSchema::PerRod(range) | ValueSchema::PerGap(range) => {
             json!({ "anyOf": [number(range), list(number(range))] })
         }
-        Form::Quantity(range) => {
+        ValueSchema::Quantity(range) => {
             let values = list(number(range));
             let profile = knots(
                 "value",
@@ -63,34 +63,36 @@ fn entry(key: Key) -> Value {
             );
             json!({ "anyOf": [number(range), list(number(range)), profile] })
         }
-        Form::Outline(range) => {
+        ValueSchema::Outline(range) => {
             json!({ "anyOf": [number(range), knots("value", list(number(range)))] })
         }
-        Form::Vector => vector(),
-        Form::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
-        Form::VectorQuantity => {
+        ValueSchema::Vector => vector(),
+        ValueSchema::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
+        ValueSchema::VectorQuantity => {
             let vectors = list(vector());
             let profile = knots("value", json!({ "anyOf": [vectors, list(list(vector()))] }));
             json!({ "anyOf": [vector(), list(vector()), profile] })
         }
-        Form::Stretch => {
+        ValueSchema::Stretch => {
             let ends =
                 json!({ "type": "array", "items": fraction(), "minItems": 2, "maxItems": 2 });
             json!({ "anyOf": [fraction(), ends] })
         }
-        Form::Pixel => {
-            json!({ "type": "array", "items": number(Range::Finite), "minItems": 2, "maxItems": 2 })
+        ValueSchema::Pixel => {
+            json!({ "type": "array", "items": number(NumberRange::Finite), "minItems": 2, "maxItems": 2 })
         }
-        Form::Fan => json!({ "anyOf": [
-            { "enum": ["paper", "symmetric"] }, list(number(Range::Finite)),
+        ValueSchema::Fan => json!({ "anyOf": [
+            { "enum": ["paper", "symmetric"] }, list(number(NumberRange::Finite)),
         ] }),
-        Form::VectorInTime => knots("value", list(vector())),
-        Form::VectorOrInTime => json!({ "anyOf": [vector(), knots("value", list(vector()))] }),
-        Form::FactorInTime => knots("factor", list(number(Range::Finite))),
+        ValueSchema::VectorInTime => knots("value", list(vector())),
+        ValueSchema::VectorOrInTime => {
+            json!({ "anyOf": [vector(), knots("value", list(vector()))] })
+        }
+        ValueSchema::FactorInTime => knots("factor", list(number(NumberRange::Finite))),
     };
     entry["description"] = json!(key.description());
     // Defaults are TOML; those that are also JSON are included.
-    if let LeftOut::Default(text) = key.left_out()
+    if let MissingKeyRule::Default(text) = key.missing_key_rule()
         && let Ok(value) = serde_json::from_str::<Value>(text)
     {
         entry["default"] = value;
@@ -99,11 +101,11 @@ fn entry(key: Key) -> Value {
 }
 
 /// A number. JSON has no infinity; editors accept TOML's `inf` as a number.
-fn number(range: Range) -> Value {
+fn number(range: NumberRange) -> Value {
     match range {
-        Range::Finite => json!({ "type": "number" }),
-        Range::NotNegative => json!({ "type": "number", "minimum": 0 }),
-        Range::Positive | Range::PositiveOrInfinite => {
+        NumberRange::Finite => json!({ "type": "number" }),
+        NumberRange::NotNegative => json!({ "type": "number", "minimum": 0 }),
+        NumberRange::Positive | NumberRange::PositiveOrInfinite => {
             json!({ "type": "number", "exclusiveMinimum": 0 })
         }
     }
@@ -125,7 +127,7 @@ fn vector() -> Value {
 fn knots(name: &str, values: Value) -> Value {
     json!({
         "type": "object",
-        "properties": { "at": list(number(Range::Finite)), name: values },
+        "properties": { "at": list(number(NumberRange::Finite)), name: values },
         "required": ["at", name],
         "additionalProperties": false,
     })

@@ -6,8 +6,8 @@
 //!
 //! The error of a refused scenario: one message for people, and its place.
 
-use crate::scenario::format::entries::Part;
-use crate::scenario::format::{Key, brackets, split};
+use crate::scenario::format::entries::EntryPath;
+use crate::scenario::format::{Key, split, table_brackets};
 use serde::Deserialize;
 use serde_json::Value as Json;
 use std::borrow::Cow;
@@ -18,7 +18,7 @@ use toml::{Spanned, Table, Value};
 
 /// Where the entries of a scenario are from.
 #[derive(Clone, Debug, Default)]
-pub(in crate::scenario) struct Source {
+pub(in crate::scenario) struct ScenarioSource {
     /// The name of the text in messages.
     pub file: String,
     pub text: String,
@@ -29,17 +29,17 @@ pub(in crate::scenario) struct Source {
 }
 
 /// The places of a key and of its value in the text.
-pub(in crate::scenario) struct Spans {
+pub(in crate::scenario) struct EntrySpans {
     pub key: Range<usize>,
     pub value: Range<usize>,
 }
 
-impl Source {
+impl ScenarioSource {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
-    pub fn parse(text: &str, file: &str) -> ScenarioResult<(Source, Table)> {
+    pub fn parse(text: &str, file: &str) -> ScenarioResult<(ScenarioSource, Table)> {
         // A mark that some editors write.
         let text = text.trim_start_matches('\u{feff}');
-        let mut source = Source {
+        let mut source = ScenarioSource {
             file: file.into(),
             text: text.into(),
             // No TOML begins like this.
@@ -48,11 +48,11 @@ impl Source {
         };
         let table = match source.has_lines {
             true => match DeTable::parse(text) {
-                Ok(table) => table_of(table.get_ref()),
+                Ok(table) => table_from_parsed(table.get_ref()),
                 Err(error) => {
                     let span = error.span().unwrap_or(0..0);
-                    let problem = not_toml(&error, text) + &snippet(text, span.clone());
-                    return Err(source.refuse(Some(span), problem));
+                    let problem = toml_error_message(&error, text) + &snippet(text, span.clone());
+                    return Err(source.error_at_span(Some(span), problem));
                 }
             },
             false => from_json(text, file)?,
@@ -64,12 +64,12 @@ impl Source {
 
     /// The places of a key, and of its value or a part of that; in one of its tables if there are
     /// several.
-    pub fn find(
+    pub fn find_entry_spans(
         &self,
         (table, name): (&str, &str),
         row: usize,
-        part: Option<Part>,
-    ) -> Option<Spans> {
+        part: Option<EntryPath>,
+    ) -> Option<EntrySpans> {
         let document = self.has_lines.then(|| DeTable::parse(&self.text).ok());
         let document = document??.into_inner();
         let mut entries = &document;
@@ -81,29 +81,29 @@ impl Source {
             };
         }
         let (key, value) = entries.get_key_value(name)?;
-        Some(Spans {
+        Some(EntrySpans {
             key: key.span(),
-            value: part.map_or(value.span(), |part| span_of(value, part)),
+            value: part.map_or(value.span(), |part| entry_span(value, part)),
         })
     }
 
     /// A value as it is written, shortened.
-    pub fn shown(&self, spans: Option<&Spans>, value: &Value) -> String {
+    pub fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
         let written = spans.and_then(|spans| self.text.get(spans.value.clone()));
         written.map_or_else(|| shorten(&value.to_string()), shorten)
     }
 
-    pub fn place(&self, at: Option<usize>) -> Place {
-        Place::File {
+    pub fn location(&self, at: Option<usize>) -> SourceLocation {
+        SourceLocation::File {
             file: self.file.clone(),
             line: at.map(|at| line_of(self.text.as_bytes(), at)),
         }
     }
 
     /// An error that is not about the value of a key.
-    fn refuse(&self, span: Option<Range<usize>>, problem: String) -> ScenarioError {
+    fn error_at_span(&self, span: Option<Range<usize>>, problem: String) -> ScenarioError {
         ScenarioError {
-            place: self.place(span.map(|span| span.start)),
+            place: self.location(span.map(|span| span.start)),
             key: None,
             problem,
             others: Vec::new(),
@@ -111,18 +111,25 @@ impl Source {
     }
 
     /// The error about a key that is none of the format, with its line.
-    pub fn refuse_key(&self, parts: (&str, &str), row: usize, problem: String) -> ScenarioError {
-        let span = self.find(parts, row, None).map(|spans| spans.key);
+    pub fn unknown_key_error(
+        &self,
+        parts: (&str, &str),
+        row: usize,
+        problem: String,
+    ) -> ScenarioError {
+        let span = self
+            .find_entry_spans(parts, row, None)
+            .map(|spans| spans.key);
         let line = span.clone().map(|span| snippet(&self.text, span));
-        self.refuse(span, problem + &line.unwrap_or_default())
+        self.error_at_span(span, problem + &line.unwrap_or_default())
     }
 
     /// The error about a value in place of a table, or of several.
-    pub fn refuse_value(&self, table: &str, value: &Value) -> ScenarioError {
-        let spans = self.find(split(table), 0, None);
-        let found = self.shown(spans.as_ref(), value);
+    pub fn misplaced_value_error(&self, table: &str, value: &Value) -> ScenarioError {
+        let spans = self.find_entry_spans(split(table), 0, None);
+        let found = self.displayed_value(spans.as_ref(), value);
         let allowed = Key::allowed_in(table).join(", ");
-        let (open, close) = brackets(table);
+        let (open, close) = table_brackets(table);
         let kind = match open.len() {
             1 => "a table",
             _ => "one table or several",
@@ -130,23 +137,23 @@ impl Source {
         let problem = format!(
             "{table} = {found}: must be {kind}: write {open}{table}{close} on a line of its own, below it {allowed}"
         );
-        self.refuse(spans.map(|spans| spans.key), problem)
+        self.error_at_span(spans.map(|spans| spans.key), problem)
     }
 }
 
 /// Why `text` is no TOML.
-pub(in crate::scenario) fn not_toml(error: &Error, text: &str) -> String {
+pub(in crate::scenario) fn toml_error_message(error: &Error, text: &str) -> String {
     let line = error
         .span()
         .map(|span| line_of(text.as_bytes(), span.start));
     let line = line.and_then(|line| text.lines().nth(line - 1));
-    let meant = line.and_then(number_meant_in);
+    let meant = line.and_then(intended_number_in_line);
     let meant = meant.map_or(String::new(), |meant| format!(": {meant}"));
     format!("not valid TOML: {}{meant}", error.message())
 }
 
 /// The place of a part of a value, or of as much of it as there is.
-pub(in crate::scenario) fn span_of(value: &Spanned<DeValue>, part: Part) -> Range<usize> {
+pub(in crate::scenario) fn entry_span(value: &Spanned<DeValue>, part: EntryPath) -> Range<usize> {
     let mut place = value;
     if let Some(list) = part.list {
         place = place.get_ref().get(list).unwrap_or(place);
@@ -157,15 +164,16 @@ pub(in crate::scenario) fn span_of(value: &Spanned<DeValue>, part: Part) -> Rang
     place.span()
 }
 
-fn table_of(table: &DeTable) -> Table {
+fn table_from_parsed(table: &DeTable) -> Table {
     let entries = table.iter();
-    let entries = entries.map(|(name, value)| (name.get_ref().to_string(), value_of(value)));
+    let entries =
+        entries.map(|(name, value)| (name.get_ref().to_string(), value_from_parsed(value)));
     entries.collect()
 }
 
 /// The value that was parsed. A number that is too large to be one is NaN; a whole number that
 /// is too large for an integer is still a number.
-pub(in crate::scenario) fn value_of(parsed: &Spanned<DeValue>) -> Value {
+pub(in crate::scenario) fn value_from_parsed(parsed: &Spanned<DeValue>) -> Value {
     let float = |number: Option<f64>| Value::Float(number.unwrap_or(f64::NAN));
     match parsed.get_ref() {
         DeValue::String(text) => Value::String(text.to_string()),
@@ -186,14 +194,14 @@ pub(in crate::scenario) fn value_of(parsed: &Spanned<DeValue>) -> Value {
         }
         DeValue::Boolean(switch) => Value::Boolean(*switch),
         DeValue::Datetime(time) => Value::Datetime(*time),
-        DeValue::Array(list) => Value::Array(list.iter().map(value_of).collect()),
-        DeValue::Table(table) => Value::Table(table_of(table)),
+        DeValue::Array(list) => Value::Array(list.iter().map(value_from_parsed).collect()),
+        DeValue::Table(table) => Value::Table(table_from_parsed(table)),
     }
 }
 
 /// A result, of which only the scenario is read.
 #[derive(Deserialize)]
-struct Outcome {
+struct ResultInput {
     input: Value,
 }
 
@@ -205,7 +213,7 @@ fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
     };
     let document: Json = serde_json::from_str(text).map_err(|error| at(error, "not valid JSON"))?;
     let input = document.get("input");
-    if let Some(path) = null_in(input.unwrap_or(&document), "") {
+    if let Some(path) = null_entry_path(input.unwrap_or(&document), "") {
         let key = path.split('[').next().and_then(Key::from_path);
         let problem =
             format!("is no scenario: {path} = null: give a value, or leave the entry out");
@@ -214,7 +222,7 @@ fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
     }
     // Unlike the document, these refuse a key that is there twice.
     let form = match input {
-        Some(_) => serde_json::from_str(text).map(|Outcome { input }| input),
+        Some(_) => serde_json::from_str(text).map(|ResultInput { input }| input),
         None => serde_json::from_str(text),
     };
     let form = form.map_err(|error| at(error, "is no scenario"))?;
@@ -222,9 +230,10 @@ fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
 }
 
 /// The path of an entry that is null, within `path`.
-fn null_in(value: &Json, path: &str) -> Option<String> {
-    let inside = |(name, value): (&String, &Json)| null_in(value, &format!("{path}.{name}"));
-    let at = |(index, value): (usize, &Json)| null_in(value, &format!("{path}[{index}]"));
+fn null_entry_path(value: &Json, path: &str) -> Option<String> {
+    let inside =
+        |(name, value): (&String, &Json)| null_entry_path(value, &format!("{path}.{name}"));
+    let at = |(index, value): (usize, &Json)| null_entry_path(value, &format!("{path}[{index}]"));
     match value {
         Json::Null if !path.is_empty() => Some(path.trim_start_matches('.').into()),
         Json::Object(table) => table.iter().find_map(inside),
@@ -261,7 +270,7 @@ const MINUS_SIGNS: [char; 7] = [
 ];
 
 /// How a text that a person would read as a number is written as one.
-pub(crate) fn number_meant(text: &str) -> Option<String> {
+pub(crate) fn intended_number(text: &str) -> Option<String> {
     let meant = text.trim().replace(MINUS_SIGNS, "-").replacen(',', ".", 1);
     meant
         .parse::<f64>()
@@ -282,14 +291,15 @@ pub(crate) fn number_meant(text: &str) -> Option<String> {
 }
 
 /// The same of a number in a line that is no TOML.
-pub(in crate::scenario) fn number_meant_in(line: &str) -> Option<String> {
+pub(in crate::scenario) fn intended_number_in_line(line: &str) -> Option<String> {
     let value = line.split_once('=').map_or(line, |(_, value)| value);
     let value = value.split('#').next().unwrap_or(value);
     // In a list a comma divides numbers.
     let marks = ['[', ']', '{', '}', '=', ' ', '\t', ','];
     let in_list = value.split(marks).find(|part| part.contains(MINUS_SIGNS));
-    let alone = (value.contains(',') || value.contains(MINUS_SIGNS)).then(|| number_meant(value));
-    alone.flatten().or_else(|| number_meant(in_list?))
+    let alone =
+        (value.contains(',') || value.contains(MINUS_SIGNS)).then(|| intended_number(value));
+    alone.flatten().or_else(|| intended_number(in_list?))
 }
 
 /// Multiplies every number; knots and times stay where they are.
@@ -347,7 +357,7 @@ pub(in crate::scenario) fn line_of(text: &[u8], at: usize) -> usize {
 /// The offending line with a caret below, to be put after a message; empty
 /// where the line is too long to be read.
 pub(in crate::scenario) fn snippet(text: &str, span: std::ops::Range<usize>) -> String {
-    const WIDEST: usize = 120;
+    const MAX_LINE_WIDTH: usize = 120;
     let at = span.start.min(text.len());
     let (Some(before), Some(after)) = (text.get(..at), text.get(at..)) else {
         return String::new();
@@ -355,7 +365,7 @@ pub(in crate::scenario) fn snippet(text: &str, span: std::ops::Range<usize>) -> 
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);
     let line = text[start..at + after.find('\n').unwrap_or(after.len())].trim_end();
     let length = line.chars().count();
-    if length > WIDEST {
+    if length > MAX_LINE_WIDTH {
         return String::new();
     }
     let number = line_of(text.as_bytes(), at).to_string();
@@ -372,14 +382,14 @@ pub(in crate::scenario) fn snippet(text: &str, span: std::ops::Range<usize>) -> 
 
 /// `text` on one line and not too long.
 pub(in crate::scenario) fn shorten(text: &str) -> String {
-    const LONGEST: usize = 60;
+    const MAX_SHORTENED_LENGTH: usize = 60;
     let mut short = String::new();
     for word in text.split_whitespace() {
         if !short.is_empty() {
             short.push(' ');
         }
         short.push_str(word);
-        if let Some((cut, _)) = short.char_indices().nth(LONGEST) {
+        if let Some((cut, _)) = short.char_indices().nth(MAX_SHORTENED_LENGTH) {
             short.truncate(cut);
             short.push_str(" ...");
             break;
@@ -393,10 +403,10 @@ pub(in crate::scenario) type ScenarioResult<T> = std::result::Result<T, Scenario
 /// Why a scenario was refused. Its text is the whole message: the place, the key, the
 /// value found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", self.told("set"))]
+#[error("{}", self.message_with_option("set"))]
 pub struct ScenarioError {
     /// Where.
-    pub place: Place,
+    pub place: SourceLocation,
     /// The key, if it is one of the format.
     pub key: Option<Key>,
     /// The rest of the message.
@@ -411,7 +421,7 @@ impl ScenarioError {
     pub(in crate::scenario) fn in_file(file: &str, line: Option<usize>, problem: String) -> Self {
         let file = file.to_string();
         ScenarioError {
-            place: Place::File { file, line },
+            place: SourceLocation::File { file, line },
             key: None,
             problem,
             others: Vec::new(),
@@ -419,15 +429,15 @@ impl ScenarioError {
     }
 
     /// The whole message, where overrides are given by this option.
-    pub fn told(&self, option: &str) -> String {
+    pub fn message_with_option(&self, option: &str) -> String {
         let mut all: Vec<&ScenarioError> = [self].into_iter().chain(&self.others).collect();
         // In the order of the lines of the file, then what it lacks, then what is set.
         all.sort_by_key(|error| match error.place {
-            Place::File { line, .. } => line.unwrap_or(usize::MAX - 1),
-            Place::Set { .. } => usize::MAX,
+            SourceLocation::File { line, .. } => line.unwrap_or(usize::MAX - 1),
+            SourceLocation::Set { .. } => usize::MAX,
         });
         let all = all.into_iter().map(|error| match &error.place {
-            Place::Set { given } => format!("{option} {given}: {}", error.problem),
+            SourceLocation::Set { given } => format!("{option} {given}: {}", error.problem),
             place => format!("{place}: {}", error.problem),
         });
         let all: Vec<String> = all.collect();
@@ -437,7 +447,7 @@ impl ScenarioError {
 
 /// Where a value was written, or is missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum SourceLocation {
     /// In a file.
     File {
         /// The file.
@@ -452,14 +462,14 @@ pub enum Place {
     },
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SourceLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::File { file, line } => {
+            SourceLocation::File { file, line } => {
                 f.write_str(file)?;
                 line.map_or(Ok(()), |line| write!(f, ":{line}"))
             }
-            Place::Set { given } => write!(f, "set {given}"),
+            SourceLocation::Set { given } => write!(f, "set {given}"),
         }
     }
 }
@@ -511,7 +521,7 @@ mod tests {
             assert!(refused.contains(said), "{refused}");
         }
         let text = "name = 'rod'\nleaf = { rods = 1, length = 1.0, fan = [0.0] }";
-        let entries = Entries::of_text(text, "rod.toml").unwrap();
+        let entries = Entries::from_text(text, "rod.toml").unwrap();
         let refused = entries.replaced(&["load.gravity=[0, 0, −2]".into()]);
         let refused = refused.unwrap_err().to_string();
         assert!(refused.contains("write -2, with a hyphen"), "{refused}");

@@ -6,7 +6,7 @@ use crate::numbers::superscript;
 pub type Dimension = [i32; 3];
 
 /// Without a unit: fractions, angles, numbers.
-pub const PURE: Dimension = [0, 0, 0];
+pub const DIMENSIONLESS: Dimension = [0, 0, 0];
 
 /// Of positions and displacements.
 pub const LENGTH: Dimension = [1, 0, 0];
@@ -53,7 +53,7 @@ pub struct Units {
 impl Units {
     /// The unit of a quantity, as in `N cm²` and `cm/s²`; `None` if it has none, or if a unit that
     /// it follows from has no name.
-    pub fn of(&self, dimension: Dimension) -> Option<String> {
+    pub fn unit_name(&self, dimension: Dimension) -> Option<String> {
         let names = [&self.force, &self.length, &self.time];
         let [length, force, time] = dimension;
         let powers = [force, length, time];
@@ -74,7 +74,7 @@ impl Units {
             false => above.join(" "),
         };
         match below.len() {
-            _ if dimension == PURE => None,
+            _ if dimension == DIMENSIONLESS => None,
             0 => Some(above),
             1 => Some(format!("{above}/{}", below[0])),
             _ => Some(format!("{above}/({})", below.join(" "))),
@@ -83,14 +83,14 @@ impl Units {
 
     /// The unit of energies and moments, if those of forces and lengths are named.
     pub fn energy(&self) -> Option<String> {
-        self.of(ENERGY)
+        self.unit_name(ENERGY)
     }
 
     /// The unit of cycles per time: `Hz` if times are in seconds.
     pub fn frequency(&self) -> Option<String> {
         match self.is_in_seconds() {
             true => Some("Hz".into()),
-            false => self.of(RATE),
+            false => self.unit_name(RATE),
         }
     }
 
@@ -125,7 +125,7 @@ mod tests {
             time: Some("s".into()),
         };
         let all = [LENGTH, ENERGY, STRESS, RATE, MASS, [-4, 1, 2], [-2, 1, 1]];
-        let names = all.map(|dimension| units.of(dimension).unwrap());
+        let names = all.map(|dimension| units.unit_name(dimension).unwrap());
         let wanted = [
             "cm",
             "N cm",
@@ -136,8 +136,8 @@ mod tests {
             "N s/cm²",
         ];
         assert_eq!(names, wanted);
-        assert_eq!(units.of(PURE), None);
-        assert_eq!(units.of([-1, -1, 0]).unwrap(), "1/(N cm)");
+        assert_eq!(units.unit_name(DIMENSIONLESS), None);
+        assert_eq!(units.unit_name([-1, -1, 0]).unwrap(), "1/(N cm)");
         assert_eq!(units.frequency().unwrap(), "Hz");
         assert_eq!(units.grams(), Some(1e5));
         let without = Units {
@@ -145,7 +145,7 @@ mod tests {
             ..units
         };
         assert_eq!(
-            (without.of(MASS), without.of(FORCE)),
+            (without.unit_name(MASS), without.unit_name(FORCE)),
             (None, Some("N".into()))
         );
         assert_eq!(without.grams(), None);

@@ -3,15 +3,15 @@
 use crate::scenario::Entries;
 use crate::scenario::supports::*;
 
-fn turnings(change: &str) -> Vec<Turning> {
+fn turnings(change: &str) -> Vec<ZeroEnergyRotation> {
     turnings_with("", change)
 }
 
-fn turnings_with(tables: &str, change: &str) -> Vec<Turning> {
-    given(tables, change).turnings()
+fn turnings_with(tables: &str, change: &str) -> Vec<ZeroEnergyRotation> {
+    scenario_with_tables(tables, change).zero_energy_rotations()
 }
 
-fn given(tables: &str, change: &str) -> Scenario {
+fn scenario_with_tables(tables: &str, change: &str) -> Scenario {
     let text = r#"
         name = "round"
         leaf = { rods = 2, length = [1.0, 0.8], fan = [0.0, 0.0], joined = false }
@@ -23,23 +23,25 @@ fn given(tables: &str, change: &str) -> Scenario {
     let entries = change.split("; ").filter(|entry| !entry.is_empty());
     let entries: Vec<_> = entries.map(|entry| entry.into()).collect();
     let text = format!("{text}\n{tables}");
-    let given = Entries::of_text(&text, "round").unwrap().replaced(&entries);
+    let given = Entries::from_text(&text, "round")
+        .unwrap()
+        .replaced(&entries);
     given.unwrap().check().unwrap()
 }
 
-fn about(axis: DVec3, rods: Range<usize>) -> Turning {
-    Turning {
+fn rotation_about(axis: DVec3, rods: Range<usize>) -> ZeroEnergyRotation {
+    ZeroEnergyRotation {
         rods,
         point: DVec3::ZERO,
         axis,
-        own: -1.0,
-        bent: true,
+        section_rate: -1.0,
+        includes_bent_veins: true,
     }
 }
 
 #[test]
 fn only_what_has_no_preferred_direction_turns() {
-    let both = [about(DVec3::X, 0..2)];
+    let both = [rotation_about(DVec3::X, 0..2)];
     assert_eq!(turnings(""), both);
     assert_eq!(turnings("rest.twist=0.4"), both);
     assert_eq!(turnings("rest.bend_2=0.1"), []);
@@ -56,7 +58,7 @@ fn loads_along_the_axis_leave_it_free_to_turn() {
         turnings(&upright.replace("coupling.z=1", "coupling.z=2.5; coupling.y=1")),
         []
     );
-    let both = [about(DVec3::X, 0..2)];
+    let both = [rotation_about(DVec3::X, 0..2)];
     for (entry, turns) in [
         ("leaf.base=[-0.3, 0, 0]", true),
         ("leaf.base=[[0, 0, 0], [0, 0.1, 0]]", false),
@@ -98,7 +100,10 @@ fn loads_along_the_axis_leave_it_free_to_turn() {
 #[test]
 fn untied_veins_turn_each_for_itself() {
     let untied = "coupling.x=0; coupling.y=0; coupling.z=0";
-    let each = [about(DVec3::X, 0..1), about(DVec3::X, 1..2)];
+    let each = [
+        rotation_about(DVec3::X, 0..1),
+        rotation_about(DVec3::X, 1..2),
+    ];
     assert_eq!(turnings(untied), each);
     let strip = format!("{untied}; stiffness.bending_3=[3.0, 1.0]");
     assert_eq!(turnings(&strip), each[1..]);
@@ -110,7 +115,14 @@ fn untied_veins_turn_each_for_itself() {
 /// The turns of the two veins on hinges: as what, and about which axis.
 fn on_hinges(tables: &str, change: &str) -> Vec<(Range<usize>, DVec3, f64, bool)> {
     let found = turnings_with(tables, &format!("leaf.base_held=pinned; {change}"));
-    let parts = |it: &Turning| (it.rods.clone(), it.axis, it.own, it.bent);
+    let parts = |it: &ZeroEnergyRotation| {
+        (
+            it.rods.clone(),
+            it.axis,
+            it.section_rate,
+            it.includes_bent_veins,
+        )
+    };
     found.iter().map(parts).collect()
 }
 
@@ -143,14 +155,15 @@ fn on_hinges_veins_turn_as_a_whole_and_spin() {
         spins
     );
     let unloaded = "leaf.base_held=pinned; coupling.x=2; load.gravity=[0, 0, 0]";
-    assert!(given("", unloaded).turns_freely());
+    assert!(scenario_with_tables("", unloaded).has_undetermined_orientation());
     for held in [
         "leaf.base=[[0, 0, 0], [0, 0.1, 0]]",
         "load.tip_force=[0, 1, 0]",
         "leaf.base_held=clamped",
     ] {
         assert!(
-            !given("", &format!("{unloaded}; {held}")).turns_freely(),
+            !scenario_with_tables("", &format!("{unloaded}; {held}"))
+                .has_undetermined_orientation(),
             "{held}"
         );
     }

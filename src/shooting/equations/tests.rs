@@ -29,7 +29,7 @@ fn turned<D: DualNum<Primitive = f64> + Copy>(frame: &[[D; 3]; 3], a: [D; 3]) ->
 fn paper<D: DualNum<Primitive = f64> + Copy>(
     z: SVector<D, 12>,
     rod: &RodState,
-    law: &Material,
+    law: &SectionLaw,
     length: f64,
     load: DVec3,
 ) -> SVector<D, 12> {
@@ -63,15 +63,15 @@ fn paper<D: DualNum<Primitive = f64> + Copy>(
 #[test]
 fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     let scenario = Scenario::from_toml(TEXT).unwrap();
-    let equations = Equations::new(&scenario);
+    let equations = BoundaryValueProblem::new(&scenario);
     let rod = RodState {
         r: DVec3::new(0.3, -0.2, 0.1),
         q: DQuat::from_scaled_axis(DVec3::new(0.5, -0.7, 1.0)),
         n: DVec3::new(2.0, -1.0, 3.0),
         m: DVec3::new(0.5, 1.5, -2.0),
     };
-    let mut y = vec![0.0; equations.size()];
-    rod.write(&mut y, 0);
+    let mut y = vec![0.0; equations.state_size()];
+    rod.write_flat_state(&mut y, 0);
     let (sigma, length) = (0.3, equations.lengths[0]);
     let law = equations.material(0, sigma);
     let load = length * equations.gravity;
@@ -80,8 +80,8 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
         &SVector::<f64, 12>::zeros(),
     );
 
-    let mut slopes = vec![0.0; equations.size()];
-    equations.slopes(sigma, &y, &mut slopes);
+    let mut slopes = vec![0.0; equations.state_size()];
+    equations.write_slopes(sigma, &y, &mut slopes);
     let part = |k: usize| DVec3::new(value[3 * k], value[3 * k + 1], value[3 * k + 2]);
     let found = |k: usize| DVec3::from_slice(&slopes[k..]);
     assert!((found(0) - part(0)).length() < 1e-14);
@@ -101,7 +101,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
         [none; 4],
         [none, d.m_theta, d.m_n, none],
     ];
-    let spin = cross(part(1));
+    let spin = cross_matrix(part(1));
     for (i, row) in blocks.iter().enumerate() {
         for (k, block) in row.iter().enumerate() {
             for c in 0..3 {

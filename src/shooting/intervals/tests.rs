@@ -1,5 +1,5 @@
 use crate::scenario::Scenario;
-use crate::shooting::integrate::Trajectory;
+use crate::shooting::integrate::LeafTrajectory;
 use crate::shooting::intervals::*;
 use faer::prelude::Solve;
 
@@ -16,8 +16,8 @@ fn scenario(joined: bool) -> Scenario {
 
 fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<CondensedEquations> {
     let scenario = scenario(joined);
-    let equations = Equations::new(&scenario);
-    let units = Units::new(&equations, &Trajectory::straight(&equations));
+    let equations = BoundaryValueProblem::new(&scenario);
+    let units = PerturbationUnits::new(&equations, &LeafTrajectory::straight(&equations));
     CondensedEquations::new(&equations, &units, maps, &[])
 }
 
@@ -41,7 +41,7 @@ fn maps(intervals: usize, growth: f64) -> Vec<Mat<f64>> {
 }
 
 /// Rows of the tip's conditions, according to the documentation of the module.
-fn tip_rows(joined: bool, units: &Units) -> Mat<f64> {
+fn tip_rows(joined: bool, units: &PerturbationUnits) -> Mat<f64> {
     let mut rows = Mat::zeros(18, 36);
     for (j, k) in (0..3).flat_map(|j| (0..3).map(move |k| (j, k))) {
         let row = 6 * j + k;
@@ -53,7 +53,8 @@ fn tip_rows(joined: bool, units: &Units) -> Mat<f64> {
             rows[(row, k)] = -1.0;
         } else {
             for rod in 0..3 {
-                rows[(row, 12 * rod + 6 + k)] = units.of(12 * rod + 6) / units.total_force();
+                rows[(row, 12 * rod + 6 + k)] =
+                    units.component_unit(12 * rod + 6) / units.total_force();
             }
         }
     }
@@ -115,16 +116,17 @@ fn the_condensed_solution_is_that_of_the_whole_system() {
 fn conditions_are_in_the_units_of_the_unknowns() {
     for joined in [true, false] {
         let scenario = scenario(joined);
-        let equations = Equations::new(&scenario);
+        let equations = BoundaryValueProblem::new(&scenario);
         let condensed = condensed(joined, maps(1, 1.0)).unwrap();
         let mut noise = noise();
         let step: Vec<f64> = (0..36).map(|_| 0.1 * noise()).collect();
-        let mut y = equations.clamped();
+        let mut y = equations.unstressed_base_state();
         condensed.units.advance(&mut y, &step, 1.0);
-        let found = condensed.scaled(&equations.tip_conditions(&y));
+        let found = condensed.scaled_tip_conditions(&equations.tip_conditions(&y));
         let step = Col::from_fn(36, |i| step[i]);
         let wanted = tip_rows(joined, &condensed.units) * &step;
-        let linear = at_tip(equations.tip(), &condensed.units, step.as_ref());
+        let linear =
+            linearized_tip_conditions(equations.tip_constraint(), &condensed.units, step.as_ref());
         for (i, found) in found.iter().enumerate() {
             assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
             assert!((linear[i] - wanted[i]).abs() < 1e-14);
@@ -143,10 +145,10 @@ fn what_the_tip_does_not_feel_is_found_and_left_alone() {
     let lost = &maps[2] * &last;
     maps[2] -= (1.0 / last.squared_norm_l2()) * &lost * last.transpose();
     let condensed = condensed(true, maps).unwrap();
-    let condition = condensed.condition();
+    let condition = condensed.singular_value_ratio();
     assert!(condition < 1e-13, "{condition:.1e}");
 
-    let null = condensed.null();
+    let null = condensed.least_determined_direction();
     let factor = null[0][6] / begin[0];
     for (i, value) in begin.iter().enumerate() {
         let found = null[0][12 * (i / 6) + 6 + i % 6];

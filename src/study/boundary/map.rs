@@ -6,155 +6,174 @@
 //! Whether critical points of branches in the plane lie on a known curve.
 
 use crate::branch::boundary::{
-    AtRest, Boundary, Path, Plane, Seed, Special, Verified, coarsened, follow_path, recount,
+    BoundarySeed, CodimensionTwoKind, ConfirmedEquilibrium, ContinuedBoundary, ParameterPath,
+    TwoParameterProblem, VerifiedBoundaryPoint, coarsened, follow_path, recount_index,
 };
-use crate::branch::{Critical, End, Kind};
+use crate::branch::{BranchEnd, CriticalKind, CriticalPoint};
 use crate::leaf::Grid;
 use crate::numbers::largest;
-use crate::shape::weights;
+use crate::shape::interpolation_weights;
 use crate::study::boundary::BoundaryMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Largest number of cells along a side.
-pub const MOST_CELLS: usize = 256;
+pub const MOST_CELLS_PER_SIDE: usize = 256;
 
 /// The cells of a map, as far as they have been computed.
-pub struct Cells<'p> {
-    plane: &'p Plane<'p>,
+pub struct IndexMapSweep<'p> {
+    plane: &'p TwoParameterProblem<'p>,
     /// Columns and rows.
-    size: [usize; 2],
+    columns_and_rows: [usize; 2],
     /// The equilibria found in the last sweep, from which others may be reached.
-    front: Vec<Option<AtRest>>,
+    frontier: Vec<Option<ConfirmedEquilibrium>>,
     /// Paths that were followed, by the cell at their end; only the last one may have reached it.
-    edges: Vec<Vec<Edge>>,
+    paths_by_cell: Vec<Vec<CellPath>>,
     pub factorizations: usize,
 }
 
 /// A path that contradicts the curves, with the critical points on it.
-pub struct Unexplained {
+pub struct UnexplainedPath {
     pub ends: [[f64; 2]; 2],
     pub grid: Grid,
-    pub critical: Vec<Critical>,
+    pub critical: Vec<CriticalPoint>,
 }
 
 /// Offsets of neighbouring cells along the first and the second parameter.
-const NEIGHBOURS: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+const NEIGHBOUR_OFFSETS: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
-impl<'p> Cells<'p> {
+impl<'p> IndexMapSweep<'p> {
     /// A map of so many cells, all unknown.
-    pub fn new(plane: &'p Plane<'p>, size: [usize; 2]) -> Self {
+    pub fn new(plane: &'p TwoParameterProblem<'p>, size: [usize; 2]) -> Self {
         let count = size[0] * size[1];
-        Cells {
+        IndexMapSweep {
             plane,
-            size,
-            front: vec![None; count],
-            edges: (0..count).map(|_| Vec::new()).collect(),
+            columns_and_rows: size,
+            frontier: vec![None; count],
+            paths_by_cell: (0..count).map(|_| Vec::new()).collect(),
             factorizations: 0,
         }
     }
 
     /// The centre of a cell.
-    fn middle(&self, cell: usize) -> [f64; 2] {
-        let at = [cell % self.size[0], cell / self.size[0]];
-        [0, 1].map(|i| (at[i] as f64 + 0.5) / self.size[i] as f64)
+    fn cell_center(&self, cell: usize) -> [f64; 2] {
+        let at = [
+            cell % self.columns_and_rows[0],
+            cell / self.columns_and_rows[0],
+        ];
+        [0, 1].map(|i| (at[i] as f64 + 0.5) / self.columns_and_rows[i] as f64)
     }
 
     /// The neighbours of a cell.
-    fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
-        let [columns, rows] = self.size;
+    fn neighbouring_cells(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let [columns, rows] = self.columns_and_rows;
         let (column, row) = (cell % columns, cell / columns);
-        NEIGHBOURS.into_iter().filter_map(move |[right, up]| {
-            let column = column.checked_add_signed(right).filter(|it| *it < columns);
-            let row = row.checked_add_signed(up).filter(|it| *it < rows);
-            Some(row? * columns + column?)
-        })
+        NEIGHBOUR_OFFSETS
+            .into_iter()
+            .filter_map(move |[right, up]| {
+                let column = column.checked_add_signed(right).filter(|it| *it < columns);
+                let row = row.checked_add_signed(up).filter(|it| *it < rows);
+                Some(row? * columns + column?)
+            })
     }
 
     /// The index in a cell, if its equilibrium is known.
-    fn index(&self, cell: usize) -> Option<usize> {
-        self.edges[cell].last()?.found
+    fn known_index(&self, cell: usize) -> Option<usize> {
+        self.paths_by_cell[cell].last()?.end_index
     }
 
     /// Continues an equilibrium to the nearest cell of the first column, along the first parameter
     /// and then along the second; returns the paths that contradict the curves.
-    pub fn begin(&mut self, first: AtRest, curves: &[Boundary]) -> Vec<Unexplained> {
+    pub fn continue_to_first_cell(
+        &mut self,
+        first: ConfirmedEquilibrium,
+        curves: &[ContinuedBoundary],
+    ) -> Vec<UnexplainedPath> {
         let second = first.solution.params[1];
-        let row = ((second * self.size[1] as f64) as usize).min(self.size[1] - 1);
-        let cell = row * self.size[0];
-        let middle = self.middle(cell);
+        let row =
+            ((second * self.columns_and_rows[1] as f64) as usize).min(self.columns_and_rows[1] - 1);
+        let cell = row * self.columns_and_rows[0];
+        let middle = self.cell_center(cell);
         let mut unexplained = Vec::new();
         let mut now = Some(first);
         for to in [[middle[0], second], middle] {
             if let Some(from) = now.take_if(|from| from.solution.params != to) {
                 let mut path = follow_path(self.plane, &from, to);
                 now = path.end.take();
-                unexplained.extend(self.record((&from, to, now.as_ref()), cell, path, curves));
+                unexplained.extend(self.record_path((&from, to, now.as_ref()), cell, path, curves));
             }
         }
-        self.front[cell] = now;
+        self.frontier[cell] = now;
         unexplained
     }
 
     /// Recounts the index on finer grids in those cells of the last sweep where it contradicts
     /// the curves: close to a curve, the grid of a path may be too coarse.
-    fn recount(&mut self, curves: &[Boundary]) {
-        let counted: Vec<(usize, usize)> = (self.front.par_iter().enumerate())
+    fn recount_contradicting_indices(&mut self, curves: &[ContinuedBoundary]) {
+        let counted: Vec<(usize, usize)> = (self.frontier.par_iter().enumerate())
             .filter_map(|(cell, at)| {
-                let (at, edge) = (at.as_ref()?, self.edges[cell].last()?);
-                if edge.is_explained(curves) {
+                let (at, edge) = (at.as_ref()?, self.paths_by_cell[cell].last()?);
+                if edge.agrees_with_curves(curves) {
                     return None;
                 }
-                Some((cell, recount(self.plane, at)?))
+                Some((cell, recount_index(self.plane, at)?))
             })
             .collect();
         for (cell, index) in counted {
-            if let (Some(at), Some(edge)) = (&mut self.front[cell], self.edges[cell].last_mut()) {
+            if let (Some(at), Some(edge)) = (
+                &mut self.frontier[cell],
+                self.paths_by_cell[cell].last_mut(),
+            ) {
                 at.index = index;
-                edge.found = Some(index);
+                edge.end_index = Some(index);
             }
         }
     }
 
     /// Continues to all neighbours of the cells found last, in parallel; returns the paths that
     /// contradict the curves, or `None` if there are no such neighbours.
-    pub fn advance(&mut self, curves: &[Boundary]) -> Option<Vec<Unexplained>> {
-        self.recount(curves);
-        let next: Vec<(usize, Vec<usize>)> = (0..self.front.len())
-            .filter(|&cell| self.index(cell).is_none())
+    pub fn sweep_to_neighbours(
+        &mut self,
+        curves: &[ContinuedBoundary],
+    ) -> Option<Vec<UnexplainedPath>> {
+        self.recount_contradicting_indices(curves);
+        let next: Vec<(usize, Vec<usize>)> = (0..self.frontier.len())
+            .filter(|&cell| self.known_index(cell).is_none())
             .map(|cell| {
-                let from = self.neighbours(cell).filter(|&it| self.front[it].is_some());
+                let from = self
+                    .neighbouring_cells(cell)
+                    .filter(|&it| self.frontier[it].is_some());
                 (cell, from.collect())
             })
             .filter(|(_, from): &(usize, Vec<usize>)| !from.is_empty())
             .collect();
-        let followed: Vec<Vec<(usize, Path)>> = (next.par_iter())
-            .map(|(cell, from)| self.reach(*cell, from))
+        let followed: Vec<Vec<(usize, ParameterPath)>> = (next.par_iter())
+            .map(|(cell, from)| self.paths_to_cell(*cell, from))
             .collect();
-        let none = vec![None; self.front.len()];
-        let before = std::mem::replace(&mut self.front, none);
+        let none = vec![None; self.frontier.len()];
+        let before = std::mem::replace(&mut self.frontier, none);
         let mut unexplained = Vec::new();
         for ((cell, _), paths) in next.iter().zip(followed) {
             for (from, mut path) in paths {
-                let (to, end) = (self.middle(*cell), path.end.take());
+                let (to, end) = (self.cell_center(*cell), path.end.take());
                 if let Some(from) = &before[from] {
                     let ends = (from, to, end.as_ref());
-                    unexplained.extend(self.record(ends, *cell, path, curves));
+                    unexplained.extend(self.record_path(ends, *cell, path, curves));
                 }
-                self.front[*cell] = end;
+                self.frontier[*cell] = end;
             }
         }
         (!next.is_empty()).then_some(unexplained)
     }
 
     /// Continues to a cell from its neighbours in turn, until one path reaches it.
-    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Path)> {
+    fn paths_to_cell(&self, cell: usize, from: &[usize]) -> Vec<(usize, ParameterPath)> {
         let mut paths = Vec::new();
         for &other in from {
-            let Some(begun) = &self.front[other] else {
+            let Some(begun) = &self.frontier[other] else {
                 continue;
             };
-            let path = follow_path(self.plane, begun, self.middle(cell));
+            let path = follow_path(self.plane, begun, self.cell_center(cell));
             let found = path.end.is_some();
             paths.push((other, path));
             if found {
@@ -165,60 +184,70 @@ impl<'p> Cells<'p> {
     }
 
     /// Records a path to a cell; returns it if it contradicts the curves.
-    fn record(
+    fn record_path(
         &mut self,
-        (from, to, end): (&AtRest, [f64; 2], Option<&AtRest>),
+        (from, to, end): (
+            &ConfirmedEquilibrium,
+            [f64; 2],
+            Option<&ConfirmedEquilibrium>,
+        ),
         cell: usize,
-        mut path: Path,
-        curves: &[Boundary],
-    ) -> Option<Unexplained> {
+        mut path: ParameterPath,
+        curves: &[ContinuedBoundary],
+    ) -> Option<UnexplainedPath> {
         self.factorizations += path.factorizations;
-        if self.plane.first().joined() {
+        if self.plane.first_leaf().joined() {
             path.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
         let ends = [from.solution.params, to];
         let along = usize::from(ends[0][0] == ends[1][0]);
-        let beyond = path.critical.extract_if(.., |it| !is_followed(it.indices));
-        let beyond = beyond.map(|critical| Crossing {
-            at: ends[0][along] + critical.fraction * (to[along] - ends[0][along]),
-            fold: critical.kind == Kind::Fold,
+        let beyond = path
+            .critical
+            .extract_if(.., |it| !is_index_change_followed(it.indices));
+        let beyond = beyond.map(|critical| CurveCrossing {
+            parameter: ends[0][along] + critical.fraction * (to[along] - ends[0][along]),
+            is_fold: critical.kind == CriticalKind::Fold,
             indices: critical.indices,
         });
-        let edge = Edge {
+        let edge = CellPath {
             ends,
-            beyond: beyond.collect(),
+            high_index_crossings: beyond.collect(),
             index: from.index,
             tips: path.tips,
-            found: end.map(|end| end.index),
+            end_index: end.map(|end| end.index),
         };
-        let unexplained = (!edge.is_explained(curves)).then_some(Unexplained {
+        let unexplained = (!edge.agrees_with_curves(curves)).then_some(UnexplainedPath {
             ends: edge.ends,
             grid: path.grid,
             critical: path.critical,
         });
-        self.edges[cell].push(edge);
+        self.paths_by_cell[cell].push(edge);
         unexplained
     }
 
     /// The map, compared with the curves. A cell disagrees if its index is not the one that they
     /// imply from the cell at the start of its path, or if no path reaches it though they do not
     /// prevent it.
-    pub fn compared(&self, curves: &[Boundary]) -> BoundaryMap {
-        let [columns, rows] = self.size;
-        let value = |i: usize, cell: usize| self.plane.values(self.middle(cell))[i];
-        let row = |r: usize| (0..columns).map(|c| self.index(r * columns + c)).collect();
+    pub fn map_compared_with_curves(&self, curves: &[ContinuedBoundary]) -> BoundaryMap {
+        let [columns, rows] = self.columns_and_rows;
+        let value = |i: usize, cell: usize| self.plane.values(self.cell_center(cell))[i];
+        let row = |r: usize| {
+            (0..columns)
+                .map(|c| self.known_index(r * columns + c))
+                .collect()
+        };
         let mut map = BoundaryMap {
             first: (0..columns).map(|c| value(0, c)).collect(),
             second: (0..rows).map(|r| value(1, r * columns)).collect(),
             index: (0..rows).map(row).collect(),
             disagreeing: Vec::new(),
         };
-        for (cell, edges) in self.edges.iter().enumerate() {
+        for (cell, edges) in self.paths_by_cell.iter().enumerate() {
             let explained = match edges.last() {
-                Some(last) if last.found.is_some() => last.is_explained(curves),
-                _ => edges.iter().all(|edge| edge.is_explained(curves)),
+                Some(last) if last.end_index.is_some() => last.agrees_with_curves(curves),
+                _ => edges.iter().all(|edge| edge.agrees_with_curves(curves)),
             };
-            if !explained && self.plane.scenario(self.middle(cell)).is_ok() {
+            if !explained && self.plane.scenario(self.cell_center(cell)).is_ok() {
                 let (column, row) = (cell % columns + 1, cell / columns + 1);
                 map.disagreeing.push([column, row]);
             }
@@ -229,20 +258,20 @@ impl<'p> Cells<'p> {
 
 /// Points closer than this part of both ranges are merged: their errors would dominate the
 /// slopes of interpolating polynomials.
-const APART_IN_RANGES: f64 = 1e-4;
+const MERGING_DISTANCE_IN_RANGES: f64 = 1e-4;
 
 /// Crossings closer than this may be in either order.
-const SAME_CROSSING: f64 = 1e-3;
+const SAME_CROSSING_DISTANCE: f64 = 1e-3;
 
 /// A curve and a branch with tips farther apart than this (lengths) belong to different leaves.
-const NEAR: f64 = 0.02;
+const LARGEST_TIP_DISTANCE: f64 = 0.02;
 
 /// Curves between larger indices are not followed for a map: beyond this, singular
 /// matrices on the path itself are used.
-pub const MOST_INDEX: usize = 8;
+pub const LARGEST_INDEX_FOLLOWED: usize = 8;
 
 /// A straight path along one of the parameters, on which a branch was followed.
-pub struct Edge {
+pub struct CellPath {
     /// Both parameters at its ends, as fractions of their ranges.
     pub ends: [[f64; 2]; 2],
     /// The index at its start.
@@ -250,70 +279,72 @@ pub struct Edge {
     /// Tips along it, in the units of the curves: only one if they are joined.
     pub tips: Vec<Vec<DVec3>>,
     /// Critical points on it with indices too large for the curves.
-    pub beyond: Vec<Crossing>,
+    pub high_index_crossings: Vec<CurveCrossing>,
     /// The index at its end; none if the branch does not reach it.
-    pub found: Option<usize>,
+    pub end_index: Option<usize>,
 }
 
 /// Crossing of a path and a curve.
 #[derive(Clone)]
-pub struct Crossing {
+pub struct CurveCrossing {
     /// The parameter that varies.
-    pub at: f64,
+    pub parameter: f64,
     /// Whether the branch ends there.
-    pub fold: bool,
+    pub is_fold: bool,
     pub indices: [usize; 2],
 }
 
 /// Whether a change of the index is followed for a map.
-pub fn is_followed(indices: [usize; 2]) -> bool {
-    indices.iter().all(|index| *index <= MOST_INDEX)
+pub fn is_index_change_followed(indices: [usize; 2]) -> bool {
+    indices.iter().all(|index| *index <= LARGEST_INDEX_FOLLOWED)
 }
 
-impl Edge {
+impl CellPath {
     /// The parameter that varies along it.
-    fn along(&self) -> usize {
+    fn varying_parameter(&self) -> usize {
         usize::from(self.ends[0][0] == self.ends[1][0])
     }
 
     /// Whether the result agrees with the curves: at each curve that has the present index on one
     /// side the index becomes that on the other; at a fold the branch ends.
-    pub fn is_explained(&self, curves: &[Boundary]) -> bool {
-        let along = self.along();
+    pub fn agrees_with_curves(&self, curves: &[ContinuedBoundary]) -> bool {
+        let along = self.varying_parameter();
         let [from, to] = self.ends.map(|end| end[along]);
-        let mut crossings: Vec<Crossing> = (curves.iter())
-            .flat_map(|curve| self.crossings(curve))
-            .filter(|crossing| is_followed(crossing.indices))
-            .chain(self.beyond.iter().cloned())
-            .filter(|crossing| (crossing.at - from) * (crossing.at - to) < 0.0)
+        let mut crossings: Vec<CurveCrossing> = (curves.iter())
+            .flat_map(|curve| self.crossings_of_curve(curve))
+            .filter(|crossing| is_index_change_followed(crossing.indices))
+            .chain(self.high_index_crossings.iter().cloned())
+            .filter(|crossing| (crossing.parameter - from) * (crossing.parameter - to) < 0.0)
             .collect();
-        let distance = |crossing: &Crossing| (crossing.at - from).abs();
+        let distance = |crossing: &CurveCrossing| (crossing.parameter - from).abs();
         crossings.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         let (mut now, mut reached) = (self.index, 0.0);
         loop {
             let next = crossings.iter().position(|crossing| {
-                crossing.indices.contains(&now) && distance(crossing) > reached - SAME_CROSSING
+                crossing.indices.contains(&now)
+                    && distance(crossing) > reached - SAME_CROSSING_DISTANCE
             });
             let Some(next) = next else { break };
             let crossing = crossings.remove(next);
-            if crossing.fold {
-                return self.found.is_none();
+            if crossing.is_fold {
+                return self.end_index.is_none();
             }
             reached = distance(&crossing);
             let [before, after] = crossing.indices;
             now = before + after - now;
         }
-        self.found == Some(now)
+        self.end_index == Some(now)
     }
 
     /// Crossings of a curve of this branch with the line of this path.
-    fn crossings(&self, curve: &Boundary) -> Vec<Crossing> {
-        let along = self.along();
+    fn crossings_of_curve(&self, curve: &ContinuedBoundary) -> Vec<CurveCrossing> {
+        let along = self.varying_parameter();
         let value = self.ends[0][1 - along];
-        let mut points: Vec<&Verified> = Vec::new();
+        let mut points: Vec<&VerifiedBoundaryPoint> = Vec::new();
         for point in &curve.points {
-            let far = |last: &&Verified| {
-                (0..2).any(|i| (point.params[i] - last.params[i]).abs() > APART_IN_RANGES)
+            let far = |last: &&VerifiedBoundaryPoint| {
+                (0..2)
+                    .any(|i| (point.params[i] - last.params[i]).abs() > MERGING_DISTANCE_IN_RANGES)
             };
             if points.last().is_none_or(far) {
                 points.push(point);
@@ -327,7 +358,9 @@ impl Edge {
         for k in 1..coordinates.len() {
             let [low, high] = [coordinates[k - 1][1], coordinates[k][1]];
             let part = (value - low) / (high - low);
-            if (low < value) == (high < value) || !self.is_near([points[k - 1], points[k]], part) {
+            if (low < value) == (high < value)
+                || !self.has_matching_tips([points[k - 1], points[k]], part)
+            {
                 continue;
             }
             // Through four points if the parameter is monotonic along them, else through two.
@@ -339,13 +372,13 @@ impl Edge {
             };
             // Where curves cross, further modes contribute.
             let point = match points[k].special {
-                Some(Special::Crossing) => points[k - 1],
+                Some(CodimensionTwoKind::Crossing) => points[k - 1],
                 _ => points[k],
             };
             let own: Vec<f64> = near.iter().map(|point| point[1]).collect();
-            crossings.push(Crossing {
-                at: through(near, &own, value)[0],
-                fold: curve.kind == Kind::Fold && curve.neutral == 1,
+            crossings.push(CurveCrossing {
+                parameter: interpolate_polynomial(near, &own, value)[0],
+                is_fold: curve.kind == CriticalKind::Fold && curve.neutral == 1,
                 indices: point.indices,
             });
         }
@@ -354,43 +387,43 @@ impl Edge {
 
     /// Whether the tips between two points of a curve agree with those of the branch, which are
     /// known at its points only, anywhere along it.
-    fn is_near(&self, [a, b]: [&Verified; 2], part: f64) -> bool {
+    fn has_matching_tips(&self, [a, b]: [&VerifiedBoundaryPoint; 2], part: f64) -> bool {
         let tips = a.tips.iter().zip(&b.tips);
         let tips: Vec<DVec3> = tips.map(|(a, b)| a + part * (b - a)).collect();
         // The mirror image in a plane of the axes has the same index.
-        let images = IMAGES.map(|signs| image(&tips, signs));
+        let images = MIRROR_IMAGE_SIGNS.map(|signs| mirror_image_of_tips(&tips, signs));
         let own = self.tips.iter();
-        let off = own.flat_map(|own| images.iter().map(|tips| distance_of_tips(own, tips)));
+        let off = own.flat_map(|own| images.iter().map(|tips| largest_tip_distance(own, tips)));
         let off = off.fold(f64::INFINITY, f64::min);
         let steps = self
             .tips
             .windows(2)
-            .map(|pair| distance_of_tips(&pair[0], &pair[1]));
-        off < NEAR + 0.5 * largest(steps)
+            .map(|pair| largest_tip_distance(&pair[0], &pair[1]));
+        off < LARGEST_TIP_DISTANCE + 0.5 * largest(steps)
     }
 }
 
 /// The largest distance between corresponding tips.
-fn distance_of_tips(a: &[DVec3], b: &[DVec3]) -> f64 {
+fn largest_tip_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
     largest(distances)
 }
 
 /// Parameters (as fractions) and tips that agree within this plus both error bounds are
 /// the same.
-const SAME_POINT: f64 = 1e-6;
+const SAME_POINT_DISTANCE: f64 = 1e-6;
 
 /// Iterations for the nearest point.
-const ITERATIONS: usize = 20;
+const NEAREST_POINT_ITERATIONS: usize = 20;
 
 /// Points of a curve closer than this are merged for interpolation: their errors would dominate
 /// the slopes.
-const APART_ON_CURVE: f64 = 1e-3;
+const MERGING_DISTANCE_ON_CURVE: f64 = 1e-3;
 
 /// A point may lie outside an interval of a curve by this part of it.
-const BEYOND: f64 = 0.05;
+const INTERVAL_OVERHANG: f64 = 0.05;
 
-impl Seed<'_> {
+impl BoundarySeed<'_> {
     /// Its grid, for leaves with these kinks.
     pub fn grid(&self, kinks: &[f64]) -> Grid {
         let segments = self.critical.state.segments();
@@ -398,32 +431,32 @@ impl Seed<'_> {
     }
 
     /// Whether it lies on a curve.
-    pub fn is_on(&self, curve: &Boundary) -> bool {
+    pub fn lies_on_curve(&self, curve: &ContinuedBoundary) -> bool {
         let [first, second] = self.direction;
-        let singular = Singular {
-            params: self.params(self.refined.fraction),
+        let singular = SingularPointSample {
+            params: self.parameters_at(self.refined.fraction),
             tips: &self.refined.tips,
-            error: self.refined.fraction_error * first.hypot(second) + self.refined.error,
+            error: self.refined.fraction_error * first.hypot(second) + self.refined.position_error,
             kind: self.critical.kind,
             modes: self.critical.modes.len(),
-            sides: sorted(self.critical.indices),
+            adjacent_indices: sorted_indices(self.critical.indices),
         };
-        singular.is_on(curve)
+        singular.lies_on_curve(curve)
     }
 }
 
 /// Removes from the ends of a curve what repeats known ones; nothing may remain.
-pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
-    let is_known = |point: &Verified| {
-        let singular = Singular {
+pub fn remove_repeated_ends(curve: &mut ContinuedBoundary, known: &[ContinuedBoundary]) {
+    let is_known = |point: &VerifiedBoundaryPoint| {
+        let singular = SingularPointSample {
             params: point.params,
             tips: &point.tips,
-            error: error(point),
+            error: total_error_bound(point),
             kind: point.kind,
             modes: curve.neutral,
-            sides: sorted(point.indices),
+            adjacent_indices: sorted_indices(point.indices),
         };
-        known.iter().any(|other| singular.is_on(other))
+        known.iter().any(|other| singular.lies_on_curve(other))
     };
     let repeated: Vec<bool> = curve.points.iter().map(is_known).collect();
     if repeated.iter().all(|known| *known) {
@@ -435,65 +468,68 @@ pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
     let last = repeated.iter().rev().take_while(|known| **known).count();
     if last > 1 {
         curve.points.truncate(repeated.len() - last + 1);
-        curve.ends[1] = End::Met;
+        curve.ends[1] = BranchEnd::KnownBoundaryMet;
     }
     if first > 1 {
         curve.points.drain(..first - 1);
-        curve.ends[0] = End::Met;
+        curve.ends[0] = BranchEnd::KnownBoundaryMet;
     }
 }
 
 /// A singular point, by its parameters and tips.
-struct Singular<'a> {
+struct SingularPointSample<'a> {
     params: [f64; 2],
     tips: &'a [DVec3],
     error: f64,
-    kind: Kind,
+    kind: CriticalKind,
     modes: usize,
     /// The smaller and the larger index next to it.
-    sides: [usize; 2],
+    adjacent_indices: [usize; 2],
 }
 
 /// A leaf and its mirror images in the planes of its longitudinal axes lose stability
 /// together: signs of y and z.
-pub const IMAGES: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+pub const MIRROR_IMAGE_SIGNS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
 
-impl Singular<'_> {
+impl SingularPointSample<'_> {
     /// Whether it lies on a curve or on one of its mirror images: no farther from a polynomial
     /// through its points than that is from one of lower degree, with the same indices on both
     /// sides. If more modes become neutral than those of the curve, others cross it there.
-    fn is_on(&self, curve: &Boundary) -> bool {
+    fn lies_on_curve(&self, curve: &ContinuedBoundary) -> bool {
         let crossed = self.modes > curve.neutral;
         if self.modes < curve.neutral || !crossed && curve.kind != self.kind {
             return false;
         }
         let (mut points, mut points_of_curve) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
-            let coordinates = coordinates(point.params, &point.tips);
-            if (points_of_curve.last())
-                .is_none_or(|last| distance_of_parameters(last, &coordinates) > APART_ON_CURVE)
-            {
+            let coordinates = parameters_and_tips(point.params, &point.tips);
+            if (points_of_curve.last()).is_none_or(|last| {
+                parameter_distance(last, &coordinates) > MERGING_DISTANCE_ON_CURVE
+            }) {
                 points.push(point);
                 points_of_curve.push(coordinates);
             }
         }
-        IMAGES.iter().any(|signs| {
-            let target = coordinates(self.params, &image(self.tips, *signs));
+        MIRROR_IMAGE_SIGNS.iter().any(|signs| {
+            let target = parameters_and_tips(self.params, &mirror_image_of_tips(self.tips, *signs));
             if let [only] = &points[..] {
-                return distance_of_parameters(&points_of_curve[0], &target)
-                    < SAME_POINT + self.error + error(only);
+                return parameter_distance(&points_of_curve[0], &target)
+                    < SAME_POINT_DISTANCE + self.error + total_error_bound(only);
             }
             (1..points.len()).any(|k| {
                 let pair = &points[k - 1..=k];
-                let within = pair.iter().map(|it| error(it)).fold(0.0, f64::max);
-                let mut sides = pair.iter().map(|it| sorted(it.indices));
-                let same_sides = crossed || sides.any(|sides| sides == self.sides);
+                let within = pair
+                    .iter()
+                    .map(|it| total_error_bound(it))
+                    .fold(0.0, f64::max);
+                let mut sides = pair.iter().map(|it| sorted_indices(it.indices));
+                let same_sides = crossed || sides.any(|sides| sides == self.adjacent_indices);
                 same_sides
-                    && is_between(
+                    && is_on_interpolated_interval(
                         &points_of_curve,
                         k,
                         &target,
-                        SAME_POINT + self.error + within,
+                        SAME_POINT_DISTANCE + self.error + within,
                     )
             })
         })
@@ -501,37 +537,42 @@ impl Singular<'_> {
 }
 
 /// The mirror image of tips, by the signs of y and z.
-pub fn image(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
+pub fn mirror_image_of_tips(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
     let signs = DVec3::new(1.0, y, z);
     tips.iter().map(|tip| signs * tip).collect()
 }
 
 /// Sum of the error bounds of a point.
-fn error(point: &Verified) -> f64 {
+fn total_error_bound(point: &VerifiedBoundaryPoint) -> f64 {
     point.errors[0] + point.errors[1] + point.error
 }
 
-fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+fn sorted_indices([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
 /// A singular point as a vector: both parameters, then the tips.
-fn coordinates(params: [f64; 2], tips: &[DVec3]) -> Vec<f64> {
+fn parameters_and_tips(params: [f64; 2], tips: &[DVec3]) -> Vec<f64> {
     let tips = tips.iter().flat_map(|tip| tip.to_array());
     params.into_iter().chain(tips).collect()
 }
 
-fn distance_of_parameters(a: &[f64], b: &[f64]) -> f64 {
+fn parameter_distance(a: &[f64], b: &[f64]) -> f64 {
     let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
     squares.sum::<f64>().sqrt()
 }
 
 /// Whether a point lies on the interpolated curve, between one of its points and the previous.
-fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool {
+fn is_on_interpolated_interval(
+    points_of_curve: &[Vec<f64>],
+    k: usize,
+    target: &[f64],
+    error: f64,
+) -> bool {
     let few = &points_of_curve[k.saturating_sub(2)..(k + 2).min(points_of_curve.len())];
     let chords = few
         .windows(2)
-        .map(|pair| distance_of_parameters(&pair[0], &pair[1]));
+        .map(|pair| parameter_distance(&pair[0], &pair[1]));
     let mut at = vec![0.0];
     at.extend(chords.scan(0.0, |sum, chord| {
         *sum += chord;
@@ -539,12 +580,12 @@ fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64
     }));
     let first = k - 1 - k.saturating_sub(2);
     let [low, high] = [at[first], at[first + 1]];
-    let beyond = BEYOND * (high - low);
+    let beyond = INTERVAL_OVERHANG * (high - low);
     let mut t = 0.5 * (low + high);
-    for _ in 0..ITERATIONS {
+    for _ in 0..NEAREST_POINT_ITERATIONS {
         let h = 1e-4 * (high - low);
-        let here = through(few, &at, t);
-        let [a, b] = [t - h, t + h].map(|t| through(few, &at, t));
+        let here = interpolate_polynomial(few, &at, t);
+        let [a, b] = [t - h, t + h].map(|t| interpolate_polynomial(few, &at, t));
         let (mut along, mut square) = (0.0, 0.0);
         for (((x, wanted), a), b) in here.iter().zip(target).zip(&a).zip(&b) {
             let rate = (b - a) / (2.0 * h);
@@ -559,18 +600,18 @@ fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64
         len if first == 0 => (0, len - 1),
         len => (1, len),
     };
-    let found = through(few, &at, t);
+    let found = interpolate_polynomial(few, &at, t);
     let lower = match few.len() {
         2 => found.clone(),
-        _ => through(&few[from..to], &at[from..to], t),
+        _ => interpolate_polynomial(&few[from..to], &at[from..to], t),
     };
-    distance_of_parameters(&found, target) < error + distance_of_parameters(&found, &lower)
+    parameter_distance(&found, target) < error + parameter_distance(&found, &lower)
 }
 
 /// The polynomial through points at these values of a variable.
-pub fn through(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
+pub fn interpolate_polynomial(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
     let mut sum = vec![0.0; points[0].as_ref().len()];
-    for (coordinates, weight) in points.iter().zip(weights(at, t, at.len()).1) {
+    for (coordinates, weight) in points.iter().zip(interpolation_weights(at, t, at.len()).1) {
         for (sum, x) in sum.iter_mut().zip(coordinates.as_ref()) {
             *sum += weight * x;
         }
@@ -581,36 +622,36 @@ pub fn through(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::branch::boundary::Direction;
+    use crate::branch::boundary::TwoParameterDirection;
     use crate::leaf::State;
     use glam::DQuat;
 
     /// A parabola over the second parameter, between two of its values, with tips that move.
-    fn curve(from: f64, to: f64, y: f64) -> Boundary {
+    fn curve(from: f64, to: f64, y: f64) -> ContinuedBoundary {
         let point = |k: usize| {
             let at = from + (to - from) * k as f64 / 20.0;
-            Verified {
+            VerifiedBoundaryPoint {
                 params: [0.3 + 0.2 * at * at, at],
                 errors: [1e-9, 0.0],
                 tips: vec![DVec3::new(1.0 - 0.3 * at, y * at, 0.0)],
                 error: 1e-9,
                 state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
-                across: Direction {
+                across: TwoParameterDirection {
                     increments: Vec::new(),
                     params: [1.0, 0.0],
                 },
                 stations: vec![0.0, 1.0],
-                kind: Kind::Branching,
+                kind: CriticalKind::Branching,
                 special: None,
                 indices: [0, 1],
                 factorizations: 0,
             }
         };
-        Boundary {
-            kind: Kind::Branching,
+        ContinuedBoundary {
+            kind: CriticalKind::Branching,
             neutral: 1,
             points: (0..=20).map(point).collect(),
-            ends: [End::Reached, End::Reached],
+            ends: [BranchEnd::RangeEndReached, BranchEnd::RangeEndReached],
             factorizations: 0,
         }
     }
@@ -619,8 +660,11 @@ mod tests {
     fn a_curve_ends_where_it_meets_another() {
         let known = [curve(0.0, 0.61, 0.5)];
         let mut second = curve(0.2, 1.0, 0.5);
-        remove_known(&mut second, &known);
-        assert_eq!(second.ends, [End::Met, End::Reached]);
+        remove_repeated_ends(&mut second, &known);
+        assert_eq!(
+            second.ends,
+            [BranchEnd::KnownBoundaryMet, BranchEnd::RangeEndReached]
+        );
         let first = &second.points[0];
         assert!((first.params[1] - 0.6).abs() < 1e-12, "{:?}", first.params);
         assert_eq!(second.points.len(), 11);
@@ -630,7 +674,7 @@ mod tests {
     fn a_curve_that_repeats_another_or_its_image_is_left_out() {
         for y in [0.5, -0.5] {
             let mut second = curve(0.1, 0.9, y);
-            remove_known(&mut second, &[curve(0.0, 1.0, 0.5)]);
+            remove_repeated_ends(&mut second, &[curve(0.0, 1.0, 0.5)]);
             assert!(second.points.is_empty());
         }
     }
@@ -641,8 +685,11 @@ mod tests {
         let mut other = curve(0.0, 1.0, 0.5);
         (other.points.iter_mut())
             .for_each(|point| point.params[0] += 1e-3 * (point.params[1] - 0.5));
-        remove_known(&mut second, &[other]);
+        remove_repeated_ends(&mut second, &[other]);
         assert_eq!(second.points.len(), 21);
-        assert_eq!(second.ends, [End::Reached, End::Reached]);
+        assert_eq!(
+            second.ends,
+            [BranchEnd::RangeEndReached, BranchEnd::RangeEndReached]
+        );
     }
 }

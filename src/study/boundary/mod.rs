@@ -7,17 +7,20 @@
 mod map;
 
 use crate::branch::boundary::{
-    Accuracy, AtRest, Neighbour, Plane, Seed, Solution, Special, Verified, WalkOptions, beside,
-    coarsened, refine_on_path,
+    BoundaryAccuracy, BoundaryContinuationOptions, BoundaryNeighbour, BoundarySeed,
+    CodimensionTwoKind, ConfirmedEquilibrium, TwoParameterProblem, TwoParameterState,
+    VerifiedBoundaryPoint, coarsened, leaves_beside_boundary, refine_on_path,
 };
-use crate::branch::{End, Kind, Range, Stuck, boundary, value_between};
+use crate::branch::{
+    BranchEnd, CorrectorFailure, CriticalKind, ParameterRange, boundary, value_at_fraction,
+};
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
-use crate::study::Keys;
-use crate::study::boundary::map::{Cells, remove_known};
-use crate::study::trace::{Trace, TraceError, TraceRequest, traced};
-use crate::study::vary::Vary;
+use crate::study::ParameterKeys;
+use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
+use crate::study::trace::{Trace, TraceError, TraceRequest, trace_with_points};
+use crate::study::vary::ParameterSweep;
 use glam::DVec3;
 use serde::ser::Serializer;
 
@@ -32,20 +35,20 @@ pub struct BoundaryRequest {
     /// its start.
     pub trace: TraceRequest,
     /// The second parameter and its range; no step is longer than the distance of its values.
-    pub across: Vary,
+    pub across: ParameterSweep,
     /// Cells of a coarse map under the curves, along both parameters, if requested.
     pub map: Option<[usize; 2]>,
 }
 
 impl BoundaryRequest {
     /// Validates the request before it is run.
-    fn check(&self) -> Result<(), TraceError> {
-        self.trace.check()?;
+    fn validate(&self) -> Result<(), TraceError> {
+        self.trace.validate()?;
         let second = TraceRequest {
             vary: self.across.clone(),
             ..self.trace.clone()
         };
-        second.check()?;
+        second.validate()?;
         let (first, second) = (&self.trace.vary.keys, &self.across.keys);
         let shared = first
             .targets()
@@ -55,9 +58,9 @@ impl BoundaryRequest {
             let why = format!("{target}: varies twice; give two numbers that differ");
             return Err(TraceError::Vary(why));
         }
-        let possible = |cells: &usize| (1..=map::MOST_CELLS).contains(cells);
+        let possible = |cells: &usize| (1..=map::MOST_CELLS_PER_SIDE).contains(cells);
         if let Some([columns, rows]) = self.map.filter(|map| !map.iter().all(possible)) {
-            let most = map::MOST_CELLS;
+            let most = map::MOST_CELLS_PER_SIDE;
             let why = format!("give from 1 to {most} cells along each number, as 16x16");
             return Err(RefusedOption::new("map", format!("{columns}x{rows}"), why).into());
         }
@@ -66,17 +69,17 @@ impl BoundaryRequest {
 }
 
 /// Longest step along a curve if few values are asked for.
-const LONGEST: f64 = 0.1;
+const LONGEST_CURVE_STEP: f64 = 0.1;
 
 /// Longest step along curves that are followed for a map.
-const OF_MAP: f64 = 0.04;
+const LONGEST_MAP_CURVE_STEP: f64 = 0.04;
 
 /// Accuracy of parameters, as parts of their ranges, that is sought, relative to that required;
 /// not for curves that are followed for a map only.
-const EXACTER: f64 = 1e-2;
+const PARAMETER_ACCURACY_RATIO: f64 = 1e-2;
 
 /// Largest number of curves with leaves on either side.
-const MOST_BESIDE: usize = 4;
+const MOST_CURVES_WITH_LEAVES: usize = 4;
 
 /// The curves on which the index of a leaf changes in the plane of two parameters, through
 /// the critical points of a trace along the first. `progress` is called for each point: with
@@ -84,80 +87,80 @@ const MOST_BESIDE: usize = 4;
 ///
 /// # Errors
 /// Requests that cannot be met; failures during the run are part of the result.
-pub fn boundary(
+pub fn trace_stability_boundary(
     request: &BoundaryRequest,
     progress: &mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
-) -> Result<Boundary, TraceError> {
-    request.check()?;
+) -> Result<StabilityBoundary, TraceError> {
+    request.validate()?;
     let clock = Instant::now();
     let (vary, across) = (&request.trace.vary, &request.across);
-    let ends = [vary, across].map(Vary::ends);
+    let ends = [vary, across].map(ParameterSweep::ends);
     let base = &request.trace.base;
     let make = |[first, second]: [f64; 2]| -> Result<Scenario, String> {
-        let at = base.at(&[(&vary.keys, first), (&across.keys, second)]);
+        let at = base.scenario_with_values(&[(&vary.keys, first), (&across.keys, second)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
     for second in ends[1] {
-        base.at(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;
+        base.scenario_with_values(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;
     }
-    let start = start(request);
+    let start = initial_second_parameter(request);
     let along = TraceRequest {
-        base: base.with(&across.keys, start)?,
+        base: base.with_value(&across.keys, start)?,
         ..request.trace.clone()
     };
-    let begun = traced(&along, &mut |_, points, value| {
+    let begun = trace_with_points(&along, &mut |_, points, value| {
         progress(None, points, [value, start]);
     })?;
-    let ranges = [vary, across].map(|it| Range {
+    let ranges = [vary, across].map(|it| ParameterRange {
         ends: it.ends(),
         log: it.log,
     });
-    let plane = Plane::plane(&make, ranges, start);
+    let plane = TwoParameterProblem::over_two_parameters(&make, ranges, start);
     let plane = plane.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
     let plane = &plane.with_limit(request.trace.limit.clone());
     let from = [0.0, ranges[1].fraction(start)];
-    let mut boundary = without_curves(request, &begun.trace, start);
-    let mut run = Run {
+    let mut boundary = boundary_without_curves(request, &begun.trace, start);
+    let mut run = BoundaryTracer {
         plane,
-        how: walk_options(request, begun.trace.tolerance),
-        known: Vec::new(),
-        tried: 0,
+        options: continuation_options(request, begun.trace.tolerance),
+        known_curves: Vec::new(),
+        seeds_tried: 0,
         progress,
     };
-    for (critical, refined) in &begun.critical {
-        let seed = Seed {
+    for (critical, refined) in &begun.critical_points {
+        let seed = BoundarySeed {
             critical,
             refined,
             from,
             direction: [1.0, 0.0],
         };
-        run.follow_new(&seed, &mut boundary);
+        run.follow_unknown_curve(&seed, &mut boundary);
     }
-    if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
-        let kinks = plane.first().kinks();
-        let first = AtRest {
+    if let (Some(size), Some((point, grid))) = (request.map, begun.first_point) {
+        let kinks = plane.first_leaf().kinks();
+        let first = ConfirmedEquilibrium {
             grid: coarsened(&grid, point.state.segments(), kinks),
             index: point.index,
-            solution: Solution {
+            solution: TwoParameterState {
                 state: point.state,
                 params: from,
             },
         };
-        let map = run.map(size, first, &mut boundary);
+        let map = run.build_index_map(size, first, &mut boundary);
         // Cells that were not reached would look like those without an equilibrium.
         boundary.map = (!plane.limit.reached()).then_some(map);
     }
-    add_leaves(plane, &run.known, &mut boundary);
+    add_leaves_beside_curves(plane, &run.known_curves, &mut boundary);
     if plane.limit.reached() && boundary.remark.is_none() {
-        boundary.remark = Some(Stuck::Stopped.to_string());
+        boundary.remark = Some(CorrectorFailure::Stopped.to_string());
     }
-    conclude(&mut boundary, begun.trace.complete);
+    set_completeness(&mut boundary, begun.trace.complete);
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(boundary)
 }
 
 /// The second parameter at the first trace.
-fn start(request: &BoundaryRequest) -> f64 {
+fn initial_second_parameter(request: &BoundaryRequest) -> f64 {
     let across = &request.across;
     let [from, to] = across.ends();
     let present = request.trace.base.number(&across.keys);
@@ -166,12 +169,16 @@ fn start(request: &BoundaryRequest) -> f64 {
 }
 
 /// The result before any curve is known.
-fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Boundary {
+fn boundary_without_curves(
+    request: &BoundaryRequest,
+    trace: &Trace,
+    start: f64,
+) -> StabilityBoundary {
     let both = [&request.trace.vary, &request.across];
-    Boundary {
+    StabilityBoundary {
         scenario: trace.scenario.clone(),
         keys: both.map(|it| it.keys.clone()),
-        ranges: both.map(Vary::ends),
+        ranges: both.map(ParameterSweep::ends),
         log: both.map(|it| it.log),
         start,
         rods: trace.rods,
@@ -188,23 +195,23 @@ fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Bound
 }
 
 /// How curves through the critical points of the first trace are followed.
-fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
-    WalkOptions {
-        longest: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST),
-        most: request.trace.most_points,
-        accuracy: Accuracy {
+fn continuation_options(request: &BoundaryRequest, tolerance: f64) -> BoundaryContinuationOptions {
+    BoundaryContinuationOptions {
+        longest_step: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST_CURVE_STEP),
+        max_points: request.trace.most_points,
+        accuracy: BoundaryAccuracy {
             tips: tolerance,
             numbers: tolerance,
-            sought: EXACTER * tolerance,
+            sought: PARAMETER_ACCURACY_RATIO * tolerance,
         },
     }
 }
 
 /// Whether all curves are known as far as requested; if not, why. `traced`: whether all branches
 /// of the first trace are.
-fn conclude(boundary: &mut Boundary, traced: bool) {
+fn set_completeness(boundary: &mut StabilityBoundary, traced: bool) {
     let curves = &boundary.curves;
-    let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(End::complete);
+    let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(BranchEnd::is_complete);
     if curves.is_empty() && boundary.remark.is_none() {
         let [vary, across] = &boundary.keys;
         let at = across.text(boundary.start);
@@ -222,58 +229,67 @@ fn conclude(boundary: &mut Boundary, traced: bool) {
 }
 
 /// The run that follows the curves.
-struct Run<'r, 'p> {
-    plane: &'r Plane<'r>,
-    how: WalkOptions,
-    known: Vec<boundary::Boundary>,
+struct BoundaryTracer<'r, 'p> {
+    plane: &'r TwoParameterProblem<'r>,
+    options: BoundaryContinuationOptions,
+    known_curves: Vec<boundary::ContinuedBoundary>,
     /// Number of critical points from which curves were started.
-    tried: usize,
+    seeds_tried: usize,
     progress: &'p mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
 }
 
-impl Run<'_, '_> {
+impl BoundaryTracer<'_, '_> {
     /// Follows the curve through a critical point, unless it lies on a known one.
-    fn follow_new(&mut self, seed: &Seed, boundary: &mut Boundary) {
+    fn follow_unknown_curve(&mut self, seed: &BoundarySeed, boundary: &mut StabilityBoundary) {
         if self.plane.limit.reached() {
             return;
         }
-        if self.known.iter().any(|known| seed.is_on(known)) {
+        if self
+            .known_curves
+            .iter()
+            .any(|known| seed.lies_on_curve(known))
+        {
             return;
         }
-        if self.tried == MOST_CURVES {
+        if self.seeds_tried == MOST_CURVES {
             boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
             return;
         }
-        self.tried += 1;
+        self.seeds_tried += 1;
         let (plane, progress) = (self.plane, &mut *self.progress);
         let number = boundary.curves.len();
         let mut report = |points, params| progress(Some(number), points, plane.values(params));
-        let grid = seed.grid(plane.first().kinks());
-        let mut curve = boundary::follow(plane, &grid, seed, &self.how, &mut report);
+        let grid = seed.grid(plane.first_leaf().kinks());
+        let mut curve = boundary::follow_boundary(plane, &grid, seed, &self.options, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
             // If the index changes nowhere, the equilibria only touch the curve, of which another
             // sheet is on both sides.
-            let bounds = |point: &Verified| point.indices[0] != point.indices[1];
+            let bounds = |point: &VerifiedBoundaryPoint| point.indices[0] != point.indices[1];
             let none = !curve.points.iter().any(bounds);
-            remove_known(&mut curve, &self.known);
+            remove_repeated_ends(&mut curve, &self.known_curves);
             if curve.points.is_empty() || none {
                 return;
             }
         }
-        (boundary.curves).push(in_units(plane, &curve));
-        self.known.push(curve);
+        (boundary.curves).push(curve_in_scenario_units(plane, &curve));
+        self.known_curves.push(curve);
     }
 
     /// The map of so many cells, continued from an equilibrium. Critical points on the paths that
     /// lie on no known curve start new ones; sequentially, so that the result does not depend on
     /// the number of threads, and with longer steps than those of the trace, for the map alone.
-    fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
-        let accuracy = self.how.accuracy.tips;
-        self.how.longest = self.how.longest.max(OF_MAP);
-        self.how.accuracy.sought = accuracy;
-        let mut cells = Cells::new(self.plane, size);
-        let mut next = Some(cells.begin(first, &self.known));
+    fn build_index_map(
+        &mut self,
+        size: [usize; 2],
+        first: ConfirmedEquilibrium,
+        boundary: &mut StabilityBoundary,
+    ) -> BoundaryMap {
+        let accuracy = self.options.accuracy.tips;
+        self.options.longest_step = self.options.longest_step.max(LONGEST_MAP_CURVE_STEP);
+        self.options.accuracy.sought = accuracy;
+        let mut cells = IndexMapSweep::new(self.plane, size);
+        let mut next = Some(cells.continue_to_first_cell(first, &self.known_curves));
         while let Some(unexplained) = next {
             for path in &unexplained {
                 let [from, to] = path.ends;
@@ -282,41 +298,48 @@ impl Run<'_, '_> {
                     let (plane, grid) = (self.plane, &path.grid);
                     let refined = refine_on_path(plane, path.ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
-                        let seed = Seed {
+                        let seed = BoundarySeed {
                             critical,
                             refined,
                             from,
                             direction,
                         };
-                        self.follow_new(&seed, boundary);
+                        self.follow_unknown_curve(&seed, boundary);
                     }
                 }
             }
-            next = cells.advance(&self.known);
+            next = cells.sweep_to_neighbours(&self.known_curves);
         }
         boundary.factorizations += cells.factorizations;
-        cells.compared(&self.known)
+        cells.map_compared_with_curves(&self.known_curves)
     }
 }
 
-fn in_units(plane: &Plane, curve: &boundary::Boundary) -> BoundaryCurve {
+fn curve_in_scenario_units(
+    plane: &TwoParameterProblem,
+    curve: &boundary::ContinuedBoundary,
+) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
         multiplicity: curve.neutral,
         ends: curve.ends.clone(),
         points: (curve.points.iter().enumerate())
-            .map(|(k, point)| point_in_units(plane, k + 1, point))
+            .map(|(k, point)| point_in_scenario_units(plane, k + 1, point))
             .collect(),
         beside: Vec::new(),
     }
 }
 
-fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoint {
+fn point_in_scenario_units(
+    plane: &TwoParameterProblem,
+    number: usize,
+    point: &VerifiedBoundaryPoint,
+) -> BoundaryPoint {
     let values = plane.values(point.params);
     let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));
     BoundaryPoint {
         point: number,
-        kind: word(point.kind, point.special),
+        kind: point_kind_word(point.kind, point.special),
         values,
         errors: [0, 1].map(|i| (beyond[i] - values[i]).abs()),
         tips: plane.tips(&point.tips),
@@ -330,8 +353,12 @@ fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoi
 
 /// Finds leaves on either side of a few curves: of those that bound stable leaves or, if there
 /// are none, of those with the smallest index next to them.
-fn add_leaves(plane: &Plane, known: &[boundary::Boundary], boundary: &mut Boundary) {
-    let index = |point: &Verified| point.indices[0].min(point.indices[1]);
+fn add_leaves_beside_curves(
+    plane: &TwoParameterProblem,
+    known: &[boundary::ContinuedBoundary],
+    boundary: &mut StabilityBoundary,
+) {
+    let index = |point: &VerifiedBoundaryPoint| point.indices[0].min(point.indices[1]);
     let mut order: Vec<(usize, usize)> = Vec::new();
     for (number, curve) in known.iter().enumerate() {
         let least = curve.points.iter().map(index).min();
@@ -354,15 +381,15 @@ fn add_leaves(plane: &Plane, known: &[boundary::Boundary], boundary: &mut Bounda
         let before = &points[at.saturating_sub(1)];
         let after = points.get(at + 1).unwrap_or(&points[at]);
         let along = [0, 1].map(|i| after.params[i] - before.params[i]);
-        Some((number, beside(plane, &points[at], along)?))
+        Some((number, leaves_beside_boundary(plane, &points[at], along)?))
     });
-    for (number, pair) in found.take(MOST_BESIDE) {
-        let leaves = pair.map(|leaf| beside_in_units(plane, leaf));
+    for (number, pair) in found.take(MOST_CURVES_WITH_LEAVES) {
+        let leaves = pair.map(|leaf| leaf_in_scenario_units(plane, leaf));
         boundary.curves[number].beside = leaves.into();
     }
 }
 
-fn beside_in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
+fn leaf_in_scenario_units(plane: &TwoParameterProblem, leaf: BoundaryNeighbour) -> LeafBeside {
     let state = &leaf.solution.state;
     let tips: Vec<DVec3> = state.tips().collect();
     LeafBeside {
@@ -377,12 +404,12 @@ fn beside_in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
 /// The boundary of stability in the plane of two parameters of a scenario: the curves on
 /// which the Morse index of a leaf changes. As JSON it is `boundary.json`.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Boundary {
+pub struct StabilityBoundary {
     /// Name of the scenario.
     pub scenario: String,
     /// The parameters.
     #[serde(rename = "vary")]
-    pub keys: [Keys; 2],
+    pub keys: [ParameterKeys; 2],
     /// Their values at the ends of their ranges.
     pub ranges: [[f64; 2]; 2],
     /// Whether their logarithms are spaced evenly.
@@ -423,11 +450,11 @@ pub struct Boundary {
 pub struct BoundaryCurve {
     /// What happens to a branch along the first parameter: a fold, or a crossing.
     #[serde(serialize_with = "serialize_kind")]
-    pub kind: Kind,
+    pub kind: CriticalKind,
     /// How many modes become neutral.
     pub multiplicity: usize,
     /// How it ended: before its first point, and after its last.
-    pub ends: [End; 2],
+    pub ends: [BranchEnd; 2],
     /// Its points, ordered so that the second parameter increases from the first point or, where
     /// that is also the last, has increased.
     pub points: Vec<BoundaryPoint>,
@@ -497,34 +524,37 @@ pub struct BoundaryMap {
     pub disagreeing: Vec<[usize; 2]>,
 }
 
-impl Boundary {
+impl StabilityBoundary {
     /// Edges of equal cells along one of the two parameters, from one end of its range to the
     /// other: one more than there are cells.
-    pub fn edges(&self, which: usize, cells: usize) -> Vec<f64> {
+    pub fn cell_edges(&self, which: usize, cells: usize) -> Vec<f64> {
         let part = |k: usize| k as f64 / cells as f64;
         (0..=cells)
-            .map(|k| value_between(self.ranges[which], self.log[which], part(k)))
+            .map(|k| value_at_fraction(self.ranges[which], self.log[which], part(k)))
             .collect()
     }
 }
 
 impl BoundaryMap {
     /// Number of cells with an index.
-    pub fn known(&self) -> usize {
+    pub fn known_cell_count(&self) -> usize {
         self.index.iter().flatten().flatten().count()
     }
 }
 
 /// The word for the kind of a point.
-pub(super) fn word(kind: Kind, special: Option<Special>) -> &'static str {
+pub(super) fn point_kind_word(
+    kind: CriticalKind,
+    special: Option<CodimensionTwoKind>,
+) -> &'static str {
     match (special, kind) {
-        (Some(Special::Cusp), _) => "cusp",
-        (Some(Special::Crossing), _) => "crossing",
-        (None, Kind::Fold) => "fold",
-        (None, Kind::Branching) => "branch-point",
+        (Some(CodimensionTwoKind::Cusp), _) => "cusp",
+        (Some(CodimensionTwoKind::Crossing), _) => "crossing",
+        (None, CriticalKind::Fold) => "fold",
+        (None, CriticalKind::Branching) => "branch-point",
     }
 }
 
-fn serialize_kind<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(word(*kind, None))
+fn serialize_kind<S: Serializer>(kind: &CriticalKind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(point_kind_word(*kind, None))
 }

@@ -15,13 +15,16 @@
 mod result;
 
 use crate::relax::{
-    MAX_NODES, Method, Options, Outcome, RelaxError, SHOOTING_START, check_tolerance, without_wind,
+    MAX_NODES, Method, Options, Outcome, RelaxError, START_TOLERANCE, check_tolerance, without_wind,
 };
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
-use crate::shooting::Reason;
-pub use crate::study::chart::result::{Chart, Decade, Ending, Peer, PeerRow, Reference, Row};
-use crate::study::judge::{Answer, timed};
+use crate::shooting::ShootingFailureReason;
+pub use crate::study::chart::result::{
+    Chart, ChartOutcome, ChartRow, FastestByAccuracy, PeerMeasurement, PeerProgram,
+    ReferenceSolution,
+};
+use crate::study::judge::{MethodSolution, run_timed};
 use crate::{read_and_write, shooting};
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -34,23 +37,23 @@ pub struct ChartOptions {
     /// long they take.
     pub seconds: f64,
     /// The methods measured.
-    pub contenders: Vec<Contender>,
+    pub contenders: Vec<SolverConfig>,
     /// Measurements of other programs.
-    pub peers: Vec<PeerRow>,
+    pub peers: Vec<PeerMeasurement>,
 }
 
 impl Default for ChartOptions {
     fn default() -> Self {
         ChartOptions {
             seconds: 10.0,
-            contenders: Contender::ALL.to_vec(),
+            contenders: SolverConfig::ALL.to_vec(),
             peers: Vec::new(),
         }
     }
 }
 
 /// Longest time that can be requested: a day.
-const MOST_SECONDS: f64 = 86_400.0;
+const LONGEST_MEASUREMENT_SECONDS: f64 = 86_400.0;
 
 /// Why a chart cannot be made.
 #[derive(Debug, Error)]
@@ -70,24 +73,25 @@ pub enum ChartError {
 pub fn chart(
     scenario: &Scenario,
     options: &ChartOptions,
-    progress: &mut (dyn FnMut(&Turn) + Send),
+    progress: &mut (dyn FnMut(&ChartProgress) + Send),
 ) -> Result<Chart, ChartError> {
     without_wind(scenario, "a chart")?;
-    let each = |&who: &Contender| {
-        let knobs = who.knobs().into_iter();
-        knobs.map(move |knob| Runs::new(scenario, who, knob))
+    let each = |&who: &SolverConfig| {
+        let knobs = who.charted_settings().into_iter();
+        knobs.map(move |knob| RepeatedRuns::new(scenario, who, knob))
     };
-    let mut all: Vec<Runs> = options.contenders.iter().flat_map(each).collect();
-    let (reference, rows, rounds) = on_one_thread(options.seconds, || {
-        let rounds = measure(&mut all, options.seconds, progress);
-        let found = result::find(scenario, result::stations(&all))?;
+    let mut all: Vec<RepeatedRuns> = options.contenders.iter().flat_map(each).collect();
+    let (reference, rows, rounds) = run_on_one_thread(options.seconds, || {
+        let rounds = time_runs(&mut all, options.seconds, progress);
+        let found = result::find_reference(scenario, result::reference_stations(&all))?;
         let (reference, answer) = found.unzip();
-        Ok((reference, result::rows(&all, answer.as_ref()), rounds))
+        Ok((reference, result::chart_rows(&all, answer.as_ref()), rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);
-    let (peers, others) = result::about(&options.peers, &scenario.name, rods, longest);
-    let mut remarks = result::remarks(&rows, &options.contenders, reference.as_ref());
+    let (peers, others) =
+        result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
+    let mut remarks = result::chart_remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {
         scenario: scenario.name.clone(),
@@ -102,16 +106,16 @@ pub fn chart(
         decades: Vec::new(),
         scaling: None,
     };
-    Ok(chart.compared())
+    Ok(chart.with_comparisons())
 }
 
 /// Calls a function on one thread, if it may take so many `seconds`.
-fn on_one_thread<R: Send>(
+fn run_on_one_thread<R: Send>(
     seconds: f64,
     work: impl FnOnce() -> Result<R, RelaxError> + Send,
 ) -> Result<R, ChartError> {
-    if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
-        let allowed = format!("must be greater than 0 and at most {MOST_SECONDS}");
+    if !(seconds > 0.0 && seconds <= LONGEST_MEASUREMENT_SECONDS) {
+        let allowed = format!("must be greater than 0 and at most {LONGEST_MEASUREMENT_SECONDS}");
         return Err(RefusedOption::new("seconds", seconds, allowed).into());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -120,7 +124,7 @@ fn on_one_thread<R: Send>(
 
 /// A method for an equilibrium, with one setting for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Contender {
+pub struct SolverConfig {
     /// The method; the setting depends on whether it is used on one grid.
     pub method: Method,
     /// Whether it is used on one grid, with the number of segments as its setting, and not on
@@ -130,7 +134,7 @@ pub struct Contender {
 
 /// The setting of a contender's accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
+pub enum AccuracySetting {
     /// Required accuracy, relative to the longest rod.
     Tolerance(f64),
     /// Segments per rod.
@@ -138,18 +142,18 @@ pub enum Setting {
 }
 
 /// Tolerances from coarse to fine.
-const TOLERANCES: [f64; 11] = [
+const CHARTED_TOLERANCES: [f64; 11] = [
     1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11,
 ];
 
 /// Single grids from coarse to fine.
-pub(super) const SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+pub(super) const CHARTED_SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 
-impl Contender {
+impl SolverConfig {
     /// All of them; the first is the default.
-    pub const ALL: [Contender; 7] = {
-        const fn of(method: usize, one_grid: bool) -> Contender {
-            Contender {
+    pub const ALL: [SolverConfig; 7] = {
+        const fn of(method: usize, one_grid: bool) -> SolverConfig {
+            SolverConfig {
                 method: Method::ALL[method],
                 one_grid,
             }
@@ -176,110 +180,115 @@ impl Contender {
 
     /// Whether it is the default of [`crate::relax::relax`].
     pub fn is_default(self) -> bool {
-        self == Contender::ALL[0]
+        self == SolverConfig::ALL[0]
     }
 
     /// The settings that are charted, from coarse to fine.
-    pub fn knobs(self) -> Vec<Setting> {
+    pub fn charted_settings(self) -> Vec<AccuracySetting> {
         match self.one_grid {
-            true => SEGMENTS.map(Setting::Segments).to_vec(),
-            false => TOLERANCES.map(Setting::Tolerance).to_vec(),
+            true => CHARTED_SEGMENTS.map(AccuracySetting::Segments).to_vec(),
+            false => CHARTED_TOLERANCES.map(AccuracySetting::Tolerance).to_vec(),
         }
     }
 }
 
-read_and_write!(Contender);
+read_and_write!(SolverConfig);
 
-impl Serialize for Setting {
+impl Serialize for AccuracySetting {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
 /// As in files: `tolerance=1e-6`, `segments=64`.
-impl fmt::Display for Setting {
+impl fmt::Display for AccuracySetting {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Setting::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
-            Setting::Segments(segments) => write!(f, "segments={segments}"),
+            AccuracySetting::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
+            AccuracySetting::Segments(segments) => write!(f, "segments={segments}"),
         }
     }
 }
 
 /// A leaf, a contender and its setting, with the results of its runs so far.
-pub struct Runs<'s> {
+pub struct RepeatedRuns<'s> {
     pub scenario: &'s Scenario,
-    pub contender: Contender,
-    pub knob: Setting,
+    pub contender: SolverConfig,
+    pub setting: AccuracySetting,
     /// The result of the first run. `None`: it was not run, since a coarser one of
     /// its contender took too long.
-    pub found: Option<Result<Answer, RelaxError>>,
+    pub first_result: Option<Result<MethodSolution, RelaxError>>,
     /// Seconds of each run; ascending once all are made.
     pub seconds: Vec<f64>,
 }
 
-impl<'s> Runs<'s> {
+impl<'s> RepeatedRuns<'s> {
     /// Before the first run.
-    pub fn new(scenario: &'s Scenario, contender: Contender, knob: Setting) -> Self {
-        Runs {
+    pub fn new(scenario: &'s Scenario, contender: SolverConfig, knob: AccuracySetting) -> Self {
+        RepeatedRuns {
             scenario,
             contender,
-            knob,
-            found: None,
+            setting: knob,
+            first_result: None,
             seconds: Vec::new(),
         }
     }
 
     /// The answer, unless the run was refused or not made.
-    pub fn answer(&self) -> Option<&Answer> {
-        self.found.as_ref()?.as_ref().ok()
+    pub fn solution(&self) -> Option<&MethodSolution> {
+        self.first_result.as_ref()?.as_ref().ok()
     }
 
     /// The answer, if the leaf is at rest.
-    pub fn at_rest(&self) -> Option<&Answer> {
-        self.answer().filter(|run| run.at_rest())
+    pub fn equilibrium(&self) -> Option<&MethodSolution> {
+        self.solution().filter(|run| run.is_at_rest())
     }
 
     /// The distance of the leaf at rest from the reference, relative to the longest rod.
-    pub fn error(&self, reference: Option<&Answer>) -> Option<f64> {
-        let distance = self.at_rest()?.distance(reference?)?;
+    pub fn distance_from_reference(&self, reference: Option<&MethodSolution>) -> Option<f64> {
+        let distance = self.equilibrium()?.largest_distance(reference?)?;
         Some(distance / longest(&self.scenario.rods))
     }
 
     /// Runs once; also returns the time from the checked scenario to the result, in seconds.
-    pub fn once(&self) -> Result<(Answer, f64), RelaxError> {
-        let (tolerance, segments) = match self.knob {
-            Setting::Tolerance(tolerance) => (Some(tolerance), None),
-            Setting::Segments(segments) => (None, Some(segments)),
+    pub fn run_once(&self) -> Result<(MethodSolution, f64), RelaxError> {
+        let (tolerance, segments) = match self.setting {
+            AccuracySetting::Tolerance(tolerance) => (Some(tolerance), None),
+            AccuracySetting::Segments(segments) => (None, Some(segments)),
         };
         if let Method::ShootingFromRest { .. } = self.contender.method {
             let accuracy = tolerance.unwrap_or(self.scenario.tolerance);
-            return shoot_from_rest(self.scenario, accuracy);
+            return shoot_from_relaxed_leaf(self.scenario, accuracy);
         }
         let options = Options {
             method: self.contender.method.on_grid(segments),
             tolerance,
             ..Options::default()
         };
-        let (answer, seconds) = timed(|| Answer::relaxed(self.scenario, &options));
+        let (answer, seconds) =
+            run_timed(|| MethodSolution::from_relaxation(self.scenario, &options));
         Ok((answer?, seconds))
     }
 }
 
 /// Shooting from a coarsely relaxed leaf. The work of both is added, and no time is
 /// spent on counting eigenvalues.
-fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), RelaxError> {
+fn shoot_from_relaxed_leaf(
+    scenario: &Scenario,
+    accuracy: f64,
+) -> Result<(MethodSolution, f64), RelaxError> {
     shooting::check_models(scenario, true)?;
     let options = Options {
-        tolerance: Some(SHOOTING_START),
+        tolerance: Some(START_TOLERANCE),
         ..Options::default()
     };
-    let (found, seconds) = timed(|| {
-        let rest = Answer::relaxed(scenario, &options)?;
-        let precision = shooting::Precision::Error(accuracy);
-        let asked = shooting::Options::new(rest.as_start(), &rest.stations, precision);
+    let (found, seconds) = run_timed(|| {
+        let rest = MethodSolution::from_relaxation(scenario, &options)?;
+        let precision = shooting::RequiredPrecision::EstimatedError(accuracy);
+        let asked =
+            shooting::ShootingOptions::new(rest.shooting_start(), &rest.stations, precision);
         let shot = rest
-            .at_rest()
+            .is_at_rest()
             .then(|| shooting::solve(scenario, &asked, &mut |_| {}));
         Ok::<_, RelaxError>((rest, shot))
     });
@@ -287,8 +296,8 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
     let answer = match shot {
         None => rest,
         Some(Ok(solution)) => {
-            let shot = Answer::of_solution(scenario, solution, accuracy);
-            Answer {
+            let shot = MethodSolution::from_shooting(scenario, solution, accuracy);
+            MethodSolution {
                 outcome: match (shot.outcome, rest.outcome) {
                     // The coarse relaxation only provides the start.
                     (Outcome::Converged, Outcome::ToleranceNotReached) => Outcome::Converged,
@@ -299,9 +308,9 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
                 ..shot
             }
         }
-        Some(Err(failure)) => Answer {
+        Some(Err(failure)) => MethodSolution {
             outcome: match failure.reason {
-                Reason::Singular(_) => Outcome::Singular,
+                ShootingFailureReason::Singular(_) => Outcome::Singular,
                 _ => Outcome::NotAtRest,
             },
             remark: Some(failure.reason.to_string()),
@@ -314,26 +323,26 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
 }
 
 /// Runs that take longer, in seconds, are slow: they are not repeated.
-const SLOW: f64 = 1.0;
+const SLOW_RUN_SECONDS: f64 = 1.0;
 
 /// Shorter runs, in seconds, follow one that is not measured: those of the others have
 /// displaced their code and data from the processor's caches.
-const SHORT: f64 = 0.01;
+const SHORT_RUN_SECONDS: f64 = 0.01;
 
 /// Least and largest number of runs of the others.
-const FEWEST: usize = 3;
+const FEWEST_RUNS: usize = 3;
 
-const MOST: usize = 101;
+const MOST_RUNS: usize = 101;
 
 /// Progress of the measurement.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn {
+pub struct ChartProgress {
     /// Veins of the leaf that is run next.
     pub rods: usize,
     /// The contender.
-    pub contender: Contender,
+    pub contender: SolverConfig,
     /// Its setting.
-    pub knob: Setting,
+    pub setting: AccuracySetting,
     /// Present round.
     pub round: usize,
     /// Number of rounds, as far as known.
@@ -342,7 +351,7 @@ pub struct Turn {
 
 /// The spread of repeated measurements, in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct TimingSpread {
     /// Median.
     #[serde(rename = "seconds")]
     pub median: f64,
@@ -359,9 +368,9 @@ pub struct Spread {
     pub runs: usize,
 }
 
-impl Spread {
+impl TimingSpread {
     /// Of measurements in ascending order; `None` without any.
-    pub fn of(sorted: &[f64]) -> Option<Self> {
+    pub fn from_sorted(sorted: &[f64]) -> Option<Self> {
         let last = sorted.len().checked_sub(1)?;
         let at = |part: f64| {
             let position = part * last as f64;
@@ -370,7 +379,7 @@ impl Spread {
             let rest = position - below as f64;
             (1.0 - rest) * sorted[below] + rest * sorted[above]
         };
-        Some(Spread {
+        Some(TimingSpread {
             min: sorted[0],
             q1: at(0.25),
             median: at(0.5),
@@ -382,7 +391,7 @@ impl Spread {
 
 /// The same keys without a measurement: all null, and no run.
 pub fn serialize_spread<S: Serializer>(
-    spread: &Option<Spread>,
+    spread: &Option<TimingSpread>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     #[derive(Default, Serialize)]
@@ -403,24 +412,28 @@ pub fn serialize_spread<S: Serializer>(
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
 /// the budget (or [`SLOW`]), those after it are not run. Returns the number of rounds.
-pub fn measure(all: &mut [Runs], budget: f64, progress: &mut (dyn FnMut(&Turn) + Send)) -> usize {
-    let mut run = |runs: &Runs, round: usize, rounds: usize| {
-        progress(&Turn {
+pub fn time_runs(
+    all: &mut [RepeatedRuns],
+    budget: f64,
+    progress: &mut (dyn FnMut(&ChartProgress) + Send),
+) -> usize {
+    let mut run = |runs: &RepeatedRuns, round: usize, rounds: usize| {
+        progress(&ChartProgress {
             rods: runs.scenario.rods.len(),
             contender: runs.contender,
-            knob: runs.knob,
+            setting: runs.setting,
             round,
             rounds,
         });
-        runs.once()
+        runs.run_once()
     };
-    let longest = budget.max(SLOW);
+    let longest = budget.max(SLOW_RUN_SECONDS);
     let mut too_slow = Vec::new();
     for runs in all.iter_mut() {
         if too_slow.contains(&runs.contender) {
             continue;
         }
-        runs.found = Some(run(runs, 1, FEWEST).map(|(answer, time)| {
+        runs.first_result = Some(run(runs, 1, FEWEST_RUNS).map(|(answer, time)| {
             runs.seconds.push(time);
             if time > longest {
                 too_slow.push(runs.contender);
@@ -428,8 +441,8 @@ pub fn measure(all: &mut [Runs], budget: f64, progress: &mut (dyn FnMut(&Turn) +
             answer
         }));
     }
-    let mut run_again = |runs: &mut Runs, round: usize, rounds: usize| {
-        if runs.seconds[0] < SHORT {
+    let mut run_again = |runs: &mut RepeatedRuns, round: usize, rounds: usize| {
+        if runs.seconds[0] < SHORT_RUN_SECONDS {
             let _ = run(runs, round, rounds);
         }
         // It succeeded before, and does so again.
@@ -437,38 +450,46 @@ pub fn measure(all: &mut [Runs], budget: f64, progress: &mut (dyn FnMut(&Turn) +
             runs.seconds.push(time);
         }
     };
-    let is_fast = |runs: &Runs| runs.seconds.first().is_some_and(|&time| time < SLOW);
-    for round in 1..FEWEST {
+    let is_fast = |runs: &RepeatedRuns| {
+        runs.seconds
+            .first()
+            .is_some_and(|&time| time < SLOW_RUN_SECONDS)
+    };
+    for round in 1..FEWEST_RUNS {
         for runs in all.iter_mut().filter(|runs| is_fast(runs)) {
-            run_again(runs, round + 1, FEWEST);
+            run_again(runs, round + 1, FEWEST_RUNS);
         }
     }
     let share = budget / all.iter().filter(|runs| is_fast(runs)).count().max(1) as f64;
     let repeats: Vec<usize> = (all.iter())
-        .map(|runs| repeats(&runs.seconds, share))
+        .map(|runs| repeat_count(&runs.seconds, share))
         .collect();
     let rest = repeats.iter().copied().max().unwrap_or(0);
     for round in 0..rest {
         for (runs, repeats) in all.iter_mut().zip(&repeats) {
-            if runs_in(round, *repeats, rest) {
-                run_again(runs, FEWEST + round + 1, FEWEST + rest);
+            if is_run_in_round(round, *repeats, rest) {
+                run_again(runs, FEWEST_RUNS + round + 1, FEWEST_RUNS + rest);
             }
         }
     }
     for runs in all {
         runs.seconds.sort_by(f64::total_cmp);
     }
-    FEWEST + rest
+    FEWEST_RUNS + rest
 }
 
 /// Number of further runs after the first few, within a `share` of the time: none for a slow
 /// one. The first run may be disturbed; the fastest one is used.
-fn repeats(seconds: &[f64], share: f64) -> usize {
+fn repeat_count(seconds: &[f64], share: f64) -> usize {
     let shortest = seconds.iter().copied().reduce(f64::min);
     match shortest {
-        Some(time) if seconds.len() >= FEWEST => {
-            let all = if time < SHORT { 2.0 * time } else { time };
-            ((share / all) as usize).clamp(FEWEST, MOST) - FEWEST
+        Some(time) if seconds.len() >= FEWEST_RUNS => {
+            let all = if time < SHORT_RUN_SECONDS {
+                2.0 * time
+            } else {
+                time
+            };
+            ((share / all) as usize).clamp(FEWEST_RUNS, MOST_RUNS) - FEWEST_RUNS
         }
         _ => 0,
     }
@@ -476,14 +497,14 @@ fn repeats(seconds: &[f64], share: f64) -> usize {
 
 /// Whether a setting with so many `repeats` runs in this round: they are spread evenly over all
 /// `rounds`.
-fn runs_in(round: usize, repeats: usize, rounds: usize) -> bool {
+fn is_run_in_round(round: usize, repeats: usize, rounds: usize) -> bool {
     (round + 1) * repeats / rounds > round * repeats / rounds
 }
 
 /// Which points (seconds, error) are on the Pareto front: no other is at least
 /// as fast and as accurate. Errors below `floor` count as equal; of equal points the
 /// first is on the front.
-pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
+pub fn pareto_front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
     let error = |i: usize| points[i].1.max(floor);
     let beats = |j: usize, i: usize| {
         let (a, b) = (points[j].0, points[i].0);
@@ -496,7 +517,7 @@ pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
 
 /// Cost against the number of veins.
 #[derive(Clone, Debug, Serialize)]
-pub struct Scaling {
+pub struct ScalingStudy {
     /// Name of the scenario.
     #[serde(skip)]
     pub scenario: String,
@@ -516,7 +537,7 @@ pub struct ScalingRow {
     pub rods: usize,
     /// The measurement.
     #[serde(flatten)]
-    pub row: Row,
+    pub row: ChartRow,
 }
 
 /// Measures all contenders on these leaves, from few veins to many, at one
@@ -526,17 +547,17 @@ pub fn scaling(
     leaves: &[Scenario],
     tolerance: f64,
     options: &ChartOptions,
-    progress: &mut (dyn FnMut(&Turn) + Send),
-) -> Result<Scaling, ChartError> {
+    progress: &mut (dyn FnMut(&ChartProgress) + Send),
+) -> Result<ScalingStudy, ChartError> {
     check_tolerance(tolerance)?;
     let mut leaves: Vec<&Scenario> = leaves.iter().collect();
     leaves.sort_by_key(|leaf| leaf.rods.len());
     leaves.dedup_by_key(|leaf| leaf.rods.len());
-    let (rows, unconfirmed) = on_one_thread(options.seconds, || {
+    let (rows, unconfirmed) = run_on_one_thread(options.seconds, || {
         measure_scaling(&leaves, tolerance, options, progress)
     })?;
     let first = leaves.first();
-    Ok(Scaling {
+    Ok(ScalingStudy {
         scenario: first.map_or(String::new(), |leaf| leaf.name.clone()),
         tolerance,
         unconfirmed,
@@ -544,12 +565,12 @@ pub fn scaling(
     })
 }
 
-type Found = (Vec<ScalingRow>, Vec<usize>);
+type MeasuredScaling = (Vec<ScalingRow>, Vec<usize>);
 
 /// A leaf, its reference, and the coarsest grid that is accurate enough for it.
-struct Leaf<'s> {
+struct ScalingLeaf<'s> {
     scenario: &'s Scenario,
-    reference: Option<Answer>,
+    reference: Option<MethodSolution>,
     grid: Option<usize>,
 }
 
@@ -557,80 +578,88 @@ fn measure_scaling(
     leaves: &[&Scenario],
     tolerance: f64,
     options: &ChartOptions,
-    progress: &mut (dyn FnMut(&Turn) + Send),
-) -> Result<Found, RelaxError> {
+    progress: &mut (dyn FnMut(&ChartProgress) + Send),
+) -> Result<MeasuredScaling, RelaxError> {
     let mut contenders = options.contenders.iter();
     let any_grid = contenders.any(|contender| contender.one_grid);
     let mut unconfirmed = Vec::new();
     let leaves = leaves.iter().map(|&scenario| {
-        let (found, reference) = result::find(scenario, Vec::new())?.unzip();
+        let (found, reference) = result::find_reference(scenario, Vec::new())?.unzip();
         if !found.is_some_and(|found| found.confirmed) {
             unconfirmed.push(scenario.rods.len());
         }
         let grid = match &reference {
-            Some(reference) if any_grid => accurate_grid(scenario, reference, tolerance),
+            Some(reference) if any_grid => coarsest_accurate_grid(scenario, reference, tolerance),
             _ => None,
         };
-        Ok(Leaf {
+        Ok(ScalingLeaf {
             scenario,
             reference,
             grid,
         })
     });
-    let leaves: Vec<Leaf> = leaves.collect::<Result<_, RelaxError>>()?;
+    let leaves: Vec<ScalingLeaf> = leaves.collect::<Result<_, RelaxError>>()?;
     // From few veins to many: if a contender takes too long for one leaf,
     // it is not tried on larger ones.
     let (mut all, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for &contender in &options.contenders {
         for leaf in &leaves {
             let knob = match (contender.one_grid, leaf.grid) {
-                (false, _) => Setting::Tolerance(tolerance),
-                (true, Some(segments)) => Setting::Segments(segments),
+                (false, _) => AccuracySetting::Tolerance(tolerance),
+                (true, Some(segments)) => AccuracySetting::Segments(segments),
                 (true, None) => {
-                    rows.push(no_grid(leaf.scenario, contender));
+                    rows.push(row_without_grid(leaf.scenario, contender));
                     continue;
                 }
             };
-            all.push(Runs::new(leaf.scenario, contender, knob));
+            all.push(RepeatedRuns::new(leaf.scenario, contender, knob));
             of_leaf.push(leaf);
         }
     }
-    measure(&mut all, options.seconds, progress);
+    time_runs(&mut all, options.seconds, progress);
     for (runs, leaf) in all.into_iter().zip(of_leaf) {
         let rods = leaf.scenario.rods.len();
-        let row = result::rows(&[runs], leaf.reference.as_ref());
+        let row = result::chart_rows(&[runs], leaf.reference.as_ref());
         rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
-    let order = |contender| Contender::ALL.iter().position(|other| *other == contender);
+    let order = |contender| {
+        SolverConfig::ALL
+            .iter()
+            .position(|other| *other == contender)
+    };
     rows.sort_by_key(|found| (order(found.row.contender), found.rods));
     Ok((rows, unconfirmed))
 }
 
 /// The coarsest single grid whose error is within the tolerance.
-fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Option<usize> {
+fn coarsest_accurate_grid(
+    scenario: &Scenario,
+    reference: &MethodSolution,
+    tolerance: f64,
+) -> Option<usize> {
     let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
-    let grids = Contender {
+    let grids = SolverConfig {
         method: Method::default(),
         one_grid: true,
     };
     let accurate = |&segments: &usize| {
-        let mut run = Runs::new(scenario, grids, Setting::Segments(segments));
-        run.found = Some(run.once().map(|(answer, _)| answer));
-        let error = run.error(Some(reference));
+        let mut run = RepeatedRuns::new(scenario, grids, AccuracySetting::Segments(segments));
+        run.first_result = Some(run.run_once().map(|(answer, _)| answer));
+        let error = run.distance_from_reference(Some(reference));
         error.is_some_and(|error| error <= tolerance)
     };
-    SEGMENTS.into_iter().take_while(fits).find(accurate)
+    CHARTED_SEGMENTS.into_iter().take_while(fits).find(accurate)
 }
 
-fn no_grid(scenario: &Scenario, contender: Contender) -> ScalingRow {
-    let finest = SEGMENTS[SEGMENTS.len() - 1];
-    let ending = Ending::Ended(Outcome::ToleranceNotReached);
+fn row_without_grid(scenario: &Scenario, contender: SolverConfig) -> ScalingRow {
+    let finest = CHARTED_SEGMENTS[CHARTED_SEGMENTS.len() - 1];
+    let ending = ChartOutcome::Ended(Outcome::ToleranceNotReached);
     let why = format!("no grid of up to {finest} segments is accurate enough");
     ScalingRow {
         rods: scenario.rods.len(),
-        row: Row {
+        row: ChartRow {
             remark: Some(why),
-            ..Row::without_result(contender, Setting::Segments(finest), ending)
+            ..ChartRow::without_result(contender, AccuracySetting::Segments(finest), ending)
         },
     }
 }
@@ -641,14 +670,20 @@ mod tests {
 
     #[test]
     fn knobs_are_written_as_they_are_typed() {
-        assert_eq!(Setting::Tolerance(1e-11).to_string(), "tolerance=1e-11");
-        assert_eq!(Setting::Tolerance(1e-2).to_string(), "tolerance=1e-2");
-        assert_eq!(Setting::Segments(64).to_string(), "segments=64");
+        assert_eq!(
+            AccuracySetting::Tolerance(1e-11).to_string(),
+            "tolerance=1e-11"
+        );
+        assert_eq!(
+            AccuracySetting::Tolerance(1e-2).to_string(),
+            "tolerance=1e-2"
+        );
+        assert_eq!(AccuracySetting::Segments(64).to_string(), "segments=64");
     }
 
     #[test]
     fn every_contender_has_its_own_word() {
-        for contender in Contender::ALL {
+        for contender in SolverConfig::ALL {
             assert_eq!(contender.word().parse(), Ok(contender));
         }
     }
@@ -661,7 +696,9 @@ mod timing_tests {
     #[test]
     fn repeats_are_as_many_as_wanted_and_spread() {
         for repeats in [0, 1, 2, 7, 100] {
-            let rounds: Vec<usize> = (0..100).filter(|&r| runs_in(r, repeats, 100)).collect();
+            let rounds: Vec<usize> = (0..100)
+                .filter(|&r| is_run_in_round(r, repeats, 100))
+                .collect();
             assert_eq!(rounds.len(), repeats);
             let gaps = rounds.windows(2).map(|pair| pair[1] - pair[0]);
             assert!(gaps.max().unwrap_or(0) <= 100_usize.div_ceil(repeats.max(1)));
@@ -670,19 +707,19 @@ mod timing_tests {
 
     #[test]
     fn fast_runs_are_repeated_often_and_slow_ones_not() {
-        assert_eq!(repeats(&[1e-6; 3], 0.1), MOST - FEWEST);
-        assert_eq!(repeats(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST);
-        assert_eq!(repeats(&[2.0], 0.1), 0);
+        assert_eq!(repeat_count(&[1e-6; 3], 0.1), MOST_RUNS - FEWEST_RUNS);
+        assert_eq!(repeat_count(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST_RUNS);
+        assert_eq!(repeat_count(&[2.0], 0.1), 0);
     }
 
     #[test]
     fn quartiles() {
-        let spread = Spread::of(&[1.0, 2.0, 3.0, 4.0, 10.0]).unwrap();
+        let spread = TimingSpread::from_sorted(&[1.0, 2.0, 3.0, 4.0, 10.0]).unwrap();
         let found = [spread.min, spread.q1, spread.median, spread.q3];
         assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
-        let spread = Spread::of(&[1.0, 2.0]).unwrap();
+        let spread = TimingSpread::from_sorted(&[1.0, 2.0]).unwrap();
         assert_eq!((spread.q1, spread.median), (1.25, 1.5));
-        assert_eq!(Spread::of(&[]), None);
+        assert_eq!(TimingSpread::from_sorted(&[]), None);
     }
 }
 
@@ -692,9 +729,9 @@ mod front_tests {
 
     #[test]
     fn of_equal_points_one_is_on_the_front_and_small_errors_are_equal() {
-        assert_eq!(front(&[(1.0, 1e-3); 3], 0.0), [true, false, false]);
+        assert_eq!(pareto_front(&[(1.0, 1e-3); 3], 0.0), [true, false, false]);
         let points = [(1.0, 1e-13), (2.0, 1e-15), (3.0, 0.0)];
-        assert_eq!(front(&points, 1e-12), [true, false, false]);
-        assert_eq!(front(&points, 0.0), [true, true, true]);
+        assert_eq!(pareto_front(&points, 1e-12), [true, false, false]);
+        assert_eq!(pareto_front(&points, 0.0), [true, true, true]);
     }
 }

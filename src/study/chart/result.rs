@@ -10,14 +10,17 @@
 use crate::relax::{Method, Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
 use crate::shooting;
-use crate::shooting::Start;
-use crate::study::chart::{Contender, Runs, Scaling, Setting, Spread, front, serialize_spread};
-use crate::study::judge::{Answer, common, union};
+use crate::shooting::ShootingStart;
+use crate::study::chart::{
+    AccuracySetting, RepeatedRuns, ScalingStudy, SolverConfig, TimingSpread, pareto_front,
+    serialize_spread,
+};
+use crate::study::judge::{MethodSolution, common_stations, union_of_stations};
 use serde::{Serialize, Serializer};
 
 /// Outcome of a run in a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum ChartOutcome {
     /// The outcome of the run itself.
     Ended(Outcome),
     /// At rest, but not in the reference's equilibrium.
@@ -28,28 +31,28 @@ pub enum Ending {
     NotRun,
 }
 
-impl Ending {
+impl ChartOutcome {
     /// The word used in files.
     pub fn word(self) -> &'static str {
         match self {
-            Ending::Ended(outcome) => outcome.word(),
-            Ending::OtherEquilibrium => "other-equilibrium",
-            Ending::Refused => "refused",
-            Ending::NotRun => "not-run",
+            ChartOutcome::Ended(outcome) => outcome.word(),
+            ChartOutcome::OtherEquilibrium => "other-equilibrium",
+            ChartOutcome::Refused => "refused",
+            ChartOutcome::NotRun => "not-run",
         }
     }
 
     /// Whether the leaf is at rest in the reference equilibrium, with the requested accuracy,
     /// and not known to be unstable.
     pub fn is_success(self) -> bool {
-        let Ending::Ended(outcome) = self else {
+        let ChartOutcome::Ended(outcome) = self else {
             return false;
         };
         matches!(outcome, Outcome::Converged | Outcome::ConvergedAfterSaddle)
     }
 }
 
-impl Serialize for Ending {
+impl Serialize for ChartOutcome {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.word())
     }
@@ -57,15 +60,15 @@ impl Serialize for Ending {
 
 /// One setting of one contender. Errors are relative to the longest rod.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct ChartRow {
     /// The contender.
     #[serde(rename = "method")]
-    pub contender: Contender,
+    pub contender: SolverConfig,
     /// Its setting.
-    pub knob: Setting,
+    pub knob: AccuracySetting,
     /// Times from the checked scenario to the result; `None` if it did not run.
     #[serde(flatten, serialize_with = "serialize_spread")]
-    pub seconds: Option<Spread>,
+    pub seconds: Option<TimingSpread>,
     /// Steps or iterations of a run; these counts are `None` if it did not run.
     pub steps: Option<usize>,
     /// Its factorisations.
@@ -79,7 +82,7 @@ pub struct Row {
     pub error_estimate: Option<f64>,
     /// How it ended.
     #[serde(rename = "outcome")]
-    pub ending: Ending,
+    pub ending: ChartOutcome,
     /// Why it did not succeed, in a sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
@@ -88,10 +91,14 @@ pub struct Row {
     pub pareto: Option<bool>,
 }
 
-impl Row {
+impl ChartRow {
     /// A row of a contender without a result.
-    pub fn without_result(contender: Contender, knob: Setting, ending: Ending) -> Self {
-        Row {
+    pub fn without_result(
+        contender: SolverConfig,
+        knob: AccuracySetting,
+        ending: ChartOutcome,
+    ) -> Self {
+        ChartRow {
             contender,
             knob,
             seconds: None,
@@ -107,7 +114,7 @@ impl Row {
     }
 
     /// Seconds and error, if it succeeded.
-    pub fn point(&self) -> Option<(f64, f64)> {
+    pub fn seconds_and_error(&self) -> Option<(f64, f64)> {
         let point = (self.seconds?.median, self.true_error?);
         self.ending.is_success().then_some(point)
     }
@@ -128,34 +135,34 @@ pub struct Chart {
     /// Number of rounds in which all contenders took turns.
     pub rounds: usize,
     /// The reference for errors; `None` if no equilibrium was found.
-    pub reference: Option<Reference>,
+    pub reference: Option<ReferenceSolution>,
     /// Remarks on the measurement: one sentence each.
     pub remarks: Vec<String>,
     /// All settings of all contenders.
     #[serde(rename = "runs")]
-    pub rows: Vec<Row>,
+    pub rows: Vec<ChartRow>,
     /// Measurements of other programs.
-    pub peers: Vec<Peer>,
+    pub peers: Vec<PeerProgram>,
     /// The fastest contender for every power of ten.
-    pub decades: Vec<Decade>,
+    pub decades: Vec<FastestByAccuracy>,
     /// Cost against the number of veins, if requested.
-    pub scaling: Option<Scaling>,
+    pub scaling: Option<ScalingStudy>,
 }
 
 /// The fastest contender for an accuracy, and how much slower the default one is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Decade {
+pub struct FastestByAccuracy {
     /// The accuracy.
     pub error: f64,
     /// The fastest contender that is as accurate.
     #[serde(rename = "method")]
-    pub contender: Option<Contender>,
+    pub contender: Option<SolverConfig>,
     /// Its setting.
-    pub knob: Option<Setting>,
+    pub knob: Option<AccuracySetting>,
     /// Its time.
     pub seconds: Option<f64>,
     /// The setting at which the default contender is as accurate.
-    pub default_knob: Option<Setting>,
+    pub default_knob: Option<AccuracySetting>,
     /// Its time.
     pub default_seconds: Option<f64>,
     /// Ratio of the default contender's time to the fastest.
@@ -163,55 +170,57 @@ pub struct Decade {
 }
 
 /// Accuracies for which the fastest contender is given: powers of ten.
-const DECADES: [i32; 9] = [-2, -3, -4, -5, -6, -7, -8, -9, -10];
+const ACCURACY_DECADES: [i32; 9] = [-2, -3, -4, -5, -6, -7, -8, -9, -10];
 
 impl Chart {
     /// Whether two independent methods agree on the reference.
-    pub fn confirmed(&self) -> bool {
+    pub fn is_reference_confirmed(&self) -> bool {
         self.reference.as_ref().is_some_and(|found| found.confirmed)
     }
 
     /// Errors below this cannot be distinguished from zero.
-    fn floor(&self) -> f64 {
+    fn error_floor(&self) -> f64 {
         self.reference
             .as_ref()
             .map_or(0.0, |found| found.known_within)
     }
 
     /// The chart with its Pareto front, the ratios of its peers, and the fastest contenders.
-    pub fn compared(mut self) -> Self {
-        self.mark_front();
-        let floor = self.floor();
-        let ratio = |peer: &Peer| {
-            let (seconds, error) = peer.point()?;
+    pub fn with_comparisons(mut self) -> Self {
+        self.mark_pareto_front();
+        let floor = self.error_floor();
+        let ratio = |peer: &PeerProgram| {
+            let (seconds, error) = peer.seconds_and_error()?;
             // Errors indistinguishable from zero count as equal.
-            let ours = self.fastest(error.max(floor), |row| row.contender.is_default())?;
+            let ours = self.fastest_row(error.max(floor), |row| row.contender.is_default())?;
             Some(seconds / ours.seconds?.median)
         };
         let ratios: Vec<Option<f64>> = self.peers.iter().map(ratio).collect();
         for (peer, ratio) in self.peers.iter_mut().zip(ratios) {
             peer.ratio = ratio;
         }
-        self.decades = DECADES.map(|power| self.decade(10f64.powi(power))).to_vec();
+        self.decades = ACCURACY_DECADES
+            .map(|power| self.fastest_by_accuracy(10f64.powi(power)))
+            .to_vec();
         self
     }
 
     /// The fastest row with an error of at most `error` among those wanted.
-    fn fastest(&self, error: f64, wanted: impl Fn(&Row) -> bool) -> Option<&Row> {
+    fn fastest_row(&self, error: f64, wanted: impl Fn(&ChartRow) -> bool) -> Option<&ChartRow> {
         let rows = self.rows.iter().filter(|row| wanted(row));
-        let timed = rows.filter_map(|row| Some((row.point()?, row)));
+        let timed = rows.filter_map(|row| Some((row.seconds_and_error()?, row)));
         let accurate = timed.filter(|((_, its_error), _)| *its_error <= error);
         let fastest = accurate.min_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
         fastest.map(|(_, row)| row)
     }
 
-    fn decade(&self, error: f64) -> Decade {
-        let fastest = self.fastest(error, |_| true);
-        let default = self.fastest(error, |row| row.contender.is_default());
-        let median = |row: &Row| row.seconds.map(|spread| spread.median);
+    fn fastest_by_accuracy(&self, error: f64) -> FastestByAccuracy {
+        let fastest = self.fastest_row(error, |_| true);
+        let default = self.fastest_row(error, |row| row.contender.is_default());
+        let median = |row: &ChartRow| row.seconds.map(|spread| spread.median);
         let [seconds, default_seconds] = [fastest, default].map(|row| row.and_then(median));
         let both = default_seconds.zip(seconds);
-        Decade {
+        FastestByAccuracy {
             error,
             contender: fastest.map(|row| row.contender),
             knob: fastest.map(|row| row.knob),
@@ -223,38 +232,40 @@ impl Chart {
     }
 
     /// Marks the Pareto front of all rows and peers together.
-    fn mark_front(&mut self) {
-        const NOWHERE: (f64, f64) = (f64::INFINITY, f64::INFINITY);
-        let points = self.rows.iter().map(Row::point);
-        let points = points.chain(self.peers.iter().map(Peer::point));
-        let points: Vec<(f64, f64)> = points.map(|point| point.unwrap_or(NOWHERE)).collect();
-        let mut marks = front(&points, self.floor()).into_iter();
+    fn mark_pareto_front(&mut self) {
+        const NEVER_ON_FRONT: (f64, f64) = (f64::INFINITY, f64::INFINITY);
+        let points = self.rows.iter().map(ChartRow::seconds_and_error);
+        let points = points.chain(self.peers.iter().map(PeerProgram::seconds_and_error));
+        let points: Vec<(f64, f64)> = points
+            .map(|point| point.unwrap_or(NEVER_ON_FRONT))
+            .collect();
+        let mut marks = pareto_front(&points, self.error_floor()).into_iter();
         for (row, on_front) in self.rows.iter_mut().zip(&mut marks) {
-            row.pareto = Some(on_front && row.point().is_some());
+            row.pareto = Some(on_front && row.seconds_and_error().is_some());
         }
         for (peer, on_front) in self.peers.iter_mut().zip(marks) {
-            peer.pareto = on_front && peer.point().is_some();
+            peer.pareto = on_front && peer.seconds_and_error().is_some();
         }
     }
 }
 
 /// Errors above this are not due to discretisation if the run's own estimate is
 /// less than half as large: it is another equilibrium.
-const ELSEWHERE: f64 = 1e-2;
+const OTHER_EQUILIBRIUM_ERROR: f64 = 1e-2;
 
-const MUCH_LESS: f64 = 0.5;
+const UNDERESTIMATED_ERROR_RATIO: f64 = 0.5;
 
 /// Stations required of the reference: those of all runs, so that
 /// nothing has to be interpolated. The stations of runs on one grid are usually among those of
 /// the others; only those that are not are added.
-pub fn stations(all: &[Runs]) -> Vec<f64> {
-    let runs = || all.iter().filter_map(Runs::answer);
+pub fn reference_stations(all: &[RepeatedRuns]) -> Vec<f64> {
+    let runs = || all.iter().filter_map(RepeatedRuns::solution);
     let Some(fewest) = runs().min_by_key(|run| run.stations.len()) else {
         return Vec::new();
     };
     let mut wanted = fewest.stations.clone();
     for run in runs() {
-        if common(&run.stations, &fewest.stations).len() < fewest.stations.len() {
+        if common_stations(&run.stations, &fewest.stations).len() < fewest.stations.len() {
             wanted.extend(&run.stations);
         }
     }
@@ -262,50 +273,60 @@ pub fn stations(all: &[Runs]) -> Vec<f64> {
 }
 
 /// The rows of one leaf.
-pub fn rows(all: &[Runs], reference: Option<&Answer>) -> Vec<Row> {
-    let errors: Vec<Option<f64>> = all.iter().map(|runs| runs.error(reference)).collect();
-    let row = |i: usize| row(&all[i], errors[i], is_elsewhere(i, all, &errors));
+pub fn chart_rows(all: &[RepeatedRuns], reference: Option<&MethodSolution>) -> Vec<ChartRow> {
+    let errors: Vec<Option<f64>> = all
+        .iter()
+        .map(|runs| runs.distance_from_reference(reference))
+        .collect();
+    let row = |i: usize| {
+        chart_row(
+            &all[i],
+            errors[i],
+            ended_in_other_equilibrium(i, all, &errors),
+        )
+    };
     (0..all.len()).map(row).collect()
 }
 
 /// Whether the error of a run is due to another equilibrium.
-fn is_elsewhere(i: usize, all: &[Runs], errors: &[Option<f64>]) -> bool {
+fn ended_in_other_equilibrium(i: usize, all: &[RepeatedRuns], errors: &[Option<f64>]) -> bool {
     let this = &all[i];
-    let (Some(answer), Some(error)) = (this.at_rest(), errors[i]) else {
+    let (Some(answer), Some(error)) = (this.equilibrium(), errors[i]) else {
         return false;
     };
-    if error <= ELSEWHERE {
+    if error <= OTHER_EQUILIBRIUM_ERROR {
         return false;
     }
     let unit = longest(&this.scenario.rods);
     if !this.contender.one_grid {
         let estimate = answer.error_estimate.map(|estimate| estimate / unit);
-        return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
+        return estimate.is_some_and(|estimate| estimate < UNDERESTIMATED_ERROR_RATIO * error);
     }
     // On one grid, without an error estimate: if a coarser grid is much more accurate,
     // or the next grid has nearly the same shape.
     let alike = |other: &usize| all[*other].contender == this.contender;
     let mut coarser = (0..i).filter(alike);
-    if coarser.any(|it| errors[it].is_some_and(|there| there < MUCH_LESS * error)) {
+    if coarser.any(|it| errors[it].is_some_and(|there| there < UNDERESTIMATED_ERROR_RATIO * error))
+    {
         return true;
     }
-    let at_rest = |other: usize| all[other].at_rest();
+    let at_rest = |other: usize| all[other].equilibrium();
     let finer = (i + 1..all.len()).find(alike).and_then(at_rest);
     let next = finer.or_else(|| (0..i).rfind(alike).and_then(at_rest));
-    let apart = next.and_then(|next| answer.distance(next));
-    apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
+    let apart = next.and_then(|next| answer.largest_distance(next));
+    apart.is_some_and(|apart| apart / unit < UNDERESTIMATED_ERROR_RATIO * error)
 }
 
-fn row(runs: &Runs, error: Option<f64>, elsewhere: bool) -> Row {
-    let blank = Row {
-        seconds: Spread::of(&runs.seconds),
-        ..Row::without_result(runs.contender, runs.knob, Ending::NotRun)
+fn chart_row(runs: &RepeatedRuns, error: Option<f64>, elsewhere: bool) -> ChartRow {
+    let blank = ChartRow {
+        seconds: TimingSpread::from_sorted(&runs.seconds),
+        ..ChartRow::without_result(runs.contender, runs.setting, ChartOutcome::NotRun)
     };
-    let run = match &runs.found {
+    let run = match &runs.first_result {
         None => return blank,
         Some(Err(refusal)) => {
-            return Row {
-                ending: Ending::Refused,
+            return ChartRow {
+                ending: ChartOutcome::Refused,
                 remark: Some(refusal.to_string()),
                 ..blank
             };
@@ -313,12 +334,12 @@ fn row(runs: &Runs, error: Option<f64>, elsewhere: bool) -> Row {
         Some(Ok(run)) => run,
     };
     let ending = match run.outcome {
-        Outcome::Saddle => Ending::Ended(Outcome::Saddle),
-        _ if elsewhere => Ending::OtherEquilibrium,
-        outcome => Ending::Ended(outcome),
+        Outcome::Saddle => ChartOutcome::Ended(Outcome::Saddle),
+        _ if elsewhere => ChartOutcome::OtherEquilibrium,
+        outcome => ChartOutcome::Ended(outcome),
     };
     let unit = longest(&runs.scenario.rods);
-    Row {
+    ChartRow {
         steps: Some(run.work.steps),
         factorizations: Some(run.work.factorizations),
         force_evaluations: Some(run.work.force_evaluations),
@@ -332,10 +353,10 @@ fn row(runs: &Runs, error: Option<f64>, elsewhere: bool) -> Row {
 }
 
 /// Remarks on these rows and their reference.
-pub fn remarks(
-    rows: &[Row],
-    contenders: &[Contender],
-    reference: Option<&Reference>,
+pub fn chart_remarks(
+    rows: &[ChartRow],
+    contenders: &[SolverConfig],
+    reference: Option<&ReferenceSolution>,
 ) -> Vec<String> {
     let floor = reference.map_or(0.0, |found| found.known_within);
     let neutral = reference.and_then(|found| found.neutral.as_ref());
@@ -353,26 +374,31 @@ pub fn remarks(
         ));
     }
     for &contender in contenders {
-        remarks.extend(remarks_on(contender, rows, floor, neutral.is_some()));
+        remarks.extend(contender_remarks(contender, rows, floor, neutral.is_some()));
     }
     remarks
 }
 
-fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> Vec<String> {
+fn contender_remarks(
+    contender: SolverConfig,
+    rows: &[ChartRow],
+    floor: f64,
+    neutral: bool,
+) -> Vec<String> {
     let mut remarks = Vec::new();
     let of_it = || rows.iter().filter(|row| row.contender == contender);
     let word = contender.word();
-    if of_it().all(|row| row.ending == Ending::Refused)
+    if of_it().all(|row| row.ending == ChartOutcome::Refused)
         && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
     {
         remarks.push(format!("{word} is not charted: {why}"));
     }
-    if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
+    if let Some(first) = of_it().find(|row| row.ending == ChartOutcome::NotRun) {
         let why = "the run before took too long; allow more seconds";
         remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
     }
     // Estimates that are smaller than the true error are reported here.
-    let too_small = |row: &&Row| {
+    let too_small = |row: &&ChartRow| {
         let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
         row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
     };
@@ -387,13 +413,13 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
 
 /// Tolerances of the relaxation: first one that most leaves reach, then the
 /// best one, or else one that requires fewer grids.
-const FIRST: f64 = 1e-10;
+const FIRST_REFERENCE_TOLERANCE: f64 = 1e-10;
 
-const LARGER: f64 = 1e-4;
+const FALLBACK_REFERENCE_TOLERANCE: f64 = 1e-4;
 
 /// The reference and its reliability. Lengths are relative to the longest rod.
 #[derive(Clone, Debug, Serialize)]
-pub struct Reference {
+pub struct ReferenceSolution {
     /// Whether relaxation and shooting agree within their error estimates.
     pub confirmed: bool,
     /// A sentence: which solution it is, and why it is not confirmed.
@@ -418,26 +444,29 @@ pub struct Reference {
 ///
 /// # Errors
 /// If the leaf cannot be relaxed at all.
-pub fn find(
+pub fn find_reference(
     scenario: &Scenario,
     wanted: Vec<f64>,
-) -> Result<Option<(Reference, Answer)>, RelaxError> {
-    let relaxed = best_relaxed(scenario)?;
+) -> Result<Option<(ReferenceSolution, MethodSolution)>, RelaxError> {
+    let relaxed = most_accurate_relaxation(scenario)?;
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
     let ends = [0.0, 1.0].into_iter();
-    let stations = union(ends.chain(wanted).chain(known.copied()).collect());
-    let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
-    let precision = shooting::Precision::Error(SMALLEST_TOLERANCE);
-    let options = shooting::Options::new(start, &stations, precision);
+    let stations = union_of_stations(ends.chain(wanted).chain(known.copied()).collect());
+    let start = relaxed
+        .as_ref()
+        .map_or(ShootingStart::Arcs, MethodSolution::shooting_start);
+    let precision = shooting::RequiredPrecision::EstimatedError(SMALLEST_TOLERANCE);
+    let options = shooting::ShootingOptions::new(start, &stations, precision);
     let solved = shooting::solve(scenario, &options, &mut |_| {});
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
         Err(_) => None,
     };
-    let shot = solved.map(|solution| Answer::of_solution(scenario, solution, SMALLEST_TOLERANCE));
+    let shot = solved
+        .map(|solution| MethodSolution::from_shooting(scenario, solution, SMALLEST_TOLERANCE));
     let unit = longest(&scenario.rods);
-    let estimate = |answer: &Answer| answer.error() / unit;
-    let mut reference = Reference {
+    let estimate = |answer: &MethodSolution| answer.error_bound() / unit;
+    let mut reference = ReferenceSolution {
         confirmed: false,
         told: String::new(),
         known_within: 0.0,
@@ -448,10 +477,11 @@ pub fn find(
     };
     let (told, answer) = match (relaxed, shot) {
         (Some(leaf), Ok(shot)) => {
-            let distance = leaf.distance(&shot);
+            let distance = leaf.largest_distance(&shot);
             reference.difference = distance.map(|distance| distance / unit);
-            reference.confirmed = distance.is_some_and(|apart| leaf.confirms(&shot, apart));
-            choose(leaf, shot, reference.confirmed)
+            reference.confirmed =
+                distance.is_some_and(|apart| leaf.agrees_within_errors(&shot, apart));
+            choose_reference(leaf, shot, reference.confirmed)
         }
         (Some(leaf), Err(failure)) => {
             let why = &failure.reason;
@@ -475,16 +505,17 @@ pub fn find(
 }
 
 /// The most accurate relaxation that comes to rest.
-fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
+fn most_accurate_relaxation(scenario: &Scenario) -> Result<Option<MethodSolution>, RelaxError> {
     let at = |tolerance: f64| {
         let options = Options {
             tolerance: Some(tolerance),
             ..Options::default()
         };
-        Ok(Some(Answer::relaxed(scenario, &options)?).filter(Answer::at_rest))
+        Ok(Some(MethodSolution::from_relaxation(scenario, &options)?)
+            .filter(MethodSolution::is_at_rest))
     };
-    let Some(first) = at(FIRST)? else {
-        return at(LARGER);
+    let Some(first) = at(FIRST_REFERENCE_TOLERANCE)? else {
+        return at(FALLBACK_REFERENCE_TOLERANCE);
     };
     if first.outcome == Outcome::ToleranceNotReached {
         return Ok(Some(first));
@@ -497,8 +528,12 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
 
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one with the smaller error estimate.
-fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
-    let leaf_is_better = leaf.error() < shot.error();
+fn choose_reference(
+    leaf: MethodSolution,
+    shot: MethodSolution,
+    confirmed: bool,
+) -> (String, MethodSolution) {
+    let leaf_is_better = leaf.error_bound() < shot.error_bound();
     let told = match (confirmed, leaf_is_better) {
         (true, _) => "relaxation and shooting agree within their error estimates",
         (false, true) => "the relaxed leaf: shooting finds another shape",
@@ -509,14 +544,14 @@ fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
 }
 
 /// First words of outcomes that are equilibria.
-const AT_REST: [&str; 2] = ["converged", "at-rest"];
+const EQUILIBRIUM_OUTCOMES: [&str; 2] = ["converged", "at-rest"];
 
 /// First word of the outcome of a measurement that is not a search for an equilibrium.
-const COMPLETED: &str = "completed";
+const COMPLETED_OUTCOME: &str = "completed";
 
 /// One measurement of another program.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PeerRow {
+pub struct PeerMeasurement {
     /// The program.
     pub program: String,
     /// Name of the scenario.
@@ -535,7 +570,7 @@ pub struct PeerRow {
 
 /// A peer's measurements at one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Peer {
+pub struct PeerProgram {
     /// The program, with its other settings.
     #[serde(rename = "program")]
     pub name: String,
@@ -543,7 +578,7 @@ pub struct Peer {
     pub knob: String,
     /// Times of all rows with these settings.
     #[serde(flatten)]
-    pub seconds: Spread,
+    pub seconds: TimingSpread,
     /// The largest error of these rows, relative to the longest rod; `None`
     /// if it did not come to rest.
     pub true_error: Option<f64>,
@@ -555,22 +590,22 @@ pub struct Peer {
     pub ratio: Option<f64>,
 }
 
-impl Peer {
+impl PeerProgram {
     /// Seconds and error, if it came to rest.
-    pub fn point(&self) -> Option<(f64, f64)> {
+    pub fn seconds_and_error(&self) -> Option<(f64, f64)> {
         Some((self.seconds.median, self.true_error?))
     }
 }
 
 /// The rows for a leaf, rows with equal settings combined, and remarks on
 /// the others. Errors become relative to the longest rod.
-pub fn about(
-    rows: &[PeerRow],
+pub fn combine_peer_measurements(
+    rows: &[PeerMeasurement],
     scenario: &str,
     rods: usize,
     longest: f64,
-) -> (Vec<Peer>, Vec<String>) {
-    let mut peers: Vec<Peer> = Vec::new();
+) -> (Vec<PeerProgram>, Vec<String>) {
+    let mut peers: Vec<PeerProgram> = Vec::new();
     let mut times: Vec<Vec<f64>> = Vec::new();
     let (mut other, mut silent) = (0, 0);
     for row in rows {
@@ -579,22 +614,23 @@ pub fn about(
             continue;
         }
         let word = row.outcome.split_whitespace().next().unwrap_or_default();
-        let at_rest = AT_REST.contains(&word);
-        if row.error.is_none() && (at_rest || word == COMPLETED) {
+        let at_rest = EQUILIBRIUM_OUTCOMES.contains(&word);
+        if row.error.is_none() && (at_rest || word == COMPLETED_OUTCOME) {
             silent += 1;
             continue;
         }
         let true_error = row.error.filter(|_| at_rest).map(|error| error / longest);
         let (knob, settings) = row.knob.split_once(' ').unwrap_or((&row.knob, ""));
         let name = format!("{} {settings}", row.program).trim_end().to_string();
-        let same =
-            |peer: &Peer| peer.name == name && peer.knob == knob && peer.outcome == row.outcome;
+        let same = |peer: &PeerProgram| {
+            peer.name == name && peer.knob == knob && peer.outcome == row.outcome
+        };
         let same = peers.iter().position(same);
         let same = same.unwrap_or_else(|| {
-            peers.push(Peer {
+            peers.push(PeerProgram {
                 name,
                 knob: knob.into(),
-                seconds: Spread::default(),
+                seconds: TimingSpread::default(),
                 true_error,
                 outcome: row.outcome.clone(),
                 pareto: false,
@@ -610,7 +646,7 @@ pub fn about(
     }
     for (peer, seconds) in peers.iter_mut().zip(&mut times) {
         seconds.sort_by(f64::total_cmp);
-        peer.seconds = Spread::of(seconds).unwrap_or_default();
+        peer.seconds = TimingSpread::from_sorted(seconds).unwrap_or_default();
     }
     let rows = |count: usize| match count {
         1 => "1 row of --peers is".to_string(),
@@ -648,8 +684,8 @@ mod tests {
 
     /// Straight but for a shift of its tip; the estimate is relative to the length
     /// of 2.
-    fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Answer {
-        Answer {
+    fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> MethodSolution {
+        MethodSolution {
             outcome,
             remark: Some("why".into()),
             error_estimate: estimate.map(|estimate| 2.0 * estimate),
@@ -659,33 +695,37 @@ mod tests {
         }
     }
 
-    type Found = Option<Result<Answer, crate::relax::RelaxError>>;
+    type Found = Option<Result<MethodSolution, crate::relax::RelaxError>>;
 
     fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Found {
         Some(Ok(answer(outcome, shift, estimate)))
     }
 
     /// The runs of a contender with these results at its first settings.
-    fn runs(scenario: &Scenario, contender: Contender, found: Vec<Found>) -> Vec<Runs<'_>> {
-        let runs = contender.knobs().into_iter().zip(found);
-        runs.map(|(knob, found)| Runs {
-            found,
+    fn runs(
+        scenario: &Scenario,
+        contender: SolverConfig,
+        found: Vec<Found>,
+    ) -> Vec<RepeatedRuns<'_>> {
+        let runs = contender.charted_settings().into_iter().zip(found);
+        runs.map(|(knob, found)| RepeatedRuns {
+            first_result: found,
             seconds: vec![1.0],
-            ..Runs::new(scenario, contender, knob)
+            ..RepeatedRuns::new(scenario, contender, knob)
         })
         .collect()
     }
 
     /// Their rows, and those of its other settings, which are not run.
-    fn judged(contender: &str, found: Vec<Found>) -> Vec<Row> {
-        let (scenario, contender) = (scenario(), contender.parse::<Contender>().unwrap());
+    fn judged(contender: &str, found: Vec<Found>) -> Vec<ChartRow> {
+        let (scenario, contender) = (scenario(), contender.parse::<SolverConfig>().unwrap());
         let mut runs = runs(&scenario, contender, found);
-        let rest = contender.knobs().into_iter().skip(runs.len());
-        runs.extend(rest.map(|knob| Runs::new(&scenario, contender, knob)));
-        rows(&runs, Some(&answer(Outcome::Converged, 0.0, None)))
+        let rest = contender.charted_settings().into_iter().skip(runs.len());
+        runs.extend(rest.map(|knob| RepeatedRuns::new(&scenario, contender, knob)));
+        chart_rows(&runs, Some(&answer(Outcome::Converged, 0.0, None)))
     }
 
-    fn words(rows: &[Row]) -> Vec<&'static str> {
+    fn words(rows: &[ChartRow]) -> Vec<&'static str> {
         rows.iter().map(|row| row.ending.word()).collect()
     }
 
@@ -704,7 +744,7 @@ mod tests {
         let wanted = ["converged", "other-equilibrium", "saddle", "not-at-rest"];
         assert_eq!(words(&rows)[..4], wanted);
         assert_eq!(words(&rows)[4..6], ["converged", "not-run"]);
-        assert_eq!(rows[0].point(), Some((1.0, 1e-4)));
+        assert_eq!(rows[0].seconds_and_error(), Some((1.0, 1e-4)));
         assert_eq!(rows[0].error_estimate, Some(3e-4));
         assert_eq!((rows[1].true_error, rows[3].true_error), (Some(0.25), None));
         // Remarks are for failures.
@@ -720,7 +760,7 @@ mod tests {
             let at = |shift: &f64| found(Outcome::Converged, *shift, None);
             let rows = judged("semi-implicit-grid", shifts.iter().map(at).collect());
             let rows = rows.iter().take(shifts.len());
-            rows.map(|row| row.ending == Ending::OtherEquilibrium)
+            rows.map(|row| row.ending == ChartOutcome::OtherEquilibrium)
                 .collect()
         };
         assert_eq!(elsewhere(&[1.6, 0.4, 0.1, 0.025]), [false; 4]);
@@ -734,7 +774,7 @@ mod tests {
         let told = [(2e-4, 1e-5), (2e-12, 1e-15)];
         let told = told.map(|(shift, told)| found(Outcome::Converged, shift, Some(told)));
         let rows = judged("semi-implicit", told.into());
-        let mut reference = Reference {
+        let mut reference = ReferenceSolution {
             confirmed: true,
             told: String::new(),
             known_within: 1e-11,
@@ -743,14 +783,14 @@ mod tests {
             difference: None,
             neutral: None,
         };
-        let contenders = [Contender::ALL[0]];
-        let told = remarks(&rows, &contenders, Some(&reference));
+        let contenders = [SolverConfig::ALL[0]];
+        let told = chart_remarks(&rows, &contenders, Some(&reference));
         assert!(told[0].starts_with("semi-implicit is not run from tolerance=1e-3 on"));
         let wrong = "semi-implicit underestimates its error at tolerance=1e-1";
         assert_eq!(told[1..], [wrong]);
         // Along a neutral direction no estimate can be wrong.
         reference.neutral = Some("the leaf can move".into());
-        let told = remarks(&rows, &contenders, Some(&reference));
+        let told = chart_remarks(&rows, &contenders, Some(&reference));
         assert!(told[0].starts_with("errors tell little: the leaf can move"));
         assert_eq!(told.len(), 2, "{told:?}");
     }
@@ -759,21 +799,24 @@ mod tests {
     fn the_reference_is_wanted_where_a_run_has_stations_of_its_own() {
         let scenario = scenario();
         let with = |stations: &[f64]| {
-            let run = Answer {
+            let run = MethodSolution {
                 stations: stations.to_vec(),
                 ..answer(Outcome::Converged, 0.0, None)
             };
-            let contender = Contender::ALL[0];
-            Runs {
-                found: Some(Ok(run)),
-                ..Runs::new(&scenario, contender, contender.knobs()[0])
+            let contender = SolverConfig::ALL[0];
+            RepeatedRuns {
+                first_result: Some(Ok(run)),
+                ..RepeatedRuns::new(&scenario, contender, contender.charted_settings()[0])
             }
         };
         let nested = [with(&[0.0, 0.25, 0.5, 0.75, 1.0]), with(&STATIONS)];
-        assert_eq!(stations(&nested), STATIONS);
+        assert_eq!(reference_stations(&nested), STATIONS);
         let other = [with(&[0.0, 0.3, 0.6, 1.0]), with(&STATIONS)];
-        assert_eq!(stations(&other), [0.0, 0.5, 1.0, 0.0, 0.3, 0.6, 1.0]);
-        assert!(stations(&[]).is_empty());
+        assert_eq!(
+            reference_stations(&other),
+            [0.0, 0.5, 1.0, 0.0, 0.3, 0.6, 1.0]
+        );
+        assert!(reference_stations(&[]).is_empty());
     }
 }
 
@@ -790,21 +833,21 @@ mod reference_tests {
             load = { gravity = [0.0, 0.0, -0.1] }
         "#;
         let scenario = Scenario::from_toml(leaf).unwrap();
-        let relaxed = best_relaxed(&scenario).unwrap().unwrap();
-        let (_, mut elsewhere) = find(&scenario, Vec::new()).unwrap().unwrap();
+        let relaxed = most_accurate_relaxation(&scenario).unwrap().unwrap();
+        let (_, mut elsewhere) = find_reference(&scenario, Vec::new()).unwrap().unwrap();
         for node in elsewhere.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
             node.position.z += 1e-6;
         }
         for (error, is_taken) in [(1e-16, true), (1e-7, false)] {
             elsewhere.error_estimate = Some(error);
-            let apart = relaxed.distance(&elsewhere).unwrap();
-            assert!(!relaxed.confirms(&elsewhere, apart));
-            let (_, taken) = choose(relaxed.clone(), elsewhere.clone(), false);
+            let apart = relaxed.largest_distance(&elsewhere).unwrap();
+            assert!(!relaxed.agrees_within_errors(&elsewhere, apart));
+            let (_, taken) = choose_reference(relaxed.clone(), elsewhere.clone(), false);
             assert_eq!(taken.rods == elsewhere.rods, is_taken);
         }
         // An estimate as large as the difference confirms little, but validly.
         elsewhere.error_estimate = Some(3e-6);
-        assert!(relaxed.confirms(&elsewhere, 1e-6));
+        assert!(relaxed.agrees_within_errors(&elsewhere, 1e-6));
     }
 }
 
@@ -813,9 +856,9 @@ mod peers_tests {
     use super::*;
 
     /// program, scenario, rods, knob, seconds, error, outcome.
-    fn row(text: &str) -> PeerRow {
+    fn row(text: &str) -> PeerMeasurement {
         let cell: Vec<&str> = text.split(',').collect();
-        PeerRow {
+        PeerMeasurement {
             program: cell[0].into(),
             scenario: cell[1].into(),
             rods: cell[2].parse().unwrap(),
@@ -841,7 +884,7 @@ mod peers_tests {
             "a,tree,5,n=20,2,1e-3,converged",
         ]
         .map(row);
-        let (peers, remarks) = about(&rows, "leaf", 5, 2.0);
+        let (peers, remarks) = combine_peer_measurements(&rows, "leaf", 5, 2.0);
         let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
         let names: Vec<(&str, &str)> = names.collect();
         assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);

@@ -9,10 +9,10 @@
 //!
 //! What a traced point tells of the place where it is: coordinates in space, or in a photograph.
 
-use crate::scenario::{Photo, PhotoRate};
-use crate::study::Keys;
+use crate::scenario::{Photo, PhotoParameterDerivative};
+use crate::study::ParameterKeys;
 use crate::study::fit::FitError;
-use crate::study::fit::table::{Table, refuse};
+use crate::study::fit::table::{DataTable, line_error};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 use std::num::NonZeroUsize;
@@ -20,14 +20,14 @@ use std::str::FromStr;
 
 /// Origin of a number: a file and a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Origin {
+pub struct DataOrigin {
     /// Name of the file.
     pub file: String,
     /// Line, counted from 1.
     pub line: usize,
 }
 
-impl std::fmt::Display for Origin {
+impl std::fmt::Display for DataOrigin {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{}:{}", self.file, self.line)
     }
@@ -35,9 +35,9 @@ impl std::fmt::Display for Origin {
 
 /// A measured number.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MeasuredValue {
     /// The quantity.
-    pub quantity: Quantity,
+    pub quantity: MeasuredQuantity,
     /// Its value; none for a candidate.
     pub value: Option<f64>,
     /// Its standard deviation, if known.
@@ -50,16 +50,16 @@ pub struct Experiment {
     /// Its name, or its number.
     pub name: String,
     /// Numbers of the scenario during the experiment.
-    pub settings: Vec<(Keys, f64)>,
+    pub settings: Vec<(ParameterKeys, f64)>,
     /// What was measured.
-    pub measured: Vec<Measured>,
+    pub measured: Vec<MeasuredValue>,
     /// Its position in the data.
-    pub origin: Option<Origin>,
+    pub origin: Option<DataOrigin>,
 }
 
 /// A point on a vein.
 #[derive(Clone, Debug)]
-pub struct Traced {
+pub struct TracedVeinPoint {
     /// The name of its experiment; none: the scenario without changes.
     pub experiment: Option<String>,
     /// Rod, counted from 0.
@@ -67,17 +67,19 @@ pub struct Traced {
     /// Fraction of the length, for a marked point.
     pub sigma: Option<f64>,
     /// The coordinates measured: x, y, z, or pixels of a photograph to the right and down.
-    pub at: [Option<f64>; 5],
+    pub coordinates: [Option<f64>; 5],
     /// Standard deviation of each, if known.
     pub sd: Option<f64>,
     /// Its position in the data.
-    pub origin: Origin,
+    pub origin: DataOrigin,
 }
 
-impl Traced {
+impl TracedVeinPoint {
     /// Whether it was traced in a photograph.
     pub(super) fn is_in_photo(&self) -> bool {
-        self.at[IN_PHOTO..].iter().any(Option::is_some)
+        self.coordinates[FIRST_PHOTO_COORDINATE..]
+            .iter()
+            .any(Option::is_some)
     }
 }
 
@@ -106,13 +108,13 @@ pub struct DataFile {
 #[derive(Clone, Debug, Default)]
 pub struct Data {
     /// How files are read.
-    pub reading: Reading,
+    pub reading: DataReadingOptions,
     /// The files.
     pub files: Vec<DataFile>,
     /// Experiments.
     pub experiments: Vec<Experiment>,
     /// Points on veins.
-    pub traced: Vec<Traced>,
+    pub traced: Vec<TracedVeinPoint>,
 }
 
 impl Data {
@@ -126,10 +128,10 @@ impl Data {
         file: &str,
         veins: usize,
     ) -> Result<(), FitError> {
-        let table = Table::of(table.as_ref(), file, &self.reading)?;
+        let table = DataTable::parse(table.as_ref(), file, &self.reading)?;
         self.files.push(DataFile {
             file: file.into(),
-            rows: table.rows(),
+            rows: table.row_count(),
             comments: table.comments[0],
             comments_among_rows: table.comments[1],
             taken: table.taken.clone(),
@@ -138,11 +140,11 @@ impl Data {
             quantities: table.header.clone(),
         });
         // A table of points has at least two of these, or one and sigma.
-        let mut names = COORDINATES.iter().chain(&["rod"]);
-        match names.any(|name| table.column(name).is_some()) {
+        let mut names = COORDINATE_COLUMNS.iter().chain(&["rod"]);
+        match names.any(|name| table.column_index(name).is_some()) {
             true => self.read_traced(&table, veins),
             false => {
-                let experiments = experiments(&table, false, self.experiments.len())?;
+                let experiments = read_experiments(&table, false, self.experiments.len())?;
                 self.experiments.extend(experiments);
                 Ok(())
             }
@@ -185,26 +187,26 @@ impl Data {
         Ok(())
     }
 
-    fn read_traced(&mut self, table: &Table, veins: usize) -> Result<(), FitError> {
+    fn read_traced(&mut self, table: &DataTable, veins: usize) -> Result<(), FitError> {
         let strange = table
             .header
             .iter()
-            .find(|name| !TRACED.contains(&name.as_str()));
+            .find(|name| !TRACED_POINT_COLUMNS.contains(&name.as_str()));
         if let Some(name) = strange {
             let why = format!(
                 "unknown column {name}: points on veins have {}; {}",
-                TRACED.join(", "),
-                renamed(name)
+                TRACED_POINT_COLUMNS.join(", "),
+                column_naming_advice(name)
             );
-            return Err(refuse(table.file, table.header_line, why));
+            return Err(line_error(table.file, table.header_line, why));
         }
-        let column = |name: &str| table.column(name);
+        let column = |name: &str| table.column_index(name);
         if column("rod").is_none() && veins > 1 {
             let why = format!("points on veins need a column rod, from 1 to {veins} (leaf.rods)");
-            return Err(refuse(table.file, table.header_line, why));
+            return Err(line_error(table.file, table.header_line, why));
         }
-        for row in 0..table.rows() {
-            let line = table.line(row);
+        for row in 0..table.row_count() {
+            let line = table.line_number(row);
             let number = |name: &str| match column(name) {
                 Some(column) => table.number(row, column),
                 None => Ok(None),
@@ -220,40 +222,40 @@ impl Data {
                 let found = if cell.is_empty() { "nothing" } else { cell };
                 let why =
                     format!("rod = {found}: must be a whole number from 1 to {veins} (leaf.rods)");
-                return Err(refuse(table.file, line, why));
+                return Err(line_error(table.file, line, why));
             };
             let sigma = number("sigma")?;
             if let Some(sigma) = sigma.filter(|sigma| !(0.0..=1.0).contains(sigma)) {
                 let why =
                     format!("sigma = {sigma}: is a fraction of the vein's length, from 0 to 1");
-                return Err(refuse(table.file, line, why));
+                return Err(line_error(table.file, line, why));
             }
-            let mut at = Seen::default();
-            for (place, name) in at.iter_mut().zip(COORDINATES) {
+            let mut at = ObservedCoordinates::default();
+            for (place, name) in at.iter_mut().zip(COORDINATE_COLUMNS) {
                 *place = number(name)?;
             }
-            let [seen, pixels] = [&at[..IN_PHOTO], &at[IN_PHOTO..]]
+            let [seen, pixels] = [&at[..FIRST_PHOTO_COORDINATE], &at[FIRST_PHOTO_COORDINATE..]]
                 .map(|coordinates| coordinates.iter().flatten().count());
             if seen > 0 && pixels > 0 {
                 let why = "a point has coordinates x, y, z, or those in a photograph, pixel_x, pixel_y: \
                            leave one of them out";
-                return Err(refuse(table.file, line, why));
+                return Err(line_error(table.file, line, why));
             }
             if seen + pixels < 2 && sigma.is_none() || seen + pixels == 0 {
                 let why = "at least two of x, y, z are needed, or pixel_x and pixel_y, or one of them and sigma";
-                return Err(refuse(table.file, line, why));
+                return Err(line_error(table.file, line, why));
             }
-            let experiment = column(NAME).map(|column| table.cell(row, column));
-            self.traced.push(Traced {
+            let experiment = column(EXPERIMENT_NAME_COLUMN).map(|column| table.cell(row, column));
+            self.traced.push(TracedVeinPoint {
                 experiment: experiment.filter(|name| !name.is_empty()).map(String::from),
                 rod: rod as usize - 1,
                 sigma,
-                at,
+                coordinates: at,
                 sd: match column("sd") {
-                    Some(column) => table.positive(row, column)?,
+                    Some(column) => table.positive_number(row, column)?,
                     None => None,
                 },
-                origin: Origin {
+                origin: DataOrigin {
                     file: table.file.into(),
                     line,
                 },
@@ -264,20 +266,20 @@ impl Data {
 }
 
 /// Candidate experiments: like those made, but without measured values.
-pub fn candidates(
+pub fn read_candidate_experiments(
     table: &[u8],
     file: &str,
     columns: &[MeasuredColumn],
 ) -> Result<Vec<Experiment>, FitError> {
-    let reading = Reading {
+    let reading = DataReadingOptions {
         columns: columns.to_vec(),
-        ..Reading::default()
+        ..DataReadingOptions::default()
     };
-    experiments(&Table::of(table, file, &reading)?, true, 0)
+    read_experiments(&DataTable::parse(table, file, &reading)?, true, 0)
 }
 
 /// How a column with another name is used.
-fn renamed(name: &str) -> String {
+fn column_naming_advice(name: &str) -> String {
     format!(
         "name it so in the file, or say what it is by the option column, as in '{name}=tip_x': columns \
          that mean nothing are then left out"
@@ -285,72 +287,77 @@ fn renamed(name: &str) -> String {
 }
 
 /// The meaning of a column of experiments.
-enum Column {
+enum ExperimentColumn {
     Name,
-    Setting(Keys),
-    Result(Quantity),
-    Deviation(Quantity),
+    Setting(ParameterKeys),
+    Result(MeasuredQuantity),
+    Deviation(MeasuredQuantity),
 }
 
-fn column(table: &Table, name: &str) -> Result<Column, FitError> {
-    let quantity = |text: &str| text.parse::<Quantity>().ok();
-    if name == NAME {
-        return Ok(Column::Name);
+fn parse_experiment_column(table: &DataTable, name: &str) -> Result<ExperimentColumn, FitError> {
+    let quantity = |text: &str| text.parse::<MeasuredQuantity>().ok();
+    if name == EXPERIMENT_NAME_COLUMN {
+        return Ok(ExperimentColumn::Name);
     }
     if let Some(quantity) = quantity(name) {
-        return Ok(Column::Result(quantity));
+        return Ok(ExperimentColumn::Result(quantity));
     }
     if let Some(quantity) = name.strip_prefix("sd_").and_then(quantity) {
-        return Ok(Column::Deviation(quantity));
+        return Ok(ExperimentColumn::Deviation(quantity));
     }
-    name.parse().map(Column::Setting).map_err(|refused| {
-        let why = match name.contains('.') {
-            true => format!("column {refused}"),
-            false => format!(
-                "unknown column {name}: columns are keys of the scenario, such as \
+    name.parse()
+        .map(ExperimentColumn::Setting)
+        .map_err(|refused| {
+            let why = match name.contains('.') {
+                true => format!("column {refused}"),
+                false => format!(
+                    "unknown column {name}: columns are keys of the scenario, such as \
                  load.tip_force[0], results ({}), their standard deviations (sd_tip_x), \
                  experiment, a name, or rod, x, y, z (or pixel_x, pixel_y) of points on veins; {}",
-                Quantity::ALL,
-                renamed(name)
-            ),
-        };
-        refuse(table.file, table.header_line, why)
-    })
+                    MeasuredQuantity::ALL,
+                    column_naming_advice(name)
+                ),
+            };
+            line_error(table.file, table.header_line, why)
+        })
 }
 
-fn experiments(
-    table: &Table,
+fn read_experiments(
+    table: &DataTable,
     candidates: bool,
     before: usize,
 ) -> Result<Vec<Experiment>, FitError> {
-    let columns = table.header.iter().map(|name| column(table, name));
+    let columns = table
+        .header
+        .iter()
+        .map(|name| parse_experiment_column(table, name));
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
-    let results: Vec<Quantity> = (columns.iter())
+    let results: Vec<MeasuredQuantity> = (columns.iter())
         .filter_map(|column| match column {
-            Column::Result(quantity) => Some(*quantity),
+            ExperimentColumn::Result(quantity) => Some(*quantity),
             _ => None,
         })
         .collect();
     for column in &columns {
-        if let Column::Deviation(quantity) = column
+        if let ExperimentColumn::Deviation(quantity) = column
             && !results.contains(quantity)
         {
             let why = format!("sd_{quantity} without {quantity}: add that column");
-            return Err(refuse(table.file, table.header_line, why));
+            return Err(line_error(table.file, table.header_line, why));
         }
     }
     if results.is_empty() && candidates {
-        let why = format!("no column is a result ({})", Quantity::ALL);
-        return Err(refuse(table.file, table.header_line, why));
+        let why = format!("no column is a result ({})", MeasuredQuantity::ALL);
+        return Err(line_error(table.file, table.header_line, why));
     }
     let mut found = Vec::new();
-    for row in 0..table.rows() {
-        let line = table.line(row);
+    for row in 0..table.row_count() {
+        let line = table.line_number(row);
         let mut experiment = Experiment {
             name: (before + row + 1).to_string(),
             settings: Vec::new(),
             measured: Vec::new(),
-            origin: Some(Origin {
+            origin: Some(DataOrigin {
                 file: table.file.into(),
                 line,
             }),
@@ -358,29 +365,29 @@ fn experiments(
         let mut deviations = BTreeMap::new();
         for (k, column) in columns.iter().enumerate() {
             match column {
-                Column::Name if !table.cell(row, k).is_empty() => {
+                ExperimentColumn::Name if !table.cell(row, k).is_empty() => {
                     experiment.name = table.cell(row, k).into();
                 }
-                Column::Name => {}
-                Column::Setting(keys) => {
+                ExperimentColumn::Name => {}
+                ExperimentColumn::Setting(keys) => {
                     let Some(value) = table.number(row, k)? else {
                         let why = format!("{keys} is empty: every experiment needs its value");
-                        return Err(refuse(table.file, line, why));
+                        return Err(line_error(table.file, line, why));
                     };
                     experiment.settings.push((keys.clone(), value));
                 }
-                Column::Result(quantity) => {
+                ExperimentColumn::Result(quantity) => {
                     let value = table.number(row, k)?;
                     if value.is_some() || candidates {
-                        experiment.measured.push(Measured {
+                        experiment.measured.push(MeasuredValue {
                             quantity: *quantity,
                             value,
                             sd: None,
                         });
                     }
                 }
-                Column::Deviation(quantity) => {
-                    deviations.insert(quantity.to_string(), table.positive(row, k)?);
+                ExperimentColumn::Deviation(quantity) => {
+                    deviations.insert(quantity.to_string(), table.positive_number(row, k)?);
                 }
             }
         }
@@ -394,17 +401,27 @@ fn experiments(
 }
 
 /// The column of the names of experiments.
-pub(super) const NAME: &str = "experiment";
+pub(super) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
 
 /// Columns of points on veins.
-pub(super) const TRACED: [&str; 9] = [
-    "rod", "x", "y", "z", "pixel_x", "pixel_y", "sigma", "sd", NAME,
+pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
+    "rod",
+    "x",
+    "y",
+    "z",
+    "pixel_x",
+    "pixel_y",
+    "sigma",
+    "sd",
+    EXPERIMENT_NAME_COLUMN,
 ];
 
 /// Whether this is the name of a column that a fit uses.
-pub(super) fn is_known(name: &str) -> bool {
+pub(super) fn is_known_column(name: &str) -> bool {
     let quantity = name.strip_prefix("sd_").unwrap_or(name);
-    TRACED.contains(&name) || quantity.parse::<Quantity>().is_ok() || name.parse::<Keys>().is_ok()
+    TRACED_POINT_COLUMNS.contains(&name)
+        || quantity.parse::<MeasuredQuantity>().is_ok()
+        || name.parse::<ParameterKeys>().is_ok()
 }
 
 /// A column of a file by the name that it has there, and what it is here:
@@ -423,7 +440,7 @@ pub struct MeasuredColumn {
 }
 
 /// The two numbers in FACTOR, FACTOR+OFFSET and FACTOR-OFFSET.
-fn factor_and_offset(text: &str) -> Option<(f64, f64)> {
+fn parse_factor_and_offset(text: &str) -> Option<(f64, f64)> {
     let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
     let sign = text.char_indices().skip(1).find(|(at, character)| {
         matches!(character, '+' | '-') && !text[..*at].ends_with(['e', 'E'])
@@ -453,9 +470,9 @@ impl FromStr for MeasuredColumn {
             return refuse("write the name that it has in the file before =");
         }
         let (quantity, [factor, offset]) = match rest.rsplit_once(':') {
-            _ if is_known(rest) => (rest, [1.0, 0.0]),
+            _ if is_known_column(rest) => (rest, [1.0, 0.0]),
             None => (rest, [1.0, 0.0]),
-            Some((quantity, numbers)) => match factor_and_offset(numbers.trim()) {
+            Some((quantity, numbers)) => match parse_factor_and_offset(numbers.trim()) {
                 Some((factor, offset)) => (quantity.trim(), [factor, offset]),
                 None => {
                     return refuse(
@@ -464,20 +481,20 @@ impl FromStr for MeasuredColumn {
                 }
             },
         };
-        if !is_known(quantity) {
+        if !is_known_column(quantity) {
             return refuse(&format!(
                 "{quantity} is no quantity: {}",
-                match quantity.parse::<Keys>() {
+                match quantity.parse::<ParameterKeys>() {
                     Err(refused) if quantity.contains('.') => refused.to_string(),
                     _ => format!(
                         "keys of the scenario, results ({}), their standard deviations (sd_tip_x), and {} are",
-                        Quantity::ALL,
-                        TRACED.join(", ")
+                        MeasuredQuantity::ALL,
+                        TRACED_POINT_COLUMNS.join(", ")
                     ),
                 }
             ));
         }
-        if quantity == NAME && [factor, offset] != [1.0, 0.0] {
+        if quantity == EXPERIMENT_NAME_COLUMN && [factor, offset] != [1.0, 0.0] {
             return refuse("a name has no factor and no offset: leave them out");
         }
         Ok(MeasuredColumn {
@@ -491,7 +508,7 @@ impl FromStr for MeasuredColumn {
 
 /// How the number in a column compares with a given one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Comparison {
+pub enum ComparisonOperator {
     /// `<`
     Less,
     /// `<=`
@@ -505,12 +522,12 @@ pub enum Comparison {
 }
 
 /// Longer signs come before those that they begin with.
-const COMPARISONS: [(&str, Comparison); 5] = [
-    ("<=", Comparison::AtMost),
-    (">=", Comparison::AtLeast),
-    ("<", Comparison::Less),
-    (">", Comparison::Greater),
-    ("=", Comparison::Equal),
+const COMPARISON_SIGNS: [(&str, ComparisonOperator); 5] = [
+    ("<=", ComparisonOperator::AtMost),
+    (">=", ComparisonOperator::AtLeast),
+    ("<", ComparisonOperator::Less),
+    (">", ComparisonOperator::Greater),
+    ("=", ComparisonOperator::Equal),
 ];
 
 /// A condition on the rows of a table: `COLUMN>VALUE`.
@@ -519,38 +536,38 @@ pub struct RowCondition {
     /// The column by its name here: a key, a result, or another column of the data.
     pub column: String,
     /// How its number compares with the value.
-    pub comparison: Comparison,
+    pub comparison: ComparisonOperator,
     /// The value, in the units of the scenario.
     pub value: f64,
 }
 
 impl RowCondition {
     /// Whether a row with this number is read.
-    pub(super) fn admits(&self, number: f64) -> bool {
+    pub(super) fn is_met_by(&self, number: f64) -> bool {
         match self.comparison {
-            Comparison::Less => number < self.value,
-            Comparison::AtMost => number <= self.value,
-            Comparison::Greater => number > self.value,
-            Comparison::AtLeast => number >= self.value,
-            Comparison::Equal => number == self.value,
+            ComparisonOperator::Less => number < self.value,
+            ComparisonOperator::AtMost => number <= self.value,
+            ComparisonOperator::Greater => number > self.value,
+            ComparisonOperator::AtLeast => number >= self.value,
+            ComparisonOperator::Equal => number == self.value,
         }
     }
 }
 
 /// Conditions on rows, all of which are met: `COLUMN>VALUE`, joined by `and`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RowChoice {
+pub struct RowFilter {
     /// The conditions.
     pub conditions: Vec<RowCondition>,
 }
 
-impl FromStr for RowChoice {
+impl FromStr for RowFilter {
     type Err = FitError;
 
     fn from_str(text: &str) -> Result<Self, FitError> {
         let refuse = |why: String| FitError::Data(format!("rows {text}: {why}"));
         let condition = |text: &str| {
-            let found = COMPARISONS.iter().filter_map(|(sign, comparison)| {
+            let found = COMPARISON_SIGNS.iter().filter_map(|(sign, comparison)| {
                 let at = text.find(sign)?;
                 Some((at, *sign, *comparison))
             });
@@ -562,11 +579,11 @@ impl FromStr for RowChoice {
             let value = text[at + sign.len()..].trim();
             let number = value.parse().ok().filter(|number: &f64| number.is_finite());
             let value = number.ok_or_else(|| refuse(format!("{value} is not a finite number")))?;
-            if !is_known(column) || column == NAME {
+            if !is_known_column(column) || column == EXPERIMENT_NAME_COLUMN {
                 return Err(refuse(format!(
                     "{column} is no column of numbers: keys of the scenario, results ({}) and columns of points \
                      on veins are",
-                    Quantity::ALL
+                    MeasuredQuantity::ALL
                 )));
             }
             Ok(RowCondition {
@@ -577,24 +594,24 @@ impl FromStr for RowChoice {
         };
         let conditions = text.split(" and ").map(condition);
         let conditions = conditions.collect::<Result<_, _>>()?;
-        Ok(RowChoice { conditions })
+        Ok(RowFilter { conditions })
     }
 }
 
 /// How files of data are read.
 #[derive(Clone, Debug)]
-pub struct Reading {
+pub struct DataReadingOptions {
     /// Columns that have other names in the files.
     pub columns: Vec<MeasuredColumn>,
     /// The first row is read, and then each that is so many further.
     pub every: NonZeroUsize,
     /// Conditions that rows meet, in tables with their columns.
-    pub rows: Vec<RowChoice>,
+    pub rows: Vec<RowFilter>,
 }
 
-impl Default for Reading {
+impl Default for DataReadingOptions {
     fn default() -> Self {
-        Reading {
+        DataReadingOptions {
             columns: Vec::new(),
             every: NonZeroUsize::MIN,
             rows: Vec::new(),
@@ -603,88 +620,90 @@ impl Default for Reading {
 }
 
 /// An experiment with the points traced on its veins.
-pub(super) struct Observed {
+pub(super) struct ObservedExperiment {
     /// Its position in the data.
     pub number: usize,
     pub experiment: Experiment,
-    pub traced: Vec<Traced>,
+    pub traced: Vec<TracedVeinPoint>,
 }
 
 /// One experiment or several under the same conditions.
-pub(super) struct Case {
+pub(super) struct ExperimentCase {
     /// At least one.
-    pub observed: Vec<Observed>,
+    pub experiments: Vec<ObservedExperiment>,
     /// Whether it differs from the other cases by loads only: it then has the same
     /// derivatives with respect to the free numbers.
-    pub loaded_only: bool,
+    pub differs_by_loads_only: bool,
 }
 
-impl Case {
-    fn new(first: Observed) -> Case {
+impl ExperimentCase {
+    fn new(first: ObservedExperiment) -> ExperimentCase {
         let settings = first.experiment.settings.iter();
         let mut targets = settings.flat_map(|it| it.0.targets());
         let loaded_only = targets.all(|target| {
             let key = target.key();
             key.is_some_and(|key| key.path().starts_with("load."))
         });
-        Case {
-            observed: vec![first],
-            loaded_only,
+        ExperimentCase {
+            experiments: vec![first],
+            differs_by_loads_only: loaded_only,
         }
     }
 
-    fn first(&self) -> &Experiment {
-        &self.observed[0].experiment
+    fn first_experiment(&self) -> &Experiment {
+        &self.experiments[0].experiment
     }
 
     /// Numbers of the scenario under its conditions.
-    pub fn settings(&self) -> &[(Keys, f64)] {
-        &self.first().settings
+    pub fn settings(&self) -> &[(ParameterKeys, f64)] {
+        &self.first_experiment().settings
     }
 
-    pub fn measured(&self) -> impl Iterator<Item = &Measured> + Clone {
-        self.observed.iter().flat_map(|it| &it.experiment.measured)
+    pub fn measured_values(&self) -> impl Iterator<Item = &MeasuredValue> + Clone {
+        self.experiments
+            .iter()
+            .flat_map(|it| &it.experiment.measured)
     }
 
-    pub fn traced(&self) -> impl Iterator<Item = &Traced> + Clone {
-        self.observed.iter().flat_map(|it| &it.traced)
+    pub fn traced_points(&self) -> impl Iterator<Item = &TracedVeinPoint> + Clone {
+        self.experiments.iter().flat_map(|it| &it.traced)
     }
 
     /// The name of its first experiment.
     pub fn name(&self) -> &str {
-        &self.first().name
+        &self.first_experiment().name
     }
 
     /// The position of its first experiment in the data as the beginning of a message, if it
     /// has one.
-    pub fn place(&self) -> String {
-        let origin = self.first().origin.as_ref();
+    pub fn origin_prefix(&self) -> String {
+        let origin = self.first_experiment().origin.as_ref();
         origin.map_or_else(String::new, |origin| format!("{origin}: "))
     }
 }
 
 /// The conditions under which there are data. A leaf is relaxed for each of these, however many
 /// experiments there are.
-pub(super) fn cases(data: Data) -> Result<Vec<Case>, FitError> {
-    let mut cases: Vec<Case> = Vec::new();
+pub(super) fn experiment_cases(data: Data) -> Result<Vec<ExperimentCase>, FitError> {
+    let mut cases: Vec<ExperimentCase> = Vec::new();
     let mut known = HashMap::new();
-    for observed in observed(data)? {
+    for observed in observed_experiments(data)? {
         let bits = observed.experiment.settings.iter().map(|(keys, value)| {
             // Names identify keys.
             (keys.to_string(), value.to_bits())
         });
         let case = *known.entry(bits.collect::<Vec<_>>()).or_insert(cases.len());
         match cases.get_mut(case) {
-            Some(case) => case.observed.push(observed),
-            None => cases.push(Case::new(observed)),
+            Some(case) => case.experiments.push(observed),
+            None => cases.push(ExperimentCase::new(observed)),
         }
     }
     Ok(cases)
 }
 
 /// The experiments with data.
-fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
-    let observed = |experiment: Experiment| Observed {
+fn observed_experiments(data: Data) -> Result<Vec<ObservedExperiment>, FitError> {
+    let observed = |experiment: Experiment| ObservedExperiment {
         number: 0,
         experiment,
         traced: Vec::new(),
@@ -694,7 +713,7 @@ fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
     for (place, observed) in all.iter().enumerate() {
         let experiment = &observed.experiment;
         let first = *named.entry(experiment.name.clone()).or_insert(place);
-        check_alike(&all[first].experiment, experiment)?;
+        check_same_settings(&all[first].experiment, experiment)?;
     }
     let mut plain = None;
     for traced in data.traced {
@@ -726,7 +745,7 @@ fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
 
 /// Checks that two experiments of one name have the same settings: points on veins could
 /// belong to either.
-fn check_alike(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
+fn check_same_settings(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
     let settings = |of: &Experiment| {
         let settings = of.settings.iter();
         let named = settings.map(|(keys, value)| (keys.to_string(), *value));
@@ -735,7 +754,7 @@ fn check_alike(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
     if settings(one) == settings(other) {
         return Ok(());
     }
-    let place = |of: &Experiment| of.origin.as_ref().map(Origin::to_string);
+    let place = |of: &Experiment| of.origin.as_ref().map(DataOrigin::to_string);
     let [first, second] = [one, other].map(|of| place(of).unwrap_or_default());
     Err(FitError::Data(format!(
         "{second}: experiment {}: has that name from {first}, which has other settings: give each a \
@@ -746,7 +765,7 @@ fn check_alike(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
 
 /// A quantity that can be measured on a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum MeasuredQuantity {
     /// A coordinate of the shared tip, or of the only rod's: 0, 1, 2.
     Tip(usize),
     /// A component of the reaction at a held tip: 0, 1, 2.
@@ -757,23 +776,23 @@ pub enum Quantity {
     Frequency(usize),
 }
 
-impl Quantity {
+impl MeasuredQuantity {
     /// The quantities as words that can be followed by a plural.
     pub(super) const ALL: &str = "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, grip_1_x, ..., frequency_1, \
          frequency_2, ...";
 
-    pub(super) fn kind(self) -> Kind {
+    pub(super) fn dimension(self) -> DatumDimension {
         match self {
-            Quantity::Tip(_) => Kind::Length,
-            Quantity::Reaction(_) | Quantity::Grip(..) => Kind::Force,
-            Quantity::Frequency(_) => Kind::Frequency,
+            MeasuredQuantity::Tip(_) => DatumDimension::Length,
+            MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..) => DatumDimension::Force,
+            MeasuredQuantity::Frequency(_) => DatumDimension::Frequency,
         }
     }
 }
 
 /// Kinds of data, which can only be weighted relative to each other by their deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum DatumDimension {
     Length,
     /// Of photographs.
     Pixel,
@@ -781,23 +800,26 @@ pub(super) enum Kind {
     Frequency,
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
-impl FromStr for Quantity {
+impl FromStr for MeasuredQuantity {
     type Err = ();
 
     fn from_str(text: &str) -> Result<Self, ()> {
-        let axis = |axis: &str| AXES.iter().position(|name| *name == axis).ok_or(());
+        let axis = |axis: &str| AXIS_NAMES.iter().position(|name| *name == axis).ok_or(());
         match text.split_once('_') {
-            Some(("tip", at)) => Ok(Quantity::Tip(axis(at)?)),
-            Some(("reaction", at)) => Ok(Quantity::Reaction(axis(at)?)),
+            Some(("tip", at)) => Ok(MeasuredQuantity::Tip(axis(at)?)),
+            Some(("reaction", at)) => Ok(MeasuredQuantity::Reaction(axis(at)?)),
             Some(("grip", rest)) => {
                 let (number, at) = rest.split_once('_').ok_or(())?;
                 let number: usize = number.parse().map_err(|_| ())?;
-                Ok(Quantity::Grip(number.checked_sub(1).ok_or(())?, axis(at)?))
+                Ok(MeasuredQuantity::Grip(
+                    number.checked_sub(1).ok_or(())?,
+                    axis(at)?,
+                ))
             }
             Some(("frequency", mode)) => match mode.parse() {
-                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(Quantity::Frequency(mode)),
+                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(MeasuredQuantity::Frequency(mode)),
                 _ => Err(()),
             },
             _ => Err(()),
@@ -805,63 +827,77 @@ impl FromStr for Quantity {
     }
 }
 
-impl std::fmt::Display for Quantity {
+impl std::fmt::Display for MeasuredQuantity {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
-            Quantity::Tip(axis) => write!(f, "tip_{}", AXES[*axis]),
-            Quantity::Reaction(axis) => write!(f, "reaction_{}", AXES[*axis]),
-            Quantity::Grip(grip, axis) => write!(f, "grip_{}_{}", grip + 1, AXES[*axis]),
-            Quantity::Frequency(mode) => write!(f, "frequency_{mode}"),
+            MeasuredQuantity::Tip(axis) => write!(f, "tip_{}", AXIS_NAMES[*axis]),
+            MeasuredQuantity::Reaction(axis) => write!(f, "reaction_{}", AXIS_NAMES[*axis]),
+            MeasuredQuantity::Grip(grip, axis) => {
+                write!(f, "grip_{}_{}", grip + 1, AXIS_NAMES[*axis])
+            }
+            MeasuredQuantity::Frequency(mode) => write!(f, "frequency_{mode}"),
         }
     }
 }
 
 /// The coordinates that a point may have, by the names of their columns.
-pub(super) const COORDINATES: [&str; 5] = ["x", "y", "z", "pixel_x", "pixel_y"];
+pub(super) const COORDINATE_COLUMNS: [&str; 5] = ["x", "y", "z", "pixel_x", "pixel_y"];
 
 /// The first of those in a photograph.
-pub(super) const IN_PHOTO: usize = 3;
+pub(super) const FIRST_PHOTO_COORDINATE: usize = 3;
 
 /// The coordinates of a traced point, as far as they were seen.
-pub(super) type Seen = [Option<f64>; COORDINATES.len()];
+pub(super) type ObservedCoordinates = [Option<f64>; COORDINATE_COLUMNS.len()];
 
 /// How coordinates follow from positions: each is a . x + b.
-pub(super) struct View<'p> {
+pub(super) struct ObservationModel<'p> {
     photo: Option<&'p Photo>,
-    rows: [(DVec3, f64); COORDINATES.len()],
+    linear_forms: [(DVec3, f64); COORDINATE_COLUMNS.len()],
 }
 
-impl<'p> View<'p> {
+impl<'p> ObservationModel<'p> {
     pub fn new(photo: Option<&'p Photo>) -> Self {
         let nowhere = [(DVec3::ZERO, f64::NAN); 2];
         let [x, y] = photo.map_or(nowhere, Photo::projection);
         let rows = [(DVec3::X, 0.0), (DVec3::Y, 0.0), (DVec3::Z, 0.0), x, y];
-        View { photo, rows }
+        ObservationModel {
+            photo,
+            linear_forms: rows,
+        }
     }
 
     /// A coordinate of a point.
-    pub fn of(&self, coordinate: usize, point: DVec3) -> f64 {
-        let (row, offset) = self.rows[coordinate];
+    pub fn project_point(&self, coordinate: usize, point: DVec3) -> f64 {
+        let (row, offset) = self.linear_forms[coordinate];
         row.dot(point) + offset
     }
 
     /// The change of a coordinate as the point moves.
-    pub fn along(&self, coordinate: usize, change: DVec3) -> f64 {
-        self.rows[coordinate].0.dot(change)
+    pub fn project_displacement(&self, coordinate: usize, change: DVec3) -> f64 {
+        self.linear_forms[coordinate].0.dot(change)
     }
 
     /// The change of a coordinate of a point as its photograph changes.
-    pub fn rate(&self, coordinate: usize, point: DVec3, by: &PhotoRate) -> f64 {
-        match (self.photo, coordinate.checked_sub(IN_PHOTO)) {
+    pub fn photo_derivative(
+        &self,
+        coordinate: usize,
+        point: DVec3,
+        by: &PhotoParameterDerivative,
+    ) -> f64 {
+        match (self.photo, coordinate.checked_sub(FIRST_PHOTO_COORDINATE)) {
             (Some(photo), Some(axis)) => photo.rate(point, by)[axis],
             _ => 0.0,
         }
     }
 
     /// Where a traced point is in space, as far as that is known.
-    pub fn place(&self, seen: &Seen) -> [Option<f64>; 3] {
-        match (self.photo, seen[IN_PHOTO], seen[IN_PHOTO + 1]) {
-            (Some(photo), Some(x), Some(y)) => photo.place([x, y]),
+    pub fn position_in_space(&self, seen: &ObservedCoordinates) -> [Option<f64>; 3] {
+        match (
+            self.photo,
+            seen[FIRST_PHOTO_COORDINATE],
+            seen[FIRST_PHOTO_COORDINATE + 1],
+        ) {
+            (Some(photo), Some(x), Some(y)) => photo.point_at_pixel([x, y]),
             _ => [seen[0], seen[1], seen[2]],
         }
     }

@@ -2,163 +2,179 @@
 //!
 //! The results in words.
 
-use crate::numbers::two_digits;
-use crate::relax::Lost;
+use crate::numbers::format_two_digits;
+use crate::relax::ContinuationFailure;
 use crate::scenario::longest;
-use crate::study::Keys;
-use crate::study::fit::data::{Experiment, Kind, Observed};
-use crate::study::fit::lack_of_fit::{BEYOND, contradicts, misses};
-use crate::study::fit::least_squares::End;
-use crate::study::fit::model::{Compared, Model};
-use crate::study::fit::statistics::{OPEN, Statistics, sparse};
+use crate::study::ParameterKeys;
+use crate::study::fit::data::{DatumDimension, Experiment, ObservedExperiment};
+use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
+use crate::study::fit::least_squares::GaussNewtonOutcome;
+use crate::study::fit::model::{DatumQuantity, FitModel};
+use crate::study::fit::statistics::{FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis};
 use crate::study::fit::{
-    Coordinate, Fit, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork,
+    Fit, FitCoordinate, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork,
     lack_of_fit, statistics,
 };
 use std::collections::BTreeMap;
 
 /// Components of a weakly determined combination smaller than this part of its
 /// largest are left out.
-const NEGLIGIBLE: f64 = 0.1;
+const NEGLIGIBLE_COEFFICIENT: f64 = 0.1;
 
-pub(super) fn fit(
-    stats: &Statistics,
-    end: &End,
+pub(super) fn assemble_fit(
+    stats: &FitStatistics,
+    end: &GaussNewtonOutcome,
     mut parameters: Vec<FitParameter>,
     work: FitWork,
     wanted: &[Experiment],
 ) -> Fit {
     let base = stats.model.base;
     let coordinates = stats.model.coordinates;
-    let mut remarks = remarks(stats, end);
-    let contradicted = *end == End::Converged && contradicts(stats);
+    let mut remarks = fit_remarks(stats, end);
+    let contradicted = *end == GaussNewtonOutcome::Converged && data_contradict_model(stats);
     let open = match end {
-        End::Converged if !contradicted => open(stats, &parameters),
+        GaussNewtonOutcome::Converged if !contradicted => {
+            unidentifiable_combinations(stats, &parameters)
+        }
         // Away from a minimum, the data may be insensitive to other combinations.
         _ => Vec::new(),
     };
     let systematic = match end {
         // What the data leave open comes first.
-        End::Converged if open.is_empty() => lack_of_fit::systematic(stats),
+        GaussNewtonOutcome::Converged if open.is_empty() => {
+            lack_of_fit::systematic_residuals(stats)
+        }
         _ => None,
     };
-    let mut says = sentences(&parameters, &open, coordinates);
+    let mut says = result_sentences(&parameters, &open, coordinates);
     if let Some(found) = &systematic {
-        lack_of_fit::widen(stats, &mut parameters, found.widened);
+        lack_of_fit::widen_intervals(stats, &mut parameters, found.widened);
         // None of them is determined any more.
-        says = sentences(&parameters, &open, coordinates);
-        says.insert(0, lack_of_fit::sentence(stats, found));
+        says = result_sentences(&parameters, &open, coordinates);
+        says.insert(0, lack_of_fit::systematic_residuals_sentence(stats, found));
     }
     let outcome = match end {
-        End::Converged if contradicted => FitOutcome::Contradicted,
-        End::Converged if systematic.is_some() => FitOutcome::Systematic,
-        End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
+        GaussNewtonOutcome::Converged if contradicted => FitOutcome::Contradicted,
+        GaussNewtonOutcome::Converged if systematic.is_some() => FitOutcome::Systematic,
+        GaussNewtonOutcome::Converged
+            if open.is_empty() && parameters.iter().all(|p| p.determined) =>
+        {
             FitOutcome::Converged
         }
-        End::Converged => FitOutcome::Undetermined,
+        GaussNewtonOutcome::Converged => FitOutcome::UnidentifiableCombination,
         _ => FitOutcome::NotConverged,
     };
-    let candidates = match statistics::rank(stats, wanted) {
+    let candidates = match statistics::rank_candidate_experiments(stats, wanted) {
         Ok(candidates) => candidates,
         Err(refused) => {
             remarks.push(format!("candidates: {refused}"));
             Vec::new()
         }
     };
-    let values: Vec<(&Keys, f64)> = (coordinates.iter().zip(&stats.point.theta))
-        .filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))))
+    let values: Vec<(&ParameterKeys, f64)> = (coordinates.iter().zip(&stats.point.theta))
+        .filter_map(|(free, theta)| {
+            Some((free.number.scenario_keys()?, free.inverse_transform(*theta)))
+        })
         .collect();
     Fit {
         scenario: base.scenario().name.clone(),
         outcome,
         remarks,
         correlations: stats.correlations(),
-        undetermined: open.iter().map(|open| map(open, coordinates)).collect(),
+        undetermined: open
+            .iter()
+            .map(|open| combination_by_key(open, coordinates))
+            .collect(),
         alternatives: Vec::new(),
         tried: Vec::new(),
         systematic,
         says,
         parameters,
-        chi_squared: match stats.known {
+        chi_squared: match stats.has_known_deviations {
             true => stats.residuals.norm_squared(),
             // In units of the deviation estimated from the residuals.
-            false => stats.residuals.norm_squared() / stats.spread.powi(2).max(f64::MIN_POSITIVE),
+            false => {
+                stats.residuals.norm_squared()
+                    / stats.residual_deviation.powi(2).max(f64::MIN_POSITIVE)
+            }
         },
-        degrees_of_freedom: stats.freedom,
-        coverage_factor: stats.quantile,
-        standard_deviation: (!stats.known).then_some(stats.spread * stats.weighting.assumed),
+        degrees_of_freedom: stats.degrees_of_freedom,
+        coverage_factor: stats.coverage_factor,
+        standard_deviation: (!stats.has_known_deviations)
+            .then_some(stats.residual_deviation * stats.weighting.assumed_deviation),
         files: Vec::new(),
-        experiments: experiments(stats),
-        residuals: compared(stats),
+        experiments: fit_experiments(stats),
+        residuals: fit_residuals(stats),
         candidates,
         work: FitWork {
-            last: Model::work(stats.point),
+            last: FitModel::solver_work(stats.point),
             ..work
         },
         wall_seconds: 0.0,
         fitted: base.toml(&values).unwrap_or_default(),
-        leaves: leaves(stats),
+        leaves: fitted_leaves(stats),
     }
 }
 
-fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
+fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<String> {
     let mut remarks = Vec::new();
     match end {
-        End::Converged => {}
+        GaussNewtonOutcome::Converged => {}
         // That is said at the end.
-        End::UsedUp => {}
-        End::MostSteps => remarks.push(
+        GaussNewtonOutcome::BudgetExhausted => {}
+        GaussNewtonOutcome::StepLimit => remarks.push(
             "the step limit came before the minimum: start from values nearer to it".into(),
         ),
-        End::Stuck(Some(Lost::Elsewhere)) => remarks.push(
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => remarks.push(
             "the way to smaller residuals ends where a leaf jumps to another equilibrium, and is not \
              followed there: start from other values, or leave out experiments beyond the jump"
                 .into(),
         ),
-        End::Stuck(Some(Lost::NotAtRest(why))) => {
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::NotAtRest(why))) => {
             remarks.push(format!("the way to smaller residuals ends: {why}"));
         }
-        End::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
+        GaussNewtonOutcome::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
     }
     for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
-        if let Some(bound) = free.at_bound(*theta) {
-            let (number, bound) = (&free.number, free.value(bound));
-            remarks.push(match free.bounded {
+        if let Some(bound) = free.active_bound(*theta) {
+            let (number, bound) = (&free.number, free.inverse_transform(bound));
+            remarks.push(match free.has_given_bounds {
                 true => format!("{number} is at its bound {bound}"),
                 false => format!("{number} went as far as {bound:.3e}, and was let no farther"),
             });
         }
     }
-    remarks.extend(other_units(stats));
-    if stats.freedom == 0 {
+    remarks.extend(unit_mismatch_remarks(stats));
+    if stats.degrees_of_freedom == 0 {
         remarks
             .push("there are as many numbers as data: nothing is left to judge the fit by".into());
     }
-    if stats.known && stats.suspicious() {
+    if stats.has_known_deviations && stats.has_excessive_residuals() {
         remarks.push(format!(
             "chi squared is {:.3e} for {} degrees of freedom: the standard deviations are not \
              those of these data, or the model is not that of this leaf, or this minimum is not the lowest",
             stats.residuals.norm_squared(),
-            stats.freedom
+            stats.degrees_of_freedom
         ));
     }
     remarks
 }
 
 /// Data that are probably in other units than the scenario.
-fn other_units(stats: &Statistics) -> Vec<String> {
+fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
     let base = stats.model.base;
     let longest = longest(&base.scenario().rods);
     let (mut beyond, mut missed) = (0, 0);
-    for component in misses(stats) {
-        match component.what.kind() == Kind::Length {
-            true if component.observed.abs() > BEYOND * longest => beyond += 1,
+    for component in data_far_from_model(stats) {
+        match component.quantity.dimension() == DatumDimension::Length {
+            true if component.observed.abs() > FAR_FROM_BASE * longest => beyond += 1,
             true => missed += 1,
             false => {}
         }
     }
     let mut components = stats.point.components();
-    let frequencies = components.any(|component| component.what.kind() == Kind::Frequency);
+    let frequencies =
+        components.any(|component| component.quantity.dimension() == DatumDimension::Frequency);
     let mut remarks = Vec::new();
     let are = |count: usize| if count == 1 { "is" } else { "are" };
     if beyond > 0 {
@@ -176,8 +192,8 @@ fn other_units(stats: &Statistics) -> Vec<String> {
         ));
     }
     let given = |key: &str| {
-        let keys = key.parse::<Keys>();
-        keys.is_ok_and(|keys| base.at(&[(&keys, 1.0)]).is_ok())
+        let keys = key.parse::<ParameterKeys>();
+        keys.is_ok_and(|keys| base.scenario_with_values(&[(&keys, 1.0)]).is_ok())
     };
     if frequencies
         && !["scale:dynamics.density", "scale:section.mass_density"]
@@ -195,39 +211,54 @@ fn other_units(stats: &Statistics) -> Vec<String> {
 
 /// Undetermined combinations: those to which the data are insensitive, in their sparsest form,
 /// and those with an uncertainty of more than a factor of ten.
-fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
-    let mut open: Vec<Undetermined> =
-        sparse(&stats.directions.columns(0, stats.insensitive).into_owned())
-            .into_iter()
-            .map(|parts| Undetermined {
-                parts,
-                exactly: true,
-            })
-            .collect();
-    for direction in stats.insensitive..stats.values.len() {
-        if stats.quantile * stats.spread / stats.values[direction] > OPEN {
-            let v = stats.directions.column(direction);
+fn unidentifiable_combinations(
+    stats: &FitStatistics,
+    parameters: &[FitParameter],
+) -> Vec<UnidentifiableCombination> {
+    let mut open: Vec<UnidentifiableCombination> = sparse_basis(
+        &stats
+            .singular_directions
+            .columns(0, stats.insensitive_count)
+            .into_owned(),
+    )
+    .into_iter()
+    .map(|parts| UnidentifiableCombination {
+        coefficients: parts,
+        is_exact: true,
+    })
+    .collect();
+    for direction in stats.insensitive_count..stats.singular_values.len() {
+        if stats.coverage_factor * stats.residual_deviation / stats.singular_values[direction]
+            > UNDETERMINED_UNCERTAINTY
+        {
+            let v = stats.singular_directions.column(direction);
             let largest = v.amax();
             let sign = v
                 .iter()
                 .find(|part| part.abs() == largest)
                 .map_or(1.0, |p| p.signum());
             let parts = v.iter().map(|part| sign * part / largest).enumerate();
-            let parts: Vec<_> = parts.filter(|(_, part)| part.abs() > NEGLIGIBLE).collect();
+            let parts: Vec<_> = parts
+                .filter(|(_, part)| part.abs() > NEGLIGIBLE_COEFFICIENT)
+                .collect();
             // Of a number alone its profile decides.
             if !matches!(parts[..], [(k, _)] if parameters[k].determined) {
                 let exactly = false;
-                open.push(Undetermined { parts, exactly });
+                open.push(UnidentifiableCombination {
+                    coefficients: parts,
+                    is_exact: exactly,
+                });
             }
         }
     }
     // A number whose profile alone has no end.
     for (k, parameter) in parameters.iter().enumerate() {
-        let named = |open: &Undetermined| open.parts.iter().any(|(part, _)| *part == k);
+        let named =
+            |open: &UnidentifiableCombination| open.coefficients.iter().any(|(part, _)| *part == k);
         if !parameter.determined && !open.iter().any(named) {
-            open.push(Undetermined {
-                parts: vec![(k, 1.0)],
-                exactly: false,
+            open.push(UnidentifiableCombination {
+                coefficients: vec![(k, 1.0)],
+                is_exact: false,
             });
         }
     }
@@ -235,15 +266,15 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
 }
 
 /// The experiments in the order of the data, which that of the leaves need not be.
-fn observed<'s>(stats: &'s Statistics) -> Vec<&'s Observed> {
+fn experiments_in_data_order<'s>(stats: &'s FitStatistics) -> Vec<&'s ObservedExperiment> {
     let cases = stats.model.cases.iter();
-    let mut observed: Vec<_> = cases.flat_map(|case| &case.observed).collect();
+    let mut observed: Vec<_> = cases.flat_map(|case| &case.experiments).collect();
     observed.sort_by_key(|it| it.number);
     observed
 }
 
-fn experiments(stats: &Statistics) -> Vec<FitExperiment> {
-    let experiment = |observed: &Observed| {
+fn fit_experiments(stats: &FitStatistics) -> Vec<FitExperiment> {
+    let experiment = |observed: &ObservedExperiment| {
         let settings = observed.experiment.settings.iter();
         FitExperiment {
             experiment: observed.experiment.name.clone(),
@@ -252,28 +283,35 @@ fn experiments(stats: &Statistics) -> Vec<FitExperiment> {
                 .collect(),
         }
     };
-    observed(stats).into_iter().map(experiment).collect()
+    experiments_in_data_order(stats)
+        .into_iter()
+        .map(experiment)
+        .collect()
 }
 
-fn compared(stats: &Statistics) -> Vec<FitResidual> {
-    let mut all: Vec<_> = stats.point.components().zip(stats.bands()).collect();
+fn fit_residuals(stats: &FitStatistics) -> Vec<FitResidual> {
+    let mut all: Vec<_> = stats
+        .point
+        .components()
+        .zip(stats.confidence_bands())
+        .collect();
     all.sort_by_key(|(component, _)| component.experiment);
-    let observed = observed(stats);
+    let observed = experiments_in_data_order(stats);
     let of = |number: usize| {
         let found = observed.binary_search_by_key(&number, |it| it.number);
         found.map_or_else(|_| String::new(), |at| observed[at].experiment.name.clone())
     };
     all.into_iter()
         .map(|(component, band)| {
-            let sd = stats.sd(component);
-            let (rod, sigma) = match component.what {
-                Compared::Result(_) => (None, None),
-                Compared::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
+            let sd = stats.datum_deviation(component);
+            let (rod, sigma) = match component.quantity {
+                DatumQuantity::Result(_) => (None, None),
+                DatumQuantity::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
             };
             FitResidual {
                 experiment: of(component.experiment),
                 number: component.experiment + 1,
-                what: component.what.column(),
+                what: component.quantity.column(),
                 rod,
                 sigma,
                 data: component.observed,
@@ -286,10 +324,10 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
         .collect()
 }
 
-fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
+fn fitted_leaves(stats: &FitStatistics) -> Vec<(String, FitLeaf)> {
     let mut leaves = Vec::new();
-    for (case, at) in stats.model.cases.iter().zip(&stats.point.cases) {
-        let Some(finest) = at.at.levels.last() else {
+    for (case, at) in stats.model.cases.iter().zip(&stats.point.case_solutions) {
+        let Some(finest) = at.equilibrium.levels.last() else {
             continue;
         };
         let length = finest.leaf.leaf.scale.length;
@@ -297,15 +335,15 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
         let curves = finest.state.x.chunks(nodes);
         let curves = curves.map(|rod| rod.iter().map(|x| *x * length).collect());
         let curves: Vec<_> = curves.collect();
-        let view = at.view();
-        for observed in &case.observed {
+        let view = at.observation_model();
+        for observed in &case.experiments {
             let traced = observed.traced.iter();
             let leaf = FitLeaf {
                 number: observed.number + 1,
                 settings: observed.experiment.settings.clone(),
                 curves: curves.clone(),
                 traced: { traced }
-                    .map(|traced| (traced.rod, view.place(&traced.at)))
+                    .map(|traced| (traced.rod, view.position_in_space(&traced.coordinates)))
                     .collect(),
             };
             leaves.push((observed.number, observed.experiment.name.clone(), leaf));
@@ -317,22 +355,29 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
 }
 
 /// An undetermined combination: coordinates and their coefficients.
-pub(super) struct Undetermined {
+pub(super) struct UnidentifiableCombination {
     /// Index of the free number, and its coefficient; the largest is one.
-    pub parts: Vec<(usize, f64)>,
+    pub coefficients: Vec<(usize, f64)>,
     /// Whether the data are completely insensitive to it, or only weakly sensitive.
-    pub exactly: bool,
+    pub is_exact: bool,
 }
 
 /// The combination in the form of the result.
-pub(super) fn map(open: &Undetermined, free: &[Coordinate]) -> BTreeMap<String, f64> {
-    let part =
-        |&(k, part): &(usize, f64)| (free[k].number.to_string(), rounded(part * free[k].unit));
-    open.parts.iter().map(part).collect()
+pub(super) fn combination_by_key(
+    open: &UnidentifiableCombination,
+    free: &[FitCoordinate],
+) -> BTreeMap<String, f64> {
+    let part = |&(k, part): &(usize, f64)| {
+        (
+            free[k].number.to_string(),
+            round_coefficient(part * free[k].unit),
+        )
+    };
+    open.coefficients.iter().map(part).collect()
 }
 
 /// Removes rounding errors from a simple number.
-fn rounded(value: f64) -> f64 {
+fn round_coefficient(value: f64) -> f64 {
     let digits = (value * 1e4).round() / 1e4;
     if (digits - value).abs() < 1e-4 * value.abs().max(1e-3) {
         digits
@@ -342,13 +387,13 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Smaller coefficients would be written as zero.
-const UNWRITTEN: f64 = 5e-3;
+const SMALLEST_WRITTEN_COEFFICIENT: f64 = 5e-3;
 
 /// A sentence for each number and each undetermined combination.
-pub(super) fn sentences(
+pub(super) fn result_sentences(
     parameters: &[FitParameter],
-    open: &[Undetermined],
-    free: &[Coordinate],
+    open: &[UnidentifiableCombination],
+    free: &[FitCoordinate],
 ) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
@@ -358,19 +403,19 @@ pub(super) fn sentences(
         };
         let half = 0.5 * (high - low);
         let key = &parameter.key;
-        said.push(match free[k].log {
-            true => format!("{key}: to {}", percent(half / parameter.value.abs())),
-            false => format!("{key}: to {}", two_digits(half)),
+        said.push(match free[k].is_logarithmic {
+            true => format!("{key}: to {}", format_percent(half / parameter.value.abs())),
+            false => format!("{key}: to {}", format_two_digits(half)),
         });
     }
-    said.extend(parameters.iter().flat_map(lost));
+    said.extend(parameters.iter().flat_map(unknown_endpoint_sentences));
     for open in open {
-        said.push(sentence(open, parameters, free));
+        said.push(combination_sentence(open, parameters, free));
     }
     said
 }
 
-fn percent(part: f64) -> String {
+fn format_percent(part: f64) -> String {
     match 100.0 * part {
         percent if percent >= 10.0 => format!("{percent:.0} %"),
         percent if percent >= 0.1 => format!("{percent:.1} %"),
@@ -378,41 +423,63 @@ fn percent(part: f64) -> String {
     }
 }
 
-fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate]) -> String {
+fn combination_sentence(
+    open: &UnidentifiableCombination,
+    parameters: &[FitParameter],
+    free: &[FitCoordinate],
+) -> String {
     let key = |k: usize| parameters[k].key.as_str();
-    let parts = open.parts.iter().copied();
-    let parts: Vec<_> = parts.filter(|(_, part)| part.abs() >= UNWRITTEN).collect();
-    let all_logs = parts.iter().all(|(k, _)| free[*k].log);
+    let parts = open.coefficients.iter().copied();
+    let parts: Vec<_> = parts
+        .filter(|(_, part)| part.abs() >= SMALLEST_WRITTEN_COEFFICIENT)
+        .collect();
+    let all_logs = parts.iter().all(|(k, _)| free[*k].is_logarithmic);
     match parts.as_slice() {
-        [(k, _)] if open.exactly => format!("{}: not at all", key(*k)),
+        [(k, _)] if open.is_exact => format!("{}: not at all", key(*k)),
         [(k, _)] if is_at_bound(&parameters[*k], &free[*k]) => format!(
             "{}: not, as it stands at its bound {}",
             key(*k),
-            digits(parameters[*k].value)
+            round_to_three_digits(parameters[*k].value)
         ),
         [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
             _ if parameters[*k].lost.iter().any(Option::is_some) => {
                 format!("{}: not known, as an end of its interval is not", key(*k))
             }
-            (Some(low), None) => format!("{}: only that it is above {}", key(*k), two_digits(low)),
+            (Some(low), None) => format!(
+                "{}: only that it is above {}",
+                key(*k),
+                format_two_digits(low)
+            ),
             (None, Some(high)) => {
-                format!("{}: only that it is below {}", key(*k), two_digits(high))
+                format!(
+                    "{}: only that it is below {}",
+                    key(*k),
+                    format_two_digits(high)
+                )
             }
             _ => format!("{}: hardly, to no better than a factor of ten", key(*k)),
         },
         [(a, one), (b, two)] if all_logs && (one.abs() - two.abs()).abs() < 1e-3 => {
             let only = if one * two > 0.0 { "ratio" } else { "product" };
-            let how = if open.exactly { "" } else { "nearly " };
+            let how = if open.is_exact { "" } else { "nearly " };
             format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
             // Of numbers that are not logarithms the combination is the tangent.
-            let change = |(k, part): &(usize, f64)| match free[*k].log {
-                true => format!("{} in proportion to t^{}", key(*k), short(*part)),
-                false => format!("{} by {} ln t", key(*k), digits(part * free[*k].unit)),
+            let change = |(k, part): &(usize, f64)| match free[*k].is_logarithmic {
+                true => format!(
+                    "{} in proportion to t^{}",
+                    key(*k),
+                    format_two_decimals(*part)
+                ),
+                false => format!(
+                    "{} by {} ln t",
+                    key(*k),
+                    round_to_three_digits(part * free[*k].unit)
+                ),
             };
             let changes: Vec<String> = parts.iter().map(change).collect();
-            let unseen = if open.exactly {
+            let unseen = if open.is_exact {
                 "unseen"
             } else {
                 "hardly seen"
@@ -424,9 +491,9 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
 }
 
 /// Which ends of an interval are not known.
-fn lost(parameter: &FitParameter) -> Vec<String> {
+fn unknown_endpoint_sentences(parameter: &FitParameter) -> Vec<String> {
     let sides = parameter.lost.iter().zip(["below", "above"]);
-    let lost = sides.filter_map(|(lost, side)| Some((digits((*lost)?), side)));
+    let lost = sides.filter_map(|(lost, side)| Some((round_to_three_digits((*lost)?), side)));
     lost.map(|(lost, side)| {
         format!(
             "{}: where its interval ends {side} is not known: held beyond {lost}, the other numbers \
@@ -438,17 +505,17 @@ fn lost(parameter: &FitParameter) -> Vec<String> {
 }
 
 /// Whether a number stands at a bound that was given.
-fn is_at_bound(parameter: &FitParameter, free: &Coordinate) -> bool {
-    let bounds = free.bounds.map(|bound| free.value(bound));
-    free.bounded && bounds.contains(&parameter.value)
+fn is_at_bound(parameter: &FitParameter, free: &FitCoordinate) -> bool {
+    let bounds = free.bounds.map(|bound| free.inverse_transform(bound));
+    free.has_given_bounds && bounds.contains(&parameter.value)
 }
 
 /// Three significant digits.
-pub(super) fn digits(value: f64) -> f64 {
+pub(super) fn round_to_three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 
-fn short(value: f64) -> String {
+fn format_two_decimals(value: f64) -> String {
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').into()
 }
@@ -459,13 +526,13 @@ mod tests {
 
     /// What is said of a combination of logarithms.
     fn said(parts: &[(&str, f64)]) -> String {
-        let coordinate = |(key, _): &(&str, f64)| Coordinate {
+        let coordinate = |(key, _): &(&str, f64)| FitCoordinate {
             number: key.parse().unwrap(),
-            log: true,
+            is_logarithmic: true,
             unit: 1.0,
             bounds: [f64::NEG_INFINITY, f64::INFINITY],
-            bounded: false,
-            start: 0.0,
+            has_given_bounds: false,
+            initial: 0.0,
         };
         let parameter = |(key, _): &(&str, f64)| FitParameter {
             key: (*key).into(),
@@ -477,14 +544,14 @@ mod tests {
             profiled: false,
             lost: [None; 2],
         };
-        let free: Vec<Coordinate> = parts.iter().map(coordinate).collect();
+        let free: Vec<FitCoordinate> = parts.iter().map(coordinate).collect();
         let parameters: Vec<FitParameter> = parts.iter().map(parameter).collect();
         let coefficients = parts.iter().map(|part| part.1).enumerate();
-        let open = Undetermined {
-            parts: coefficients.collect(),
-            exactly: true,
+        let open = UnidentifiableCombination {
+            coefficients: coefficients.collect(),
+            is_exact: true,
         };
-        sentence(&open, &parameters, &free)
+        combination_sentence(&open, &parameters, &free)
     }
 
     #[test]

@@ -9,34 +9,34 @@
 //! Whether the data contradict the model at a minimum.
 
 use crate::scenario::longest;
-use crate::study::fit::data::{Kind, Quantity};
-use crate::study::fit::model::{Compared, Component};
-use crate::study::fit::statistics::Statistics;
-use crate::study::fit::{FitParameter, FitSystematic, FreeNumber};
+use crate::study::fit::data::{DatumDimension, MeasuredQuantity};
+use crate::study::fit::model::{DatumQuantity, ScalarDatum};
+use crate::study::fit::statistics::FitStatistics;
+use crate::study::fit::{FitParameter, FreeParameterTarget, SystematicResiduals};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
 /// The level of the test: so often residuals of a true model are called systematic.
-const LEVEL: f64 = 5e-3;
+const SIGNIFICANCE_LEVEL: f64 = 5e-3;
 
 /// Where deviations are given, the p-value below which residuals are smooth beside the others.
-const SMOOTH: f64 = 0.05;
+const SMOOTH_RESIDUALS_P_VALUE: f64 = 0.05;
 
 /// Below this p-value the rest of the residuals is too large for the standard deviations that are given, and
 /// takes their place.
-const TOO_LARGE: f64 = 0.01;
+const LARGE_RESIDUALS_P_VALUE: f64 = 0.01;
 
 /// The least standard deviation of data, in assumed ones: below it errors of the equilibria decide.
-const LEAST_DEVIATION: f64 = 1e-2;
+const LEAST_RELATIVE_DEVIATION: f64 = 1e-2;
 
 /// Of a cosine at least this part is not explained by free numbers and the cosines before it.
-const INDEPENDENT: f64 = 0.1;
+const LEAST_INDEPENDENT_FRACTION: f64 = 0.1;
 
 /// Largest number of cosines of all series.
-const MOST: usize = 48;
+const MOST_COSINES: usize = 48;
 
 /// The number of cosines of a series of so many data.
-fn cosines(data: usize) -> usize {
+fn cosine_count(data: usize) -> usize {
     match data {
         0..=3 => 0,
         4..=5 => 1,
@@ -48,20 +48,20 @@ fn cosines(data: usize) -> usize {
 }
 
 /// The systematic part of the residuals of a minimum, if there is one that is significant.
-pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
-    let series = series(stats);
-    let roots = stats.weighting.roots(&stats.residuals);
+pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicResiduals> {
+    let series = data_series(stats);
+    let roots = stats.weighting.weight_roots(&stats.residuals);
     let residuals = stats.residuals.component_mul(&roots);
-    let mut basis: Vec<DVector<f64>> = (stats.insensitive..stats.values.len())
-        .map(|k| (&stats.jacobian * stats.directions.column(k)) / stats.values[k])
+    let mut basis: Vec<DVector<f64>> = (stats.insensitive_count..stats.singular_values.len())
+        .map(|k| (&stats.jacobian * stats.singular_directions.column(k)) / stats.singular_values[k])
         .collect();
     let explained = basis.len();
-    let most = MOST.min(stats.freedom / 2);
+    let most = MOST_COSINES.min(stats.degrees_of_freedom / 2);
     // By ascending frequency, so that a limit leaves out the highest.
     let mut energies = vec![0.0; series.len()];
-    for frequency in 0..cosines(usize::MAX) {
+    for frequency in 0..cosine_count(usize::MAX) {
         for (energy, (_, places)) in energies.iter_mut().zip(&series) {
-            if frequency >= cosines(places.len()) || basis.len() - explained >= most {
+            if frequency >= cosine_count(places.len()) || basis.len() - explained >= most {
                 continue;
             }
             let mut wave = DVector::zeros(residuals.len());
@@ -78,7 +78,7 @@ pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
                 }
             }
             let left = wave.norm();
-            if left > INDEPENDENT {
+            if left > LEAST_INDEPENDENT_FRACTION {
                 wave /= left;
                 *energy += wave.dot(&residuals).powi(2);
                 basis.push(wave);
@@ -86,29 +86,33 @@ pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
         }
     }
     let count = basis.len() - explained;
-    let rest = stats.freedom.checked_sub(count).filter(|rest| *rest > 0)?;
+    let rest = stats
+        .degrees_of_freedom
+        .checked_sub(count)
+        .filter(|rest| *rest > 0)?;
     if count == 0 {
         return None;
     }
     let smooth: f64 = energies.iter().sum();
     let scattered = (residuals.norm_squared() - smooth).max(0.0) / rest as f64;
-    let is_as_given = stats.known && tail(scattered, rest, None) > TOO_LARGE;
+    let is_as_given = stats.has_known_deviations
+        && f_distribution_tail(scattered, rest, None) > LARGE_RESIDUALS_P_VALUE;
     // Deviations that are given too small make all residuals too large, and none of them smooth.
-    let among_residuals = tail(smooth / count as f64 / scattered, count, Some(rest));
+    let among_residuals = f_distribution_tail(smooth / count as f64 / scattered, count, Some(rest));
     let p_value = match is_as_given {
-        true if among_residuals > SMOOTH => return None,
-        true => tail(smooth / count as f64, count, None),
+        true if among_residuals > SMOOTH_RESIDUALS_P_VALUE => return None,
+        true => f_distribution_tail(smooth / count as f64, count, None),
         false => {
-            let least = if stats.known {
+            let least = if stats.has_known_deviations {
                 1.0
             } else {
-                LEAST_DEVIATION.powi(2)
+                LEAST_RELATIVE_DEVIATION.powi(2)
             };
             let ratio = smooth / count as f64 / scattered.max(least);
-            tail(ratio, count, Some(rest))
+            f_distribution_tail(ratio, count, Some(rest))
         }
     };
-    if p_value >= LEVEL {
+    if p_value >= SIGNIFICANCE_LEVEL {
         return None;
     }
     let mut along: Vec<String> = Vec::new();
@@ -121,37 +125,37 @@ pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
             along.push(name.clone());
         }
     }
-    Some(FitSystematic {
+    Some(SystematicResiduals {
         p_value,
         along,
         // As if all of it were one error.
-        widened: (smooth.sqrt() / stats.spread).max(1.0),
+        widened: (smooth.sqrt() / stats.residual_deviation).max(1.0),
     })
 }
 
 /// The data in series, by their places among all, each with a name: results in the order of the experiments
 /// and in that of their predictions, points of a vein from its base to its tip.
-fn series(stats: &Statistics) -> Vec<(String, Vec<usize>)> {
+fn data_series(stats: &FitStatistics) -> Vec<(String, Vec<usize>)> {
     let components: Vec<_> = stats.point.components().collect();
     let mut all: BTreeMap<(String, usize, usize), Vec<usize>> = BTreeMap::new();
     for (place, component) in components.iter().enumerate() {
         // Normal to a vein a point has one residual, along it none.
-        if component.free {
+        if component.is_uninformative {
             continue;
         }
-        let column = component.what.column();
-        let key = match component.what {
-            Compared::Result(_) => (column, 0, 0),
-            Compared::Vein { rod, .. } => (column, component.experiment + 1, rod + 1),
+        let column = component.quantity.column();
+        let key = match component.quantity {
+            DatumQuantity::Result(_) => (column, 0, 0),
+            DatumQuantity::Vein { rod, .. } => (column, component.experiment + 1, rod + 1),
         };
         all.entry(key).or_default().push(place);
     }
     let mut found = Vec::new();
     for ((column, experiment, rod), mut places) in all {
         if experiment > 0 {
-            let sigma = |place: &usize| match components[*place].what {
-                Compared::Vein { sigma, .. } => sigma,
-                Compared::Result(_) => 0.0,
+            let sigma = |place: &usize| match components[*place].quantity {
+                DatumQuantity::Vein { sigma, .. } => sigma,
+                DatumQuantity::Result(_) => 0.0,
             };
             places.sort_by(|a, b| sigma(a).total_cmp(&sigma(b)));
             found.push((format!("{column} of vein {rod}"), places));
@@ -171,13 +175,13 @@ fn series(stats: &Statistics) -> Vec<(String, Vec<usize>)> {
 
 /// Widens the intervals of numbers, none of which is then determined. Standard errors stay those of
 /// independent errors, as covariances and bands are.
-pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64) {
+pub(super) fn widen_intervals(stats: &FitStatistics, parameters: &mut [FitParameter], by: f64) {
     let all = parameters.iter_mut().zip(stats.model.coordinates);
     for ((parameter, free), theta) in all.zip(&stats.point.theta) {
         let [low, high] = free.bounds;
         let end = |end: f64| {
-            let wider = theta + by * (free.of(end) - theta);
-            free.value(wider.clamp(low, high))
+            let wider = theta + by * (free.transform(end) - theta);
+            free.inverse_transform(wider.clamp(low, high))
         };
         parameter.low = parameter.low.map(end);
         parameter.high = parameter.high.map(end);
@@ -186,7 +190,10 @@ pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64
 }
 
 /// What the model may lack, in words.
-pub(super) fn sentence(stats: &Statistics, found: &FitSystematic) -> String {
+pub(super) fn systematic_residuals_sentence(
+    stats: &FitStatistics,
+    found: &SystematicResiduals,
+) -> String {
     let along = found.along.join(", ");
     let cases = stats.model.cases.iter();
     let mut settings = cases.flat_map(|case| case.settings());
@@ -195,7 +202,7 @@ pub(super) fn sentence(stats: &Statistics, found: &FitSystematic) -> String {
         let name = keys.to_string();
         let free = stats.model.coordinates.iter();
         let mut free = free.map(|free| &free.number);
-        let is_free = free.any(|free: &FreeNumber| free.is_offset_of(keys));
+        let is_free = free.any(|free: &FreeParameterTarget| free.is_offset_of(keys));
         (name.starts_with("tip.position") || name.contains(".move")) && !is_free
     });
     let slack = match moved {
@@ -211,10 +218,13 @@ pub(super) fn sentence(stats: &Statistics, found: &FitSystematic) -> String {
 
 /// The probability that a mean square with some degrees of freedom is at least `ratio` times that of others,
 /// or of their known expectation (Abramowitz and Stegun, 26.6.2 and 26.5.8).
-fn tail(ratio: f64, freedom: usize, of: Option<usize>) -> f64 {
+fn f_distribution_tail(ratio: f64, freedom: usize, of: Option<usize>) -> f64 {
     /// So many degrees of freedom have no uncertainty.
-    const KNOWN: f64 = 1e6;
-    let [one, other] = [freedom as f64, of.map_or(KNOWN, |of| of as f64)];
+    const INFINITE_DEGREES_OF_FREEDOM: f64 = 1e6;
+    let [one, other] = [
+        freedom as f64,
+        of.map_or(INFINITE_DEGREES_OF_FREEDOM, |of| of as f64),
+    ];
     if !ratio.is_finite() {
         return if ratio > 0.0 { 0.0 } else { 1.0 };
     }
@@ -269,41 +279,50 @@ fn log_gamma(z: f64) -> f64 {
 
 /// Coordinates this far from the fitted leaf, in lengths of the longest rod, are hardly those of
 /// this leaf under these loads; and this far from the base, not of any leaf of this length.
-const MISSED: f64 = 0.5;
+const FAR_FROM_MODEL: f64 = 0.5;
 
-pub(super) const BEYOND: f64 = 3.0;
+pub(super) const FAR_FROM_BASE: f64 = 3.0;
 
 /// Data that are far from the model: coordinates by a part of the leaf's length, and frequencies by
 /// that part of the larger one.
-pub(super) fn misses<'s>(stats: &'s Statistics) -> impl Iterator<Item = &'s Component> {
+pub(super) fn data_far_from_model<'s>(
+    stats: &'s FitStatistics,
+) -> impl Iterator<Item = &'s ScalarDatum> {
     let longest = longest(&stats.model.base.scenario().rods);
-    let pixel = stats.model.pixel();
+    let pixel = stats.model.initial_pixel_length();
     stats.point.components().filter(move |component| {
         let (data, model) = (component.observed.abs(), component.model.abs());
-        let size = match component.what {
-            Compared::Vein { .. } if component.what.kind() == Kind::Pixel => longest / pixel,
-            Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
-            Compared::Result(Quantity::Frequency(_)) => data.max(model),
-            Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => f64::INFINITY,
+        let size = match component.quantity {
+            DatumQuantity::Vein { .. }
+                if component.quantity.dimension() == DatumDimension::Pixel =>
+            {
+                longest / pixel
+            }
+            DatumQuantity::Vein { .. } | DatumQuantity::Result(MeasuredQuantity::Tip(_)) => longest,
+            DatumQuantity::Result(MeasuredQuantity::Frequency(_)) => data.max(model),
+            DatumQuantity::Result(MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..)) => {
+                f64::INFINITY
+            }
         };
-        let beyond = component.what.kind() == Kind::Length && data > BEYOND * longest;
-        beyond || (component.observed - component.model).abs() > MISSED * size
+        let beyond = component.quantity.dimension() == DatumDimension::Length
+            && data > FAR_FROM_BASE * longest;
+        beyond || (component.observed - component.model).abs() > FAR_FROM_MODEL * size
     })
 }
 
 /// Whether the residuals are those of a model that does not describe the data: beyond what their
 /// standard deviations allow, or, without these, as large as the leaf.
-pub(super) fn contradicts(stats: &Statistics) -> bool {
-    let robust = stats.weighting.robust;
-    if stats.known && !robust {
-        return stats.suspicious();
+pub(super) fn data_contradict_model(stats: &FitStatistics) -> bool {
+    let robust = stats.weighting.is_robust;
+    if stats.has_known_deviations && !robust {
+        return stats.has_excessive_residuals();
     }
     // A robust fit has outliers.
     let permitted = match robust {
         true => stats.residuals.len() / 2,
         false => 0,
     };
-    misses(stats).count() > permitted
+    data_far_from_model(stats).count() > permitted
 }
 
 #[cfg(test)]
@@ -321,7 +340,7 @@ mod tests {
             (2.706, 1, None, 0.1),
             (124.342 / 100.0, 100, None, 0.05),
         ] {
-            let found = tail(ratio, freedom, of);
+            let found = f_distribution_tail(ratio, freedom, of);
             assert!((found / wanted - 1.0).abs() < 2e-2, "{ratio}: {found}");
         }
     }

@@ -7,84 +7,89 @@
 //!
 //! The search for a minimum near a start.
 
-use crate::relax::{Grids, Lost};
+use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::data::Experiment;
-use crate::study::fit::intervals::BETTER;
-use crate::study::fit::minima::{misfit, sum};
-use crate::study::fit::model::{Model, Point};
-use crate::study::fit::statistics::{NULL, Statistics, singular};
+use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
+use crate::study::fit::minima::{relative_misfit, sum_of_squares};
+use crate::study::fit::model::{FitModel, FitPoint};
+use crate::study::fit::statistics::{
+    FitStatistics, NULL_SINGULAR_VALUE, singular_value_decomposition,
+};
 use crate::study::fit::{
-    Fit, FitError, FitStep, FitWork, LONGEST_STEP, found, intervals, lack_of_fit,
+    Fit, FitError, FitStep, FitWork, LONGEST_COORDINATE_STEP, found, intervals, lack_of_fit,
 };
 use nalgebra::{DMatrix, DVector};
 
 /// Largest number of steps of an iteration.
-const MOST_STEPS: usize = 100;
+const MOST_GAUSS_NEWTON_STEPS: usize = 100;
 
 /// The initial radius of the trust region, in logarithms or units, and the least one.
-const FIRST_STEP: f64 = 0.7;
+const INITIAL_TRUST_RADIUS: f64 = 0.7;
 
-const LEAST_STEP: f64 = 1e-12;
+const LEAST_TRUST_RADIUS: f64 = 1e-12;
 
 /// A smaller step ends the iteration; and a point from which the longest step is
 /// expected to gain no more than this part of one datum's variance.
-const STEP: f64 = 1e-9;
+const CONVERGED_STEP: f64 = 1e-9;
 
-const GAIN: f64 = 1e-7;
+const CONVERGED_GAIN: f64 = 1e-7;
 
 /// Gains below this part of the variance may be errors of the equilibria: two in
 /// succession end the iteration, and so does a loss.
-const ACCURACY: f64 = 1e-2;
+const SUM_OF_SQUARES_ACCURACY: f64 = 1e-2;
 
 /// A minimum is rejected if the longest step was expected to gain more than this part.
-const WORTHWHILE: f64 = 0.1;
+const REMAINING_GAIN_LIMIT: f64 = 0.1;
 
 /// The part of the way to a sum that the longest step must be expected to lead, and that of the
 /// way back to a known minimum that it may lead.
-const PROMISING: f64 = 0.5;
+const EXPECTED_PROGRESS: f64 = 0.5;
 
-const RETURNING: f64 = 0.5;
+const RETURN_TO_KNOWN_MINIMUM: f64 = 0.5;
 
 /// Bisections for the damping that shortens a step.
-const BISECTIONS: usize = 40;
+const DAMPING_BISECTIONS: usize = 40;
 
 /// Least variance of residuals in units of the assumed deviation: equilibria are not more
 /// accurate.
 const LEAST_VARIANCE: f64 = 1e-6;
 
 /// Tuning constant of Huber's weights: 95 % efficient for normal errors.
-const HUBER: f64 = 1.345;
+const HUBER_TUNING_CONSTANT: f64 = 1.345;
 
 /// The standard deviation assumed if none is known, in lengths of the
 /// leaf, until it is estimated from the residuals.
-pub(super) const ASSUMED: f64 = 1e-3;
+pub(super) const ASSUMED_RELATIVE_DEVIATION: f64 = 1e-3;
 
-/// As [`NULL`], for the less accurate derivatives of the search.
-const NULL_OF_SEARCH: f64 = 3e-7;
+/// As [`NULL_SINGULAR_VALUE`], for the less accurate derivatives of the search.
+const NULL_SINGULAR_VALUE_SEARCH: f64 = 3e-7;
 
 /// Weights of residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighting {
     /// Replaces unknown standard deviations.
-    pub assumed: f64,
+    pub assumed_deviation: f64,
     /// Whether large residuals have smaller weights.
-    pub robust: bool,
+    pub is_robust: bool,
 }
 
 impl Weighting {
     /// Residuals divided by their standard deviations.
-    pub fn residuals(&self, point: &Point) -> DVector<f64> {
+    pub fn residuals(&self, point: &FitPoint) -> DVector<f64> {
         let components = point.components();
-        let residual = components.map(|c| (c.model - c.observed) / c.sd.unwrap_or(self.assumed));
+        let residual =
+            components.map(|c| (c.model - c.observed) / c.sd.unwrap_or(self.assumed_deviation));
         DVector::from_vec(residual.collect())
     }
 
     /// Their derivatives; zero if they are not known.
-    pub fn jacobian(&self, point: &Point) -> DMatrix<f64> {
+    pub fn jacobian(&self, point: &FitPoint) -> DMatrix<f64> {
         let components = point.components();
-        let sd: Vec<f64> = components.map(|c| c.sd.unwrap_or(self.assumed)).collect();
-        let rows = point.cases.iter().flat_map(|case| {
-            let components = 0..case.components.len();
+        let sd: Vec<f64> = components
+            .map(|c| c.sd.unwrap_or(self.assumed_deviation))
+            .collect();
+        let rows = point.case_solutions.iter().flat_map(|case| {
+            let components = 0..case.scalar_data.len();
             components.map(|i| case.gradients.get(i))
         });
         let rows: Vec<Option<&Vec<f64>>> = rows.collect();
@@ -93,12 +98,12 @@ impl Weighting {
     }
 
     /// Square roots of the weights of residuals, and derivatives times these.
-    pub fn weighted(
+    pub fn apply_weights(
         &self,
-        point: &Point,
+        point: &FitPoint,
         residuals: &DVector<f64>,
     ) -> (DVector<f64>, DMatrix<f64>) {
-        let (roots, mut jacobian) = (self.roots(residuals), self.jacobian(point));
+        let (roots, mut jacobian) = (self.weight_roots(residuals), self.jacobian(point));
         for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
             row *= *root;
         }
@@ -107,11 +112,11 @@ impl Weighting {
 
     /// Square roots of the weights of residuals: less than one beyond Huber's
     /// bound, in units of the spread of all.
-    pub fn roots(&self, residuals: &DVector<f64>) -> DVector<f64> {
-        if !self.robust {
+    pub fn weight_roots(&self, residuals: &DVector<f64>) -> DVector<f64> {
+        if !self.is_robust {
             return DVector::from_element(residuals.len(), 1.0);
         }
-        let bound = HUBER * spread(residuals);
+        let bound = HUBER_TUNING_CONSTANT * median_deviation(residuals);
         residuals.map(|r| match r.abs() > bound {
             true => (bound / r.abs()).sqrt(),
             false => 1.0,
@@ -119,21 +124,21 @@ impl Weighting {
     }
 
     /// The sum of their squares, linear beyond Huber's bound.
-    pub fn sum(&self, residuals: &DVector<f64>, bound: f64) -> f64 {
-        let term = |r: &f64| match self.robust && r.abs() > bound {
+    pub fn huber_sum(&self, residuals: &DVector<f64>, bound: f64) -> f64 {
+        let term = |r: &f64| match self.is_robust && r.abs() > bound {
             true => bound * (2.0 * r.abs() - bound),
             false => r * r,
         };
         residuals.iter().map(term).sum()
     }
 
-    pub fn bound(&self, residuals: &DVector<f64>) -> f64 {
-        HUBER * spread(residuals)
+    pub fn huber_bound(&self, residuals: &DVector<f64>) -> f64 {
+        HUBER_TUNING_CONSTANT * median_deviation(residuals)
     }
 }
 
 /// The standard deviation of normal variables, from the median of their magnitudes.
-fn spread(residuals: &DVector<f64>) -> f64 {
+fn median_deviation(residuals: &DVector<f64>) -> f64 {
     let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
@@ -142,144 +147,157 @@ fn spread(residuals: &DVector<f64>) -> f64 {
 
 /// How an iteration ended.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum End {
+pub(super) enum GaussNewtonOutcome {
     Converged,
-    MostSteps,
+    StepLimit,
     /// The budget of evaluations is used up.
-    UsedUp,
+    BudgetExhausted,
     /// No further step succeeds; with the reason of the last failure.
-    Stuck(Option<Lost>),
+    Stuck(Option<ContinuationFailure>),
 }
 
 /// A known minimum, besides which another one is searched.
-pub(super) struct Besides<'t> {
+pub(super) struct ExcludedMinimum<'t> {
     pub theta: &'t [f64],
     /// The largest sum of another minimum that fits as well.
-    pub most: f64,
+    pub largest_sum: f64,
     /// The distance at which the search begins.
     pub distance: f64,
 }
 
-impl Besides<'_> {
+impl ExcludedMinimum<'_> {
     /// Whether a step hardly leads to such a minimum: the sum that is expected after it is too large
     /// still, or it leads back to the known minimum.
-    fn is_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
-        let returns = change(self.theta, theta).norm() < RETURNING * self.distance;
-        returns || expected - self.most > (1.0 - PROMISING) * (sum - self.most).max(0.0)
+    fn is_step_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
+        let returns =
+            coordinate_change(self.theta, theta).norm() < RETURN_TO_KNOWN_MINIMUM * self.distance;
+        returns
+            || expected - self.largest_sum
+                > (1.0 - EXPECTED_PROGRESS) * (sum - self.largest_sum).max(0.0)
     }
 }
 
-pub(super) struct Iteration<'m, 'a> {
-    pub model: &'m Model<'a>,
+pub(super) struct GaussNewtonIteration<'m, 'a> {
+    pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
     /// Coordinates that are held fixed.
     pub held: Vec<bool>,
     pub most_steps: usize,
     /// Gain that the longest step may still promise at the end, as a part of a datum's variance.
-    pub enough: f64,
+    pub gain_tolerance: f64,
     /// Whether the derivatives of the previous point may be used for the last one, if that is a
     /// minimum by them.
-    pub lean: bool,
+    pub reuses_derivatives: bool,
     /// A minimum besides which another one is searched that fits as well.
-    pub besides: Option<Besides<'m>>,
+    pub excluded_minimum: Option<ExcludedMinimum<'m>>,
     /// The values tried from the last point at which a leaf would have had to jump, the farthest first.
     pub jumps: Vec<Vec<f64>>,
     /// Called with the number of the step and the sum.
     pub progress: &'m mut dyn FnMut(usize, f64),
 }
 
-impl<'m, 'a> Iteration<'m, 'a> {
+impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     pub fn new(
-        model: &'m Model<'a>,
+        model: &'m FitModel<'a>,
         weighting: Weighting,
         progress: &'m mut dyn FnMut(usize, f64),
     ) -> Self {
-        Iteration {
+        GaussNewtonIteration {
             model,
             weighting,
             held: vec![false; model.coordinates.len()],
-            most_steps: MOST_STEPS,
-            enough: GAIN,
-            lean: false,
-            besides: None,
+            most_steps: MOST_GAUSS_NEWTON_STEPS,
+            gain_tolerance: CONVERGED_GAIN,
+            reuses_derivatives: false,
+            excluded_minimum: None,
             jumps: Vec::new(),
             progress,
         }
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, mut point: Point) -> (Point, End, usize) {
-        if let Err(lost) = self.model.differentiate(&mut point) {
-            return (point, End::Stuck(Some(lost)), 0);
+    pub fn run(&mut self, mut point: FitPoint) -> (FitPoint, GaussNewtonOutcome, usize) {
+        if let Err(lost) = self.model.differentiate_data(&mut point) {
+            return (point, GaussNewtonOutcome::Stuck(Some(lost)), 0);
         }
-        let mut radius = FIRST_STEP;
+        let mut radius = INITIAL_TRUST_RADIUS;
         let mut evaluations = 0;
         let mut small = 0;
         for step in 0..self.most_steps {
             let residuals = self.weighting.residuals(&point);
-            let bound = self.weighting.bound(&residuals);
-            let sum = self.weighting.sum(&residuals, bound);
+            let bound = self.weighting.huber_bound(&residuals);
+            let sum = self.weighting.huber_sum(&residuals, bound);
             (self.progress)(step, sum);
-            let linear = self.linear(&point, &residuals);
-            let variance = linear.variance(&point, sum);
-            let longest = self.clamped(&point.theta, &linear.step(LONGEST_STEP));
-            let open = linear.gain(&change(&point.theta, &longest));
-            if open < self.enough * variance {
-                return (point, End::Converged, evaluations);
+            let linear = self.linearize_residuals(&point, &residuals);
+            let variance = linear.datum_variance(&point, sum);
+            let longest = self.bounded_update(
+                &point.theta,
+                &linear.trust_region_step(LONGEST_COORDINATE_STEP),
+            );
+            let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
+            if open < self.gain_tolerance * variance {
+                return (point, GaussNewtonOutcome::Converged, evaluations);
             }
-            let besides = self.besides.as_ref();
-            if besides.is_some_and(|it| it.is_hopeless(sum - open, sum, &longest)) {
-                return (point, End::Stuck(None), evaluations);
+            let besides = self.excluded_minimum.as_ref();
+            if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
+                return (point, GaussNewtonOutcome::Stuck(None), evaluations);
             }
             self.jumps.clear();
-            let nearly = open < ACCURACY * variance;
+            let nearly = open < SUM_OF_SQUARES_ACCURACY * variance;
             let mut lost = None;
             loop {
-                let theta = self.clamped(&point.theta, &linear.step(radius));
-                let change = change(&point.theta, &theta);
-                let (size, predicted) = (change.norm(), linear.gain(&change));
-                let end = |lost: Option<Lost>| match open > WORTHWHILE * variance {
-                    true => End::Stuck(lost),
-                    false => End::Converged,
+                let theta = self.bounded_update(&point.theta, &linear.trust_region_step(radius));
+                let change = coordinate_change(&point.theta, &theta);
+                let (size, predicted) = (change.norm(), linear.expected_reduction(&change));
+                let end = |lost: Option<ContinuationFailure>| match open
+                    > REMAINING_GAIN_LIMIT * variance
+                {
+                    true => GaussNewtonOutcome::Stuck(lost),
+                    false => GaussNewtonOutcome::Converged,
                 };
                 let number = size.is_finite() && predicted.is_finite();
-                let worth = size >= STEP && predicted >= GAIN * variance && radius >= LEAST_STEP;
+                let worth = size >= CONVERGED_STEP
+                    && predicted >= CONVERGED_GAIN * variance
+                    && radius >= LEAST_TRUST_RADIUS;
                 if !number || !worth {
                     return (point, end(lost), evaluations);
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, End::UsedUp, evaluations);
+                    return (point, GaussNewtonOutcome::BudgetExhausted, evaluations);
                 }
                 evaluations += 1;
-                match self.model.follow(&point, &theta) {
+                match self.model.continue_leaves(&point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
-                        let gained = sum - self.weighting.sum(&found, bound);
-                        if self.lean && gained > 0.0 && self.is_minimum(&point, &theta, &found) {
+                        let gained = sum - self.weighting.huber_sum(&found, bound);
+                        if self.reuses_derivatives
+                            && gained > 0.0
+                            && self.is_minimum(&point, &theta, &found)
+                        {
                             trial.take_gradients(&mut point);
-                            return (trial, End::Converged, evaluations);
+                            return (trial, GaussNewtonOutcome::Converged, evaluations);
                         }
-                        if gained > 0.0 && self.model.differentiate(&mut trial).is_ok() {
+                        if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
                             if ratio < 0.25 {
                                 radius = 0.5 * size;
                             } else if ratio > 0.75 {
-                                radius = radius.max(2.0 * size).min(LONGEST_STEP);
+                                radius = radius.max(2.0 * size).min(LONGEST_COORDINATE_STEP);
                             }
                             point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, End::Converged, evaluations);
+                                return (point, GaussNewtonOutcome::Converged, evaluations);
                             }
                             break;
                         }
                         if nearly {
-                            return (point, End::Converged, evaluations);
+                            return (point, GaussNewtonOutcome::Converged, evaluations);
                         }
                         lost = None;
                     }
                     Err(why) => {
-                        if why == Lost::Elsewhere {
+                        if why == ContinuationFailure::OtherEquilibrium {
                             self.jumps.push(theta);
                         }
                         lost = Some(why);
@@ -288,44 +306,50 @@ impl<'m, 'a> Iteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, End::MostSteps, evaluations)
+        (point, GaussNewtonOutcome::StepLimit, evaluations)
     }
 
     /// The linearised residuals in the coordinates that may move.
-    fn linear(&self, point: &Point, residuals: &DVector<f64>) -> Linear {
-        let (roots, mut jacobian) = self.weighting.weighted(point, residuals);
+    fn linearize_residuals(
+        &self,
+        point: &FitPoint,
+        residuals: &DVector<f64>,
+    ) -> LinearizedResiduals {
+        let (roots, mut jacobian) = self.weighting.apply_weights(point, residuals);
         let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
-        let active = self.active(point, &gradient);
+        let active = self.movable_coordinates(point, &gradient);
         for k in (0..active.len()).filter(|&k| !active[k]) {
             jacobian.column_mut(k).fill(0.0);
         }
-        let (values, directions) = singular(&jacobian);
+        let (values, directions) = singular_value_decomposition(&jacobian);
         let slopes = directions.tr_mul(&gradient);
         let null = match self.model.grids {
-            Grids::AsNeeded => NULL,
-            Grids::These => NULL_OF_SEARCH,
+            GridPolicy::AsNeeded => NULL_SINGULAR_VALUE,
+            GridPolicy::These => NULL_SINGULAR_VALUE_SEARCH,
         };
         let least = null * values.last().copied().unwrap_or(0.0);
-        Linear {
-            insensitive: values.iter().filter(|value| **value <= least).count(),
+        LinearizedResiduals {
+            insensitive_count: values.iter().filter(|value| **value <= least).count(),
             slopes,
-            values,
-            directions,
+            singular_values: values,
+            singular_directions: directions,
         }
     }
 
     /// Whether residuals at `theta` are minimal by the derivatives at a point, up to what is
     /// significant.
-    fn is_minimum(&self, point: &Point, theta: &[f64], residuals: &DVector<f64>) -> bool {
-        let bound = self.weighting.bound(residuals);
-        let linear = self.linear(point, residuals);
-        let variance = linear.variance(point, self.weighting.sum(residuals, bound));
-        let longest = self.clamped(theta, &linear.step(LONGEST_STEP));
-        linear.gain(&change(theta, &longest)) < self.enough * variance
+    fn is_minimum(&self, point: &FitPoint, theta: &[f64], residuals: &DVector<f64>) -> bool {
+        let bound = self.weighting.huber_bound(residuals);
+        let linear = self.linearize_residuals(point, residuals);
+        let variance = linear.datum_variance(point, self.weighting.huber_sum(residuals, bound));
+        let longest =
+            self.bounded_update(theta, &linear.trust_region_step(LONGEST_COORDINATE_STEP));
+        linear.expected_reduction(&coordinate_change(theta, &longest))
+            < self.gain_tolerance * variance
     }
 
     /// Coordinates that may move: neither held, nor pushed against a bound by the gradient.
-    fn active(&self, point: &Point, gradient: &DVector<f64>) -> Vec<bool> {
+    fn movable_coordinates(&self, point: &FitPoint, gradient: &DVector<f64>) -> Vec<bool> {
         let coordinates = self.model.coordinates.iter().enumerate();
         coordinates
             .map(|(k, free)| {
@@ -338,35 +362,35 @@ impl<'m, 'a> Iteration<'m, 'a> {
             .collect()
     }
 
-    fn clamped(&self, theta: &[f64], change: &DVector<f64>) -> Vec<f64> {
-        let shorten = (LONGEST_STEP / change.amax()).min(1.0);
-        self.model.moved(theta, shorten, change)
+    fn bounded_update(&self, theta: &[f64], change: &DVector<f64>) -> Vec<f64> {
+        let shorten = (LONGEST_COORDINATE_STEP / change.amax()).min(1.0);
+        self.model.bounded_update(theta, shorten, change)
     }
 }
 
-fn change(from: &[f64], to: &[f64]) -> DVector<f64> {
+fn coordinate_change(from: &[f64], to: &[f64]) -> DVector<f64> {
     DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
 }
 
 /// Weighted residuals, linearised, along their singular directions.
-struct Linear {
+struct LinearizedResiduals {
     /// Singular values, ascending, and their directions as columns.
-    values: Vec<f64>,
-    directions: DMatrix<f64>,
+    singular_values: Vec<f64>,
+    singular_directions: DMatrix<f64>,
     /// Derivatives of half the sum of squares along these.
     slopes: DVector<f64>,
     /// Number of directions, the first ones, to which the data are insensitive; they stay fixed.
-    insensitive: usize,
+    insensitive_count: usize,
 }
 
-impl Linear {
+impl LinearizedResiduals {
     /// The variance of a datum, in units of its assumed one.
-    fn variance(&self, point: &Point, sum: f64) -> f64 {
-        let sensitive = self.values.len() - self.insensitive;
+    fn datum_variance(&self, point: &FitPoint, sum: f64) -> f64 {
+        let sensitive = self.singular_values.len() - self.insensitive_count;
         let mut count = 0_usize;
         let mut known = true;
         for component in point.components() {
-            count += usize::from(!component.free);
+            count += usize::from(!component.is_uninformative);
             known &= component.sd.is_some();
         }
         match known {
@@ -376,11 +400,11 @@ impl Linear {
     }
 
     /// The step within a radius that minimises the sum of squares.
-    fn step(&self, radius: f64) -> DVector<f64> {
+    fn trust_region_step(&self, radius: f64) -> DVector<f64> {
         let along = |damping: f64| {
-            let part = |k: usize, slope: f64| match k < self.insensitive {
+            let part = |k: usize, slope: f64| match k < self.insensitive_count {
                 true => 0.0,
-                false => -slope / (self.values[k].powi(2) + damping),
+                false => -slope / (self.singular_values[k].powi(2) + damping),
             };
             let parts = self.slopes.iter().enumerate();
             DVector::from_iterator(self.slopes.len(), parts.map(|(k, slope)| part(k, *slope)))
@@ -389,7 +413,7 @@ impl Linear {
         if parts.norm() > radius {
             // The length decreases with the damping.
             let (mut low, mut high) = (0.0, self.slopes.norm() / radius);
-            for _ in 0..BISECTIONS {
+            for _ in 0..DAMPING_BISECTIONS {
                 let middle = match low > 0.0 {
                     true => f64::sqrt(low * high),
                     false => 1e-4 * high,
@@ -401,41 +425,43 @@ impl Linear {
             }
             parts = along(high);
         }
-        &self.directions * parts
+        &self.singular_directions * parts
     }
 
     /// The expected reduction of the sum of squares by a step.
-    fn gain(&self, step: &DVector<f64>) -> f64 {
-        let parts = self.directions.tr_mul(step);
+    fn expected_reduction(&self, step: &DVector<f64>) -> f64 {
+        let parts = self.singular_directions.tr_mul(step);
         let terms = parts.iter().enumerate();
         terms
-            .map(|(k, part)| -part * (2.0 * self.slopes[k] + self.values[k].powi(2) * part))
+            .map(|(k, part)| {
+                -part * (2.0 * self.slopes[k] + self.singular_values[k].powi(2) * part)
+            })
             .sum()
     }
 }
 
 /// Largest number of minima abandoned for better ones.
-const MOST_MINIMA: usize = 4;
+const MOST_MINIMA_ABANDONED: usize = 4;
 
 /// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
-const MOST_JUMPS: usize = 3;
+const MOST_EQUILIBRIUM_JUMPS: usize = 3;
 
 /// If the standard deviation of the data is estimated from the residuals, the largest ratio of
 /// that of the search to it: a larger one is due to coarse grids.
-const SAME_SPREAD: f64 = 1.05;
+const CONSISTENT_DEVIATION_RATIO: f64 = 1.05;
 
 /// Remark if a leaf did not stay on its branch.
-const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to which it \
+const EQUILIBRIUM_JUMP_REMARK: &str = "on the way a leaf jumped to another equilibrium, that to which it \
     relaxes from the start: compare with a fit that starts from the values found";
 
 /// A minimum, or where the search for it ended.
-pub(super) struct Minimum {
+pub(super) struct FitMinimum {
     pub fit: Fit,
     pub theta: Vec<f64>,
     /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
     pub sum: f64,
     pub variance: f64,
-    pub significant: f64,
+    pub significant_excess: f64,
     pub converged: bool,
     /// Root mean square of the residuals, relative to the size of the data.
     pub misfit: f64,
@@ -444,9 +470,9 @@ pub(super) struct Minimum {
     pub beyond_window: bool,
 }
 
-impl Minimum {
+impl FitMinimum {
     /// Whether this is the better answer. A minimum is not left for values that are none.
-    pub fn is_preferred_to(&self, other: &Minimum) -> bool {
+    pub fn is_preferred_to(&self, other: &FitMinimum) -> bool {
         match self.converged == other.converged {
             true => self.sum < other.sum,
             false => self.converged,
@@ -454,37 +480,37 @@ impl Minimum {
     }
 
     /// This minimum as one besides which another is searched from these values.
-    pub fn besides(&self, theta: &[f64]) -> Besides<'_> {
+    pub fn exclude_from(&self, theta: &[f64]) -> ExcludedMinimum<'_> {
         let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
-        Besides {
+        ExcludedMinimum {
             theta: &self.theta,
-            most: self.sum + self.significant,
+            largest_sum: self.sum + self.significant_excess,
             distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
         }
     }
 }
 
 /// The search for a minimum near a start.
-pub(super) struct Search<'m, 'a> {
-    pub model: &'m Model<'a>,
+pub(super) struct LocalFitSearch<'m, 'a> {
+    pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
     /// Whether the standard deviations of the data are known.
-    pub known: bool,
+    pub has_known_deviations: bool,
     pub candidates: &'m [Experiment],
     /// Largest number of steps to a minimum.
     pub most_steps: usize,
 }
 
-impl<'m, 'a> Search<'m, 'a> {
+impl<'m, 'a> LocalFitSearch<'m, 'a> {
     /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
     /// there.
     pub fn run(
         &self,
-        first: &Point,
+        first: &FitPoint,
         progress: &mut dyn FnMut(&FitStep),
-    ) -> Result<Minimum, FitError> {
+    ) -> Result<FitMinimum, FitError> {
         let (model, weighting) = (self.model, self.weighting);
-        let (mut coarse, mut point) = model.coarse(first, weighting)?;
+        let (mut coarse, mut point) = model.coarse_model(first, weighting)?;
         let mut work = FitWork::default();
         let mut attempts = 0;
         let mut jumps = 0;
@@ -499,78 +525,86 @@ impl<'m, 'a> Search<'m, 'a> {
                     budget: None,
                 });
             };
-            let mut search = Iteration::new(&coarse, weighting, &mut searching);
+            let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
             search.most_steps = search.most_steps.min(self.most_steps);
             let (near, searched, more) = search.run(point);
             work.evaluations += more;
             attempts += 1;
-            let there = model.follow(&near, &near.theta);
-            let there = there.or_else(|_| model.find(&near.theta))?;
-            let mut last = Iteration::new(model, weighting, &mut searching);
-            last.lean = true;
+            let there = model.continue_leaves(&near, &near.theta);
+            let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
+            let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
+            last.reuses_derivatives = true;
             last.most_steps = last.most_steps.min(self.most_steps);
             let (mut least, end, more) = last.run(there);
             work.evaluations += 1 + more;
             work.accurate += 1 + more;
-            let is_lost = end == End::Stuck(Some(Lost::Elsewhere));
+            let is_lost =
+                end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
             if is_lost
-                && jumps < MOST_JUMPS
-                && let Some(there) = model.beyond(&last.jumps, &least, weighting)
+                && jumps < MOST_EQUILIBRIUM_JUMPS
+                && let Some(there) = model.relax_beyond_jump(&last.jumps, &least, weighting)
             {
                 jumps += 1;
                 attempts -= 1;
-                (coarse, point) = model.coarse(&there, weighting)?;
+                (coarse, point) = model.coarse_model(&there, weighting)?;
                 continue;
             }
-            let of_search = Statistics::new(&coarse, weighting, self.known, &near);
-            let spread = self.statistics(&least).spread;
-            let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
-            if !same && end == End::Converged {
+            let of_search =
+                FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
+            let spread = self.statistics(&least).residual_deviation;
+            let same = searched == GaussNewtonOutcome::Converged
+                && of_search.residual_deviation < CONSISTENT_DEVIATION_RATIO * spread;
+            if !same && end == GaussNewtonOutcome::Converged {
                 // Its neighbourhood is computed with its own leaves.
-                let differentiated = model.differentiate(&mut least);
-                differentiated.map_err(|lost| model.no_equilibrium(&near.theta, 0, &lost))?;
+                let differentiated = model.differentiate_data(&mut least);
+                differentiated.map_err(|lost| model.no_equilibrium_error(&near.theta, 0, &lost))?;
             }
             let stats = self.statistics(&least);
             let shape = if same { &of_search } else { &stats };
-            let contradicted = lack_of_fit::contradicts(&stats);
+            let contradicted = lack_of_fit::data_contradict_model(&stats);
             let parameters = match end {
-                End::Converged if !contradicted => intervals::intervals(&stats, shape, progress),
-                _ => Ok(intervals::without_intervals(&stats)),
+                GaussNewtonOutcome::Converged if !contradicted => {
+                    intervals::parameters_with_intervals(&stats, shape, progress)
+                }
+                _ => Ok(intervals::parameters_without_intervals(&stats)),
             };
             let (end, parameters) = match parameters {
                 Ok(parameters) => (end, parameters),
-                Err(better) if attempts < MOST_MINIMA => {
+                Err(better) if attempts < MOST_MINIMA_ABANDONED => {
                     point = better;
                     continue;
                 }
-                Err(_) => (End::MostSteps, intervals::without_intervals(&stats)),
+                Err(_) => (
+                    GaussNewtonOutcome::StepLimit,
+                    intervals::parameters_without_intervals(&stats),
+                ),
             };
-            break Minimum {
-                fit: found::fit(&stats, &end, parameters, work, self.candidates),
-                sum: sum(weighting, stats.point),
-                variance: stats.spread.powi(2),
-                significant: (stats.quantile * stats.spread).powi(2),
-                converged: end == End::Converged,
-                misfit: misfit(model, stats.point),
+            break FitMinimum {
+                fit: found::assemble_fit(&stats, &end, parameters, work, self.candidates),
+                sum: sum_of_squares(weighting, stats.point),
+                variance: stats.residual_deviation.powi(2),
+                significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
+                converged: end == GaussNewtonOutcome::Converged,
+                misfit: relative_misfit(model, stats.point),
                 beyond_window: falls_beyond_window(&stats),
                 theta: stats.point.theta.clone(),
             };
         };
         if jumps > 0 {
-            found.fit.remarks.push(JUMPED.into());
+            found.fit.remarks.push(EQUILIBRIUM_JUMP_REMARK.into());
         }
         Ok(found)
     }
 
-    fn statistics<'p>(&'p self, point: &'p Point) -> Statistics<'p, 'a> {
-        Statistics::new(self.model, self.weighting, self.known, point)
+    fn statistics<'p>(&'p self, point: &'p FitPoint) -> FitStatistics<'p, 'a> {
+        FitStatistics::new(self.model, self.weighting, self.has_known_deviations, point)
     }
 }
 
 /// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
 /// than chance.
-fn falls_beyond_window(stats: &Statistics) -> bool {
-    let weighed = stats.weighting.roots(&stats.residuals);
+fn falls_beyond_window(stats: &FitStatistics) -> bool {
+    let weighed = stats.weighting.weight_roots(&stats.residuals);
     let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
     let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
     coordinates.enumerate().any(|(k, (free, theta))| {
@@ -578,8 +612,10 @@ fn falls_beyond_window(stats: &Statistics) -> bool {
         let slope = slopes[k];
         let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
         let bend = stats.jacobian.column(k).norm_squared();
-        let step = (slope.abs() / bend).min(LONGEST_STEP);
+        let step = (slope.abs() / bend).min(LONGEST_COORDINATE_STEP);
         let gain = step * (2.0 * slope.abs() - bend * step);
-        !free.bounded && outwards && gain > BETTER * stats.spread.powi(2)
+        !free.has_given_bounds
+            && outwards
+            && gain > BETTER_MINIMUM_EXCESS * stats.residual_deviation.powi(2)
     })
 }

@@ -6,13 +6,16 @@
 
 use crate::run::Instant;
 use crate::scenario::longest;
-use crate::study::fit::data::{Experiment, Kind, Quantity};
-use crate::study::fit::intervals::BETTER;
-use crate::study::fit::least_squares::{Besides, End, Iteration, Minimum, Search, Weighting};
-use crate::study::fit::model::{Compared, Model, Point};
-use crate::study::fit::statistics::OPEN;
+use crate::study::fit::data::{DatumDimension, Experiment, MeasuredQuantity};
+use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
+use crate::study::fit::least_squares::{
+    ExcludedMinimum, FitMinimum, GaussNewtonIteration, GaussNewtonOutcome, LocalFitSearch,
+    Weighting,
+};
+use crate::study::fit::model::{DatumQuantity, FitModel, FitPoint};
+use crate::study::fit::statistics::UNDETERMINED_UNCERTAINTY;
 use crate::study::fit::{
-    Coordinate, Fit, FitAlternative, FitError, FitOutcome, FitParameter, FitStep,
+    Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
 };
 use rayon::prelude::*;
 use std::cell::Cell;
@@ -20,50 +23,50 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Root mean square of the residuals, relative to the size of the data, beyond which initial values
 /// say nothing of the minimum: they are searched in decades first.
-const FAR: f64 = 0.25;
+const POOR_INITIAL_MISFIT: f64 = 0.25;
 
 /// The same of a minimum, beyond which the data would be less accurate than measurements are.
-const COARSE: f64 = 0.05;
+const POOR_MINIMUM_MISFIT: f64 = 0.05;
 
 /// Largest number of searches from other values, and of values from which each begins.
 const MOST_SEARCHES: usize = 3;
 
-const MOST_STARTS: usize = 4;
+const MOST_STARTS_PER_SEARCH: usize = 4;
 
 /// Largest number of steps to another minimum.
-const FEW_STEPS: usize = 30;
+const MOST_STEPS_TO_ALTERNATIVE: usize = 30;
 
 /// Relative difference of values that are the same.
-const SAME: f64 = 1e-3;
+const SAME_VALUES_TOLERANCE: f64 = 1e-3;
 
 /// Where a search begins.
-pub(super) struct Beginning {
-    pub point: Point,
+pub(super) struct FitStart {
+    pub point: FitPoint,
     /// The values of the scenario, if it does not begin there although all leaves come to rest.
-    initial: Option<Point>,
+    initial: Option<FitPoint>,
     /// Why it does not begin at the values of the scenario, or what was tried.
     remark: Option<String>,
     /// How often the leaves were relaxed to find it.
     evaluations: usize,
 }
 
-impl Beginning {
+impl FitStart {
     /// The values of the scenario, if all leaves come to rest there and the data are not far from
     /// them; otherwise the best ones in decades around them, or near them.
     /// `told` is called with the time in seconds that the first leaves took.
-    pub fn find(
-        model: &Model,
+    pub fn choose_start(
+        model: &FitModel,
         weighting: Weighting,
         told: &mut dyn FnMut(f64),
-    ) -> Result<Beginning, FitError> {
-        let start: Vec<f64> = model.coordinates.iter().map(|free| free.start).collect();
-        let loose = model.with_loose_tolerance(weighting.assumed);
+    ) -> Result<FitStart, FitError> {
+        let start: Vec<f64> = model.coordinates.iter().map(|free| free.initial).collect();
+        let loose = model.with_loose_tolerance(weighting.assumed_deviation);
         let clock = Instant::now();
-        let found = loose.find(&start);
+        let found = loose.relax_leaves(&start);
         told(clock.elapsed().as_secs_f64());
         let (initial, refused) = match found {
-            Ok(point) if misfit(model, &point) <= FAR => {
-                return Ok(Beginning {
+            Ok(point) if relative_misfit(model, &point) <= POOR_INITIAL_MISFIT => {
+                return Ok(FitStart {
                     point,
                     initial: None,
                     remark: None,
@@ -77,11 +80,18 @@ impl Beginning {
         let mut taken = 0;
         if let Some(point) = &initial {
             // One search from there costs less than a look at other decades.
-            let (found, evaluations) = descend(model, weighting, &point.theta, (None, FEW_STEPS));
+            let (found, evaluations) = find_coarse_minimum(
+                model,
+                weighting,
+                &point.theta,
+                (None, MOST_STEPS_TO_ALTERNATIVE),
+            );
             taken = evaluations;
-            let there = found.and_then(|found| loose.find(&found.theta).ok());
-            if let Some(there) = there.filter(|there| misfit(model, there) <= COARSE) {
-                return Ok(Beginning {
+            let there = found.and_then(|found| loose.relax_leaves(&found.theta).ok());
+            if let Some(there) =
+                there.filter(|there| relative_misfit(model, there) <= POOR_MINIMUM_MISFIT)
+            {
+                return Ok(FitStart {
                     point: there,
                     initial: None,
                     remark: None,
@@ -89,31 +99,31 @@ impl Beginning {
                 });
             }
         }
-        let scout = Scout::new(model, weighting);
+        let scout = Multistart::new(model, weighting);
         let least = match &initial {
-            Some(point) => sum(weighting, point),
+            Some(point) => sum_of_squares(weighting, point),
             None => f64::INFINITY,
         };
         let mut starts = match initial {
             Some(_) => Vec::new(),
-            None => scout.nearest(&start),
+            None => scout.nearest_starts(&start),
         };
         if starts.is_empty() {
-            starts = scout.in_decades(&start, least);
+            starts = scout.starts_in_decades(&start, least);
         }
         let better = starts.iter().filter(|found| found.sum < least);
         let better = better
-            .take(MOST_STARTS)
-            .find_map(|found| loose.find(&found.theta).ok());
+            .take(MOST_STARTS_PER_SEARCH)
+            .find_map(|found| loose.relax_leaves(&found.theta).ok());
         let evaluations = taken + scout.evaluations();
         match (better, initial, refused) {
             (Some(point), initial, refused) => {
-                let values = model.in_words(&point.theta);
+                let values = model.values_in_words(&point.theta);
                 let why = refused.unwrap_or_else(|| {
                     "with the numbers of the scenario the leaf is far from the data".into()
                 });
                 let remark = Some(format!("{why}; the search began with {values}"));
-                Ok(Beginning {
+                Ok(FitStart {
                     point,
                     initial,
                     remark,
@@ -126,7 +136,7 @@ impl Beginning {
                      decade of them is nearer"
                         .into(),
                 );
-                Ok(Beginning {
+                Ok(FitStart {
                     point,
                     initial: None,
                     remark,
@@ -139,26 +149,26 @@ impl Beginning {
 }
 
 /// The minimum near some values, on coarse grids, and how often the leaves were relaxed.
-fn descend(
-    model: &Model,
+fn find_coarse_minimum(
+    model: &FitModel,
     weighting: Weighting,
     theta: &[f64],
-    (besides, most_steps): (Option<Besides>, usize),
-) -> (Option<Start>, usize) {
-    let first = model.with_loose_tolerance(weighting.assumed);
-    let Ok(first) = first.find_within(theta, MOST_STEPS) else {
+    (besides, most_steps): (Option<ExcludedMinimum>, usize),
+) -> (Option<EvaluatedStart>, usize) {
+    let first = model.with_loose_tolerance(weighting.assumed_deviation);
+    let Ok(first) = first.relax_leaves_within_steps(theta, MOST_RELAXATION_STEPS) else {
         return (None, 1);
     };
-    let Ok((coarse, point)) = model.coarse(&first, weighting) else {
+    let Ok((coarse, point)) = model.coarse_model(&first, weighting) else {
         return (None, 1);
     };
     let mut quietly = |_, _| {};
-    let mut iteration = Iteration::new(&coarse, weighting, &mut quietly);
+    let mut iteration = GaussNewtonIteration::new(&coarse, weighting, &mut quietly);
     iteration.most_steps = most_steps;
-    iteration.besides = besides;
+    iteration.excluded_minimum = besides;
     let (point, end, more) = iteration.run(point);
-    let found = (end == End::Converged).then(|| Start {
-        sum: sum(weighting, &point),
+    let found = (end == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
+        sum: sum_of_squares(weighting, &point),
         theta: point.theta,
     });
     (found, 1 + more)
@@ -166,36 +176,39 @@ fn descend(
 
 /// Other minima, and what was tried to find them.
 #[derive(Default)]
-struct Others {
-    minima: Vec<Start>,
+struct AlternativeMinima {
+    minima: Vec<EvaluatedStart>,
     tried: Vec<String>,
 }
 
 /// Searches for the best minimum.
-pub(super) struct Minima<'m, 'a> {
-    pub model: &'m Model<'a>,
+pub(super) struct GlobalFitSearch<'m, 'a> {
+    pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
     /// Whether the standard deviations of the data are known.
-    pub known: bool,
+    pub has_known_deviations: bool,
     pub candidates: &'m [Experiment],
     /// How often the leaves were relaxed, by searches and to compare minima.
     pub evaluations: Cell<usize>,
 }
 
-impl<'a> Minima<'_, 'a> {
+impl<'a> GlobalFitSearch<'_, 'a> {
     /// The best minimum, with the others that fit as well.
-    pub fn best(
+    pub fn best_fit(
         &self,
-        began: Beginning,
+        began: FitStart,
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<Fit, FitError> {
         let mut remark = began.remark;
-        let first = self.search(&began.point, usize::MAX, progress);
+        let first = self.search_from_point(&began.point, usize::MAX, progress);
         // What the initial values lead to is found even where other values seemed better.
-        let doubtful = first.as_ref().map_or(true, |first| self.doubts(first));
+        let doubtful = first
+            .as_ref()
+            .map_or(true, |first| self.suspects_better_minimum(first));
         let budget = &self.model.budget;
         let plain = (began.initial).filter(|_| doubtful && !budget.is_used_up());
-        let plain = plain.and_then(|initial| self.search(&initial, usize::MAX, progress).ok());
+        let plain =
+            plain.and_then(|initial| self.search_from_point(&initial, usize::MAX, progress).ok());
         let mut best = match (first, plain) {
             (Ok(first), Some(plain)) if !plain.is_preferred_to(&first) => first,
             (_, Some(plain)) => {
@@ -209,28 +222,30 @@ impl<'a> Minima<'_, 'a> {
         };
         for _ in 0..MOST_SEARCHES {
             let further = (best.beyond_window && !budget.is_used_up())
-                .then(|| self.again(&best, &best.theta, progress));
+                .then(|| self.search_from_values(&best, &best.theta, progress));
             let further = further.flatten();
             match further.filter(|again| again.is_preferred_to(&best)) {
                 Some(again) => best = again,
                 None => break,
             }
         }
-        let mut others = Others::default();
+        let mut others = AlternativeMinima::default();
         for _ in 0..MOST_SEARCHES {
             if budget.is_used_up() {
                 break;
             }
-            others = match self.doubts(&best) {
-                true => self.elsewhere(&best),
-                false => self.images(&best),
+            others = match self.suspects_better_minimum(&best) {
+                true => self.minima_from_other_starts(&best),
+                false => self.minima_from_symmetric_values(&best),
             };
             let better = others
                 .minima
                 .iter()
                 .filter(|other| self.is_better(&best, other.sum));
             let better = better.min_by(|a, b| a.sum.total_cmp(&b.sum));
-            let Some(again) = better.and_then(|it| self.again(&best, &it.theta, progress)) else {
+            let Some(again) =
+                better.and_then(|it| self.search_from_values(&best, &it.theta, progress))
+            else {
                 break;
             };
             if !again.is_preferred_to(&best) {
@@ -240,10 +255,10 @@ impl<'a> Minima<'_, 'a> {
         }
         let mut fit = best.fit;
         if best.converged {
-            let significant = best.significant;
-            let as_well = |other: &&Start| other.sum <= best.sum + significant;
+            let significant = best.significant_excess;
+            let as_well = |other: &&EvaluatedStart| other.sum <= best.sum + significant;
             for other in others.minima.iter().filter(as_well) {
-                self.tell(&mut fit, (other, best.sum));
+                self.add_alternative(&mut fit, (other, best.sum));
             }
         }
         fit.tried = others.tried;
@@ -254,7 +269,7 @@ impl<'a> Minima<'_, 'a> {
                 format!(
                     "the budget of {} evaluations was used up: this is the best that was found so far; allow more, \
                      free fewer numbers, or begin nearer",
-                    budget.most()
+                    budget.limit()
                 ),
             );
         }
@@ -262,13 +277,13 @@ impl<'a> Minima<'_, 'a> {
         Ok(fit)
     }
 
-    fn count(&self, more: usize) {
+    fn count_evaluations(&self, more: usize) {
         self.evaluations.set(self.evaluations.get() + more);
     }
 
     /// The number of evaluations at which searches from other values end: beside a minimum, they take no
     /// more in all than the fit itself took.
-    fn most_evaluations(&self, best: &Minimum) -> usize {
+    fn search_evaluation_limit(&self, best: &FitMinimum) -> usize {
         match best.converged {
             true => self.evaluations.get() + best.fit.work.evaluations,
             false => usize::MAX,
@@ -276,125 +291,130 @@ impl<'a> Minima<'_, 'a> {
     }
 
     /// How many evaluations are left up to that, if any.
-    fn left(&self, most: usize) -> Option<usize> {
+    fn remaining_evaluations(&self, most: usize) -> Option<usize> {
         let left = most.saturating_sub(self.evaluations.get());
         (left > 0).then_some(left)
     }
 
-    fn loose(&self) -> Model<'a> {
-        self.model.with_loose_tolerance(self.weighting.assumed)
+    fn model_with_loose_tolerance(&self) -> FitModel<'a> {
+        self.model
+            .with_loose_tolerance(self.weighting.assumed_deviation)
     }
 
     /// The search from a point in no more than so many steps, with bounds around it if none are given.
-    fn search(
+    fn search_from_point(
         &self,
-        first: &Point,
+        first: &FitPoint,
         most_steps: usize,
         progress: &mut dyn FnMut(&FitStep),
-    ) -> Result<Minimum, FitError> {
+    ) -> Result<FitMinimum, FitError> {
         let coordinates = self.model.coordinates.iter().zip(&first.theta);
-        let coordinates: Vec<Coordinate> = coordinates
-            .map(|(free, theta)| free.starting_at(*theta))
+        let coordinates: Vec<FitCoordinate> = coordinates
+            .map(|(free, theta)| free.with_initial_value(*theta))
             .collect();
-        let model = Model {
+        let model = FitModel {
             coordinates: &coordinates,
             ..self.model.clone()
         };
-        let search = Search {
+        let search = LocalFitSearch {
             model: &model,
             weighting: self.weighting,
-            known: self.known,
+            has_known_deviations: self.has_known_deviations,
             candidates: self.candidates,
             most_steps,
         };
         let found = search.run(first, progress)?;
-        self.count(found.fit.work.evaluations);
+        self.count_evaluations(found.fit.work.evaluations);
         Ok(found)
     }
 
     /// The search from other values; where a minimum is known, in no more steps than that took.
-    fn again(
+    fn search_from_values(
         &self,
-        best: &Minimum,
+        best: &FitMinimum,
         theta: &[f64],
         progress: &mut dyn FnMut(&FitStep),
-    ) -> Option<Minimum> {
-        let point = self.loose().find(theta).ok()?;
+    ) -> Option<FitMinimum> {
+        let point = self.model_with_loose_tolerance().relax_leaves(theta).ok()?;
         let most_steps = match best.converged {
             true => best.fit.work.evaluations,
             false => usize::MAX,
         };
-        self.search(&point, most_steps, progress).ok()
+        self.search_from_point(&point, most_steps, progress).ok()
     }
 
     /// The search from values near those from which it ended where there is no leaf.
     fn search_near(
         &self,
-        from: &Point,
+        from: &FitPoint,
         why: String,
         progress: &mut dyn FnMut(&FitStep),
-    ) -> Result<Minimum, FitError> {
-        let starts = Scout::new(self.model, self.weighting).near(&from.theta);
-        let mut points = starts.iter().take(MOST_STARTS);
+    ) -> Result<FitMinimum, FitError> {
+        let starts = Multistart::new(self.model, self.weighting).starts_nearby(&from.theta);
+        let mut points = starts.iter().take(MOST_STARTS_PER_SEARCH);
         let found = points.find_map(|start| {
-            let point = self.loose().find(&start.theta).ok()?;
-            self.search(&point, usize::MAX, progress).ok()
+            let point = self
+                .model_with_loose_tolerance()
+                .relax_leaves(&start.theta)
+                .ok()?;
+            self.search_from_point(&point, usize::MAX, progress).ok()
         });
         found.ok_or(FitError::NoEquilibrium(why))
     }
 
     /// Whether there may well be a better minimum elsewhere.
-    fn doubts(&self, best: &Minimum) -> bool {
+    fn suspects_better_minimum(&self, best: &FitMinimum) -> bool {
         let contradicted = best.fit.outcome == FitOutcome::Contradicted;
-        let coarse = !self.known && best.misfit > COARSE;
+        let coarse = !self.has_known_deviations && best.misfit > POOR_MINIMUM_MISFIT;
         !best.converged || best.beyond_window || contradicted || coarse
     }
 
     /// Whether a sum of squares is less than that of a minimum by more than chance.
-    fn is_better(&self, best: &Minimum, sum: f64) -> bool {
+    fn is_better(&self, best: &FitMinimum, sum: f64) -> bool {
         match best.converged {
-            true => sum < best.sum - BETTER * best.variance,
+            true => sum < best.sum - BETTER_MINIMUM_EXCESS * best.variance,
             false => sum < best.sum,
         }
     }
 
     /// Minima to which searches lead that begin elsewhere: in other decades, and near.
-    fn elsewhere(&self, best: &Minimum) -> Others {
+    fn minima_from_other_starts(&self, best: &FitMinimum) -> AlternativeMinima {
         let mut tried = vec!["values near these".to_string()];
-        let scout = Scout::new(self.model, self.weighting);
-        let initial = self.model.coordinates.iter().map(|free| free.start);
-        let mut starts = scout.compare(vec![initial.collect()]);
-        starts.extend(scout.near(&best.theta));
-        if best.beyond_window || best.misfit > COARSE {
+        let scout = Multistart::new(self.model, self.weighting);
+        let initial = self.model.coordinates.iter().map(|free| free.initial);
+        let mut starts = scout.ranked_starts(vec![initial.collect()]);
+        starts.extend(scout.starts_nearby(&best.theta));
+        if best.beyond_window || best.misfit > POOR_MINIMUM_MISFIT {
             tried.push("other decades".into());
-            starts.extend(scout.in_decades(&best.theta, best.sum));
+            starts.extend(scout.starts_in_decades(&best.theta, best.sum));
         }
         starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
-        self.count(scout.evaluations());
+        self.count_evaluations(scout.evaluations());
         let mut minima = Vec::new();
-        let most = self.most_evaluations(best);
-        for start in starts.into_iter().take(MOST_STARTS) {
+        let most = self.search_evaluation_limit(best);
+        for start in starts.into_iter().take(MOST_STARTS_PER_SEARCH) {
             // Values that are better already need not lead away from the minimum.
             let beside = best.converged && !self.is_better(best, start.sum);
-            let besides = beside.then(|| best.besides(&start.theta));
-            let Some(most_steps) = self.left(most) else {
+            let besides = beside.then(|| best.exclude_from(&start.theta));
+            let Some(most_steps) = self.remaining_evaluations(most) else {
                 break;
             };
-            let most_steps = most_steps.min(FEW_STEPS);
-            minima.extend(self.descend(&start.theta, besides, most_steps));
+            let most_steps = most_steps.min(MOST_STEPS_TO_ALTERNATIVE);
+            minima.extend(self.find_coarse_minimum(&start.theta, besides, most_steps));
         }
-        Others { minima, tried }
+        AlternativeMinima { minima, tried }
     }
 
     /// Minima near values that may fit as well.
-    fn images(&self, best: &Minimum) -> Others {
-        let mut others = Others::default();
-        let most = self.most_evaluations(best);
-        for (theta, what) in images(self.model, &best.theta) {
-            let Some(most_steps) = self.left(most) else {
+    fn minima_from_symmetric_values(&self, best: &FitMinimum) -> AlternativeMinima {
+        let mut others = AlternativeMinima::default();
+        let most = self.search_evaluation_limit(best);
+        for (theta, what) in symmetric_values(self.model, &best.theta) {
+            let Some(most_steps) = self.remaining_evaluations(most) else {
                 break;
             };
-            let found = self.descend(&theta, Some(best.besides(&theta)), most_steps);
+            let found =
+                self.find_coarse_minimum(&theta, Some(best.exclude_from(&theta)), most_steps);
             others.minima.extend(found);
             others.tried.push(what);
         }
@@ -402,17 +422,22 @@ impl<'a> Minima<'_, 'a> {
     }
 
     /// The minimum near some values, on coarse grids.
-    fn descend(&self, theta: &[f64], besides: Option<Besides>, most_steps: usize) -> Option<Start> {
+    fn find_coarse_minimum(
+        &self,
+        theta: &[f64],
+        besides: Option<ExcludedMinimum>,
+        most_steps: usize,
+    ) -> Option<EvaluatedStart> {
         let (found, evaluations) =
-            descend(self.model, self.weighting, theta, (besides, most_steps));
-        self.count(evaluations);
+            find_coarse_minimum(self.model, self.weighting, theta, (besides, most_steps));
+        self.count_evaluations(evaluations);
         found
     }
 
     /// Adds another minimum to a fit, if a number that is determined has a value there beyond its
     /// interval: then it is not.
-    fn tell(&self, fit: &mut Fit, (other, least): (&Start, f64)) {
-        let values = self.model.numbers(&other.theta);
+    fn add_alternative(&self, fit: &mut Fit, (other, least): (&EvaluatedStart, f64)) {
+        let values = self.model.named_values(&other.theta);
         let beyond = |parameter: &FitParameter, value: f64| {
             let (low, high) = (parameter.low, parameter.high);
             let outside =
@@ -421,7 +446,7 @@ impl<'a> Minima<'_, 'a> {
         };
         let known = fit.alternatives.iter().any(|known| {
             let mut both = values.iter();
-            both.all(|(key, value)| (known.values[key] / value - 1.0).abs() < SAME)
+            both.all(|(key, value)| (known.values[key] / value - 1.0).abs() < SAME_VALUES_TOLERANCE)
         });
         let differs: Vec<bool> = (fit.parameters.iter().zip(&values))
             .map(|(parameter, (_, value))| beyond(parameter, *value))
@@ -434,10 +459,10 @@ impl<'a> Minima<'_, 'a> {
             chi_squared: fit.chi_squared * ratio,
             values: values.iter().cloned().collect(),
         };
-        let told = self.model.in_words(&other.theta);
+        let told = self.model.values_in_words(&other.theta);
         fit.says.push(format!("other values fit as well: {told}"));
         fit.alternatives.push(alternative);
-        fit.outcome = FitOutcome::Undetermined;
+        fit.outcome = FitOutcome::UnidentifiableCombination;
         let parameters = fit.parameters.iter_mut().zip(differs);
         parameters.for_each(|(parameter, differs)| parameter.determined &= !differs);
     }
@@ -445,50 +470,50 @@ impl<'a> Minima<'_, 'a> {
 
 /// Largest number of decades searched to each side, of those in succession that are no better before
 /// one is and after it, and the reduction of the sum of squares that counts as better.
-const DECADES: usize = 8;
+const MOST_DECADES_SEARCHED: usize = 8;
 
-const NO_BETTER: [usize; 2] = [4, 2];
+const FRUITLESS_DECADES_LIMIT: [usize; 2] = [4, 2];
 
-const CLEARLY_LESS: f64 = 0.999;
+const IMPROVED_SUM_RATIO: f64 = 0.999;
 
 /// Reduction of the sum of squares in larger numbers at which smaller ones are not searched: leaves
 /// of small stiffness take long.
-const ENOUGH: f64 = 0.5;
+const SUFFICIENT_SUM_RATIO: f64 = 0.5;
 
 /// Largest number of numbers that are searched one by one.
-const FEW: usize = 6;
+const MOST_PARAMETERS_VARIED_SINGLY: usize = 6;
 
 /// Factors of values near given ones, and changes of numbers that are not positive, in their units.
-const FACTORS: [f64; 4] = [1.05, 1.0 / 1.3, 0.5, 2.0];
+const NEARBY_VALUE_FACTORS: [f64; 4] = [1.05, 1.0 / 1.3, 0.5, 2.0];
 
-const CHANGES: [f64; 4] = [-0.2, 0.2, -1.0, 1.0];
+const NEARBY_VALUE_OFFSETS: [f64; 4] = [-0.2, 0.2, -1.0, 1.0];
 
 /// Accuracy of leaves that are only compared, in lengths of the leaf, and the largest number of
 /// steps in which they come to rest: soft leaves far from the data may take thousands.
-const COMPARED: f64 = 1e-3;
+const COMPARISON_TOLERANCE: f64 = 1e-3;
 
-pub(super) const MOST_STEPS: usize = 400;
+pub(super) const MOST_RELAXATION_STEPS: usize = 400;
 
 /// Values of the coordinates and the sum of squares there.
 #[derive(Clone, Debug)]
-pub(super) struct Start {
+pub(super) struct EvaluatedStart {
     pub theta: Vec<f64>,
     pub sum: f64,
 }
 
 /// Looks for values from which a search may begin.
-pub(super) struct Scout<'a> {
-    model: Model<'a>,
+pub(super) struct Multistart<'a> {
+    model: FitModel<'a>,
     weighting: Weighting,
     /// Number of values at which the leaves were relaxed.
     evaluations: AtomicUsize,
 }
 
-impl<'a> Scout<'a> {
-    pub fn new(model: &Model<'a>, weighting: Weighting) -> Self {
+impl<'a> Multistart<'a> {
+    pub fn new(model: &FitModel<'a>, weighting: Weighting) -> Self {
         let mut model = model.clone();
-        model.options.tolerance = Some(COMPARED.max(model.tolerance()));
-        Scout {
+        model.options.tolerance = Some(COMPARISON_TOLERANCE.max(model.equilibrium_tolerance()));
+        Multistart {
             model,
             weighting,
             evaluations: AtomicUsize::new(0),
@@ -501,38 +526,42 @@ impl<'a> Scout<'a> {
     }
 
     /// The leaves relaxed from their usual starts. `None` if one does not come to rest.
-    fn at(&self, theta: Vec<f64>) -> Option<Start> {
-        if !is_permitted(&self.model, &theta) {
+    fn evaluate_start(&self, theta: Vec<f64>) -> Option<EvaluatedStart> {
+        if !is_within_given_bounds(&self.model, &theta) {
             return None;
         }
         self.evaluations.fetch_add(1, Ordering::Relaxed);
-        let point = self.model.find_within(&theta, MOST_STEPS).ok()?;
-        let sum = sum(self.weighting, &point);
-        sum.is_finite().then_some(Start { theta, sum })
+        let point = self
+            .model
+            .relax_leaves_within_steps(&theta, MOST_RELAXATION_STEPS)
+            .ok()?;
+        let sum = sum_of_squares(self.weighting, &point);
+        sum.is_finite().then_some(EvaluatedStart { theta, sum })
     }
 
     /// Those of these values at which all leaves come to rest, by ascending sums of squares.
-    pub fn compare(&self, all: Vec<Vec<f64>>) -> Vec<Start> {
-        let found = all.into_par_iter().map(|theta| self.at(theta));
-        let mut found: Vec<Start> = found.collect::<Vec<_>>().into_iter().flatten().collect();
+    pub fn ranked_starts(&self, all: Vec<Vec<f64>>) -> Vec<EvaluatedStart> {
+        let found = all.into_par_iter().map(|theta| self.evaluate_start(theta));
+        let mut found: Vec<EvaluatedStart> =
+            found.collect::<Vec<_>>().into_iter().flatten().collect();
         found.sort_by(|a, b| a.sum.total_cmp(&b.sum));
         found
     }
 
     /// Values in decades around given ones: first of all positive numbers together, then of one
     /// after the other. By ascending sums of squares; `least` is the one there.
-    pub fn in_decades(&self, from: &[f64], least: f64) -> Vec<Start> {
+    pub fn starts_in_decades(&self, from: &[f64], least: f64) -> Vec<EvaluatedStart> {
         let free = self.model.coordinates;
         let positive: Vec<usize> = (0..free.len())
             .filter(|&k| free[k].is_searched_in_decades())
             .collect();
-        let mut found = self.both_ways((from, least), &positive);
-        if positive.len() > 1 && positive.len() <= FEW {
+        let mut found = self.scan_decades_both_ways((from, least), &positive);
+        if positive.len() > 1 && positive.len() <= MOST_PARAMETERS_VARIED_SINGLY {
             for &k in &positive {
                 let best = found.iter().min_by(|a, b| a.sum.total_cmp(&b.sum));
                 let best = best.filter(|best| best.sum < least);
                 let from = best.map_or((from, least), |best| (&best.theta, best.sum));
-                let more = self.both_ways(from, &[k]);
+                let more = self.scan_decades_both_ways(from, &[k]);
                 found.extend(more);
             }
         }
@@ -540,35 +569,40 @@ impl<'a> Scout<'a> {
         found
     }
 
-    fn both_ways(&self, from: (&[f64], f64), moving: &[usize]) -> Vec<Start> {
+    fn scan_decades_both_ways(&self, from: (&[f64], f64), moving: &[usize]) -> Vec<EvaluatedStart> {
         if moving.is_empty() {
             return Vec::new();
         }
-        let mut found = self.one_way(from, moving, OPEN);
-        let better = |start: &Start| start.sum < ENOUGH * from.1;
+        let mut found = self.scan_decades_one_way(from, moving, UNDETERMINED_UNCERTAINTY);
+        let better = |start: &EvaluatedStart| start.sum < SUFFICIENT_SUM_RATIO * from.1;
         if from.1.is_infinite() || !found.iter().any(better) {
-            found.extend(self.one_way(from, moving, -OPEN));
+            found.extend(self.scan_decades_one_way(from, moving, -UNDETERMINED_UNCERTAINTY));
         }
         found
     }
 
     /// Decade after decade, until no more are better.
-    fn one_way(&self, (from, least): (&[f64], f64), moving: &[usize], decade: f64) -> Vec<Start> {
-        let mut found: Vec<Start> = Vec::new();
+    fn scan_decades_one_way(
+        &self,
+        (from, least): (&[f64], f64),
+        moving: &[usize],
+        decade: f64,
+    ) -> Vec<EvaluatedStart> {
+        let mut found: Vec<EvaluatedStart> = Vec::new();
         let (mut best, mut no_better) = (least, 0);
-        for step in 1..=DECADES {
+        for step in 1..=MOST_DECADES_SEARCHED {
             let mut theta = from.to_vec();
             for &k in moving {
                 theta[k] += step as f64 * decade;
             }
             no_better += 1;
-            if let Some(start) = self.at(theta) {
-                if start.sum < CLEARLY_LESS * best {
+            if let Some(start) = self.evaluate_start(theta) {
+                if start.sum < IMPROVED_SUM_RATIO * best {
                     (best, no_better) = (start.sum, 0);
                 }
                 found.push(start);
             }
-            if no_better == NO_BETTER[usize::from(best < least)] {
+            if no_better == FRUITLESS_DECADES_LIMIT[usize::from(best < least)] {
                 break;
             }
         }
@@ -577,40 +611,42 @@ impl<'a> Scout<'a> {
 
     /// Values near given ones at which all leaves come to rest, by ascending sums of squares:
     /// all numbers changed together, or, if none of these does, one after the other.
-    pub fn nearest(&self, from: &[f64]) -> Vec<Start> {
-        let together = self.compare(self.together(from));
+    pub fn nearest_starts(&self, from: &[f64]) -> Vec<EvaluatedStart> {
+        let together = self.ranked_starts(self.scaled_together(from));
         match together.is_empty() {
-            true => self.compare(self.one_by_one(from)),
+            true => self.ranked_starts(self.varied_singly(from)),
             false => together,
         }
     }
 
     /// Values near given ones, by ascending sums of squares.
-    pub fn near(&self, from: &[f64]) -> Vec<Start> {
-        let mut all = self.together(from);
-        all.extend(self.one_by_one(from));
-        self.compare(all)
+    pub fn starts_nearby(&self, from: &[f64]) -> Vec<EvaluatedStart> {
+        let mut all = self.scaled_together(from);
+        all.extend(self.varied_singly(from));
+        self.ranked_starts(all)
     }
 
-    fn together(&self, from: &[f64]) -> Vec<Vec<f64>> {
+    fn scaled_together(&self, from: &[f64]) -> Vec<Vec<f64>> {
         let times = |factor: f64| {
             let both = self.model.coordinates.iter().zip(from);
-            let changed = both.map(|(free, theta)| match free.log {
+            let changed = both.map(|(free, theta)| match free.is_logarithmic {
                 true => theta + factor.ln(),
                 false => *theta,
             });
             changed.collect()
         };
-        FACTORS.map(times).into()
+        NEARBY_VALUE_FACTORS.map(times).into()
     }
 
-    fn one_by_one(&self, from: &[f64]) -> Vec<Vec<f64>> {
+    fn varied_singly(&self, from: &[f64]) -> Vec<Vec<f64>> {
         let free = self.model.coordinates;
         let mut all = Vec::new();
-        for k in (0..free.len()).filter(|_| free.len() > 1 && free.len() <= FEW) {
-            let changes = match free[k].log {
-                true => FACTORS.map(f64::ln),
-                false => CHANGES,
+        for k in (0..free.len())
+            .filter(|_| free.len() > 1 && free.len() <= MOST_PARAMETERS_VARIED_SINGLY)
+        {
+            let changes = match free[k].is_logarithmic {
+                true => NEARBY_VALUE_FACTORS.map(f64::ln),
+                false => NEARBY_VALUE_OFFSETS,
             };
             for change in changes {
                 let mut theta = from.to_vec();
@@ -624,7 +660,7 @@ impl<'a> Scout<'a> {
 
 /// Values that may fit as well as given ones, and what they are: of exchanged directions of a section,
 /// of reversed lists of veins, and of the other sign.
-pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
+pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, String)> {
     let keys = model.coordinates.iter().map(|free| free.number.to_string());
     let keys: Vec<String> = keys.collect();
     let place = |key: &str| keys.iter().position(|other| other == key);
@@ -654,11 +690,14 @@ pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
     ];
     let can_be_mirrored = |k: &usize| {
         let free = &model.coordinates[*k];
-        !free.log && free.number.keys().is_some()
+        !free.is_logarithmic && free.number.scenario_keys().is_some()
     };
     let signed = (0..of.len()).filter(can_be_mirrored);
     let signed: Vec<usize> = signed.collect();
-    for &k in signed.iter().filter(|_| signed.len() <= FEW) {
+    for &k in signed
+        .iter()
+        .filter(|_| signed.len() <= MOST_PARAMETERS_VARIED_SINGLY)
+    {
         let mut theta = of.to_vec();
         theta[k] = -theta[k];
         all.push((theta, format!("{} with the other sign", keys[k])));
@@ -666,7 +705,7 @@ pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
     let mut images: Vec<(Vec<f64>, String)> = Vec::new();
     for (theta, what) in all {
         let known = images.iter().any(|(known, _)| *known == theta);
-        if theta != of && !known && is_permitted(model, &theta) {
+        if theta != of && !known && is_within_given_bounds(model, &theta) {
             images.push((theta, what));
         }
     }
@@ -674,37 +713,48 @@ pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
 }
 
 /// Whether values are within the bounds that were given.
-fn is_permitted(model: &Model, theta: &[f64]) -> bool {
+fn is_within_given_bounds(model: &FitModel, theta: &[f64]) -> bool {
     let mut both = model.coordinates.iter().zip(theta);
     both.all(|(free, theta)| {
         let [low, high] = free.bounds;
-        !free.bounded || (low..=high).contains(theta)
+        !free.has_given_bounds || (low..=high).contains(theta)
     })
 }
 
 /// The sum of squares at a point.
-pub(super) fn sum(weighting: Weighting, point: &Point) -> f64 {
+pub(super) fn sum_of_squares(weighting: Weighting, point: &FitPoint) -> f64 {
     let residuals = weighting.residuals(point);
-    weighting.sum(&residuals, weighting.bound(&residuals))
+    weighting.huber_sum(&residuals, weighting.huber_bound(&residuals))
 }
 
 /// The root mean square of the residuals, of coordinates in lengths of the leaf, of other data
 /// relative to the largest of their kind.
-pub(super) fn misfit(model: &Model, point: &Point) -> f64 {
+pub(super) fn relative_misfit(model: &FitModel, point: &FitPoint) -> f64 {
     let longest = longest(&model.base.scenario().rods);
-    let pixel = model.pixel();
-    let largest = |kind: Kind| {
-        let alike = point.components().filter(move |c| c.what.kind() == kind);
+    let pixel = model.initial_pixel_length();
+    let largest = |kind: DatumDimension| {
+        let alike = point
+            .components()
+            .filter(move |c| c.quantity.dimension() == kind);
         alike.fold(0.0_f64, |most, c| most.max(c.observed.abs()))
     };
-    let (force, frequency) = (largest(Kind::Force), largest(Kind::Frequency));
+    let (force, frequency) = (
+        largest(DatumDimension::Force),
+        largest(DatumDimension::Frequency),
+    );
     let (mut squares, mut count) = (0.0, 0.0_f64);
     for component in point.components() {
-        let size = match component.what {
-            Compared::Vein { .. } if component.what.kind() == Kind::Pixel => longest / pixel,
-            Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
-            Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => force,
-            Compared::Result(Quantity::Frequency(_)) => frequency,
+        let size = match component.quantity {
+            DatumQuantity::Vein { .. }
+                if component.quantity.dimension() == DatumDimension::Pixel =>
+            {
+                longest / pixel
+            }
+            DatumQuantity::Vein { .. } | DatumQuantity::Result(MeasuredQuantity::Tip(_)) => longest,
+            DatumQuantity::Result(MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..)) => {
+                force
+            }
+            DatumQuantity::Result(MeasuredQuantity::Frequency(_)) => frequency,
         };
         let part = (component.model - component.observed) / size.max(f64::MIN_POSITIVE);
         squares += part.powi(2);

@@ -20,19 +20,19 @@ mod responses;
 mod statistics;
 mod table;
 
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use crate::run::{Instant, Limit};
 use crate::scenario::format::units::LENGTH;
-use crate::study::fit::data::Quantity;
+
 pub use crate::study::fit::data::{
-    Comparison, Data, DataFile, Experiment, Measured, MeasuredColumn, Origin,
-    Quantity as MeasuredQuantity, Reading, RowChoice, RowCondition, Traced,
+    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, MeasuredColumn,
+    MeasuredQuantity, MeasuredValue, RowCondition, RowFilter, TracedVeinPoint,
 };
-use crate::study::fit::least_squares::{ASSUMED, Weighting};
-use crate::study::fit::minima::{Beginning, Minima};
-use crate::study::fit::model::{Budget, Model};
-use crate::study::{Base, Keys, Target, VaryError};
+use crate::study::fit::least_squares::{ASSUMED_RELATIVE_DEVIATION, Weighting};
+use crate::study::fit::minima::{FitStart, GlobalFitSearch};
+use crate::study::fit::model::{EvaluationBudget, FitModel};
+use crate::study::{BaseScenario, ParameterKeys, VariableTarget, VaryError};
 use crate::words;
 use serde::Serialize;
 use std::cell::Cell;
@@ -64,11 +64,11 @@ pub enum FitError {
 #[derive(Clone, Debug)]
 pub struct FitRequest {
     /// The scenario, with the initial values of its numbers.
-    pub base: Base,
+    pub base: BaseScenario,
     /// The data.
     pub data: Data,
     /// The free numbers.
-    pub free: Vec<Free>,
+    pub free: Vec<FreeParameter>,
     /// Whether outliers have smaller weights (Huber's weights).
     pub robust: bool,
     /// Candidate experiments, to be ordered by information.
@@ -84,7 +84,7 @@ pub struct FitRequest {
 
 /// How often the leaves of all experiments are relaxed or followed in a fit, unless it is said: some
 /// hundred are usual with many free numbers, and what takes more mostly has no minimum.
-pub const MOST_EVALUATIONS: usize = 1000;
+pub const DEFAULT_EVALUATION_LIMIT: usize = 1000;
 
 impl FitRequest {
     /// Reads candidate experiments from a table like that of experiments, whose columns may
@@ -97,7 +97,7 @@ impl FitRequest {
         file: &str,
         columns: &[MeasuredColumn],
     ) -> Result<Vec<Experiment>, FitError> {
-        data::candidates(table.as_ref(), file, columns)
+        data::read_candidate_experiments(table.as_ref(), file, columns)
     }
 }
 
@@ -114,18 +114,18 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     without_wind(base.scenario(), "a fit")?;
     request.data.check_columns()?;
     request.data.check_choices()?;
-    let coordinates = coordinates(request)?;
+    let coordinates = fit_coordinates(request)?;
     let options = Options {
         tolerance: request.tolerance,
         limit: request.limit.clone(),
         ..Options::default()
     };
-    let most = request.most_evaluations.unwrap_or(MOST_EVALUATIONS);
-    let data = (request.data.clone(), Budget::new(most));
-    let model = Model::new(base, &coordinates, &options, data)?;
+    let most = request.most_evaluations.unwrap_or(DEFAULT_EVALUATION_LIMIT);
+    let data = (request.data.clone(), EvaluationBudget::new(most));
+    let model = FitModel::new(base, &coordinates, &options, data)?;
     let weighting = Weighting {
-        assumed: ASSUMED * model.unit(),
-        robust: request.robust,
+        assumed_deviation: ASSUMED_RELATIVE_DEVIATION * model.data_length_unit(),
+        is_robust: request.robust,
     };
     let mut told = |seconds: f64| {
         let leaves = model.cases.len();
@@ -140,27 +140,30 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             }),
         });
     };
-    let began = Beginning::find(&model, weighting, &mut told)?;
+    let began = FitStart::choose_start(&model, weighting, &mut told)?;
     let known = model.check_deviations(&began.point)?;
     model.check_weights(&began.point)?;
-    let measured = began.point.components().filter(|component| !component.free);
-    check_count(coordinates.len(), measured.count(), known)?;
-    let minima = Minima {
+    let measured = began
+        .point
+        .components()
+        .filter(|component| !component.is_uninformative);
+    check_data_count(coordinates.len(), measured.count(), known)?;
+    let minima = GlobalFitSearch {
         model: &model,
         weighting,
-        known,
+        has_known_deviations: known,
         candidates: &request.candidates,
         evaluations: Cell::new(0),
     };
-    let mut found = minima.best(began, progress)?;
+    let mut found = minima.best_fit(began, progress)?;
     found.files = request.data.files.clone();
-    found.remarks.extend(comments(&found.files));
+    found.remarks.extend(comment_lines_remark(&found.files));
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
 }
 
 /// How many lines among the rows of data were left out.
-fn comments(files: &[DataFile]) -> Option<String> {
+fn comment_lines_remark(files: &[DataFile]) -> Option<String> {
     let left_out = files.iter().filter(|file| file.comments_among_rows > 0);
     let left_out = left_out.map(|file| format!("{} of {}", file.comments_among_rows, file.file));
     let left_out: Vec<String> = left_out.collect();
@@ -173,12 +176,12 @@ fn comments(files: &[DataFile]) -> Option<String> {
 }
 
 /// The coordinates of the free numbers, checked to be distinct.
-fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
+fn fit_coordinates(request: &FitRequest) -> Result<Vec<FitCoordinate>, FitError> {
     let base = &request.base;
-    let free = expanded(request)?;
+    let free = expand_free_parameters(request)?;
     let coordinates = free
         .iter()
-        .map(|free| Coordinate::new(base, &request.data, free));
+        .map(|free| FitCoordinate::new(base, &request.data, free));
     let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
     for (k, one) in coordinates.iter().enumerate() {
         if coordinates[..k]
@@ -194,13 +197,13 @@ fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     Ok(coordinates)
 }
 
-fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
+fn check_data_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     if free == 0 || free > count {
         return Err(FitError::Free(match free {
             0 => "no number is free: name at least one".into(),
             _ if count == 0 => format!(
                 "there are no data: columns of results are {}, or rod, x, y, z of points on veins",
-                Quantity::ALL
+                MeasuredQuantity::ALL
             ),
             _ => format!(
                 "{free} numbers are free, and there are {count} data: free fewer, or measure more"
@@ -217,17 +220,20 @@ fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
 }
 
 /// The free numbers, lists and profiles replaced by their entries.
-fn expanded(request: &FitRequest) -> Result<Vec<Free>, FitError> {
+fn expand_free_parameters(request: &FitRequest) -> Result<Vec<FreeParameter>, FitError> {
     let mut all = Vec::new();
     for free in &request.free {
         let entries = match &free.number {
-            FreeNumber::Entry(keys) => {
-                let entries = request.base.entries_of(keys);
-                entries.into_iter().map(FreeNumber::Entry).collect()
+            FreeParameterTarget::Entry(keys) => {
+                let entries = request.base.keys_by_entry(keys);
+                entries
+                    .into_iter()
+                    .map(FreeParameterTarget::Entry)
+                    .collect()
             }
-            offset @ FreeNumber::Offset(_) => vec![offset.clone()],
+            offset @ FreeParameterTarget::Offset(_) => vec![offset.clone()],
         };
-        all.extend(entries.into_iter().map(|number| Free {
+        all.extend(entries.into_iter().map(|number| FreeParameter {
             number,
             bounds: free.bounds,
         }));
@@ -243,7 +249,7 @@ words! {
         /// Not at a minimum.
         NotConverged = "not-converged",
         /// At a minimum, but some number or combination of numbers is not determined.
-        Undetermined = "undetermined",
+        UnidentifiableCombination = "undetermined",
         /// At a minimum, but the residuals are systematic there: the model lacks something.
         Systematic = "systematic",
         /// At a minimum, but the data contradict the model there.
@@ -277,7 +283,7 @@ pub struct FitParameter {
 
 /// Residuals that are smooth along series of data, not scattered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FitSystematic {
+pub struct SystematicResiduals {
     /// The probability that independent errors are as smooth.
     pub p_value: f64,
     /// The columns whose residuals are.
@@ -380,7 +386,7 @@ pub struct FitWork {
     pub accurate: usize,
     /// Work for the leaves at the minimum.
     #[serde(flatten)]
-    pub last: Work,
+    pub last: SolverCounts,
 }
 
 /// A fit. As JSON it is `fit.json`.
@@ -408,7 +414,7 @@ pub struct Fit {
     pub tried: Vec<String>,
     /// The systematic part of the residuals, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic: Option<FitSystematic>,
+    pub systematic: Option<SystematicResiduals>,
     /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.
@@ -449,7 +455,7 @@ pub struct FitLeaf {
     /// The position of its experiment in the data, from 1.
     pub number: usize,
     /// Numbers of the scenario during that experiment.
-    pub settings: Vec<(Keys, f64)>,
+    pub settings: Vec<(ParameterKeys, f64)>,
     /// Centerlines, one per rod.
     pub curves: Vec<Vec<glam::DVec3>>,
     /// Traced points: rod, counted from 0, and coordinates seen.
@@ -464,102 +470,106 @@ impl Fit {
 }
 
 /// Longest step of a logarithm, or of another number in its unit.
-pub(super) const LONGEST_STEP: f64 = 1.5;
+pub(super) const LONGEST_COORDINATE_STEP: f64 = 1.5;
 
 /// Largest distance of a number without bounds from its initial value, in logarithms (a
 /// factor of a thousand) or units: numbers that the data drive beyond this
 /// are not determined by them.
-const FARTHEST: f64 = 6.907_755_278_982_137;
+const LARGEST_DISTANCE_FROM_INITIAL: f64 = 6.907_755_278_982_137;
 
 /// A column of the data whose zero may be unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OffsetColumn {
     /// Of what was set in experiments.
-    Setting(Keys),
+    Setting(ParameterKeys),
     /// Of what was measured in experiments.
-    Result(Quantity),
+    Result(MeasuredQuantity),
 }
 
 /// Numbers that a fit varies.
 #[derive(Clone, Debug, PartialEq)]
-pub enum FreeNumber {
+pub enum FreeParameterTarget {
     /// Numbers of the scenario that take the same value: `KEY`.
-    Entry(Keys),
+    Entry(ParameterKeys),
     /// What is added to the numbers in a column of the data, in the unit of that column:
     /// `offset:COLUMN`.
     Offset(OffsetColumn),
 }
 
 /// How the name of an offset begins.
-const OFFSET: &str = "offset:";
+const OFFSET_PREFIX: &str = "offset:";
 
-impl FreeNumber {
+impl FreeParameterTarget {
     /// The keys of the scenario that it stands for, if it does.
-    pub(super) fn keys(&self) -> Option<&Keys> {
+    pub(super) fn scenario_keys(&self) -> Option<&ParameterKeys> {
         match self {
-            FreeNumber::Entry(keys) => Some(keys),
-            FreeNumber::Offset(_) => None,
+            FreeParameterTarget::Entry(keys) => Some(keys),
+            FreeParameterTarget::Offset(_) => None,
         }
     }
 
     /// Whether it is the offset of a setting of experiments by these keys.
-    pub(super) fn is_offset_of(&self, setting: &Keys) -> bool {
-        matches!(self, FreeNumber::Offset(OffsetColumn::Setting(keys)) if keys == setting)
+    pub(super) fn is_offset_of(&self, setting: &ParameterKeys) -> bool {
+        matches!(self, FreeParameterTarget::Offset(OffsetColumn::Setting(keys)) if keys == setting)
     }
 
     /// Whether they have a number in common.
-    pub(super) fn overlaps(&self, other: &FreeNumber) -> bool {
+    pub(super) fn overlaps(&self, other: &FreeParameterTarget) -> bool {
         match (self, other) {
-            (FreeNumber::Entry(one), FreeNumber::Entry(two)) => one.overlaps(two),
+            (FreeParameterTarget::Entry(one), FreeParameterTarget::Entry(two)) => one.overlaps(two),
             _ => self == other,
         }
     }
 }
 
-impl FromStr for FreeNumber {
+impl FromStr for FreeParameterTarget {
     type Err = FitError;
 
     fn from_str(text: &str) -> Result<Self, FitError> {
-        let keys = |text: &str| text.parse::<Keys>();
-        let Some(column) = text.trim().strip_prefix(OFFSET) else {
+        let keys = |text: &str| text.parse::<ParameterKeys>();
+        let Some(column) = text.trim().strip_prefix(OFFSET_PREFIX) else {
             let keys = keys(text).map_err(|refused| FitError::Free(refused.to_string()))?;
-            return Ok(FreeNumber::Entry(keys));
+            return Ok(FreeParameterTarget::Entry(keys));
         };
         let column = column.trim();
         if let Ok(quantity) = column.parse() {
-            return Ok(FreeNumber::Offset(OffsetColumn::Result(quantity)));
+            return Ok(FreeParameterTarget::Offset(OffsetColumn::Result(quantity)));
         }
         let refuse = |refused: VaryError| {
             FitError::Free(format!(
                 "{text}: offsets are those of columns of experiments, keys of the scenario and results ({}): {refused}",
-                Quantity::ALL
+                MeasuredQuantity::ALL
             ))
         };
         let keys = keys(column).map_err(refuse)?;
-        Ok(FreeNumber::Offset(OffsetColumn::Setting(keys)))
+        Ok(FreeParameterTarget::Offset(OffsetColumn::Setting(keys)))
     }
 }
 
-impl fmt::Display for FreeNumber {
+impl fmt::Display for FreeParameterTarget {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            FreeNumber::Entry(keys) => keys.fmt(f),
-            FreeNumber::Offset(OffsetColumn::Setting(keys)) => write!(f, "{OFFSET}{keys}"),
-            FreeNumber::Offset(OffsetColumn::Result(quantity)) => write!(f, "{OFFSET}{quantity}"),
+            FreeParameterTarget::Entry(keys) => keys.fmt(f),
+            FreeParameterTarget::Offset(OffsetColumn::Setting(keys)) => {
+                write!(f, "{OFFSET_PREFIX}{keys}")
+            }
+            FreeParameterTarget::Offset(OffsetColumn::Result(quantity)) => {
+                write!(f, "{OFFSET_PREFIX}{quantity}")
+            }
         }
     }
 }
 
 /// Numbers that a fit varies together: `KEY` or `offset:COLUMN`, or with bounds `KEY=LOW..HIGH`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Free {
+pub struct FreeParameter {
     /// What is free.
-    pub number: FreeNumber,
+    pub number: FreeParameterTarget,
     /// Bounds, if given.
     pub bounds: Option<[f64; 2]>,
 }
 
-impl FromStr for Free {
+impl FromStr for FreeParameter {
     type Err = FitError;
 
     fn from_str(text: &str) -> Result<Self, FitError> {
@@ -570,13 +580,13 @@ impl FromStr for Free {
         let number = number.parse()?;
         let Some(given) = bounds else {
             let bounds = None;
-            return Ok(Free { number, bounds });
+            return Ok(FreeParameter { number, bounds });
         };
         let numbers = given
             .split_once("..")
             .and_then(|(low, high)| Some([low.trim().parse().ok()?, high.trim().parse().ok()?]));
         match numbers {
-            Some([low, high]) if low < high => Ok(Free {
+            Some([low, high]) if low < high => Ok(FreeParameter {
                 number,
                 bounds: Some([low, high]),
             }),
@@ -588,7 +598,7 @@ impl FromStr for Free {
     }
 }
 
-impl fmt::Display for Free {
+impl fmt::Display for FreeParameter {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{}", self.number)?;
         match self.bounds {
@@ -601,45 +611,53 @@ impl fmt::Display for Free {
 /// A free number as a coordinate of the least squares: its logarithm, or the number in a
 /// suitable unit.
 #[derive(Clone, Debug)]
-pub(super) struct Coordinate {
-    pub number: FreeNumber,
-    pub log: bool,
+pub(super) struct FitCoordinate {
+    pub number: FreeParameterTarget,
+    pub is_logarithmic: bool,
     pub unit: f64,
     /// Bounds of the coordinate, and whether they were given.
     pub bounds: [f64; 2],
-    pub bounded: bool,
-    pub start: f64,
+    pub has_given_bounds: bool,
+    pub initial: f64,
 }
 
-impl Coordinate {
-    pub fn new(base: &Base, data: &Data, free: &Free) -> Result<Coordinate, FitError> {
+impl FitCoordinate {
+    pub fn new(
+        base: &BaseScenario,
+        data: &Data,
+        free: &FreeParameter,
+    ) -> Result<FitCoordinate, FitError> {
         let number = free.number.clone();
         let (value, log, unit) = match &number {
-            FreeNumber::Entry(keys) => {
-                let value = base.value(keys);
+            FreeParameterTarget::Entry(keys) => {
+                let value = base.differentiable_value(keys);
                 let value = value.map_err(|refused| FitError::Free(refused.to_string()))?;
                 match keys.is_positive() && value > 0.0 {
                     true => (value, true, 1.0),
-                    false => (value, false, value.abs().max(keys.unit(base.scenario()))),
+                    false => (
+                        value,
+                        false,
+                        value.abs().max(keys.reference_magnitude(base.scenario())),
+                    ),
                 }
             }
-            FreeNumber::Offset(column) => (0.0, false, unit_of_offset(column, data)?),
+            FreeParameterTarget::Offset(column) => (0.0, false, offset_unit(column, data)?),
         };
-        let mut coordinate = Coordinate {
+        let mut coordinate = FitCoordinate {
             number,
-            log,
+            is_logarithmic: log,
             unit,
             bounds: [f64::NEG_INFINITY, f64::INFINITY],
-            bounded: free.bounds.is_some(),
-            start: 0.0,
+            has_given_bounds: free.bounds.is_some(),
+            initial: 0.0,
         };
         if let Some([low, high]) = free.bounds {
             if !(low..=high).contains(&value) {
                 let why = match &free.number {
-                    FreeNumber::Entry(_) => {
+                    FreeParameterTarget::Entry(_) => {
                         format!("the scenario has {value}, which is not between the bounds")
                     }
-                    FreeNumber::Offset(_) => {
+                    FreeParameterTarget::Offset(_) => {
                         "an offset begins at 0, which is not between the bounds".into()
                     }
                 };
@@ -649,12 +667,16 @@ impl Coordinate {
                 let why = "the number is positive, and so must be its bounds";
                 return Err(FitError::Free(format!("{free}: {why}")));
             }
-            coordinate.bounds = [low, high].map(|bound| coordinate.of(bound));
+            coordinate.bounds = [low, high].map(|bound| coordinate.transform(bound));
         }
-        coordinate.start = coordinate.of(value);
+        coordinate.initial = coordinate.transform(value);
         if free.bounds.is_none() {
-            let farthest = if log { FARTHEST } else { FARTHEST.exp() };
-            coordinate.bounds = [-farthest, farthest].map(|far| coordinate.start + far);
+            let farthest = if log {
+                LARGEST_DISTANCE_FROM_INITIAL
+            } else {
+                LARGEST_DISTANCE_FROM_INITIAL.exp()
+            };
+            coordinate.bounds = [-farthest, farthest].map(|far| coordinate.initial + far);
         }
         Ok(coordinate)
     }
@@ -662,58 +684,63 @@ impl Coordinate {
     /// Whether its order of magnitude may be unknown: that of stiffnesses and other positive numbers, but
     /// not of lengths, which are measured.
     pub fn is_searched_in_decades(&self) -> bool {
-        let mut keys = self.number.keys().into_iter().flat_map(Keys::targets);
-        let is_length = |target: &Target| target.key().is_some_and(|it| it.dimension() == LENGTH);
-        self.log && !keys.any(is_length)
+        let mut keys = self
+            .number
+            .scenario_keys()
+            .into_iter()
+            .flat_map(ParameterKeys::targets);
+        let is_length =
+            |target: &VariableTarget| target.key().is_some_and(|it| it.dimension() == LENGTH);
+        self.is_logarithmic && !keys.any(is_length)
     }
 
     /// The same coordinate with another initial value. Bounds that were not given move with it.
-    pub fn starting_at(&self, start: f64) -> Coordinate {
-        let moved = start - self.start;
-        let bounds = match self.bounded {
+    pub fn with_initial_value(&self, start: f64) -> FitCoordinate {
+        let moved = start - self.initial;
+        let bounds = match self.has_given_bounds {
             true => self.bounds,
             false => self.bounds.map(|bound| bound + moved),
         };
-        Coordinate {
-            start,
+        FitCoordinate {
+            initial: start,
             bounds,
             ..self.clone()
         }
     }
 
-    pub fn of(&self, value: f64) -> f64 {
-        match self.log {
+    pub fn transform(&self, value: f64) -> f64 {
+        match self.is_logarithmic {
             true => value.ln(),
             false => value / self.unit,
         }
     }
 
-    pub fn value(&self, coordinate: f64) -> f64 {
-        match self.log {
+    pub fn inverse_transform(&self, coordinate: f64) -> f64 {
+        match self.is_logarithmic {
             true => coordinate.exp(),
             false => coordinate * self.unit,
         }
     }
 
     /// The bound at which the coordinate stands.
-    pub fn at_bound(&self, coordinate: f64) -> Option<f64> {
+    pub fn active_bound(&self, coordinate: f64) -> Option<f64> {
         let [low, high] = self.bounds;
         [low, high].into_iter().find(|bound| *bound == coordinate)
     }
 
     /// So far on the way from the initial value to another, by orders of magnitude.
-    pub fn on_the_way(&self, to: f64, part: f64) -> f64 {
-        let way = to - self.start;
-        let far = match self.log {
+    pub fn interpolate_from_initial(&self, to: f64, part: f64) -> f64 {
+        let way = to - self.initial;
+        let far = match self.is_logarithmic {
             true => part * way.abs(),
             false => (1.0 + way.abs()).powf(part) - 1.0,
         };
-        self.start + far * way.signum()
+        self.initial + far * way.signum()
     }
 
     /// d value/d coordinate.
-    pub fn slope(&self, coordinate: f64) -> f64 {
-        match self.log {
+    pub fn value_derivative(&self, coordinate: f64) -> f64 {
+        match self.is_logarithmic {
             true => coordinate.exp(),
             false => self.unit,
         }
@@ -721,7 +748,7 @@ impl Coordinate {
 }
 
 /// The range of the numbers in a column, or their size where there is one: how far its zero may be off.
-fn unit_of_offset(column: &OffsetColumn, data: &Data) -> Result<f64, FitError> {
+fn offset_unit(column: &OffsetColumn, data: &Data) -> Result<f64, FitError> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for experiment in &data.experiments {
         let set = experiment.settings.iter().filter_map(|(keys, value)| {
@@ -736,7 +763,7 @@ fn unit_of_offset(column: &OffsetColumn, data: &Data) -> Result<f64, FitError> {
         }
     }
     if low > high {
-        let name = FreeNumber::Offset(column.clone());
+        let name = FreeParameterTarget::Offset(column.clone());
         let why = "no file of experiments has that column";
         return Err(FitError::Free(format!("{name}: {why}")));
     }

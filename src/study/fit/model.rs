@@ -4,125 +4,137 @@
 //! A leaf at rest under the conditions of its experiments, its predictions for the data, and
 //! their derivatives.
 
-use crate::leaf::{LeafRate, Response, shift};
+use crate::leaf::{LeafParameterDerivative, LinearResponse, displacement_part};
 use crate::modes;
 use crate::motion::Physics;
-use crate::newton::Work;
+use crate::newton::SolverCounts;
 use crate::relax::accuracy::transfer::weights;
 use crate::relax::{
-    Grids, Level, Lost, Nearby, NestedEquilibrium, Options, Parameter, unit_forces,
+    ContinuationFailure, GridLevel, GridPolicy, NeighbouringEquilibria, NestedEquilibrium, Options,
+    Parameter, unit_forces,
 };
-use crate::scenario::{Photo, PhotoRate, Scenario};
+use crate::scenario::{Photo, PhotoParameterDerivative, Scenario};
 use crate::study::fit::data::{
-    COORDINATES, Case, Data, IN_PHOTO, Kind, Measured, Observed, Origin, Quantity, Traced, View,
+    COORDINATE_COLUMNS, Data, DataOrigin, DatumDimension, ExperimentCase, FIRST_PHOTO_COORDINATE,
+    MeasuredQuantity, MeasuredValue, ObservationModel, ObservedExperiment, TracedVeinPoint,
 };
-use crate::study::fit::found::digits;
-use crate::study::fit::responses::{Responses, Vein};
-use crate::study::fit::{Coordinate, FitError, FreeNumber, OffsetColumn, data};
-use crate::study::{Base, Keys};
+use crate::study::fit::found::round_to_three_digits;
+use crate::study::fit::responses::{ParameterResponses, VeinInterpolant};
+use crate::study::fit::{FitCoordinate, FitError, FreeParameterTarget, OffsetColumn, data};
+use crate::study::{BaseScenario, ParameterKeys};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
-pub(super) type Change = Vec<(f64, Scenario)>;
+pub(super) type ScenarioDerivative = Vec<(f64, Scenario)>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
-pub(super) const INSIGNIFICANT: f64 = 0.05;
+pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;
 
 /// The largest tolerance of leaves from which a search starts.
-const LOOSEST: f64 = 1e-4;
+const LARGEST_SEARCH_TOLERANCE: f64 = 1e-4;
 
 /// How often the leaves of all experiments may be relaxed or followed in a fit, and how often they were.
-pub(super) struct Budget {
-    most: usize,
+pub(super) struct EvaluationBudget {
+    limit: usize,
     spent: AtomicUsize,
 }
 
-impl Budget {
+impl EvaluationBudget {
     pub fn new(most: usize) -> Self {
         let spent = AtomicUsize::new(0);
-        Budget { most, spent }
+        EvaluationBudget { limit: most, spent }
     }
 
     /// Whether it is used up. Asked where nothing is computed in parallel, so that a fit ends at the
     /// same place on any number of threads.
     pub fn is_used_up(&self) -> bool {
-        self.spent.load(Ordering::Relaxed) >= self.most
+        self.spent.load(Ordering::Relaxed) >= self.limit
     }
 
-    pub fn most(&self) -> usize {
-        self.most
+    pub fn limit(&self) -> usize {
+        self.limit
     }
 }
 
 /// Data common to all points of a fit.
 #[derive(Clone)]
-pub(super) struct Model<'a> {
-    pub base: &'a Base,
-    pub coordinates: &'a [Coordinate],
+pub(super) struct FitModel<'a> {
+    pub base: &'a BaseScenario,
+    pub coordinates: &'a [FitCoordinate],
     pub options: Options,
-    pub cases: Arc<Vec<Case>>,
+    pub cases: Arc<Vec<ExperimentCase>>,
     /// The grids on which leaves are followed.
-    pub grids: Grids,
+    pub grids: GridPolicy,
     /// Whether scenarios are linear in the free numbers.
-    pub linear: bool,
+    pub has_linear_scenarios: bool,
     /// The derivatives of scenarios with respect to the free numbers, if common to all.
-    pub changes: Arc<OnceLock<Option<Vec<Change>>>>,
-    pub budget: Arc<Budget>,
+    pub scenario_derivatives: Arc<OnceLock<Option<Vec<ScenarioDerivative>>>>,
+    pub budget: Arc<EvaluationBudget>,
 }
 
 /// The leaves of all experiments.
-pub(super) struct Point {
+pub(super) struct FitPoint {
     pub theta: Vec<f64>,
-    pub cases: Vec<CaseAt>,
+    pub case_solutions: Vec<CaseSolution>,
 }
 
-impl Point {
-    pub fn components(&self) -> impl Iterator<Item = &Component> {
-        self.cases.iter().flat_map(|case| &case.components)
+impl FitPoint {
+    pub fn components(&self) -> impl Iterator<Item = &ScalarDatum> {
+        self.case_solutions
+            .iter()
+            .flat_map(|case| &case.scalar_data)
     }
 
     /// Takes over the derivatives of another point.
-    pub fn take_gradients(&mut self, other: &mut Point) {
-        for (own, other) in self.cases.iter_mut().zip(&mut other.cases) {
+    pub fn take_gradients(&mut self, other: &mut FitPoint) {
+        for (own, other) in self
+            .case_solutions
+            .iter_mut()
+            .zip(&mut other.case_solutions)
+        {
             own.gradients = std::mem::take(&mut other.gradients);
         }
     }
 
     pub fn gradients(&self) -> impl Iterator<Item = &Vec<f64>> {
-        self.cases.iter().flat_map(|case| &case.gradients)
+        self.case_solutions.iter().flat_map(|case| &case.gradients)
     }
 }
 
 /// Tables of a scenario in whose numbers it is linear, independently of the others:
 /// a length changes the coupling of its gap, and a section its stiffnesses.
-const APART: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
+const LINEAR_SCENARIO_TABLES: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
 
 /// Whether the derivatives of a scenario with respect to these are constant.
-fn is_linear(coordinates: &[Coordinate]) -> bool {
+fn is_scenario_linear(coordinates: &[FitCoordinate]) -> bool {
     coordinates.iter().all(|free| {
-        free.number.keys().is_some_and(|keys| {
+        free.number.scenario_keys().is_some_and(|keys| {
             let mut all = keys.targets().iter().filter_map(|target| target.key());
-            let apart = all.all(|key| APART.iter().any(|table| key.path().starts_with(table)));
-            apart && keys.is_linear()
+            let apart = all.all(|key| {
+                LINEAR_SCENARIO_TABLES
+                    .iter()
+                    .any(|table| key.path().starts_with(table))
+            });
+            apart && keys.is_scenario_linear()
         })
     })
 }
 
-impl<'a> Model<'a> {
+impl<'a> FitModel<'a> {
     pub fn new(
-        base: &'a Base,
-        coordinates: &'a [Coordinate],
+        base: &'a BaseScenario,
+        coordinates: &'a [FitCoordinate],
         options: &Options,
-        (data, budget): (Data, Budget),
+        (data, budget): (Data, EvaluationBudget),
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
-        let cases = data::cases(data)?;
+        let cases = data::experiment_cases(data)?;
         for case in &cases {
-            let of_a_tip = |m: &&Measured| m.quantity.kind() == Kind::Length;
-            if let Some(measured) = case.measured().find(of_a_tip)
+            let of_a_tip = |m: &&MeasuredValue| m.quantity.dimension() == DatumDimension::Length;
+            if let Some(measured) = case.measured_values().find(of_a_tip)
                 && rods > 1
                 && !base.scenario().joined
             {
@@ -133,7 +145,7 @@ impl<'a> Model<'a> {
                 );
                 return Err(FitError::Data(why));
             }
-            let mut traced = case.traced();
+            let mut traced = case.traced_points();
             if let Some(traced) = traced.find(|traced| traced.is_in_photo())
                 && base.scenario().photo.is_none()
             {
@@ -144,8 +156,9 @@ impl<'a> Model<'a> {
                 );
                 return Err(FitError::Data(why));
             }
-            let of_a_holder = |m: &&Measured| matches!(m.quantity, Quantity::Reaction(_));
-            if let Some(measured) = case.measured().find(of_a_holder)
+            let of_a_holder =
+                |m: &&MeasuredValue| matches!(m.quantity, MeasuredQuantity::Reaction(_));
+            if let Some(measured) = case.measured_values().find(of_a_holder)
                 && base.scenario().held_tip.is_none()
             {
                 let why = format!(
@@ -156,9 +169,8 @@ impl<'a> Model<'a> {
                 return Err(FitError::Data(why));
             }
             let grips = base.scenario().grips.len();
-            let of_no_grip =
-                |m: &&Measured| matches!(m.quantity, Quantity::Grip(grip, _) if grip >= grips);
-            if let Some(measured) = case.measured().find(of_no_grip) {
+            let of_no_grip = |m: &&MeasuredValue| matches!(m.quantity, MeasuredQuantity::Grip(grip, _) if grip >= grips);
+            if let Some(measured) = case.measured_values().find(of_no_grip) {
                 let why = format!(
                     "{} is what a grip feels, counted from 1, and the scenario has {grips} of \
                      [[grip]]",
@@ -166,52 +178,62 @@ impl<'a> Model<'a> {
                 );
                 return Err(FitError::Data(why));
             }
-            let both = |(keys, _): &&(Keys, f64)| {
-                let mut free = coordinates.iter().filter_map(|free| free.number.keys());
+            let both = |(keys, _): &&(ParameterKeys, f64)| {
+                let mut free = coordinates
+                    .iter()
+                    .filter_map(|free| free.number.scenario_keys());
                 free.any(|free| free.overlaps(keys))
             };
             if let Some((keys, _)) = case.settings().iter().find(both) {
-                let place = case.place();
+                let place = case.origin_prefix();
                 let why = format!("{place}{keys} is set by the experiment, and free");
                 return Err(FitError::Data(why));
             }
         }
-        Ok(Model {
+        Ok(FitModel {
             base,
             coordinates,
             options: options.clone(),
             cases: Arc::new(cases),
-            grids: Grids::AsNeeded,
-            linear: is_linear(coordinates) && !base.scenario().depends_on_natural_leaf(),
-            changes: Arc::default(),
+            grids: GridPolicy::AsNeeded,
+            has_linear_scenarios: is_scenario_linear(coordinates)
+                && !base.scenario().needs_stress_free_leaf(),
+            scenario_derivatives: Arc::default(),
             budget: Arc::new(budget),
         })
     }
 
     /// The numbers of the scenario in an experiment: its settings with their offsets, and then the free
     /// ones.
-    pub(super) fn values<'s>(&'s self, case: &'s Case, theta: &[f64]) -> Vec<(&'s Keys, f64)> {
+    pub(super) fn scenario_values<'s>(
+        &'s self,
+        case: &'s ExperimentCase,
+        theta: &[f64],
+    ) -> Vec<(&'s ParameterKeys, f64)> {
         let free = || self.coordinates.iter().zip(theta);
         let settings = case.settings().iter().map(|(keys, value)| {
             let offsets = free().filter(|(free, _)| free.number.is_offset_of(keys));
-            let offset: f64 = offsets.map(|(free, theta)| free.value(*theta)).sum();
+            let offset: f64 = offsets
+                .map(|(free, theta)| free.inverse_transform(*theta))
+                .sum();
             (keys, value + offset)
         });
-        let entries =
-            free().filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))));
+        let entries = free().filter_map(|(free, theta)| {
+            Some((free.number.scenario_keys()?, free.inverse_transform(*theta)))
+        });
         settings.chain(entries).collect()
     }
 
     /// Where the number that a coordinate changes stands among [`Model::values`]; none if it changes
     /// nothing in this experiment's leaf.
-    pub(super) fn place_of(&self, case: &Case, k: usize) -> Option<usize> {
+    pub(super) fn scenario_value_index(&self, case: &ExperimentCase, k: usize) -> Option<usize> {
         match &self.coordinates[k].number {
-            FreeNumber::Entry(_) => {
+            FreeParameterTarget::Entry(_) => {
                 let before = self.coordinates[..k].iter();
-                let before = before.filter(|free| free.number.keys().is_some());
+                let before = before.filter(|free| free.number.scenario_keys().is_some());
                 Some(case.settings().len() + before.count())
             }
-            offset @ FreeNumber::Offset(_) => {
+            offset @ FreeParameterTarget::Offset(_) => {
                 let mut settings = case.settings().iter();
                 settings.position(|(keys, _)| offset.is_offset_of(keys))
             }
@@ -219,76 +241,95 @@ impl<'a> Model<'a> {
     }
 
     /// Predictions of a leaf at rest for the data of an experiment, less the offsets of their columns.
-    pub(super) fn case_at(
+    pub(super) fn solved_case(
         &self,
         case: usize,
         theta: &[f64],
         at: NestedEquilibrium,
-    ) -> Result<CaseAt, Lost> {
-        let mut found = CaseAt::new(&self.cases[case], at)?;
+    ) -> Result<CaseSolution, ContinuationFailure> {
+        let mut found = CaseSolution::new(&self.cases[case], at)?;
         for (free, theta) in self.coordinates.iter().zip(theta) {
-            let offset = free.value(*theta);
-            let own = found.components.iter_mut().filter(|it| it.has_offset(free));
+            let offset = free.inverse_transform(*theta);
+            let own = found
+                .scalar_data
+                .iter_mut()
+                .filter(|it| it.has_offset(free));
             own.for_each(|component| component.model -= offset);
         }
         Ok(found)
     }
 
     /// The scenario of an experiment.
-    pub(super) fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Arc<Scenario>, FitError> {
-        match self.base.at(&self.values(case, theta)) {
+    pub(super) fn case_scenario(
+        &self,
+        case: &ExperimentCase,
+        theta: &[f64],
+    ) -> Result<Arc<Scenario>, FitError> {
+        match self
+            .base
+            .scenario_with_values(&self.scenario_values(case, theta))
+        {
             Ok(varied) => Ok(Arc::new(varied.scenario)),
-            Err(refused) => Err(FitError::Data(format!("{}{refused}", case.place()))),
+            Err(refused) => Err(FitError::Data(format!("{}{refused}", case.origin_prefix()))),
         }
     }
 
     /// The leaves at rest, relaxed from their usual starts.
-    pub fn find(&self, theta: &[f64]) -> Result<Point, FitError> {
-        let find = |case: usize| -> Result<CaseAt, FitError> {
-            let scenario = self.scenario(&self.cases[case], theta)?;
-            let found = NestedEquilibrium::find(&scenario, &self.options)?;
-            let found = found.and_then(|at| self.case_at(case, theta, at));
-            found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
+    pub fn relax_leaves(&self, theta: &[f64]) -> Result<FitPoint, FitError> {
+        let find = |case: usize| -> Result<CaseSolution, FitError> {
+            let scenario = self.case_scenario(&self.cases[case], theta)?;
+            let found = NestedEquilibrium::relax_to_stable(&scenario, &self.options)?;
+            let found = found.and_then(|at| self.solved_case(case, theta, at));
+            found.map_err(|lost| self.no_equilibrium_error(theta, case, &lost))
         };
-        self.point(theta, find)
+        self.assemble_point(theta, find)
     }
 
     /// The same in no more than so many steps of each leaf.
-    pub fn find_within(&self, theta: &[f64], most_steps: usize) -> Result<Point, FitError> {
-        let find = |case: usize| -> Result<CaseAt, FitError> {
-            let scenario = self.scenario(&self.cases[case], theta)?;
+    pub fn relax_leaves_within_steps(
+        &self,
+        theta: &[f64],
+        most_steps: usize,
+    ) -> Result<FitPoint, FitError> {
+        let find = |case: usize| -> Result<CaseSolution, FitError> {
+            let scenario = self.case_scenario(&self.cases[case], theta)?;
             let found = NestedEquilibrium::find_within(&scenario, &self.options, most_steps)?;
-            let found = found.and_then(|at| self.case_at(case, theta, at));
-            found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
+            let found = found.and_then(|at| self.solved_case(case, theta, at));
+            found.map_err(|lost| self.no_equilibrium_error(theta, case, &lost))
         };
-        self.point(theta, find)
+        self.assemble_point(theta, find)
     }
 
     /// The point at which `of` finds the leaf of each case.
-    pub(super) fn point<E: Send>(
+    pub(super) fn assemble_point<E: Send>(
         &self,
         theta: &[f64],
-        of: impl Fn(usize) -> Result<CaseAt, E> + Sync + Send,
-    ) -> Result<Point, E> {
+        of: impl Fn(usize) -> Result<CaseSolution, E> + Sync + Send,
+    ) -> Result<FitPoint, E> {
         self.budget.spent.fetch_add(1, Ordering::Relaxed);
         let cases = (0..self.cases.len()).into_par_iter().map(of);
-        Ok(Point {
+        Ok(FitPoint {
             theta: theta.to_vec(),
-            cases: cases.collect::<Result<_, _>>()?,
+            case_solutions: cases.collect::<Result<_, _>>()?,
         })
     }
 
-    pub(super) fn no_equilibrium(&self, theta: &[f64], case: usize, lost: &Lost) -> FitError {
+    pub(super) fn no_equilibrium_error(
+        &self,
+        theta: &[f64],
+        case: usize,
+        lost: &ContinuationFailure,
+    ) -> FitError {
         let case = &self.cases[case];
-        let (place, name) = (case.place(), case.name());
+        let (place, name) = (case.origin_prefix(), case.name());
         let why = match lost {
-            Lost::NotAtRest(why) => why.as_str(),
-            Lost::Elsewhere => "it jumps to another equilibrium",
+            ContinuationFailure::NotAtRest(why) => why.as_str(),
+            ContinuationFailure::OtherEquilibrium => "it jumps to another equilibrium",
         };
         let mut both = self.coordinates.iter().zip(theta);
-        let numbers = match both.all(|(free, theta)| free.start == *theta) {
+        let numbers = match both.all(|(free, theta)| free.initial == *theta) {
             true => "the numbers of the scenario".into(),
-            false => self.in_words(theta),
+            false => self.values_in_words(theta),
         };
         FitError::NoEquilibrium(format!(
             "{place}experiment {name}: with {numbers} there is no stable equilibrium ({why}): \
@@ -297,49 +338,62 @@ impl<'a> Model<'a> {
     }
 
     /// The number that each coordinate stands for.
-    pub fn numbers(&self, theta: &[f64]) -> Vec<(String, f64)> {
+    pub fn named_values(&self, theta: &[f64]) -> Vec<(String, f64)> {
         let both = self.coordinates.iter().zip(theta);
-        both.map(|(free, theta)| (free.number.to_string(), free.value(*theta)))
+        both.map(|(free, theta)| (free.number.to_string(), free.inverse_transform(*theta)))
             .collect()
     }
 
     /// These in words.
-    pub fn in_words(&self, theta: &[f64]) -> String {
-        let numbers = self.numbers(theta);
+    pub fn values_in_words(&self, theta: &[f64]) -> String {
+        let numbers = self.named_values(theta);
         let each = numbers
             .iter()
-            .map(|(key, value)| format!("{key} = {}", digits(*value)));
+            .map(|(key, value)| format!("{key} = {}", round_to_three_digits(*value)));
         each.collect::<Vec<_>>().join(", ")
     }
 
     /// The leaves at other values, followed from those of a point with derivatives.
-    pub fn follow(&self, from: &Point, theta: &[f64]) -> Result<Point, Lost> {
-        self.follow_on(from, theta, self.grids)
+    pub fn continue_leaves(
+        &self,
+        from: &FitPoint,
+        theta: &[f64],
+    ) -> Result<FitPoint, ContinuationFailure> {
+        self.continue_leaves_on_grids(from, theta, self.grids)
     }
 
     /// The same on these grids.
-    pub fn follow_on(&self, from: &Point, theta: &[f64], grids: Grids) -> Result<Point, Lost> {
-        let steps = self.steps(&from.theta, theta);
-        let follow = |case: usize| -> Result<CaseAt, Lost> {
-            let scenario = self.scenario(&self.cases[case], theta);
-            let scenario = scenario.map_err(|refused| Lost::NotAtRest(refused.to_string()))?;
-            let from = &from.cases[case];
+    pub fn continue_leaves_on_grids(
+        &self,
+        from: &FitPoint,
+        theta: &[f64],
+        grids: GridPolicy,
+    ) -> Result<FitPoint, ContinuationFailure> {
+        let steps = self.value_increments(&from.theta, theta);
+        let follow = |case: usize| -> Result<CaseSolution, ContinuationFailure> {
+            let scenario = self.case_scenario(&self.cases[case], theta);
+            let scenario =
+                scenario.map_err(|refused| ContinuationFailure::NotAtRest(refused.to_string()))?;
+            let from = &from.case_solutions[case];
             let how = (&self.options, grids);
-            let answer = from.answer(&from.at.levels, &steps)?;
-            let at = from.at.follow(scenario, &answer, how)?;
-            self.case_at(case, theta, at)
+            let answer = from.response_to_steps(&from.equilibrium.levels, &steps)?;
+            let at = from
+                .equilibrium
+                .continue_to_scenario(scenario, &answer, how)?;
+            self.solved_case(case, theta, at)
         };
-        self.point(theta, follow)
+        self.assemble_point(theta, follow)
     }
 
     /// Unit of the data: the length of the leaf, or the largest of them.
-    pub fn unit(&self) -> f64 {
-        let mut measured = self.cases.iter().flat_map(Case::measured);
-        let mut traced = self.cases.iter().flat_map(Case::traced);
-        let lengths = |measured: &Measured| measured.quantity.kind() == Kind::Length;
-        let in_photo = traced.clone().any(Traced::is_in_photo);
+    pub fn data_length_unit(&self) -> f64 {
+        let mut measured = self.cases.iter().flat_map(ExperimentCase::measured_values);
+        let mut traced = self.cases.iter().flat_map(ExperimentCase::traced_points);
+        let lengths =
+            |measured: &MeasuredValue| measured.quantity.dimension() == DatumDimension::Length;
+        let in_photo = traced.clone().any(TracedVeinPoint::is_in_photo);
         match traced.next().is_some() || measured.clone().all(lengths) {
-            true if in_photo => self.base.scenario().scale().length / self.pixel(),
+            true if in_photo => self.base.scenario().scale().length / self.initial_pixel_length(),
             true => self.base.scenario().scale().length,
             false => {
                 let sizes = measured.by_ref().filter_map(|measured| measured.value);
@@ -350,13 +404,13 @@ impl<'a> Model<'a> {
     }
 
     /// The length of a pixel of its photograph before the fit, if there is one.
-    pub fn pixel(&self) -> f64 {
+    pub fn initial_pixel_length(&self) -> f64 {
         let photo = self.base.scenario().photo.as_ref();
         photo.map_or(1.0, |photo| photo.scale)
     }
 
     /// Values of the coordinates after `step` times a change, within their bounds.
-    pub fn moved(&self, from: &[f64], step: f64, change: &DVector<f64>) -> Vec<f64> {
+    pub fn bounded_update(&self, from: &[f64], step: f64, change: &DVector<f64>) -> Vec<f64> {
         let coordinates = self.coordinates.iter().zip(from).zip(change.iter());
         let moved = coordinates.map(|((free, from), change)| {
             let [low, high] = free.bounds;
@@ -365,53 +419,57 @@ impl<'a> Model<'a> {
         moved.collect()
     }
 
-    pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+    pub fn value_increments(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let each = self.coordinates.iter().zip(to).zip(from);
-        each.map(|((free, to), from)| free.value(*to) - free.value(*from))
+        each.map(|((free, to), from)| free.inverse_transform(*to) - free.inverse_transform(*from))
             .collect()
     }
 
     /// The same model with leaves only as accurate as the resolution of its data, all of which are
     /// lengths.
-    pub fn with_loose_tolerance(&self, assumed: f64) -> Model<'a> {
+    pub fn with_loose_tolerance(&self, assumed: f64) -> FitModel<'a> {
         let length = self.base.scenario().scale().length;
         let sd = |sd: Option<f64>| sd.unwrap_or(assumed) / length;
         let mut tolerance = f64::INFINITY;
         for case in self.cases.iter() {
-            for measured in case.measured() {
-                let known = match measured.quantity.kind() {
-                    Kind::Length => INSIGNIFICANT * sd(measured.sd),
+            for measured in case.measured_values() {
+                let known = match measured.quantity.dimension() {
+                    DatumDimension::Length => INSIGNIFICANT_PREDICTION_ERROR * sd(measured.sd),
                     _ => 0.0,
                 };
                 tolerance = known.min(tolerance);
             }
-            let traced = case.traced().map(|traced| {
+            let traced = case.traced_points().map(|traced| {
                 let unit = if traced.is_in_photo() {
-                    self.pixel()
+                    self.initial_pixel_length()
                 } else {
                     1.0
                 };
-                INSIGNIFICANT * unit * sd(traced.sd)
+                INSIGNIFICANT_PREDICTION_ERROR * unit * sd(traced.sd)
             });
             tolerance = traced.fold(tolerance, f64::min);
         }
-        Model {
+        FitModel {
             options: Options {
-                tolerance: Some(tolerance.min(LOOSEST).max(self.tolerance())),
+                tolerance: Some(
+                    tolerance
+                        .min(LARGEST_SEARCH_TOLERANCE)
+                        .max(self.equilibrium_tolerance()),
+                ),
                 ..self.options.clone()
             },
             ..self.clone()
         }
     }
 
-    pub fn tolerance(&self) -> f64 {
+    pub fn equilibrium_tolerance(&self) -> f64 {
         let scenario = self.base.scenario();
         self.options.tolerance.unwrap_or(scenario.tolerance)
     }
 
     /// Checks that the standard deviations are known for all data, or for none, then of one kind.
-    pub fn check_deviations(&self, point: &Point) -> Result<bool, FitError> {
-        let known = |component: &&Component| component.sd.is_some();
+    pub fn check_deviations(&self, point: &FitPoint) -> Result<bool, FitError> {
+        let known = |component: &&ScalarDatum| component.sd.is_some();
         let count = point.components().filter(known).count();
         if count == point.components().count() {
             return Ok(true);
@@ -419,12 +477,14 @@ impl<'a> Model<'a> {
         let without = point.components().find(|component| !known(component));
         if count > 0 {
             let place = without.and_then(|c| c.origin.as_ref());
-            let place = place.map(Origin::to_string).unwrap_or_default();
+            let place = place.map(DataOrigin::to_string).unwrap_or_default();
             return Err(FitError::Data(format!(
                 "{place}: has no standard deviation, and others have: give all or none"
             )));
         }
-        let mut kinds = point.components().map(|component| component.what.kind());
+        let mut kinds = point
+            .components()
+            .map(|component| component.quantity.dimension());
         let first = kinds.next();
         if kinds.any(|kind| Some(kind) != first) {
             return Err(FitError::Data(
@@ -437,16 +497,16 @@ impl<'a> Model<'a> {
     }
 
     /// Checks that double precision can weigh all data.
-    pub fn check_weights(&self, point: &Point) -> Result<(), FitError> {
-        let all = point.cases.iter();
-        let all = all.flat_map(|case| case.components.iter().map(move |datum| (case, datum)));
+    pub fn check_weights(&self, point: &FitPoint) -> Result<(), FitError> {
+        let all = point.case_solutions.iter();
+        let all = all.flat_map(|case| case.scalar_data.iter().map(move |datum| (case, datum)));
         for (case, datum) in all {
-            let (value, column) = (datum.observed, datum.what.column());
-            let kind = datum.what.kind();
+            let (value, column) = (datum.observed, datum.quantity.column());
+            let kind = datum.quantity.dimension();
             let size = match kind {
                 // A vein is extended to any point that was traced.
-                Kind::Length | Kind::Pixel => case.unit(kind),
-                _ => case.unit(kind).max(datum.model.abs()),
+                DatumDimension::Length | DatumDimension::Pixel => case.data_unit(kind),
+                _ => case.data_unit(kind).max(datum.model.abs()),
             };
             let why = match datum.sd {
                 _ if value.abs() * f64::EPSILON > size => format!(
@@ -456,55 +516,61 @@ impl<'a> Model<'a> {
                 Some(sd) if sd < f64::EPSILON * size.max(value.abs()) => format!(
                     "{} = {sd:e}: is less than the rounding of {column} as computed: give the \
                      standard deviation of the measurement",
-                    datum.what.deviation_column()
+                    datum.quantity.deviation_column()
                 ),
                 _ => continue,
             };
-            let place = datum.origin.as_ref().map(Origin::to_string);
+            let place = datum.origin.as_ref().map(DataOrigin::to_string);
             let place = place.map_or_else(String::new, |place| format!("{place}: "));
             return Err(FitError::Data(format!("{place}{why}")));
         }
         Ok(())
     }
 
-    pub fn work(point: &Point) -> Work {
-        let works = point.cases.iter().map(|case| case.at.work);
-        works.fold(Work::default(), |sum, work| sum + work)
+    pub fn solver_work(point: &FitPoint) -> SolverCounts {
+        let works = point
+            .case_solutions
+            .iter()
+            .map(|case| case.equilibrium.work);
+        works.fold(SolverCounts::default(), |sum, work| sum + work)
     }
 }
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
-const FEW_UNKNOWNS: usize = 4_000;
+const MOST_UNKNOWNS_FOR_MODES: usize = 4_000;
 
 /// One scalar datum.
 #[derive(Clone, Debug)]
-pub(super) struct Component {
+pub(super) struct ScalarDatum {
     /// The number of its experiment.
     pub experiment: usize,
-    pub what: Compared,
+    pub quantity: DatumQuantity,
     pub observed: f64,
     pub model: f64,
     /// Its standard deviation, if known.
     pub sd: Option<f64>,
     /// Whether it does not count as a datum: the distance of a point from a curve contains no
     /// information on the position along it.
-    pub free: bool,
-    pub origin: Option<Origin>,
+    pub is_uninformative: bool,
+    pub origin: Option<DataOrigin>,
 }
 
-impl Component {
+impl ScalarDatum {
     /// Whether a coordinate is the offset of its column.
-    pub fn has_offset(&self, free: &Coordinate) -> bool {
-        match (&free.number, self.what) {
-            (FreeNumber::Offset(OffsetColumn::Result(of)), Compared::Result(what)) => *of == what,
+    pub fn has_offset(&self, free: &FitCoordinate) -> bool {
+        match (&free.number, self.quantity) {
+            (
+                FreeParameterTarget::Offset(OffsetColumn::Result(of)),
+                DatumQuantity::Result(what),
+            ) => *of == what,
             _ => false,
         }
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Compared {
-    Result(Quantity),
+pub(super) enum DatumQuantity {
+    Result(MeasuredQuantity),
     /// One of [`COORDINATES`] of a point on a rod, at this fraction of its length.
     Vein {
         rod: usize,
@@ -513,117 +579,129 @@ pub(super) enum Compared {
     },
 }
 
-impl Compared {
-    pub fn kind(self) -> Kind {
+impl DatumQuantity {
+    pub fn dimension(self) -> DatumDimension {
         match self {
-            Compared::Result(quantity) => quantity.kind(),
-            Compared::Vein { coordinate, .. } if coordinate >= IN_PHOTO => Kind::Pixel,
-            Compared::Vein { .. } => Kind::Length,
+            DatumQuantity::Result(quantity) => quantity.dimension(),
+            DatumQuantity::Vein { coordinate, .. } if coordinate >= FIRST_PHOTO_COORDINATE => {
+                DatumDimension::Pixel
+            }
+            DatumQuantity::Vein { .. } => DatumDimension::Length,
         }
     }
 
     /// The name of its column in the data.
     pub fn column(self) -> String {
         match self {
-            Compared::Result(quantity) => quantity.to_string(),
-            Compared::Vein { coordinate, .. } => COORDINATES[coordinate].into(),
+            DatumQuantity::Result(quantity) => quantity.to_string(),
+            DatumQuantity::Vein { coordinate, .. } => COORDINATE_COLUMNS[coordinate].into(),
         }
     }
 
     /// The name of the column of its standard deviation.
     pub fn deviation_column(self) -> String {
         match self {
-            Compared::Result(quantity) => format!("sd_{quantity}"),
-            Compared::Vein { .. } => "sd".into(),
+            DatumQuantity::Result(quantity) => format!("sd_{quantity}"),
+            DatumQuantity::Vein { .. } => "sd".into(),
         }
     }
 }
 
 /// A leaf at rest at some values of the free numbers.
-pub(super) struct CaseAt {
-    pub at: NestedEquilibrium,
+pub(super) struct CaseSolution {
+    pub equilibrium: NestedEquilibrium,
     /// Modes on the first grids.
     pub modes: Vec<Vec<modes::Eigenpair>>,
-    pub components: Vec<Component>,
+    pub scalar_data: Vec<ScalarDatum>,
     /// Its response to the numbers, once computed.
-    pub responses: Option<Responses>,
+    pub responses: Option<ParameterResponses>,
     /// The gradients of the components; empty until computed.
     pub gradients: Vec<Vec<f64>>,
 }
 
-impl CaseAt {
+impl CaseSolution {
     /// Predictions of a leaf at rest for the data under these conditions.
-    pub fn new(of: &Case, at: NestedEquilibrium) -> Result<CaseAt, Lost> {
+    pub fn new(
+        of: &ExperimentCase,
+        at: NestedEquilibrium,
+    ) -> Result<CaseSolution, ContinuationFailure> {
         let frequencies = of
-            .measured()
+            .measured_values()
             .filter_map(|measured| match measured.quantity {
-                Quantity::Frequency(mode) => Some(mode),
+                MeasuredQuantity::Frequency(mode) => Some(mode),
                 _ => None,
             });
         let count = frequencies.max().unwrap_or(0);
         let mut modes = Vec::new();
         for level in at.levels.iter().filter(|_| count > 0) {
             let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-            if modes.is_empty() || unknowns < FEW_UNKNOWNS {
-                let pairs = modes::loaded(&level.leaf, &level.state, count);
-                let lost = || Lost::NotAtRest("its frequencies cannot be found".into());
+            if modes.is_empty() || unknowns < MOST_UNKNOWNS_FOR_MODES {
+                let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
+                let lost =
+                    || ContinuationFailure::NotAtRest("its frequencies cannot be found".into());
                 let pairs = pairs
                     .filter(|pairs| pairs.len() == count)
                     .ok_or_else(lost)?;
                 modes.push(pairs);
             }
         }
-        let mut found = CaseAt {
-            at,
+        let mut found = CaseSolution {
+            equilibrium: at,
             modes,
-            components: Vec::new(),
+            scalar_data: Vec::new(),
             responses: None,
             gradients: Vec::new(),
         };
         let mut veins = Vec::new();
-        let observed = of.observed.iter();
-        let components = observed.flat_map(|of| found.compared(of, &mut veins));
-        found.components = components.collect();
+        let observed = of.experiments.iter();
+        let components = observed.flat_map(|of| found.experiment_data(of, &mut veins));
+        found.scalar_data = components.collect();
         Ok(found)
     }
 
     /// The components of an experiment.
-    fn compared<'v>(&'v self, of: &Observed, veins: &mut Vec<Option<Vein<'v>>>) -> Vec<Component> {
+    fn experiment_data<'v>(
+        &'v self,
+        of: &ObservedExperiment,
+        veins: &mut Vec<Option<VeinInterpolant<'v>>>,
+    ) -> Vec<ScalarDatum> {
         let mut components = Vec::new();
-        let view = self.view();
+        let view = self.observation_model();
         for measured in &of.experiment.measured {
-            components.push(Component {
+            components.push(ScalarDatum {
                 experiment: of.number,
-                what: Compared::Result(measured.quantity),
+                quantity: DatumQuantity::Result(measured.quantity),
                 observed: measured.value.unwrap_or(f64::NAN),
-                model: self.result(measured.quantity),
+                model: self.predicted_result(measured.quantity),
                 sd: measured.sd,
-                free: false,
+                is_uninformative: false,
                 origin: of.experiment.origin.clone(),
             });
         }
         for traced in &of.traced {
             veins.resize_with(veins.len().max(traced.rod + 1), || None);
-            let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&self.at, traced.rod));
+            let vein = veins[traced.rod].get_or_insert_with(|| {
+                VeinInterpolant::from_equilibrium(&self.equilibrium, traced.rod)
+            });
             let beside = traced.sigma.is_none();
             let (sigma, model) = match traced.sigma {
-                Some(sigma) => (sigma, vein.point(sigma).0),
-                None => vein.nearest(&traced.at, &view),
+                Some(sigma) => (sigma, vein.point_and_tangent(sigma).0),
+                None => vein.nearest_point(&traced.coordinates, &view),
             };
-            let seen = traced.at.iter().enumerate();
+            let seen = traced.coordinates.iter().enumerate();
             let seen = seen.filter_map(|(k, value)| value.map(|value| (k, value)));
             for (number, (coordinate, observed)) in seen.enumerate() {
-                components.push(Component {
+                components.push(ScalarDatum {
                     experiment: of.number,
-                    what: Compared::Vein {
+                    quantity: DatumQuantity::Vein {
                         rod: traced.rod,
                         coordinate,
                         sigma,
                     },
                     observed,
-                    model: view.of(coordinate, model),
+                    model: view.project_point(coordinate, model),
                     sd: traced.sd,
-                    free: beside && number == 0,
+                    is_uninformative: beside && number == 0,
                     origin: Some(traced.origin.clone()),
                 });
             }
@@ -634,14 +712,14 @@ impl CaseAt {
     /// The axes along which its tip was measured, if there are no other data, and the equations of
     /// the leaf are symmetric: adjoint solutions for each axis then give the derivatives with
     /// respect to all numbers. `None` if solving for each number takes no more work.
-    pub fn tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
-        let leaf = &self.at.levels[0].leaf;
-        let symmetric = !leaf.leaf.is_held() && !leaf.has_moments();
-        let tip = |component: &Component| match component.what {
-            Compared::Result(Quantity::Tip(axis)) => Some(axis),
+    pub fn measured_tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
+        let leaf = &self.equilibrium.levels[0].leaf;
+        let symmetric = !leaf.leaf.has_placed_supports() && !leaf.has_moments();
+        let tip = |component: &ScalarDatum| match component.quantity {
+            DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => Some(axis),
             _ => None,
         };
-        let mut axes: Vec<usize> = self.components.iter().map(tip).collect::<Option<_>>()?;
+        let mut axes: Vec<usize> = self.scalar_data.iter().map(tip).collect::<Option<_>>()?;
         axes.sort_unstable();
         axes.dedup();
         // One more is for the next step.
@@ -649,101 +727,118 @@ impl CaseAt {
     }
 
     /// The gradients of the components from these solutions.
-    pub fn tip_rates(
+    pub fn tip_gradients(
         &self,
-        responses: &Responses,
+        responses: &ParameterResponses,
         axes: &[usize],
         slopes: &[f64],
-    ) -> Result<Vec<Vec<f64>>, Lost> {
+    ) -> Result<Vec<Vec<f64>>, ContinuationFailure> {
         let mut sums = [(); 3].map(|()| vec![0.0; slopes.len()]);
-        for (k, level) in self.at.levels.iter().enumerate() {
-            let weight = self.at.weights[k] * self.length();
+        for (k, level) in self.equilibrium.levels.iter().enumerate() {
+            let weight = self.equilibrium.weights[k] * self.leaf_length();
             if weight == 0.0 {
                 continue;
             }
             let all = unit_forces(&level.leaf, 1);
             let units: Vec<_> = axes.iter().map(|&axis| all[axis].clone()).collect();
-            let rates = responses.by_results((k, level), &units)?;
+            let rates = responses.adjoint_derivatives((k, level), &units)?;
             for (axis, rates) in axes.iter().zip(rates) {
                 let sums = sums[*axis].iter_mut().zip(rates).zip(slopes);
                 sums.for_each(|((sum, rate), slope)| *sum += weight * rate * slope);
             }
         }
-        let row = |component: &Component| match component.what {
-            Compared::Result(Quantity::Tip(axis)) => sums[axis].clone(),
+        let row = |component: &ScalarDatum| match component.quantity {
+            DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => sums[axis].clone(),
             _ => Vec::new(),
         };
-        Ok(self.components.iter().map(row).collect())
+        Ok(self.scalar_data.iter().map(row).collect())
     }
 
     /// Its response to steps of the numbers on these grids, each of which must be one of its
     /// own; empty if there are no steps.
-    pub fn answer(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
-        let none = |level: &Level| Response::zeros(&level.leaf);
+    pub fn response_to_steps(
+        &self,
+        levels: &[GridLevel],
+        steps: &[f64],
+    ) -> Result<Vec<LinearResponse>, ContinuationFailure> {
+        let none = |level: &GridLevel| LinearResponse::zeros(&level.leaf);
         match &self.responses {
-            Some(responses) if steps.iter().any(|step| *step != 0.0) => responses.to(levels, steps),
+            Some(responses) if steps.iter().any(|step| *step != 0.0) => {
+                responses.response_to_steps(levels, steps)
+            }
             _ => Ok(levels.iter().map(none).collect()),
         }
     }
 
     /// How points on its veins are seen.
-    pub fn view(&self) -> View<'_> {
-        View::new(self.photo())
+    pub fn observation_model(&self) -> ObservationModel<'_> {
+        ObservationModel::new(self.photograph())
     }
 
-    fn photo(&self) -> Option<&Photo> {
-        let leaf = &self.at.levels[0].leaf.leaf;
+    fn photograph(&self) -> Option<&Photo> {
+        let leaf = &self.equilibrium.levels[0].leaf.leaf;
         leaf.scenario().photo.as_ref()
     }
 
-    fn length(&self) -> f64 {
-        self.at.levels[0].leaf.leaf.scale.length
+    fn leaf_length(&self) -> f64 {
+        self.equilibrium.levels[0].leaf.leaf.scale.length
     }
 
-    fn force(&self) -> f64 {
-        self.at.levels[0].leaf.leaf.scale.force()
+    fn force_unit(&self) -> f64 {
+        self.equilibrium.levels[0].leaf.leaf.scale.force()
     }
 
     /// The unit of such data in which numbers of the leaf are about one.
-    pub fn unit(&self, kind: Kind) -> f64 {
+    pub fn data_unit(&self, kind: DatumDimension) -> f64 {
         match kind {
-            Kind::Length => self.length(),
-            Kind::Pixel => self.length() / self.photo().map_or(1.0, |photo| photo.scale),
-            Kind::Force => self.force(),
-            Kind::Frequency => {
-                let physics = Physics::new(&self.at.levels[0].leaf.leaf);
-                1.0 / (std::f64::consts::TAU * physics.time)
+            DatumDimension::Length => self.leaf_length(),
+            DatumDimension::Pixel => {
+                self.leaf_length() / self.photograph().map_or(1.0, |photo| photo.scale)
+            }
+            DatumDimension::Force => self.force_unit(),
+            DatumDimension::Frequency => {
+                let physics = Physics::new(&self.equilibrium.levels[0].leaf.leaf);
+                1.0 / (std::f64::consts::TAU * physics.time_unit)
             }
         }
     }
 
-    pub fn result(&self, quantity: Quantity) -> f64 {
+    pub fn predicted_result(&self, quantity: MeasuredQuantity) -> f64 {
         match quantity {
-            Quantity::Tip(axis) => {
-                let tip = self.at.best(|_, level| level.state.tip(0));
-                tip[axis] * self.length()
+            MeasuredQuantity::Tip(axis) => {
+                let tip = self
+                    .equilibrium
+                    .extrapolated_value(|_, level| level.state.tip(0));
+                tip[axis] * self.leaf_length()
             }
-            Quantity::Reaction(axis) => {
-                let force = self.at.best(|_, level| level.leaf.reaction(&level.state).0);
-                force[axis] * self.force()
+            MeasuredQuantity::Reaction(axis) => {
+                let force = self
+                    .equilibrium
+                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).0);
+                force[axis] * self.force_unit()
             }
-            Quantity::Grip(grip, axis) => {
-                let force = |_, level: &Level| level.leaf.grip_reactions(&level.state)[grip][0];
-                self.at.best(force)[axis] * self.force()
+            MeasuredQuantity::Grip(grip, axis) => {
+                let force = |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip][0];
+                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
-            Quantity::Frequency(mode) => {
-                self.eigenvalue(mode).max(0.0).sqrt() * self.unit(Kind::Frequency)
+            MeasuredQuantity::Frequency(mode) => {
+                self.extrapolated_eigenvalue(mode).max(0.0).sqrt()
+                    * self.data_unit(DatumDimension::Frequency)
             }
         }
     }
 
     /// An eigenvalue, extrapolated over the grids with modes.
-    fn eigenvalue(&self, mode: usize) -> f64 {
-        self.over_modes(|level| self.modes[level][mode - 1].eigenvalue)
+    fn extrapolated_eigenvalue(&self, mode: usize) -> f64 {
+        self.extrapolate_over_grids(|level| self.modes[level][mode - 1].eigenvalue)
     }
 
-    fn over_modes(&self, value: impl Fn(usize) -> f64) -> f64 {
-        let segments = self.at.levels.iter().map(|level| level.leaf.segments());
+    fn extrapolate_over_grids(&self, value: impl Fn(usize) -> f64) -> f64 {
+        let segments = self
+            .equilibrium
+            .levels
+            .iter()
+            .map(|level| level.leaf.segments());
         let segments: Vec<usize> = segments.take(self.modes.len()).collect();
         let weights = weights(&segments, f64::INFINITY);
         weights
@@ -754,81 +849,102 @@ impl CaseAt {
     }
 
     /// The derivative of a result with respect to a number of the scenario.
-    pub fn result_rate(
+    pub fn result_derivative(
         &self,
-        quantity: Quantity,
-        (number, rate, responses): (&Parameter, &LeafRate, &[Response]),
+        quantity: MeasuredQuantity,
+        (number, rate, responses): (&Parameter, &LeafParameterDerivative, &[LinearResponse]),
     ) -> f64 {
         match quantity {
-            Quantity::Tip(axis) => {
-                let tip = |k: usize, level: &Level| {
-                    shift(&responses[k].of_node(&level.leaf, 0, level.leaf.segments()))
+            MeasuredQuantity::Tip(axis) => {
+                let tip = |k: usize, level: &GridLevel| {
+                    displacement_part(&responses[k].node_increment(
+                        &level.leaf,
+                        0,
+                        level.leaf.segments(),
+                    ))
                 };
-                self.at.best(tip)[axis] * self.length()
+                self.equilibrium.extrapolated_value(tip)[axis] * self.leaf_length()
             }
-            Quantity::Reaction(axis) => {
-                let force = |k: usize, level: &Level| level.leaf.reaction_rate(rate, &responses[k]);
-                self.at.best(force)[axis] * self.force()
+            MeasuredQuantity::Reaction(axis) => {
+                let force =
+                    |k: usize, level: &GridLevel| level.leaf.reaction_rate(rate, &responses[k]);
+                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
-            Quantity::Grip(grip, axis) => {
-                let force = |k: usize, level: &Level| {
-                    let Level { leaf, state } = level;
+            MeasuredQuantity::Grip(grip, axis) => {
+                let force = |k: usize, level: &GridLevel| {
+                    let GridLevel { leaf, state } = level;
                     leaf.grip_force_rates(state, rate, &responses[k])[grip]
                 };
-                self.at.best(force)[axis] * self.force()
+                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
-            Quantity::Frequency(mode) => {
-                let scenarios = number.nearby().unwrap_or_default();
+            MeasuredQuantity::Frequency(mode) => {
+                let scenarios = number.neighbouring_scenarios().unwrap_or_default();
                 let of = |k: usize| {
-                    let near = Nearby::new(&self.at.levels[k], &scenarios, (rate, &responses[k]));
+                    let near = NeighbouringEquilibria::new(
+                        &self.equilibrium.levels[k],
+                        &scenarios,
+                        (rate, &responses[k]),
+                    );
                     near.eigenvalue_rate(&self.modes[k][mode - 1])
                 };
                 // omega^2 = (2 pi f)^2.
-                let frequency = self.result(quantity);
-                self.over_modes(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
+                let frequency = self.predicted_result(quantity);
+                self.extrapolate_over_grids(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
             }
         }
     }
 
     /// The derivatives of the coordinates of a point on a vein by numbers that change the leaf and its
     /// photograph; for the nearest point to an unmarked one, only the components normal to the vein.
-    pub fn vein_rates(
+    pub fn vein_point_gradients(
         &self,
-        (responses, photos): (&Responses, &[PhotoRate]),
+        (responses, photos): (&ParameterResponses, &[PhotoParameterDerivative]),
         (rod, sigma): (usize, f64),
-        point: &[&Component],
+        point: &[&ScalarDatum],
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
-        let (view, stencils) = (self.view(), self.at.stencils(sigma));
-        let coordinates = point.iter().map(|component| match component.what {
-            Compared::Vein { coordinate, .. } => coordinate,
-            Compared::Result(_) => 0,
+        let (view, stencils) = (self.observation_model(), self.equilibrium.stencils(sigma));
+        let coordinates = point.iter().map(|component| match component.quantity {
+            DatumQuantity::Vein { coordinate, .. } => coordinate,
+            DatumQuantity::Result(_) => 0,
         });
         let coordinates: Vec<usize> = coordinates.collect();
         let of_vein = |derivative: usize| {
-            self.at.best(|k, level| {
+            self.equilibrium.extrapolated_value(|k, level| {
                 let base = level.state.base(rod);
                 stencils[k][derivative].value(|i| level.state.x[base + i])
             })
         };
         let mut along = vec![0.0; coordinates.len()];
-        if point.iter().any(|component| component.free) {
+        if point.iter().any(|component| component.is_uninformative) {
             let slope = of_vein(1);
-            let seen = coordinates.iter().map(|k| view.along(*k, slope));
-            along = normalized(seen.collect());
+            let seen = coordinates
+                .iter()
+                .map(|k| view.project_displacement(*k, slope));
+            along = normalize_or_zero(seen.collect());
         }
-        let place = of_vein(0) * self.length();
-        let change = |(responses, photo): (&Vec<Response>, &PhotoRate)| -> Vec<f64> {
-            let change = self.at.best(|k, level| {
-                stencils[k][0].value(|i| shift(&responses[k].of_node(&level.leaf, rod, i)))
-            }) * self.length();
-            let seen = |k: &usize| view.along(*k, change) + view.rate(*k, place, photo);
-            let seen: Vec<f64> = coordinates.iter().map(seen).collect();
-            let part: f64 = seen.iter().zip(&along).map(|(a, b)| a * b).sum();
-            let both = seen.iter().zip(&along);
-            both.map(|(seen, along)| seen - part * along).collect()
-        };
-        let changes: Vec<Vec<f64>> = responses.each.iter().zip(photos).map(change).collect();
+        let place = of_vein(0) * self.leaf_length();
+        let change =
+            |(responses, photo): (&Vec<LinearResponse>, &PhotoParameterDerivative)| -> Vec<f64> {
+                let change = self.equilibrium.extrapolated_value(|k, level| {
+                    stencils[k][0].value(|i| {
+                        displacement_part(&responses[k].node_increment(&level.leaf, rod, i))
+                    })
+                }) * self.leaf_length();
+                let seen = |k: &usize| {
+                    view.project_displacement(*k, change) + view.photo_derivative(*k, place, photo)
+                };
+                let seen: Vec<f64> = coordinates.iter().map(seen).collect();
+                let part: f64 = seen.iter().zip(&along).map(|(a, b)| a * b).sum();
+                let both = seen.iter().zip(&along);
+                both.map(|(seen, along)| seen - part * along).collect()
+            };
+        let changes: Vec<Vec<f64>> = responses
+            .per_parameter
+            .iter()
+            .zip(photos)
+            .map(change)
+            .collect();
         let row = |place: usize| {
             let all = changes.iter().zip(slopes);
             all.map(|(change, slope)| change[place] * slope).collect()
@@ -838,7 +954,7 @@ impl CaseAt {
 }
 
 /// A vector of length one, or zero.
-fn normalized(vector: Vec<f64>) -> Vec<f64> {
+fn normalize_or_zero(vector: Vec<f64>) -> Vec<f64> {
     let length = vector.iter().map(|it| it * it).sum::<f64>().sqrt();
     let by = if length > 0.0 { 1.0 / length } else { 0.0 };
     vector.into_iter().map(|it| it * by).collect()

@@ -4,89 +4,95 @@
 //!
 //! Which candidate experiment would be most informative.
 
-use crate::study::fit::data::{Data, Experiment, Kind};
+use crate::study::fit::data::{Data, DatumDimension, Experiment};
 use crate::study::fit::least_squares::Weighting;
-use crate::study::fit::model::{Budget, Compared, Component, Model, Point};
+use crate::study::fit::model::{DatumQuantity, EvaluationBudget, FitModel, FitPoint, ScalarDatum};
 use crate::study::fit::{FitCandidate, FitError};
 use nalgebra::{DMatrix, DVector};
 
 /// A number with an uncertainty of more than this, in logarithms or units, is not determined: a
 /// factor of ten.
-pub(super) const OPEN: f64 = std::f64::consts::LN_10;
+pub(super) const UNDETERMINED_UNCERTAINTY: f64 = std::f64::consts::LN_10;
 
 /// A number with a larger component than this in combinations to which the data are insensitive
 /// is not determined.
-const INSENSITIVE: f64 = 1e-3;
+const INSENSITIVE_COMPONENT: f64 = 1e-3;
 
 /// The minimum and its statistics.
-pub(super) struct Statistics<'m, 'a> {
-    pub model: &'m Model<'a>,
+pub(super) struct FitStatistics<'m, 'a> {
+    pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
     /// Whether the standard deviations of the data are known.
-    pub known: bool,
-    pub point: &'m Point,
+    pub has_known_deviations: bool,
+    pub point: &'m FitPoint,
     pub residuals: DVector<f64>,
     pub jacobian: DMatrix<f64>,
     /// Singular directions of the coordinates, in ascending order of the sensitivity of the data,
     /// and the singular values.
-    pub directions: DMatrix<f64>,
-    pub values: Vec<f64>,
+    pub singular_directions: DMatrix<f64>,
+    pub singular_values: Vec<f64>,
     /// Number of directions, the first ones, to which the data are insensitive.
-    pub insensitive: usize,
+    pub insensitive_count: usize,
     /// Degrees of freedom: data minus determined combinations.
-    pub freedom: usize,
+    pub degrees_of_freedom: usize,
     /// Standard deviation of residuals.
-    pub spread: f64,
+    pub residual_deviation: f64,
     /// Half width of a 95 % interval in standard deviations.
-    pub quantile: f64,
+    pub coverage_factor: f64,
 }
 
-impl<'m, 'a> Statistics<'m, 'a> {
-    pub fn new(model: &'m Model<'a>, weighting: Weighting, known: bool, point: &'m Point) -> Self {
+impl<'m, 'a> FitStatistics<'m, 'a> {
+    pub fn new(
+        model: &'m FitModel<'a>,
+        weighting: Weighting,
+        known: bool,
+        point: &'m FitPoint,
+    ) -> Self {
         let residuals = weighting.residuals(point);
-        let (roots, jacobian) = weighting.weighted(point, &residuals);
-        let (values, directions) = singular(&jacobian);
+        let (roots, jacobian) = weighting.apply_weights(point, &residuals);
+        let (values, directions) = singular_value_decomposition(&jacobian);
         let largest = values.last().copied().unwrap_or(0.0);
         let insensitive = values
             .iter()
-            .filter(|value| **value <= NULL * largest)
+            .filter(|value| **value <= NULL_SINGULAR_VALUE * largest)
             .count();
         let count = point
             .components()
-            .filter(|component| !component.free)
+            .filter(|component| !component.is_uninformative)
             .count();
         let freedom = count.saturating_sub(values.len() - insensitive);
         let weighed = residuals.component_mul(&roots);
         let (spread, quantile) = match known || freedom == 0 {
-            true => (1.0, NORMAL),
+            true => (1.0, NORMAL_QUANTILE_95),
             false => {
                 let mean = weighed.norm_squared() / freedom as f64;
-                (mean.sqrt(), student(freedom))
+                (mean.sqrt(), student_quantile_95(freedom))
             }
         };
-        Statistics {
+        FitStatistics {
             model,
             weighting,
-            known,
+            has_known_deviations: known,
             point,
             residuals,
             jacobian,
-            directions,
-            values,
-            insensitive,
-            freedom,
-            spread,
-            quantile,
+            singular_directions: directions,
+            singular_values: values,
+            insensitive_count: insensitive,
+            degrees_of_freedom: freedom,
+            residual_deviation: spread,
+            coverage_factor: quantile,
         }
     }
 
     /// Standard deviation of a coordinate, and the correlated changes of the others.
-    pub fn deviation(&self, k: usize) -> (f64, DVector<f64>) {
-        let sensitive = self.insensitive..self.values.len();
-        let mut along = DVector::zeros(self.values.len());
+    pub fn standard_error(&self, k: usize) -> (f64, DVector<f64>) {
+        let sensitive = self.insensitive_count..self.singular_values.len();
+        let mut along = DVector::zeros(self.singular_values.len());
         for direction in sensitive {
-            let v = self.directions.column(direction);
-            along += v * (v[k] * (self.spread / self.values[direction]).powi(2));
+            let v = self.singular_directions.column(direction);
+            along +=
+                v * (v[k] * (self.residual_deviation / self.singular_values[direction]).powi(2));
         }
         let variance = along[k];
         match variance > 0.0 {
@@ -96,13 +102,14 @@ impl<'m, 'a> Statistics<'m, 'a> {
     }
 
     /// The changes of the others that are correlated with that of a coordinate, if none of them has
-    /// a larger uncertainty than [`OPEN`]: weakly determined combinations then do not change.
-    pub fn conditional(&self, k: usize) -> DVector<f64> {
-        let mut along = DVector::zeros(self.values.len());
-        for (direction, value) in self.values.iter().enumerate() {
-            let v = self.directions.column(direction);
-            let sensitive = (value / self.spread).powi(2);
-            along += v * (v[k] / (sensitive + (self.quantile / OPEN).powi(2)));
+    /// a larger uncertainty than [`UNDETERMINED_UNCERTAINTY`]: weakly determined combinations then do not change.
+    pub fn conditional_changes(&self, k: usize) -> DVector<f64> {
+        let mut along = DVector::zeros(self.singular_values.len());
+        for (direction, value) in self.singular_values.iter().enumerate() {
+            let v = self.singular_directions.column(direction);
+            let sensitive = (value / self.residual_deviation).powi(2);
+            along += v
+                * (v[k] / (sensitive + (self.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2)));
         }
         let own = along[k];
         along / own
@@ -110,52 +117,54 @@ impl<'m, 'a> Statistics<'m, 'a> {
 
     /// Whether the sum of squares of the residuals is larger than their standard deviations allow:
     /// at the quantile of five deviations of a normal variable (Wilson and Hilferty 1931).
-    pub fn suspicious(&self) -> bool {
-        let freedom = self.freedom.max(1) as f64;
+    pub fn has_excessive_residuals(&self) -> bool {
+        let freedom = self.degrees_of_freedom.max(1) as f64;
         let part = 2.0 / (9.0 * freedom);
         let most = freedom * (1.0 - part + 5.0 * part.sqrt()).powi(3);
         let explained = self.residuals.norm_squared() <= most;
-        !self.weighting.robust && !explained
+        !self.weighting.is_robust && !explained
     }
 
     /// Whether the data are sensitive to every change of a coordinate.
     pub fn is_sensitive_to(&self, k: usize) -> bool {
-        let insensitive =
-            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
-        insensitive.sum::<f64>().sqrt() <= INSENSITIVE
+        let insensitive = (0..self.insensitive_count)
+            .map(|direction| self.singular_directions[(k, direction)].powi(2));
+        insensitive.sum::<f64>().sqrt() <= INSENSITIVE_COMPONENT
     }
 
     /// Whether the data drove a coordinate far from its initial value without determining it, or to
     /// a bound.
-    pub fn ran_away(&self, k: usize) -> bool {
+    pub fn is_runaway(&self, k: usize) -> bool {
         let (free, theta) = (&self.model.coordinates[k], self.point.theta[k]);
-        let far = (theta - free.start).abs() > OPEN;
-        free.at_bound(theta).is_some() || far && self.is_vague(k)
+        let far = (theta - free.initial).abs() > UNDETERMINED_UNCERTAINTY;
+        free.active_bound(theta).is_some() || far && self.is_weakly_determined(k)
     }
 
     /// Whether the data determine a coordinate to no better than a factor of ten.
-    pub fn is_vague(&self, k: usize) -> bool {
-        self.quantile * self.deviation(k).0 > OPEN
+    pub fn is_weakly_determined(&self, k: usize) -> bool {
+        self.coverage_factor * self.standard_error(k).0 > UNDETERMINED_UNCERTAINTY
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
-    pub fn assumed(&self, kind: Kind) -> Option<f64> {
-        let alike = |component: &&Component| component.what.kind() == kind;
+    pub fn typical_deviation(&self, kind: DatumDimension) -> Option<f64> {
+        let alike = |component: &&ScalarDatum| component.quantity.dimension() == kind;
         let alike = self.point.components().filter(alike);
-        let mut sds: Vec<f64> = alike.map(|c| self.sd(c)).collect();
+        let mut sds: Vec<f64> = alike.map(|c| self.datum_deviation(c)).collect();
         sds.sort_by(f64::total_cmp);
         sds.get(sds.len() / 2).copied()
     }
 
     /// The standard deviation of a datum: as given, or as estimated from all residuals.
-    pub fn sd(&self, component: &Component) -> f64 {
-        component.sd.unwrap_or(self.spread * self.weighting.assumed)
+    pub fn datum_deviation(&self, component: &ScalarDatum) -> f64 {
+        component
+            .sd
+            .unwrap_or(self.residual_deviation * self.weighting.assumed_deviation)
     }
 
     /// Correlations of the coordinates to which the data are sensitive.
     pub fn correlations(&self) -> Vec<Vec<Option<f64>>> {
-        let count = self.values.len();
-        let deviations: Vec<_> = (0..count).map(|k| self.deviation(k)).collect();
+        let count = self.singular_values.len();
+        let deviations: Vec<_> = (0..count).map(|k| self.standard_error(k)).collect();
         let entry = |a: usize, b: usize| {
             let ((own, along), (other, _)) = (&deviations[a], &deviations[b]);
             let known =
@@ -168,21 +177,21 @@ impl<'m, 'a> Statistics<'m, 'a> {
     }
 
     /// Half width of the model's 95 % band at each datum.
-    pub fn bands(&self) -> Vec<f64> {
-        let roots = self.weighting.roots(&self.residuals);
+    pub fn confidence_bands(&self) -> Vec<f64> {
+        let roots = self.weighting.weight_roots(&self.residuals);
         let components = self.point.components().enumerate();
         components
             .map(|(i, component)| {
                 let row = self.jacobian.row(i);
-                let sensitive = self.insensitive..self.values.len();
+                let sensitive = self.insensitive_count..self.singular_values.len();
                 let variance: f64 = sensitive
                     .map(|direction| {
-                        let v = self.directions.column(direction);
-                        ((row * v)[(0, 0)] / self.values[direction]).powi(2)
+                        let v = self.singular_directions.column(direction);
+                        ((row * v)[(0, 0)] / self.singular_values[direction]).powi(2)
                     })
                     .sum();
-                let sd = component.sd.unwrap_or(self.weighting.assumed);
-                self.quantile * self.spread * variance.sqrt() * sd / roots[i]
+                let sd = component.sd.unwrap_or(self.weighting.assumed_deviation);
+                self.coverage_factor * self.residual_deviation * variance.sqrt() * sd / roots[i]
             })
             .collect()
     }
@@ -190,20 +199,20 @@ impl<'m, 'a> Statistics<'m, 'a> {
 
 /// Singular values below this part of the largest belong to combinations to which the data are
 /// insensitive; derivatives are more accurate than that.
-pub(super) const NULL: f64 = 1e-7;
+pub(super) const NULL_SINGULAR_VALUE: f64 = 1e-7;
 
 /// Components of a combination smaller than this part of its largest are set to zero.
-const NEGLIGIBLE: f64 = 1e-3;
+const NEGLIGIBLE_COMPONENT: f64 = 1e-3;
 
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
-pub(super) const NORMAL: f64 = 1.959_963_984_540_054;
+pub(super) const NORMAL_QUANTILE_95: f64 = 1.959_963_984_540_054;
 
 /// Singular values, ascending, and their right singular vectors as columns.
-pub(super) fn singular(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let count = jacobian.ncols();
     if jacobian.nrows() > 2 * count {
         // For many rows: those of the triangular factor, which are the same.
-        return singular(&jacobian.clone().qr().r());
+        return singular_value_decomposition(&jacobian.clone().qr().r());
     }
     // Padded with zero rows, there are as many values as columns.
     let rows = jacobian.nrows().max(count);
@@ -219,7 +228,7 @@ pub(super) fn singular(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
 
 /// A basis of a space of directions with as many zero components as possible:
 /// its reduced row echelon form.
-pub(super) fn sparse(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
+pub(super) fn sparse_basis(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
     let mut rows = space.transpose();
     let (count, width) = rows.shape();
     let mut pivots: Vec<usize> = Vec::new();
@@ -243,7 +252,8 @@ pub(super) fn sparse(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
     let parts = |row: usize| {
         let largest = rows.row(row).amax();
         let all = (0..width).map(|k| (k, rows[(row, k)] / largest));
-        all.filter(|(_, part)| part.abs() > NEGLIGIBLE).collect()
+        all.filter(|(_, part)| part.abs() > NEGLIGIBLE_COMPONENT)
+            .collect()
     };
     let mut all: Vec<Vec<(usize, f64)>> = (0..count).map(parts).collect();
     all.sort_by_key(|parts| parts.first().map_or(0, |part| part.0));
@@ -253,12 +263,12 @@ pub(super) fn sparse(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
 /// Half width of a 95 % interval in standard deviations that are estimated with this number of
 /// degrees of freedom (Student's distribution; Abramowitz and Stegun, Handbook of Mathematical
 /// Functions, 26.7.5).
-pub(super) fn student(freedom: usize) -> f64 {
+pub(super) fn student_quantile_95(freedom: usize) -> f64 {
     const FEW: [f64; 4] = [12.706_2, 4.302_7, 3.182_4, 2.776_4];
     if let Some(quantile) = FEW.get(freedom.wrapping_sub(1)) {
         return *quantile;
     }
-    let (z, n) = (NORMAL, freedom as f64);
+    let (z, n) = (NORMAL_QUANTILE_95, freedom as f64);
     let z2 = z * z;
     z + z * (z2 + 1.0) / (4.0 * n)
         + z * (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / (96.0 * n * n)
@@ -268,17 +278,17 @@ pub(super) fn student(freedom: usize) -> f64 {
 }
 
 /// Prior of a coordinate: 95 % within a factor of ten up and down.
-const BEFORE: f64 = std::f64::consts::LN_10 / NORMAL;
+const PRIOR_DEVIATION: f64 = std::f64::consts::LN_10 / NORMAL_QUANTILE_95;
 
 /// The information each of these experiments would add to the fit, the most informative
 /// first. Its data are as accurate as given, or as those of the fit.
-pub(super) fn rank(
-    stats: &Statistics,
+pub(super) fn rank_candidate_experiments(
+    stats: &FitStatistics,
     wanted: &[Experiment],
 ) -> Result<Vec<FitCandidate>, FitError> {
-    let count = stats.values.len();
-    let known = stats.jacobian.transpose() * &stats.jacobian / stats.spread.powi(2);
-    let known = known + DMatrix::identity(count, count) / BEFORE.powi(2);
+    let count = stats.singular_values.len();
+    let known = stats.jacobian.transpose() * &stats.jacobian / stats.residual_deviation.powi(2);
+    let known = known + DMatrix::identity(count, count) / PRIOR_DEVIATION.powi(2);
     let mut found = Vec::new();
     for experiment in wanted {
         let data = Data {
@@ -287,15 +297,15 @@ pub(super) fn rank(
         };
         let of = stats.model;
         // One leaf for each, whatever the search took.
-        let data = (data, Budget::new(usize::MAX));
-        let model = Model::new(of.base, of.coordinates, &of.options, data)?;
+        let data = (data, EvaluationBudget::new(usize::MAX));
+        let model = FitModel::new(of.base, of.coordinates, &of.options, data)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),
             bits: 0.0,
             shrinks: 1.0,
             remark: None,
         };
-        match added(stats, &model) {
+        match information_added(stats, &model) {
             Err(refused) => candidate.remark = Some(refused),
             Ok(added) => {
                 let with = &known + &added;
@@ -315,19 +325,24 @@ pub(super) fn rank(
     Ok(found)
 }
 
-fn added(stats: &Statistics, model: &Model) -> Result<DMatrix<f64>, String> {
-    let found = model.find(&stats.point.theta);
+fn information_added(stats: &FitStatistics, model: &FitModel) -> Result<DMatrix<f64>, String> {
+    let found = model.relax_leaves(&stats.point.theta);
     let mut point = found.map_err(|refused| refused.to_string())?;
     (model.check_weights(&point)).map_err(|refused| refused.to_string())?;
-    (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
-    let sd = |component: &Component| match component.what {
-        Compared::Result(quantity) => component.sd.or(stats.assumed(quantity.kind())),
-        Compared::Vein { .. } => component.sd,
+    (model.differentiate_data(&mut point))
+        .map_err(|_| "its equilibrium is singular".to_string())?;
+    let sd = |component: &ScalarDatum| match component.quantity {
+        DatumQuantity::Result(quantity) => component
+            .sd
+            .or(stats.typical_deviation(quantity.dimension())),
+        DatumQuantity::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();
     let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;
     let rows: Vec<&Vec<f64>> = point.gradients().collect();
-    let jacobian = DMatrix::from_fn(rows.len(), stats.values.len(), |i, k| rows[i][k] / sd[i]);
+    let jacobian = DMatrix::from_fn(rows.len(), stats.singular_values.len(), |i, k| {
+        rows[i][k] / sd[i]
+    });
     Ok(jacobian.transpose() * jacobian)
 }
 
@@ -346,7 +361,10 @@ mod tests {
             (30, 2.0423),
             (1_000_000, 1.9600),
         ] {
-            assert!((student(freedom) - quantile).abs() < 5e-4, "{freedom}");
+            assert!(
+                (student_quantile_95(freedom) - quantile).abs() < 5e-4,
+                "{freedom}"
+            );
         }
     }
 
@@ -354,7 +372,7 @@ mod tests {
     fn a_space_of_directions_has_a_sparse_basis() {
         // Spanned by (1, 1, 0, 0) and (0, 0, 1, -2), mixed.
         let space = DMatrix::from_column_slice(4, 2, &[1.0, 1.0, 1.0, -2.0, 2.0, 2.0, -1.0, 2.0]);
-        let basis = sparse(&space);
+        let basis = sparse_basis(&space);
         assert!(basis[0].iter().map(|part| part.0).eq([0, 1]));
         assert!((basis[0][0].1 - basis[0][1].1).abs() < 1e-12);
         assert!((basis[1][0].1 + 0.5).abs() < 1e-12 && basis[1][1].1 == 1.0);
@@ -362,7 +380,8 @@ mod tests {
 
     #[test]
     fn rows_fewer_than_columns_leave_directions_unfelt() {
-        let (values, directions) = singular(&DMatrix::from_row_slice(1, 2, &[3.0, 4.0]));
+        let (values, directions) =
+            singular_value_decomposition(&DMatrix::from_row_slice(1, 2, &[3.0, 4.0]));
         assert!(values[0] < 1e-12 && (values[1] - 5.0).abs() < 1e-12);
         let insensitive = directions.column(0);
         assert!((3.0 * insensitive[0] + 4.0 * insensitive[1]).abs() < 1e-12);

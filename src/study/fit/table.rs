@@ -10,10 +10,12 @@
 
 use crate::scenario::MOST_BYTES;
 use crate::study::fit::FitError;
-use crate::study::fit::data::{NAME, Reading, RowChoice, is_known};
+use crate::study::fit::data::{
+    DataReadingOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
+};
 
 /// A parsed table.
-pub(super) struct Table<'t> {
+pub(super) struct DataTable<'t> {
     pub file: &'t str,
     /// Line of the header, counted from 1.
     pub header_line: usize,
@@ -27,21 +29,21 @@ pub(super) struct Table<'t> {
     pub taken: Vec<String>,
     /// What was left out.
     pub left_out: Vec<String>,
-    sources: Vec<Source>,
-    rows: Vec<Line>,
-    decimals: Decimals,
+    sources: Vec<ColumnSource>,
+    rows: Vec<TableLine>,
+    decimals: NumberFormat,
 }
 
 /// Where a column stands, and what makes its numbers those of the scenario.
-struct Source {
+struct ColumnSource {
     at: usize,
     factor: f64,
     offset: f64,
 }
 
-impl Source {
-    fn plain(at: usize) -> Self {
-        Source {
+impl ColumnSource {
+    fn unscaled(at: usize) -> Self {
+        ColumnSource {
             at,
             factor: 1.0,
             offset: 0.0,
@@ -49,19 +51,19 @@ impl Source {
     }
 }
 
-fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+fn count_in_words(count: usize, one: &str, many: &str) -> Option<String> {
     (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
 }
 
 /// Whether a name stands there twice.
-fn has_repeated(header: &Line) -> bool {
+fn has_repeated_name(header: &TableLine) -> bool {
     let names: Vec<&str> = header.cells().filter(|name| !name.is_empty()).collect();
     (1..names.len()).any(|k| names[..k].contains(&names[k]))
 }
 
 /// The names of columns, each behind that of its group if there are groups, as in `Vein X`. A
 /// group's name stands above its first column.
-fn names_of(header: &Line, groups: Option<&Line>) -> Vec<String> {
+fn column_names(header: &TableLine, groups: Option<&TableLine>) -> Vec<String> {
     let mut group = "";
     let names = header.cells().enumerate().map(|(at, name)| {
         let above = groups.map_or("", |groups| groups.cell(at));
@@ -75,22 +77,26 @@ fn names_of(header: &Line, groups: Option<&Line>) -> Vec<String> {
     names.collect()
 }
 
-impl<'t> Table<'t> {
-    pub fn of(bytes: &[u8], file: &'t str, reading: &Reading) -> Result<Self, FitError> {
+impl<'t> DataTable<'t> {
+    pub fn parse(
+        bytes: &[u8],
+        file: &'t str,
+        reading: &DataReadingOptions,
+    ) -> Result<Self, FitError> {
         let decoded = decode(bytes, file)?;
         let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
-        let known = |name: &str| is_known(name) || mapped(name).is_some();
+        let known = |name: &str| is_known_column(name) || mapped(name).is_some();
         let named = |name: &str| match mapped(name) {
-            Some(map) => map.quantity == NAME,
-            None => name == NAME,
+            Some(map) => map.quantity == EXPERIMENT_NAME_COLUMN,
+            None => name == EXPERIMENT_NAME_COLUMN,
         };
-        let Some(lines) = Lines::of(&decoded.text, &known, &named) else {
+        let Some(lines) = TableLines::split_text(&decoded.text, &known, &named) else {
             let why = "is empty: give a header, and a row for each datum";
-            return Err(refuse(file, 1, why));
+            return Err(line_error(file, 1, why));
         };
         let (above, below) = lines.lines.split_at(lines.header);
         let (header, below) = (&below[0], &below[1..]);
-        let names_columns = |line: &&Line| {
+        let names_columns = |line: &&TableLine| {
             let mut names = line.cells().filter(|name| !name.is_empty());
             !line.is_blank() && names.all(known)
         };
@@ -99,13 +105,13 @@ impl<'t> Table<'t> {
                 "names columns, and so does line {}: write each table to a file of its own",
                 header.number
             );
-            return Err(refuse(file, other.number, why));
+            return Err(line_error(file, other.number, why));
         }
         let groups = above
             .last()
-            .filter(|line| !line.is_blank() && has_repeated(header));
-        let names = names_of(header, groups);
-        let mut table = Table {
+            .filter(|line| !line.is_blank() && has_repeated_name(header));
+        let names = column_names(header, groups);
+        let mut table = DataTable {
             file,
             header_line: header.number,
             header: Vec::new(),
@@ -115,7 +121,7 @@ impl<'t> Table<'t> {
             left_out: Vec::new(),
             sources: Vec::new(),
             rows: Vec::new(),
-            decimals: Decimals::of(std::iter::empty(), file)?,
+            decimals: NumberFormat::detect(std::iter::empty(), file)?,
         };
         table.check_header(header)?;
         let above = above.iter().filter(|line| !line.is_blank()).count();
@@ -125,9 +131,9 @@ impl<'t> Table<'t> {
             .filter(|line| !line.is_blank())
             .cloned()
             .collect();
-        let units = table.take_units();
+        let units = table.remove_unit_row();
         table.check_cells()?;
-        let unused = table.choose_columns(reading)?;
+        let unused = table.select_columns(reading)?;
         let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
         table
             .rows
@@ -141,9 +147,9 @@ impl<'t> Table<'t> {
             .into_iter()
             .step_by(every)
             .collect();
-        table.taken = table.notation(lines.separator, decoded.encoding);
+        table.taken = table.notation_remarks(lines.separator, decoded.encoding);
         let before = table.rows.len();
-        table.choose_rows(&reading.rows)?;
+        table.filter_rows(&reading.rows)?;
         let not_chosen = before - table.rows.len();
         if every > 1 {
             let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
@@ -152,15 +158,15 @@ impl<'t> Table<'t> {
         }
         let comments = table.comments[0];
         table.left_out = [
-            counted(
+            count_in_words(
                 comments,
                 "line that is a comment",
                 "lines that are comments",
             ),
-            counted(above, "line before the header", "lines before the header"),
+            count_in_words(above, "line before the header", "lines before the header"),
             units.map(|units| format!("a row of units ({units}; nothing is converted)")),
-            counted(blank, "blank row", "blank rows"),
-            counted(
+            count_in_words(blank, "blank row", "blank rows"),
+            count_in_words(
                 not_chosen,
                 "row that was not chosen",
                 "rows that were not chosen",
@@ -174,53 +180,53 @@ impl<'t> Table<'t> {
     }
 
     /// How the numbers of all columns that are used are written.
-    fn read_decimals(&self) -> Result<Decimals, FitError> {
+    fn read_decimals(&self) -> Result<NumberFormat, FitError> {
         let columns = self.sources.iter().zip(&self.header);
-        let numbers = columns.filter(|(_, name)| *name != NAME);
+        let numbers = columns.filter(|(_, name)| *name != EXPERIMENT_NAME_COLUMN);
         let numbers: Vec<usize> = numbers.map(|(source, _)| source.at).collect();
         let rows = self.rows.iter();
         let cells = rows.flat_map(|row| numbers.iter().map(|at| (row.number, row.cell(*at))));
-        Decimals::of(cells, self.file)
+        NumberFormat::detect(cells, self.file)
     }
 
     /// What the file was taken for, where that is not the usual CSV.
-    fn notation(&self, separator: &str, encoding: Option<&str>) -> Vec<String> {
+    fn notation_remarks(&self, separator: &str, encoding: Option<&str>) -> Vec<String> {
         let divided = separator != "commas" && self.names.len() > 1;
         let group = match self.decimals.mark {
-            Mark::Point => "thousands divided by commas",
-            Mark::Comma => "thousands divided by points",
+            DecimalMark::Point => "thousands divided by commas",
+            DecimalMark::Comma => "thousands divided by points",
         };
         let said = [
             divided.then(|| format!("cells divided by {separator}")),
-            (self.decimals.mark == Mark::Comma).then(|| "decimal commas".into()),
+            (self.decimals.mark == DecimalMark::Comma).then(|| "decimal commas".into()),
             self.decimals.grouped.then(|| group.into()),
             encoding.map(|encoding| format!("text in {encoding}")),
         ];
         said.into_iter().flatten().collect()
     }
 
-    fn check_header(&self, header: &Line) -> Result<(), FitError> {
+    fn check_header(&self, header: &TableLine) -> Result<(), FitError> {
         if header.cells().any(is_number) {
             let why = "has no header: the first line names the columns, such as \
                        load.tip_force[0],tip_x,sd_tip_x, or rod,sigma,x,y,z";
-            return Err(refuse(self.file, self.header_line, why));
+            return Err(line_error(self.file, self.header_line, why));
         }
         if let [name] = self.names.as_slice()
             && name
                 .split_whitespace()
-                .filter(|word| is_known(word))
+                .filter(|word| is_known_column(word))
                 .count()
                 > 1
         {
             let why = "columns are divided by blanks: divide them by commas, semicolons or tabs";
-            return Err(refuse(self.file, self.header_line, why));
+            return Err(line_error(self.file, self.header_line, why));
         }
         Ok(())
     }
 
     /// Removes the row of units below the header, and returns it.
-    fn take_units(&mut self) -> Option<String> {
-        let first = self.rows.first().filter(|row| are_units(row.cells()))?;
+    fn remove_unit_row(&mut self) -> Option<String> {
+        let first = self.rows.first().filter(|row| is_unit_row(row.cells()))?;
         let units: Vec<&str> = first.cells().filter(|cell| !cell.is_empty()).collect();
         let units = units.join(", ");
         self.rows.remove(0);
@@ -230,11 +236,11 @@ impl<'t> Table<'t> {
     /// Rows are on one line. They may have more cells than the header, or fewer, where these are
     /// empty and have no names.
     fn check_cells(&self) -> Result<(), FitError> {
-        let broken = |row: &&Line| row.cells().any(|cell| cell.contains('\n'));
+        let broken = |row: &&TableLine| row.cells().any(|cell| cell.contains('\n'));
         if let Some(row) = self.rows.iter().find(broken) {
             let why = "a quotation mark is not closed in this line: close it, and write a name \
                        on one line";
-            return Err(refuse(self.file, row.number, why));
+            return Err(line_error(self.file, row.number, why));
         }
         let wanted = self.names.len();
         let last = self.names.iter().rposition(|name| !name.is_empty());
@@ -247,14 +253,14 @@ impl<'t> Table<'t> {
                      have numbers with a decimal point; with decimal commas divide them by \
                      semicolons or tabs"
                 );
-                return Err(refuse(self.file, row.number, why));
+                return Err(line_error(self.file, row.number, why));
             }
         }
         Ok(())
     }
 
     /// Chooses the columns that are used, and returns words for others.
-    fn choose_columns(&mut self, reading: &Reading) -> Result<Vec<String>, FitError> {
+    fn select_columns(&mut self, reading: &DataReadingOptions) -> Result<Vec<String>, FitError> {
         let (mut unnamed, mut unused) = (None, Vec::new());
         let maps_of = |name: &str| {
             let maps = reading.columns.iter();
@@ -262,7 +268,7 @@ impl<'t> Table<'t> {
         };
         // With names given for columns of a file, others that mean nothing here are not meant.
         let some_given = self.names.iter().any(|name| !maps_of(name).is_empty());
-        let means_nothing = |name: &&String| !name.is_empty() && !is_known(name);
+        let means_nothing = |name: &&String| !name.is_empty() && !is_known_column(name);
         if !some_given
             && !reading.columns.is_empty()
             && self.names.iter().any(|name| means_nothing(&name))
@@ -273,7 +279,7 @@ impl<'t> Table<'t> {
                 "has none of the columns that were said to be quantities ({given}): its columns are {}",
                 self.names.join(", ")
             );
-            return Err(refuse(self.file, self.header_line, why));
+            return Err(line_error(self.file, self.header_line, why));
         }
         for (at, name) in self.names.iter().enumerate() {
             let maps = maps_of(name);
@@ -284,18 +290,18 @@ impl<'t> Table<'t> {
                         "column {} has no name, and cells below: name it, or leave it out",
                         at + 1
                     );
-                    return Err(refuse(self.file, self.header_line, why));
+                    return Err(line_error(self.file, self.header_line, why));
                 }
                 unnamed = unnamed.or(is_used.then(|| "the first column, without a name".into()));
-            } else if maps.is_empty() && some_given && !is_known(name) {
+            } else if maps.is_empty() && some_given && !is_known_column(name) {
                 unused.push(name.as_str());
             } else if maps.is_empty() {
                 self.header.push(name.clone());
-                self.sources.push(Source::plain(at));
+                self.sources.push(ColumnSource::unscaled(at));
             }
             for map in maps {
                 self.header.push(map.quantity.clone());
-                self.sources.push(Source {
+                self.sources.push(ColumnSource {
                     at,
                     factor: map.factor,
                     offset: map.offset,
@@ -317,7 +323,7 @@ impl<'t> Table<'t> {
                         format!("the columns {one} and {other} both are {name}: leave one out")
                     }
                 };
-                return Err(refuse(self.file, self.header_line, why));
+                return Err(line_error(self.file, self.header_line, why));
             }
         }
         let columns = if unused.len() == 1 {
@@ -330,24 +336,24 @@ impl<'t> Table<'t> {
     }
 
     /// Leaves out rows that do not meet a condition on a column of this table.
-    fn choose_rows(&mut self, choices: &[RowChoice]) -> Result<(), FitError> {
+    fn filter_rows(&mut self, choices: &[RowFilter]) -> Result<(), FitError> {
         let mut kept = vec![true; self.rows.len()];
         let mut chosen = false;
         for condition in choices.iter().flat_map(|choice| &choice.conditions) {
-            let Some(column) = self.column(&condition.column) else {
+            let Some(column) = self.column_index(&condition.column) else {
                 continue;
             };
             chosen = true;
             for (row, kept) in kept.iter_mut().enumerate() {
                 let value = self.number(row, column)?;
-                *kept &= value.is_some_and(|value| condition.admits(value));
+                *kept &= value.is_some_and(|value| condition.is_met_by(value));
             }
         }
         let mut kept = kept.into_iter();
         self.rows.retain(|_| kept.next().unwrap_or(true));
         if chosen && self.rows.is_empty() {
             let why = "has no row that meets the conditions on rows: choose others".to_string();
-            return Err(refuse(self.file, self.header_line, why));
+            return Err(line_error(self.file, self.header_line, why));
         }
         Ok(())
     }
@@ -360,23 +366,23 @@ impl<'t> Table<'t> {
                     "has no row below the header ({comments} lines that begin with # are comments)"
                 ),
             };
-            return Err(refuse(self.file, self.header_line, why));
+            return Err(line_error(self.file, self.header_line, why));
         }
         Ok(())
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub fn row_count(&self) -> usize {
         self.rows.len()
     }
 
     /// Line of a row, counted from 1.
-    pub fn line(&self, row: usize) -> usize {
+    pub fn line_number(&self, row: usize) -> usize {
         self.rows[row].number
     }
 
     /// Where a column is.
-    pub fn column(&self, name: &str) -> Option<usize> {
+    pub fn column_index(&self, name: &str) -> Option<usize> {
         self.header.iter().position(|known| known == name)
     }
 
@@ -391,7 +397,7 @@ impl<'t> Table<'t> {
             return Ok(None);
         }
         let source = &self.sources[column];
-        let value = self.decimals.number(cell);
+        let value = self.decimals.parse_finite(cell);
         let value = value.map(|value| match (source.factor, source.offset) {
             (1.0, 0.0) => value,
             (factor, offset) => value * factor + offset,
@@ -403,32 +409,32 @@ impl<'t> Table<'t> {
         let why = format!(
             "{name} = {cell}: must be a finite number, or empty where nothing was measured"
         );
-        Err(refuse(self.file, self.line(row), why))
+        Err(line_error(self.file, self.line_number(row), why))
     }
 
-    pub fn positive(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+    pub fn positive_number(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
         let number = self.number(row, column)?;
         if let Some(value) = number.filter(|value| *value <= 0.0) {
             let name = &self.header[column];
             let why = format!("{name} = {value}: a standard deviation is greater than 0");
-            return Err(refuse(self.file, self.line(row), why));
+            return Err(line_error(self.file, self.line_number(row), why));
         }
         Ok(number)
     }
 }
 
 /// What divides cells, the most usual first.
-const SEPARATORS: [(u8, &str); 3] = [(b',', "commas"), (b';', "semicolons"), (b'\t', "tabs")];
+const CELL_SEPARATORS: [(u8, &str); 3] = [(b',', "commas"), (b';', "semicolons"), (b'\t', "tabs")];
 
 /// A line that is not empty, and its cells.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct TableLine {
     /// Counted from 1.
     pub number: usize,
     cells: csv::StringRecord,
 }
 
-impl Line {
+impl TableLine {
     /// A cell, without blanks and quotes around it; empty beyond the last.
     pub fn cell(&self, at: usize) -> &str {
         let cell = self.cells.get(at).unwrap_or_default().trim();
@@ -454,14 +460,14 @@ impl Line {
     }
 
     /// Whether it may name columns.
-    fn is_header(&self) -> bool {
+    fn may_be_header(&self) -> bool {
         !self.is_blank() && !self.cells().any(is_number)
     }
 }
 
 /// Lines, one of which is the header.
-pub struct Lines {
-    pub lines: Vec<Line>,
+pub struct TableLines {
+    pub lines: Vec<TableLine>,
     /// Index of the header.
     pub header: usize,
     /// What divides cells, in words.
@@ -475,7 +481,7 @@ fn is_comment(line: &str) -> bool {
 }
 
 /// Divides lines into cells. Lines that begin with # are left out up to a line, counted from 1.
-fn divided(text: &str, separator: u8, up_to: usize) -> Vec<Line> {
+fn split_cells(text: &str, separator: u8, up_to: usize) -> Vec<TableLine> {
     // Lines left out stay as empty ones, so that lines keep their numbers.
     let kept = text.lines().enumerate();
     let kept = kept.map(|(i, line)| {
@@ -499,49 +505,53 @@ fn divided(text: &str, separator: u8, up_to: usize) -> Vec<Line> {
         let begin = begin + empty;
         number += kept[counted..begin].matches('\n').count();
         counted = begin;
-        lines.push(Line { number, cells });
+        lines.push(TableLine { number, cells });
     }
     lines
 }
 
 /// The line with most columns that are known, and how many these are.
-fn header(lines: &[Line], known: &dyn Fn(&str) -> bool) -> Option<(usize, usize)> {
-    let count = |line: &Line| line.cells().filter(|name| known(name)).count();
+fn header_with_known_columns(
+    lines: &[TableLine],
+    known: &dyn Fn(&str) -> bool,
+) -> Option<(usize, usize)> {
+    let count = |line: &TableLine| line.cells().filter(|name| known(name)).count();
     let counts = lines
         .iter()
         .enumerate()
-        .filter(|(_, line)| line.is_header());
+        .filter(|(_, line)| line.may_be_header());
     let counts = counts.map(|(at, line)| (at, count(line)));
     let counts = counts.filter(|(_, count)| *count > 0);
     counts.rev().max_by_key(|(_, count)| *count)
 }
 
 /// Of the lines of words above a number the one with most of them; without such lines, the first.
-fn unknown_header(lines: &[Line]) -> usize {
+fn guess_header(lines: &[TableLine]) -> usize {
     let last = lines.iter().rposition(|line| line.cells().any(is_number));
     let above = lines[..last.unwrap_or(0)].iter().enumerate();
-    let words = above.filter(|(_, line)| line.is_header());
-    let count = |line: &Line| line.cells().filter(|cell| !cell.is_empty()).count();
+    let words = above.filter(|(_, line)| line.may_be_header());
+    let count = |line: &TableLine| line.cells().filter(|cell| !cell.is_empty()).count();
     let most = words.rev().max_by_key(|(_, line)| count(line));
     most.map_or(0, |(at, _)| at)
 }
 
-impl Lines {
+impl TableLines {
     /// Divides a text by the separator with which a line has most names that are `known`, and of
     /// such separators by one with which all rows have as many cells as that line. The names in
     /// the first column may begin with # if `named` is that column's.
-    pub fn of(
+    pub fn split_text(
         text: &str,
         known: &dyn Fn(&str) -> bool,
         named: &dyn Fn(&str) -> bool,
     ) -> Option<Self> {
-        let mut best: Option<((usize, bool, usize), Lines, u8)> = None;
-        for (separator, word) in SEPARATORS {
-            let lines = divided(text, separator, usize::MAX);
+        let mut best: Option<((usize, bool, usize), TableLines, u8)> = None;
+        for (separator, word) in CELL_SEPARATORS {
+            let lines = split_cells(text, separator, usize::MAX);
             let Some(first) = lines.iter().find(|line| !line.is_blank()) else {
                 continue;
             };
-            let (at, count) = header(&lines, known).unwrap_or((unknown_header(&lines), 0));
+            let (at, count) =
+                header_with_known_columns(&lines, known).unwrap_or((guess_header(&lines), 0));
             let width = lines[at].len();
             let fits = lines[at..].iter().all(|line| line.len() == width);
             // Where no name is known, the most cells.
@@ -552,7 +562,7 @@ impl Lines {
             };
             let rank = (count, fits && (count > 0 || width > 1), cells);
             if best.as_ref().is_none_or(|(best, ..)| rank > *best) {
-                let found = Lines {
+                let found = TableLines {
                     lines,
                     header: at,
                     separator: word,
@@ -569,9 +579,10 @@ impl Lines {
         let (before, below) = all.split_at(above);
         found.comments = [comments(&all), comments(below)];
         if named(line.cell(0)) {
-            found.lines = divided(text, separator, above);
-            let left_out =
-                |line: &Line| line.number > above && line.begins_with_hash() && line.len() != width;
+            found.lines = split_cells(text, separator, above);
+            let left_out = |line: &TableLine| {
+                line.number > above && line.begins_with_hash() && line.len() != width
+            };
             let among = found.lines.iter().filter(|line| left_out(line)).count();
             found.lines.retain(|line| !left_out(line));
             found.comments = [comments(before) + among, among];
@@ -582,37 +593,37 @@ impl Lines {
 
 /// How the numbers of a file are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Decimals {
-    pub mark: Mark,
+pub struct NumberFormat {
+    pub mark: DecimalMark,
     /// Whether thousands are divided by the other mark.
     pub grouped: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mark {
+pub enum DecimalMark {
     Point,
     Comma,
 }
 
-impl Mark {
+impl DecimalMark {
     fn character(self) -> char {
         match self {
-            Mark::Point => '.',
-            Mark::Comma => ',',
+            DecimalMark::Point => '.',
+            DecimalMark::Comma => ',',
         }
     }
 
-    fn other(self) -> Mark {
+    fn thousands_mark(self) -> DecimalMark {
         match self {
-            Mark::Point => Mark::Comma,
-            Mark::Comma => Mark::Point,
+            DecimalMark::Point => DecimalMark::Comma,
+            DecimalMark::Comma => DecimalMark::Point,
         }
     }
 }
 
 /// The number in a cell with this decimal mark; the other mark may divide thousands.
-fn read(cell: &str, mark: Mark) -> Option<f64> {
-    let group = mark.other().character();
+fn parse_number(cell: &str, mark: DecimalMark) -> Option<f64> {
+    let group = mark.thousands_mark().character();
     // U+2212 is the minus sign of typeset numbers.
     let mut plain = cell.replacen('\u{2212}', "-", 2);
     if plain.contains(group) {
@@ -634,7 +645,7 @@ fn read(cell: &str, mark: Mark) -> Option<f64> {
             return None;
         }
         plain = format!("{whole}.{fraction}");
-    } else if mark == Mark::Comma {
+    } else if mark == DecimalMark::Comma {
         plain = plain.replace(',', ".");
     }
     let number = plain.parse::<f64>().ok();
@@ -643,46 +654,46 @@ fn read(cell: &str, mark: Mark) -> Option<f64> {
 
 /// Whether a cell is a number, with either mark.
 pub fn is_number(cell: &str) -> bool {
-    [Mark::Point, Mark::Comma]
+    [DecimalMark::Point, DecimalMark::Comma]
         .iter()
-        .any(|mark| read(cell, *mark).is_some())
+        .any(|mark| parse_number(cell, *mark).is_some())
 }
 
 /// Whether a number has four digits or more before its decimal mark, which nothing divides.
-fn is_long(cell: &str, mark: Mark) -> bool {
+fn is_ungrouped_long(cell: &str, mark: DecimalMark) -> bool {
     let end = [mark.character(), 'e', 'E'];
     let whole = cell.split(end).next().unwrap_or(cell);
     let digits = whole.trim_start_matches(['+', '-', '\u{2212}']);
-    digits.len() > 3 && !digits.contains(mark.other().character())
+    digits.len() > 3 && !digits.contains(mark.thousands_mark().character())
 }
 
-impl Decimals {
+impl NumberFormat {
     /// The marks of these cells, each with its line. A cell that is a number with one of the
     /// marks only decides for all.
-    pub fn of<'c>(
+    pub fn detect<'c>(
         cells: impl Iterator<Item = (usize, &'c str)> + Clone,
         file: &str,
     ) -> Result<Self, FitError> {
         let marked = cells.filter(|(_, cell)| cell.contains(['.', ',']));
-        let reads = |cell: &str, mark| read(cell, mark).is_some();
-        let proof = |mark: Mark| {
+        let reads = |cell: &str, mark| parse_number(cell, mark).is_some();
+        let proof = |mark: DecimalMark| {
             let mut cells = marked.clone();
-            cells.find(|(_, cell)| reads(cell, mark) && !reads(cell, mark.other()))
+            cells.find(|(_, cell)| reads(cell, mark) && !reads(cell, mark.thousands_mark()))
         };
-        let mark = match (proof(Mark::Point), proof(Mark::Comma)) {
+        let mark = match (proof(DecimalMark::Point), proof(DecimalMark::Comma)) {
             (Some((line, point)), Some((other, comma))) => {
                 let why = format!(
                     "{point} has a decimal point, and {comma} in line {other} a decimal comma: \
                      write all numbers of a file with one of them"
                 );
-                return Err(refuse(file, line, why));
+                return Err(line_error(file, line, why));
             }
-            (_, Some(_)) => Mark::Comma,
-            (Some(_), None) => Mark::Point,
+            (_, Some(_)) => DecimalMark::Comma,
+            (Some(_), None) => DecimalMark::Point,
             (None, None) => {
                 let mut either = marked.clone();
                 let unclear =
-                    either.find(|(_, cell)| cell.contains(',') && reads(cell, Mark::Comma));
+                    either.find(|(_, cell)| cell.contains(',') && reads(cell, DecimalMark::Comma));
                 if let Some((line, cell)) = unclear {
                     let point = cell.replace(',', ".");
                     let why = format!(
@@ -690,69 +701,72 @@ impl Decimals {
                          write numbers with a decimal point, and thousands undivided",
                         cell.replace(',', "")
                     );
-                    return Err(refuse(file, line, why));
+                    return Err(line_error(file, line, why));
                 }
-                Mark::Point
+                DecimalMark::Point
             }
         };
-        let group = mark.other().character();
+        let group = mark.thousands_mark().character();
         let mut grouped = marked.clone();
         let grouped = grouped.find(|(_, cell)| cell.contains(group) && reads(cell, mark));
         let mut long = marked.clone();
-        let long = long.find(|(_, cell)| reads(cell, mark) && is_long(cell, mark));
+        let long = long.find(|(_, cell)| reads(cell, mark) && is_ungrouped_long(cell, mark));
         if let (Some((line, grouped)), Some((other, long))) = (grouped, long) {
             let why = format!(
                 "{grouped} has its thousands divided, or another decimal mark, and {long} in line \
                  {other} has not: write all numbers of a file alike"
             );
-            return Err(refuse(file, line, why));
+            return Err(line_error(file, line, why));
         }
-        Ok(Decimals {
+        Ok(NumberFormat {
             mark,
             grouped: grouped.is_some(),
         })
     }
 
     /// The finite number in a cell.
-    pub fn number(self, cell: &str) -> Option<f64> {
-        read(cell, self.mark)
+    pub fn parse_finite(self, cell: &str) -> Option<f64> {
+        parse_number(cell, self.mark)
     }
 }
 
 /// The refusal of a line of a file.
-pub fn refuse(file: &str, line: usize, why: impl std::fmt::Display) -> FitError {
+pub fn line_error(file: &str, line: usize, why: impl std::fmt::Display) -> FitError {
     FitError::Data(format!("{file}:{line}: {why}"))
 }
 
 /// A text, and its encoding if that is not UTF-8.
-pub struct Decoded {
+pub struct DecodedText {
     pub text: String,
     pub encoding: Option<&'static str>,
 }
 
 /// First bytes of archives, among them spreadsheets, and of older spreadsheets.
-const SPREADSHEETS: [&[u8]; 2] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0"];
+const SPREADSHEET_SIGNATURES: [&[u8]; 2] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0"];
 
 /// Decodes UTF-8, UTF-16 with a byte order mark, and Latin-1.
-pub fn decode(bytes: &[u8], file: &str) -> Result<Decoded, FitError> {
+pub fn decode(bytes: &[u8], file: &str) -> Result<DecodedText, FitError> {
     if bytes.len() as u64 > MOST_BYTES {
         let why = format!("is larger than {MOST_BYTES} bytes: keep every tenth row, or fewer");
-        return Err(refuse(file, 1, why));
+        return Err(line_error(file, 1, why));
     }
-    if SPREADSHEETS.iter().any(|first| bytes.starts_with(first)) {
+    if SPREADSHEET_SIGNATURES
+        .iter()
+        .any(|first| bytes.starts_with(first))
+    {
         let why = "is a spreadsheet or another archive: export the table as CSV";
-        return Err(refuse(file, 1, why));
+        return Err(line_error(file, 1, why));
     }
     let (text, encoding) = match bytes {
-        [0xff, 0xfe, rest @ ..] => (utf16(rest, u16::from_le_bytes), Some("UTF-16")),
-        [0xfe, 0xff, rest @ ..] => (utf16(rest, u16::from_be_bytes), Some("UTF-16")),
+        [0xff, 0xfe, rest @ ..] => (decode_utf16(rest, u16::from_le_bytes), Some("UTF-16")),
+        [0xfe, 0xff, rest @ ..] => (decode_utf16(rest, u16::from_be_bytes), Some("UTF-16")),
         _ => match std::str::from_utf8(bytes) {
             Ok(text) => (Some(text.into()), None),
-            Err(_) => (latin_1(bytes), Some("Latin-1")),
+            Err(_) => (decode_latin_1(bytes), Some("Latin-1")),
         },
     };
     let Some(text) = text.filter(|text| !text.contains('\0')) else {
-        return Err(refuse(
+        return Err(line_error(
             file,
             1,
             "is not text in UTF-8: save the file as UTF-8",
@@ -761,28 +775,28 @@ pub fn decode(bytes: &[u8], file: &str) -> Result<Decoded, FitError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     if text.contains('\r') && !text.contains('\n') {
         let why = "has line ends of CR alone: save it with line ends LF or CR LF";
-        return Err(refuse(file, 1, why));
+        return Err(line_error(file, 1, why));
     }
-    Ok(Decoded {
+    Ok(DecodedText {
         text: text.into(),
         encoding,
     })
 }
 
-fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
+fn decode_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
     let (pairs, rest) = bytes.as_chunks::<2>();
     let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
     String::from_utf16(&units).ok().filter(|_| rest.is_empty())
 }
 
 /// The bytes from 0x80 to 0x9f have no characters in Latin-1, and different ones in its kin.
-fn latin_1(bytes: &[u8]) -> Option<String> {
+fn decode_latin_1(bytes: &[u8]) -> Option<String> {
     let known = bytes.iter().all(|byte| !(0x80..0xa0).contains(byte));
     known.then(|| bytes.iter().copied().map(char::from).collect())
 }
 
 /// Units that stand without brackets, in small letters: programs write them in either case.
-const UNITS: [&str; 61] = [
+const UNIT_NAMES: [&str; 61] = [
     "n", "mn", "un", "µn", "μn", "kn", "m", "dm", "cm", "mm", "um", "µm", "μm", "nm", "in", "inch",
     "ft", "px", "pixel", "s", "sec", "ms", "min", "h", "hz", "khz", "rad", "deg", "°", "%", "g",
     "mg", "kg", "gf", "kgf", "lbf", "pa", "kpa", "mpa", "gpa", "psi", "v", "mv", "j", "us", "µs",
@@ -793,11 +807,11 @@ const UNITS: [&str; 61] = [
 fn is_unit(cell: &str) -> bool {
     let pairs = [('(', ')'), ('[', ']')];
     let bracketed = |(open, close)| cell.starts_with(open) && cell.ends_with(close);
-    cell.len() > 1 && pairs.into_iter().any(bracketed) || is_product(cell)
+    cell.len() > 1 && pairs.into_iter().any(bracketed) || is_product_of_units(cell)
 }
 
 /// Whether a cell is a product or a quotient of units, which may have exponents, as `N/mm2`.
-fn is_product(cell: &str) -> bool {
+fn is_product_of_units(cell: &str) -> bool {
     let small = cell.to_lowercase();
     let base = |factor: &str| -> String {
         let factor = factor.trim();
@@ -807,12 +821,12 @@ fn is_product(cell: &str) -> bool {
     let mut factors = small.split(['/', '*', '·']).enumerate();
     factors.all(|(at, factor)| match factor.trim() {
         "1" => at == 0 && small.contains('/'),
-        factor => UNITS.contains(&base(factor).as_str()),
+        factor => UNIT_NAMES.contains(&base(factor).as_str()),
     })
 }
 
 /// Whether a row has units: no number, and a unit in at least half of what else it has besides dashes.
-pub fn are_units<'c>(cells: impl Iterator<Item = &'c str>) -> bool {
+pub fn is_unit_row<'c>(cells: impl Iterator<Item = &'c str>) -> bool {
     let cells = cells.filter(|cell| !matches!(*cell, "" | "-"));
     let cells: Vec<&str> = cells.collect();
     let units = cells.iter().filter(|cell| is_unit(cell)).count();

@@ -9,20 +9,25 @@
 //! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
 //! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
-use crate::branch::value_between;
+use crate::branch::value_at_fraction;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::motion::{Explicit, Physics, Stopped, TimeIntegrator};
 use crate::numbers::{larger, largest};
-use crate::relax::{Method, Options, Outcome, RelaxError, Work, index_near, shape_of, start};
+use crate::relax::{
+    Method, Options, Outcome, RelaxError, SolverCounts, index_near, initial_state, rod_shapes,
+};
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::Undulation;
-use crate::shooting::{Reason, Start};
+use crate::shooting::{ShootingFailureReason, ShootingStart};
 use crate::study::judge::{
-    Answer, SAME_LEAF, SEGMENTS, fine_grid, grid_error, index_at, timed, union,
+    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, eigenvalue_grid,
+    morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
-use crate::study::map::{Confidence, Found, Map, MapMethod, MapOutcome, MapRequest, MapRow};
-use crate::study::vary::{Knobs, Varied};
+use crate::study::map::{
+    CellSolution, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
+};
+use crate::study::vary::{SolverSettings, VariedScenario};
 use crate::{relax, shooting};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -32,36 +37,36 @@ use std::time::Duration;
 
 /// The tolerance of the reference is smaller than that of the answers by this factor, as far
 /// as double precision allows.
-const SHARPER: f64 = 1e-2;
+const REFERENCE_TOLERANCE_RATIO: f64 = 1e-2;
 
-const SHARPEST: f64 = 1e-12;
+const LEAST_REFERENCE_TOLERANCE: f64 = 1e-12;
 
 /// Lower bound on the seconds per node on any machine; two to four times as many are measured.
 /// A grid is built and its solution started before the time limit is first checked.
-const LEAST_SECONDS: f64 = 3e-6;
+const LEAST_SECONDS_PER_NODE: f64 = 3e-6;
 
 /// Least segments a rod of a grid, or steps of shooting.
-const LEAST_SEGMENTS: usize = 4;
+const LEAST_SEGMENTS_PER_ROD: usize = 4;
 
 /// What is needed to solve a cell's leaf.
-pub struct Cell<'a> {
+pub struct MapCell<'a> {
     scenario: &'a Scenario,
-    knobs: Knobs,
+    solver_settings: SolverSettings,
     tolerance: f64,
     limit: Duration,
     /// Time limit for all cells.
-    all: &'a Limit,
+    total_limit: &'a Limit,
     /// The default method's answer and its seconds: the start of shooting from rest.
-    relaxed: (Found, f64),
-    reference: Option<Answer>,
-    confidence: Confidence,
+    relaxed_answer: (CellSolution, f64),
+    reference: Option<MethodSolution>,
+    confidence: ReferenceConfidence,
 }
 
-impl<'a> Cell<'a> {
+impl<'a> MapCell<'a> {
     /// Finds the reference: the relaxed leaf, and the solution of the
     /// boundary-value problem near it.
     pub fn new(
-        varied: &'a Varied,
+        varied: &'a VariedScenario,
         tolerance: Option<f64>,
         limit: Duration,
         all: &'a Limit,
@@ -69,33 +74,35 @@ impl<'a> Cell<'a> {
         let scenario = &varied.scenario;
         let tolerance = tolerance.unwrap_or(scenario.tolerance);
         let rods = scenario.rods.len();
-        let relaxed = too_many(LEAST_SEGMENTS, rods, limit).unwrap_or_else(|| {
-            within(limit, all, |limit| {
-                relaxed(scenario, Method::default(), tolerance, limit)
+        let relaxed = refuse_slow_grid(LEAST_SEGMENTS_PER_ROD, rods, limit).unwrap_or_else(|| {
+            run_within_limit(limit, all, |limit| {
+                relax_with_error_estimate(scenario, Method::default(), tolerance, limit)
             })
         });
-        let mut cell = Cell {
+        let mut cell = MapCell {
             scenario,
-            knobs: varied.knobs,
+            solver_settings: varied.solver_settings,
             tolerance,
             limit,
-            all,
-            relaxed,
+            total_limit: all,
+            relaxed_answer: relaxed,
             reference: None,
-            confidence: Confidence::None,
+            confidence: ReferenceConfidence::None,
         };
-        let sharp = (SHARPER * tolerance).max(SHARPEST);
-        let (shot, _) = within(limit, all, |limit| cell.shoot_from_rest(sharp, limit));
-        if let Ok(relaxed) = &cell.relaxed.0 {
-            let (confidence, reference) = confirm(relaxed, shot.ok());
+        let sharp = (REFERENCE_TOLERANCE_RATIO * tolerance).max(LEAST_REFERENCE_TOLERANCE);
+        let (shot, _) = run_within_limit(limit, all, |limit| {
+            cell.shoot_from_relaxed_leaf(sharp, limit)
+        });
+        if let Ok(relaxed) = &cell.relaxed_answer.0 {
+            let (confidence, reference) = choose_reference(relaxed, shot.ok());
             (cell.confidence, cell.reference) = (confidence, Some(reference));
         }
         cell
     }
 
     /// Solves by a method and judges the answer.
-    pub fn row(&self, cell: usize, method: MapMethod) -> MapRow {
-        let (found, seconds) = self.answer(method);
+    pub fn solve_by_method(&self, cell: usize, method: MapMethod) -> MapRow {
+        let (found, seconds) = self.timed_solution(method);
         let blank = MapRow {
             seconds,
             cell,
@@ -108,20 +115,20 @@ impl<'a> Cell<'a> {
             Err((outcome, detail)) => {
                 return MapRow {
                     outcome,
-                    detail: one_line(&detail),
+                    detail: join_lines(&detail),
                     ..blank
                 };
             }
         };
         let length = longest(&self.scenario.rods);
         let reference = self.reference.as_ref();
-        let distance = reference.and_then(|it| it.distance(&answer));
-        let (outcome, detail) = self.judge(&answer, distance);
+        let distance = reference.and_then(|it| it.largest_distance(&answer));
+        let (outcome, detail) = self.judge_solution(&answer, distance);
         let margin = answer.undulation.margin();
         let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
         MapRow {
             outcome,
-            detail: one_line(&detail),
+            detail: join_lines(&detail),
             index: answer.index,
             tip_x: tip.map(|node| node.position.x),
             tip_y: tip.map(|node| node.position.y),
@@ -131,62 +138,80 @@ impl<'a> Cell<'a> {
             margin_amplitude: margin.map(|vein| vein.amplitude / length),
             twist: Some(answer.undulation.twist()),
             error: distance.map(|distance| distance / length),
-            error_estimate: Some(answer.error() / length),
+            error_estimate: Some(answer.error_bound() / length),
             ..blank
         }
     }
 
-    fn answer(&self, method: MapMethod) -> (Found, f64) {
-        let segments = self.knobs.segments;
+    fn timed_solution(&self, method: MapMethod) -> (CellSolution, f64) {
+        let segments = self.solver_settings.segments;
         let (scenario, tolerance) = (self.scenario, self.tolerance);
         if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
-            return self.relaxed.clone();
+            return self.relaxed_answer.clone();
         }
         let on_grid = match method {
             MapMethod::ExplicitMotion => true,
             MapMethod::ToRest(method) => !method.is_shooting(),
         };
-        let segments_at_least = segments.filter(|_| on_grid).unwrap_or(LEAST_SEGMENTS);
-        if let Some(late) = too_many(segments_at_least, scenario.rods.len(), self.limit) {
+        let segments_at_least = segments
+            .filter(|_| on_grid)
+            .unwrap_or(LEAST_SEGMENTS_PER_ROD);
+        if let Some(late) = refuse_slow_grid(segments_at_least, scenario.rods.len(), self.limit) {
             return late;
         }
-        within(self.limit, self.all, |limit| match method {
-            MapMethod::ExplicitMotion => answer_of_motion(scenario, self.knobs, tolerance, limit),
+        run_within_limit(self.limit, self.total_limit, |limit| match method {
+            MapMethod::ExplicitMotion => {
+                solve_by_explicit_motion(scenario, self.solver_settings, tolerance, limit)
+            }
             MapMethod::ToRest(method) => match method {
-                Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), limit),
-                Method::Shooting { intervals } => {
-                    self.shoot(Start::Arcs, tolerance, intervals, limit)
+                Method::SingleShooting => {
+                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, Some(1), limit)
                 }
-                Method::ShootingFromRest { .. } => self.shoot_from_rest(tolerance, limit),
+                Method::Shooting { intervals } => {
+                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, intervals, limit)
+                }
+                Method::ShootingFromRest { .. } => self.shoot_from_relaxed_leaf(tolerance, limit),
                 Method::SemiImplicit(_) | Method::Explicit { .. } => {
-                    relaxed(scenario, method.on_grid(segments), tolerance, limit)
+                    relax_with_error_estimate(scenario, method.on_grid(segments), tolerance, limit)
                 }
             },
         })
     }
 
-    fn shoot(&self, start: Start, accuracy: f64, intervals: Option<usize>, limit: &Limit) -> Found {
-        let segments = match &self.relaxed.0 {
+    fn solve_by_shooting(
+        &self,
+        start: ShootingStart,
+        accuracy: f64,
+        intervals: Option<usize>,
+        limit: &Limit,
+    ) -> CellSolution {
+        let segments = match &self.relaxed_answer.0 {
             Ok(relaxed) => relaxed.stations.len() - 1,
-            Err(_) => SEGMENTS,
+            Err(_) => LEAST_EIGENVALUE_SEGMENTS,
         };
-        let grid = fine_grid(self.scenario, segments);
-        let others = stations(self.scenario, self.knobs);
-        let stations = union([grid.sigma(), &others].concat());
-        let options = shooting::Options {
+        let grid = eigenvalue_grid(self.scenario, segments);
+        let others = reference_stations(self.scenario, self.solver_settings);
+        let stations = union_of_stations([grid.sigma(), &others].concat());
+        let options = shooting::ShootingOptions {
             intervals,
             limit: limit.clone(),
-            ..shooting::Options::new(start, &stations, shooting::Precision::Error(accuracy))
+            ..shooting::ShootingOptions::new(
+                start,
+                &stations,
+                shooting::RequiredPrecision::EstimatedError(accuracy),
+            )
         };
         let solved = shooting::solve(self.scenario, &options, &mut |_| {});
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
-                Reason::Unbounded { .. } => MapOutcome::Diverged,
-                Reason::TooMuch(_) | Reason::Unmodelled(_) => MapOutcome::Refused,
-                Reason::OutOfTime => MapOutcome::OutOfTime,
+                ShootingFailureReason::Unbounded { .. } => MapOutcome::Diverged,
+                ShootingFailureReason::TooMuchMemory(_) | ShootingFailureReason::Unmodelled(_) => {
+                    MapOutcome::Refused
+                }
+                ShootingFailureReason::OutOfTime => MapOutcome::OutOfTime,
                 _ => MapOutcome::NotConverged,
             };
-            let way = match failure.part {
+            let way = match failure.lambda {
                 part if part < 1.0 => format!(" (at {part:.4} of the way from arcs)"),
                 _ => String::new(),
             };
@@ -200,26 +225,29 @@ impl<'a> Cell<'a> {
         let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
         let growth = solution.growth;
         let note = format!("over {intervals}, growth 10^{growth:.1}{neutral}");
-        let answer = Answer::of_solution(self.scenario, solution, accuracy);
+        let answer = MethodSolution::from_shooting(self.scenario, solution, accuracy);
         if !answer.outcome.is_success() {
-            let known = format!("the solution is only known within {:.1e}", answer.error());
+            let known = format!(
+                "the solution is only known within {:.1e}",
+                answer.error_bound()
+            );
             return Err((MapOutcome::NotConverged, known));
         }
-        Ok(Answer {
-            index: index_at(
+        Ok(MethodSolution {
+            index: morse_index_near(
                 self.scenario,
                 grid,
                 (&answer.stations, &answer.rods),
-                answer.error(),
+                answer.error_bound(),
             ),
             remark: Some(note),
             ..answer
         })
     }
 
-    fn shoot_from_rest(&self, accuracy: f64, limit: &Limit) -> Found {
-        match &self.relaxed.0 {
-            Ok(relaxed) => self.shoot(relaxed.as_start(), accuracy, None, limit),
+    fn shoot_from_relaxed_leaf(&self, accuracy: f64, limit: &Limit) -> CellSolution {
+        match &self.relaxed_answer.0 {
+            Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
             Err((outcome, why)) => {
                 let why = format!("the leaf to start from is not at rest: {why}");
                 Err((*outcome, why))
@@ -228,7 +256,11 @@ impl<'a> Cell<'a> {
     }
 
     /// The verdict on an answer at this distance from the reference.
-    fn judge(&self, answer: &Answer, distance: Option<f64>) -> (MapOutcome, String) {
+    fn judge_solution(
+        &self,
+        answer: &MethodSolution,
+        distance: Option<f64>,
+    ) -> (MapOutcome, String) {
         let note = answer.remark.as_deref().unwrap_or_default();
         if let Some(index @ 1..) = answer.index {
             return (MapOutcome::Saddle, format!("index {index}; {note}"));
@@ -237,7 +269,7 @@ impl<'a> Cell<'a> {
             let text = format!("stable, with nothing to compare with; {note}");
             return (MapOutcome::Right, text);
         };
-        if answer.confirms(reference, distance) {
+        if answer.agrees_within_errors(reference, distance) {
             return (MapOutcome::Right, note.into());
         }
         let lower = match answer.energy - reference.energy {
@@ -246,42 +278,51 @@ impl<'a> Cell<'a> {
         };
         let apart = distance / longest(&self.scenario.rods);
         let text = format!("{apart:.1e} lengths from the reference, {lower}; {note}");
-        match self.is_elsewhere(answer, reference, distance) {
+        match self.is_other_equilibrium(answer, reference, distance) {
             true => (MapOutcome::OtherEquilibrium, text),
             false => (MapOutcome::Inaccurate, text),
         }
     }
 
     /// Whether the equilibrium near an answer is another than the reference.
-    fn is_elsewhere(&self, answer: &Answer, reference: &Answer, distance: f64) -> bool {
-        let (near, _) = within(self.limit, self.all, |limit| {
-            self.shoot(answer.as_start(), self.tolerance, None, limit)
+    fn is_other_equilibrium(
+        &self,
+        answer: &MethodSolution,
+        reference: &MethodSolution,
+        distance: f64,
+    ) -> bool {
+        let (near, _) = run_within_limit(self.limit, self.total_limit, |limit| {
+            self.solve_by_shooting(answer.shooting_start(), self.tolerance, None, limit)
         });
         match near {
-            Ok(near) if near.distance(answer) < Some(distance) => {
-                near.distance(reference) > Some(0.5 * distance)
+            Ok(near) if near.largest_distance(answer) < Some(distance) => {
+                near.largest_distance(reference) > Some(0.5 * distance)
             }
-            _ => distance > SAME_LEAF * longest(&self.scenario.rods),
+            _ => distance > SAME_LEAF_DISTANCE * longest(&self.scenario.rods),
         }
     }
 }
 
 /// The outcome on a grid that takes longer than the limit in any case.
-fn too_many(segments: usize, rods: usize, limit: Duration) -> Option<(Found, f64)> {
+fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<(CellSolution, f64)> {
     let (nodes, limit) = (segments.saturating_mul(rods), limit.as_secs_f64());
-    let late = nodes as f64 * LEAST_SECONDS > limit;
+    let late = nodes as f64 * LEAST_SECONDS_PER_NODE > limit;
     let why = || format!("{nodes} nodes take longer than {limit} s");
     late.then(|| (Err((MapOutcome::OutOfTime, why())), 0.0))
 }
 
 /// Runs a method with a time limit; also returns the seconds it took.
 /// A run that exceeds the limit counts as out of time, whatever its result.
-fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (Found, f64) {
+fn run_within_limit(
+    limit: Duration,
+    all: &Limit,
+    run: impl FnOnce(&Limit) -> CellSolution,
+) -> (CellSolution, f64) {
     let until = Limit {
         deadline: Some(Instant::now() + limit),
         ..all.clone()
     };
-    let (found, seconds) = timed(|| run(&until));
+    let (found, seconds) = run_timed(|| run(&until));
     let limit = limit.as_secs_f64();
     match seconds > limit {
         true => {
@@ -293,7 +334,12 @@ fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (F
 }
 
 /// Relaxes, perhaps on one grid. That has no error estimate of its own: a finer grid gives one.
-pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limit) -> Found {
+pub fn relax_with_error_estimate(
+    scenario: &Scenario,
+    method: Method,
+    tolerance: f64,
+    limit: &Limit,
+) -> CellSolution {
     let options = Options {
         method,
         tolerance: Some(tolerance),
@@ -304,7 +350,7 @@ pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limi
     let leaf = leaf.map_err(|refused| (MapOutcome::Refused, refused.to_string()))?;
     let saddle = leaf.stability.saddle;
     let saddle = saddle.map(|saddle| saddle.negative_eigenvalues);
-    let mut answer = Answer::from(leaf);
+    let mut answer = MethodSolution::from(leaf);
     if !answer.outcome.is_success() {
         let outcome = match answer.outcome {
             Outcome::Diverged => MapOutcome::Diverged,
@@ -314,7 +360,7 @@ pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limi
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();
-        let error = segments.and_then(|n| grid_error(scenario, n, tolerance, limit));
+        let error = segments.and_then(|n| single_grid_error(scenario, n, tolerance, limit));
         let Some(error) = error else {
             let why = "the error of the grid cannot be told: a finer one finds no rest";
             return Err((MapOutcome::NotConverged, why.into()));
@@ -330,42 +376,50 @@ pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limi
 /// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
 /// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
 /// if not, only if that is stable.
-fn confirm(relaxed: &Answer, shot: Option<Answer>) -> (Confidence, Answer) {
+fn choose_reference(
+    relaxed: &MethodSolution,
+    shot: Option<MethodSolution>,
+) -> (ReferenceConfidence, MethodSolution) {
     let Some(shot) = shot else {
-        return (Confidence::Unconfirmed, relaxed.clone());
+        return (ReferenceConfidence::Unconfirmed, relaxed.clone());
     };
-    let distance = relaxed.distance(&shot);
-    let same = distance.is_some_and(|distance| relaxed.confirms(&shot, distance));
+    let distance = relaxed.largest_distance(&shot);
+    let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&shot, distance));
     match (same && shot.index == relaxed.index, shot.index) {
-        (true, _) => (Confidence::Confirmed, shot),
-        (false, Some(0)) => (Confidence::Unconfirmed, shot),
-        (false, _) => (Confidence::Unconfirmed, relaxed.clone()),
+        (true, _) => (ReferenceConfidence::Confirmed, shot),
+        (false, Some(0)) => (ReferenceConfidence::Unconfirmed, shot),
+        (false, _) => (ReferenceConfidence::Unconfirmed, relaxed.clone()),
     }
 }
 
 /// Puts a text on one line, as tables require.
-pub fn one_line(text: &str) -> String {
+pub fn join_lines(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Default number of segments per rod: as in a simulation.
-const MOTION_SEGMENTS: usize = 16;
+const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// Largest number of stations at which answers are compared.
-const MOST_STATIONS: usize = 4096;
+const MOST_COMPARED_STATIONS: usize = 4096;
 
 /// Steps between checks of the time limit.
-const LOOK: f64 = 1000.0;
+const STEPS_PER_TIME_CHECK: f64 = 1000.0;
 
 /// Moves the leaf, released from the initial state of a relaxation, for the scenario's
 /// duration under the loads of its dynamics, in steps of `method.step`.
-pub fn answer_of_motion(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) -> Found {
+pub fn solve_by_explicit_motion(
+    scenario: &Scenario,
+    knobs: SolverSettings,
+    tolerance: f64,
+    limit: &Limit,
+) -> CellSolution {
     let refused = |why: String| Err((MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
         return refused("explicit motion needs method.step".into());
     };
     let leaf = Leaf::new(scenario);
-    let grid = match grid(&leaf, knobs) {
+    let grid = match motion_grid(&leaf, knobs) {
         Ok(grid) => grid,
         Err(error) => return refused(error.to_string()),
     };
@@ -374,25 +428,25 @@ pub fn answer_of_motion(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit
         return refused("a free leaf has no place to rest in".into());
     }
     let discrete = DiscreteLeaf::new(&leaf, grid.clone());
-    let state = start(&discrete);
-    let h = step / physics.time;
+    let state = initial_state(&discrete);
+    let h = step / physics.time_unit;
     let Ok(mut motion) = Explicit::new(discrete, physics.clone(), &state, Some(h)) else {
         return refused("no time step is stable for rigid rods (a stiffness is inf)".into());
     };
     let stable = motion.stable_step();
-    let (most, why) = (stable.step * physics.time, stable.limit);
+    let (most, why) = (stable.step * physics.time_unit, stable.limit);
     let note = format!("step {step:.3e}, stable up to {most:.3e} because of {why}");
     let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
-    let (duration, _) = physics.duration();
+    let (duration, _) = physics.duration_and_interval();
     while motion.time() < duration {
-        let until = motion.time() + LOOK * h;
+        let until = motion.time() + STEPS_PER_TIME_CHECK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
             let (Stopped::Unresolved { time, .. }
             | Stopped::HalfTurn { time, .. }
             | Stopped::Diverged { time, .. }
             | Stopped::StepTooShort { time, .. }
             | Stopped::Interrupted { time }) = stopped;
-            let at = format!("at t = {:.3e}", time * physics.time);
+            let at = format!("at t = {:.3e}", time * physics.time_unit);
             return match stopped {
                 Stopped::Unresolved { turn, .. } => {
                     let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
@@ -420,15 +474,20 @@ pub fn answer_of_motion(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit
         let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
         return failed(MapOutcome::NotConverged, moves);
     }
-    let rods = shape_of(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
-    let index = index_near(scenario, grid.clone(), &rods, SAME_LEAF * leaf.scale.length);
+    let rods = rod_shapes(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
+    let index = index_near(
+        scenario,
+        grid.clone(),
+        &rods,
+        SAME_LEAF_DISTANCE * leaf.scale.length,
+    );
     if index.is_none() && !leaf.loads.has_moments() {
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;
-    let error = grid_error(scenario, grid.segments(), tolerance, limit);
-    let estimate = error.unwrap_or(SAME_LEAF * length) + tolerance * length;
-    Ok(Answer {
+    let error = single_grid_error(scenario, grid.segments(), tolerance, limit);
+    let estimate = error.unwrap_or(SAME_LEAF_DISTANCE * length) + tolerance * length;
+    Ok(MethodSolution {
         outcome: Outcome::Converged,
         remark: Some(note),
         undulation: Undulation::at_stations(scenario, grid.sigma(), &rods, Some(estimate)),
@@ -438,35 +497,35 @@ pub fn answer_of_motion(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit
             * leaf.scale.moment(),
         index,
         error_estimate: Some(estimate),
-        work: Work::default(),
+        work: SolverCounts::default(),
     })
 }
 
 /// The grid, of as many segments as are set or needed.
-fn grid(leaf: &Leaf, knobs: Knobs) -> Result<Grid, RelaxError> {
-    let segments = relax::check_segments(leaf, knobs.segments, MOTION_SEGMENTS)?;
+fn motion_grid(leaf: &Leaf, knobs: SolverSettings) -> Result<Grid, RelaxError> {
+    let segments = relax::check_segments(leaf, knobs.segments, DEFAULT_MOTION_SEGMENTS)?;
     Ok(Grid::new(segments, leaf.kinks()))
 }
 
 /// The longest step known to be stable.
-pub fn stable_step(varied: &Varied) -> Option<f64> {
+pub fn longest_stable_step(varied: &VariedScenario) -> Option<f64> {
     let leaf = Leaf::new(&varied.scenario);
-    let grid = grid(&leaf, varied.knobs).ok()?;
+    let grid = motion_grid(&leaf, varied.solver_settings).ok()?;
     let physics = Physics::new(&leaf);
     let discrete = DiscreteLeaf::new(&leaf, grid);
-    let state = start(&discrete);
-    let time = physics.time;
+    let state = initial_state(&discrete);
+    let time = physics.time_unit;
     let motion = Explicit::new(discrete, physics, &state, Some(1.0)).ok()?;
     Some(motion.stable_step().step * time)
 }
 
 /// Additional stations that a reference should have.
-pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
+pub fn reference_stations(scenario: &Scenario, knobs: SolverSettings) -> Vec<f64> {
     let leaf = Leaf::new(scenario);
-    match relax::check_segments(&leaf, knobs.segments, MOTION_SEGMENTS) {
+    match relax::check_segments(&leaf, knobs.segments, DEFAULT_MOTION_SEGMENTS) {
         Ok(segments) if knobs.segments.is_some() => {
-            let grid = fine_grid(scenario, segments);
-            let every = grid.segments().div_ceil(MOST_STATIONS);
+            let grid = eigenvalue_grid(scenario, segments);
+            let every = grid.segments().div_ceil(MOST_COMPARED_STATIONS);
             let some = grid.sigma().iter().copied().step_by(every);
             some.chain([1.0]).collect()
         }
@@ -475,19 +534,19 @@ pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
 }
 
 /// Leaves closer than this, in lengths, count as the same.
-const SAME: f64 = 0.01;
+const SAME_ROW_DISTANCE: f64 = 0.01;
 
 /// A pair is examined if its tips, or its twists, are farther apart than those of
 /// a neighbouring pair by this factor.
-const FARTHER: f64 = 1.5;
+const SUSPICIOUS_DISTANCE_RATIO: f64 = 1.5;
 
 /// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
 /// part of their distance.
-const NEAR_MIDDLE: f64 = 0.1;
+const CONTINUITY_RATIO: f64 = 0.1;
 
 /// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
 /// distance from it, here a sixty-fourth.
-const HALVES: usize = 12;
+const JUMP_BISECTIONS: usize = 12;
 
 /// Two neighbouring cells between which the leaf jumps to another equilibrium.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -505,7 +564,7 @@ pub struct MapJump {
 }
 
 /// Two neighbouring cells along an axis.
-struct Pair {
+struct NeighbouringCells {
     axis: usize,
     cells: [usize; 2],
 }
@@ -515,11 +574,11 @@ impl Map {
     /// default method, and stores them in `jumps`.
     /// `progress` is called with the number of pairs examined and their total number.
     pub fn find_jumps(&mut self, progress: &(dyn Fn(usize, usize) + Sync)) {
-        self.jumps = Some(jumps(&self.request, &self.rows, progress));
+        self.jumps = Some(locate_jumps(&self.request, &self.rows, progress));
     }
 }
 
-fn jumps(
+fn locate_jumps(
     request: &MapRequest,
     rows: &[MapRow],
     progress: &(dyn Fn(usize, usize) + Sync),
@@ -530,42 +589,47 @@ fn jumps(
     for row in rows.iter().filter(at_rest) {
         known[row.cell] = Some(row);
     }
-    let pairs: Vec<Pair> = pairs(request)
+    let pairs: Vec<NeighbouringCells> = neighbouring_cell_pairs(request)
         .filter(|pair| may_jump(request, &known, pair))
         .collect();
     let done = AtomicUsize::new(0);
     let found = pairs.par_iter().map(|pair| {
-        let found = jump(request, pair);
+        let found = locate_jump(request, pair);
         progress(1 + done.fetch_add(1, Ordering::Relaxed), pairs.len());
         found
     });
     found.flatten().collect()
 }
 
-fn pairs(request: &MapRequest) -> impl Iterator<Item = Pair> {
+fn neighbouring_cell_pairs(request: &MapRequest) -> impl Iterator<Item = NeighbouringCells> {
     (0..request.cells()).flat_map(move |cell| {
         (0..request.axes.len()).filter_map(move |axis| {
-            let next = neighbour(request, cell, axis, 1)?;
+            let next = neighbouring_cell(request, cell, axis, 1)?;
             let cells = [cell, next];
-            Some(Pair { axis, cells })
+            Some(NeighbouringCells { axis, cells })
         })
     })
 }
 
 /// The cell at a signed offset along an axis.
-fn neighbour(request: &MapRequest, cell: usize, axis: usize, offset: isize) -> Option<usize> {
+fn neighbouring_cell(
+    request: &MapRequest,
+    cell: usize,
+    axis: usize,
+    offset: isize,
+) -> Option<usize> {
     let later = request.axes.iter().skip(axis + 1);
     let stride: usize = later.map(|axis| axis.values.len()).product();
-    let at = request.place(cell)[axis].checked_add_signed(offset)?;
+    let at = request.cell_position(cell)[axis].checked_add_signed(offset)?;
     let there = at < request.axes[axis].values.len();
     there.then(|| cell.wrapping_add_signed(offset * stride as isize))
 }
 
 /// Whether the leaf may jump between two cells, by comparison with neighbouring rows. If
 /// its tip is held, only its shape can show it.
-fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &Pair) -> bool {
+fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &NeighbouringCells) -> bool {
     let [a, b] = pair.cells;
-    let distances = |a: usize, b: usize| Some(distances(known[a]?, known[b]?));
+    let distances = |a: usize, b: usize| Some(tip_and_twist_distances(known[a]?, known[b]?));
     let Some(own) = distances(a, b) else {
         return false;
     };
@@ -573,18 +637,20 @@ fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &Pair) -> boo
     if scenario.held_tip.is_some() {
         return true;
     }
-    let before = neighbour(request, a, pair.axis, -1).and_then(|before| distances(before, a));
-    let after = neighbour(request, b, pair.axis, 1).and_then(|after| distances(b, after));
+    let before =
+        neighbouring_cell(request, a, pair.axis, -1).and_then(|before| distances(before, a));
+    let after = neighbouring_cell(request, b, pair.axis, 1).and_then(|after| distances(b, after));
     let units = [longest(&scenario.rods), 1.0];
     (0..2).any(|k| {
         let others = [before, after].into_iter().flatten().map(|it| it[k]);
         let least = others.fold(f64::INFINITY, f64::min);
-        own[k] > SAME * units[k] && (!least.is_finite() || own[k] > FARTHER * least)
+        own[k] > SAME_ROW_DISTANCE * units[k]
+            && (!least.is_finite() || own[k] > SUSPICIOUS_DISTANCE_RATIO * least)
     })
 }
 
 /// Distances of the tips and of the twists.
-fn distances(a: &MapRow, b: &MapRow) -> [f64; 2] {
+fn tip_and_twist_distances(a: &MapRow, b: &MapRow) -> [f64; 2] {
     let difference = |of: fn(&MapRow) -> Option<f64>| of(a).zip(of(b)).map_or(0.0, |(a, b)| a - b);
     let tip = [difference(|row| row.tip_x), difference(|row| row.tip_y)];
     let tip = tip[0].hypot(tip[1]).hypot(difference(|row| row.tip_z));
@@ -592,30 +658,34 @@ fn distances(a: &MapRow, b: &MapRow) -> [f64; 2] {
 }
 
 /// The jump between two cells, if there certainly is one.
-fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
+fn locate_jump(request: &MapRequest, pair: &NeighbouringCells) -> Option<MapJump> {
     let axis = &request.axes[pair.axis];
     let ends = pair.cells.map(|cell| request.values(cell)[pair.axis].1);
-    let value = |part: f64| value_between(ends, axis.log, part);
-    let at = |part: f64| answer_between(request, pair, value(part));
+    let value = |part: f64| value_at_fraction(ends, axis.log, part);
+    let at = |part: f64| relax_between_cells(request, pair, value(part));
     let length = longest(&request.base.scenario().rods);
     let [mut low, mut high] = [(0.0, at(0.0)?), (1.0, at(1.0)?)];
-    let mut distance = low.1.distance(&high.1)?;
-    for half in 0..HALVES {
-        if distance < SAME * length {
+    let mut distance = low.1.largest_distance(&high.1)?;
+    for half in 0..JUMP_BISECTIONS {
+        if distance < SAME_ROW_DISTANCE * length {
             return None;
         }
         let part = 0.5 * (low.0 + high.0);
         let middle = at(part)?;
-        if half == 0 && distance_from_middle(&low.1, &middle, &high.1)? < NEAR_MIDDLE * distance {
+        if half == 0 && distance_from_mean(&low.1, &middle, &high.1)? < CONTINUITY_RATIO * distance
+        {
             return None;
         }
-        let [below, above] = [low.1.distance(&middle)?, middle.distance(&high.1)?];
+        let [below, above] = [
+            low.1.largest_distance(&middle)?,
+            middle.largest_distance(&high.1)?,
+        ];
         match below > above {
             true => (high, distance) = ((part, middle), below),
             false => (low, distance) = ((part, middle), above),
         }
     }
-    (distance >= SAME * length).then(|| MapJump {
+    (distance >= SAME_ROW_DISTANCE * length).then(|| MapJump {
         key: axis.keys.to_string(),
         from: request.texts(pair.cells[0]),
         to: request.texts(pair.cells[1]),
@@ -625,22 +695,30 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
 }
 
 /// The relaxed leaf at another value along the axis of a pair.
-fn answer_between(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
+fn relax_between_cells(
+    request: &MapRequest,
+    pair: &NeighbouringCells,
+    value: f64,
+) -> Option<MethodSolution> {
     let mut values = request.values(pair.cells[0]);
     values[pair.axis].1 = value;
-    let varied = request.base.at(&values).ok()?;
+    let varied = request.base.scenario_with_values(&values).ok()?;
     let limit = Limit {
         deadline: Some(Instant::now() + Duration::from_secs_f64(request.cell_seconds)),
         ..request.limit.clone()
     };
-    let method = Method::default().on_grid(varied.knobs.segments);
+    let method = Method::default().on_grid(varied.solver_settings.segments);
     let tolerance = request.tolerance.unwrap_or(varied.scenario.tolerance);
-    relaxed(&varied.scenario, method, tolerance, &limit).ok()
+    relax_with_error_estimate(&varied.scenario, method, tolerance, &limit).ok()
 }
 
 /// Largest distance of a leaf from the mean of two others.
-fn distance_from_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<f64> {
-    let common = |sigma: f64, of: &Answer| of.stations.iter().position(|it| *it == sigma);
+fn distance_from_mean(
+    low: &MethodSolution,
+    middle: &MethodSolution,
+    high: &MethodSolution,
+) -> Option<f64> {
+    let common = |sigma: f64, of: &MethodSolution| of.stations.iter().position(|it| *it == sigma);
     let mut most: f64 = 0.0;
     for (i, &sigma) in middle.stations.iter().enumerate() {
         let (Some(a), Some(b)) = (common(sigma, low), common(sigma, high)) else {

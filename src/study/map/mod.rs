@@ -15,10 +15,10 @@ mod cell;
 use crate::memory::TooMuch;
 use crate::relax::{Method, RelaxError, check_tolerance, without_wind};
 use crate::run::{Limit, RefusedOption};
-use crate::study::judge::Answer;
+use crate::study::judge::MethodSolution;
 pub use crate::study::map::cell::MapJump;
-use crate::study::map::cell::{Cell, one_line};
-use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
+use crate::study::map::cell::{MapCell, join_lines};
+use crate::study::vary::{BaseScenario, ParameterKeys, ParameterSweep, SolverSetting, VaryError};
 use crate::{memory, read_and_write, words};
 use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
@@ -53,18 +53,20 @@ impl Map {
     }
 
     /// Number of a method's answers with an outcome.
-    pub fn count(&self, method: MapMethod, outcome: MapOutcome) -> usize {
+    pub fn outcome_count(&self, method: MapMethod, outcome: MapOutcome) -> usize {
         let counted = |row: &&MapRow| row.method == method && row.outcome == outcome;
         self.rows.iter().filter(counted).count()
     }
 
     /// Number of cells with rows, and of those whose reference is confirmed.
-    pub fn known_and_confirmed(&self) -> (usize, usize) {
-        let mut cells: Vec<(usize, Confidence)> = (self.rows.iter())
+    pub fn known_and_confirmed_cells(&self) -> (usize, usize) {
+        let mut cells: Vec<(usize, ReferenceConfidence)> = (self.rows.iter())
             .map(|row| (row.cell, row.reference))
             .collect();
         cells.dedup_by_key(|(cell, _)| *cell);
-        let confirmed = |(_, reference): &&(usize, Confidence)| *reference == Confidence::Confirmed;
+        let confirmed = |(_, reference): &&(usize, ReferenceConfidence)| {
+            *reference == ReferenceConfidence::Confirmed
+        };
         (cells.len(), cells.iter().filter(confirmed).count())
     }
 }
@@ -73,7 +75,7 @@ impl Map {
 impl Serialize for Map {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Keys<'a> {
+        struct ParameterKeys<'a> {
             scenario: &'a str,
             request: &'a MapRequest,
             cells: usize,
@@ -90,15 +92,15 @@ impl Serialize for Map {
         let outcomes = request.methods.iter().map(|&method| Counts {
             method,
             counts: (MapOutcome::ALL.into_iter())
-                .map(|outcome| (outcome.word(), self.count(method, outcome)))
+                .map(|outcome| (outcome.word(), self.outcome_count(method, outcome)))
                 .filter(|(_, count)| *count > 0)
                 .collect(),
         });
-        Keys {
+        ParameterKeys {
             scenario: &request.base.scenario().name,
             request,
             cells: request.cells(),
-            confirmed: self.known_and_confirmed().1,
+            confirmed: self.known_and_confirmed_cells().1,
             outcomes: outcomes.collect(),
             jumps: &self.jumps,
         }
@@ -143,18 +145,18 @@ pub fn map(
 }
 
 /// Largest number of cells of a map.
-const MOST_CELLS: usize = 1_000_000;
+const MOST_MAP_CELLS: usize = 1_000_000;
 
 /// Default seconds allowed for each method in each cell.
-pub const CELL_SECONDS: f64 = 20.0;
+pub const DEFAULT_CELL_SECONDS: f64 = 20.0;
 
 /// A request for a map.
 #[derive(Clone, Debug)]
 pub struct MapRequest {
     /// The scenario.
-    pub base: Base,
+    pub base: BaseScenario,
     /// One or two axes.
-    pub axes: Vec<Vary>,
+    pub axes: Vec<ParameterSweep>,
     /// The methods, in the order of [`MapMethod::ALL`].
     pub methods: Vec<MapMethod>,
     /// Replaces the scenario's tolerance.
@@ -189,8 +191,8 @@ impl MapRequest {
     /// Validates the request. Default `methods`: all, explicit motion only if
     /// its time step is set or varies.
     pub fn new(
-        base: Base,
-        axes: Vec<Vary>,
+        base: BaseScenario,
+        axes: Vec<ParameterSweep>,
         methods: Option<Vec<MapMethod>>,
         tolerance: Option<f64>,
         cell_seconds: f64,
@@ -207,8 +209,9 @@ impl MapRequest {
             }
         }
         let found: usize = axes.iter().map(|axis| axis.values.len()).product();
-        if found > MOST_CELLS {
-            let allowed = format!("at most {MOST_CELLS} are allowed; lower the counts of the axes");
+        if found > MOST_MAP_CELLS {
+            let allowed =
+                format!("at most {MOST_MAP_CELLS} are allowed; lower the counts of the axes");
             return refuse(format!("{found} cells: {allowed}"));
         }
         if !(cell_seconds > 0.0 && cell_seconds <= 1e6) {
@@ -218,7 +221,10 @@ impl MapRequest {
         if let Some(tolerance) = tolerance {
             check_tolerance(tolerance)?;
         }
-        let steps = base.knobs().step.is_some() || axes.iter().any(|a| a.keys.sets(Knob::Step));
+        let steps = base.solver_settings().step.is_some()
+            || axes
+                .iter()
+                .any(|a| a.keys.contains_solver_setting(SolverSetting::Step));
         let methods = match methods {
             Some(mut methods) => {
                 if methods.contains(&MapMethod::ExplicitMotion) && !steps {
@@ -236,7 +242,7 @@ impl MapRequest {
         if methods.is_empty() {
             return refuse("no methods: name one at least".into());
         }
-        memory::map(found, methods.len())?;
+        memory::check_map_memory(found, methods.len())?;
         let request = MapRequest {
             base,
             axes,
@@ -251,8 +257,10 @@ impl MapRequest {
 
     /// A value that no cell accepts is a mistake in the request, not a failure of methods.
     fn check_entries(&self) -> Result<(), MapRefused> {
-        let first = self.base.at(&self.values(0));
-        let last = self.base.at(&self.values(self.cells() - 1));
+        let first = self.base.scenario_with_values(&self.values(0));
+        let last = self
+            .base
+            .scenario_with_values(&self.values(self.cells() - 1));
         match (first, last) {
             (Err(why), Err(other)) if !why.depends_on_value() && !other.depends_on_value() => {
                 Err(why.into())
@@ -267,7 +275,7 @@ impl MapRequest {
     }
 
     /// Index of a cell along each axis.
-    pub fn place(&self, cell: usize) -> Vec<usize> {
+    pub fn cell_position(&self, cell: usize) -> Vec<usize> {
         let mut rest = cell;
         let mut place: Vec<usize> = (self.axes.iter().rev())
             .map(|axis| {
@@ -281,8 +289,8 @@ impl MapRequest {
     }
 
     /// The varied values of a cell.
-    pub fn values(&self, cell: usize) -> Vec<(&Keys, f64)> {
-        let axes = self.axes.iter().zip(self.place(cell));
+    pub fn values(&self, cell: usize) -> Vec<(&ParameterKeys, f64)> {
+        let axes = self.axes.iter().zip(self.cell_position(cell));
         axes.map(|(axis, at)| (&axis.keys, axis.values[at]))
             .collect()
     }
@@ -295,16 +303,16 @@ impl MapRequest {
 
     /// The longest time step of explicit motion known to be stable in a cell, in the scenario's
     /// unit of time.
-    pub fn stable_step(&self, cell: usize) -> Option<f64> {
-        cell::stable_step(&self.base.at(&self.values(cell)).ok()?)
+    pub fn longest_stable_step(&self, cell: usize) -> Option<f64> {
+        cell::longest_stable_step(&self.base.scenario_with_values(&self.values(cell)).ok()?)
     }
 
     /// Solves one cell by these methods.
     pub fn solve(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
-        let varied = match self.base.at(&self.values(cell)) {
+        let varied = match self.base.scenario_with_values(&self.values(cell)) {
             Ok(varied) => varied,
             Err(refused) => {
-                let detail = one_line(&refused.to_string());
+                let detail = join_lines(&refused.to_string());
                 let refused = |&method: &MapMethod| MapRow {
                     detail: detail.clone(),
                     cell,
@@ -315,8 +323,11 @@ impl MapRequest {
             }
         };
         let limit = Duration::from_secs_f64(self.cell_seconds);
-        let solved = Cell::new(&varied, self.tolerance, limit, &self.limit);
-        (methods.iter().map(|&method| solved.row(cell, method))).collect()
+        let solved = MapCell::new(&varied, self.tolerance, limit, &self.limit);
+        (methods
+            .iter()
+            .map(|&method| solved.solve_by_method(cell, method)))
+        .collect()
     }
 }
 
@@ -325,7 +336,7 @@ impl MapRequest {
 impl Serialize for MapRequest {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Keys<'a> {
+        struct ParameterKeys<'a> {
             scenario_digest: String,
             set: &'a [String],
             vary: Vec<Axis>,
@@ -340,14 +351,14 @@ impl Serialize for MapRequest {
             log: bool,
             values: Vec<String>,
         }
-        let knobs = self.base.knobs();
+        let knobs = self.base.solver_settings();
         let text = |value: f64| format!("{value:?}");
         let axes = self.axes.iter().map(|axis| Axis {
             keys: axis.keys.to_string(),
             log: axis.log,
             values: axis.values.iter().map(|&v| axis.keys.text(v)).collect(),
         });
-        Keys {
+        ParameterKeys {
             scenario_digest: format!("{:08x}", crc32fast::hash(self.base.text().as_bytes())),
             set: self.base.overrides(),
             vary: axes.collect(),
@@ -389,7 +400,7 @@ impl MapMethod {
         }
     }
 
-    fn rank(self) -> Option<usize> {
+    fn method_order(self) -> Option<usize> {
         MapMethod::ALL.iter().position(|method| *method == self)
     }
 }
@@ -402,7 +413,7 @@ impl Default for MapMethod {
 
 impl Ord for MapMethod {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.rank().cmp(&other.rank())
+        self.method_order().cmp(&other.method_order())
     }
 }
 
@@ -439,12 +450,12 @@ words! {
 
 /// An answer at rest within the tolerance, or an outcome and a sentence that say why there
 /// is none.
-pub type Found = Result<Answer, (MapOutcome, String)>;
+pub type CellSolution = Result<MethodSolution, (MapOutcome, String)>;
 
 words! {
     /// Reliability of the reference.
     #[derive(Default, PartialOrd, Ord, Hash)]
-    pub enum Confidence {
+    pub enum ReferenceConfidence {
         /// Relaxation and shooting from there agree within both error estimates,
         /// and so do their numbers of negative eigenvalues.
         Confirmed = "confirmed",
@@ -485,41 +496,44 @@ pub struct MapRow {
     /// Negative eigenvalues of the equilibrium found.
     pub index: Option<usize>,
     /// The shared tip, or the first rod's.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub tip_x: Option<f64>,
     /// Its y.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub tip_y: Option<f64>,
     /// Its z.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub tip_z: Option<f64>,
     /// Energy of the equilibrium found.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub energy: Option<f64>,
     /// Largest distance from the reference.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub error: Option<f64>,
     /// The method's own error estimate.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub error_estimate: Option<f64>,
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub margin_waves: Option<f64>,
     /// Their amplitude.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub margin_amplitude: Option<f64>,
     /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
-    #[serde(serialize_with = "number")]
+    #[serde(serialize_with = "serialize_exact_number")]
     pub twist: Option<f64>,
     /// Time taken, by one thread.
-    #[serde(serialize_with = "microseconds")]
+    #[serde(serialize_with = "serialize_microseconds")]
     pub seconds: f64,
     /// The reliability of the reference.
-    pub reference: Confidence,
+    pub reference: ReferenceConfidence,
 }
 
 /// As in Rust's notation, from which every bit can be read.
-fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_exact_number<S: Serializer>(
+    value: &Option<f64>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     match value {
         // Adding zero turns -0 into 0.
         Some(value) => serializer.collect_str(&format_args!("{:?}", value + 0.0)),
@@ -527,7 +541,7 @@ fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S:
     }
 }
 
-fn microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&format_args!("{seconds:.6}"))
 }
 

@@ -5,16 +5,17 @@
 mod barrier;
 
 use crate::branch::{
-    Critical, End, Equations, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck,
-    Walk, on_finer, refine_at, switch, times,
+    BranchEnd, BranchEquations, ContinuationOptions, CorrectorFailure, CriticalKind, CriticalPoint,
+    EquilibriumPoint, ExtrapolatedPoint, LeafFamily, NEARLY_RIGID, NestedBranchEquations,
+    VerifiedBranch, on_finer, scale_field, switch_branches, verify_at_parameter,
 };
-use crate::leaf::{Field, Grid, State, are_mirrored, is_mirrored};
+use crate::leaf::{Grid, NodalField, State, are_mirror_symmetric, is_mirrored};
 use crate::memory;
-use crate::numbers::power_of_ten;
-use crate::relax::solve_on_grid::settle_from;
+use crate::numbers::format_error_bound;
+use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
-    Direction, Equilibrium, Fate, Level, Loss, Margin, Neighbour, Options, Progress, Push,
-    RelaxError, relax_on_grids, without_wind,
+    AxisDirection, CriticalTipForce, Equilibrium, GridLevel, InstabilityKind, Margin, Neighbour,
+    Options, PostcriticalBehavior, Progress, RelaxError, relax_on_grids, without_wind,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
@@ -27,15 +28,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The largest push: this many A/L^2, the load under which the veins buckle as columns pinned at
 /// both ends (Euler), and so many weights; but no more than this part of
 /// their axial stiffness.
-const STIFF: f64 = PI * PI;
+const LARGEST_BENDING_LOAD_FACTOR: f64 = PI * PI;
 
-const WEIGHTS: f64 = 10.0;
+const LARGEST_WEIGHT_FACTOR: f64 = 10.0;
 
-const AXIAL: f64 = 0.2;
+const LARGEST_AXIAL_LOAD_FACTOR: f64 = 0.2;
 
 /// Accuracy of points on the branch (of the tips, relative to the leaf); a
 /// critical one has its own error.
-const ACCURACY: f64 = 1e-4;
+const BRANCH_ACCURACY: f64 = 1e-4;
 
 /// Why a margin cannot be found.
 #[derive(Debug, thiserror::Error)]
@@ -65,26 +66,27 @@ pub enum MarginProgress {
         /// Number of all searches.
         all: usize,
         /// Direction and force of a running one.
-        push: Option<(Direction, f64)>,
+        push: Option<(AxisDirection, f64)>,
     },
 }
 
 /// Largest relative difference of the softest eigenvalue between two successive grids, or of that
 /// extrapolated over them.
-const ALIKE: f64 = 0.25;
+const EIGENVALUE_AGREEMENT: f64 = 0.25;
 
 /// Nodes of the finest grid in that search.
-const MOST_NODES: usize = 5_000;
+const MOST_CONTINUATION_NODES: usize = 5_000;
 
 /// Why there is no margin if no grid satisfies it.
-const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any grid tried";
+const UNRESOLVED_EIGENVALUE_REASON: &str =
+    "its softest eigenvalue cannot be told from zero on any grid tried";
 
 /// Remark on pushes that are not tried.
-const TURNS: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
+const ZERO_ENERGY_ROTATION_REMARK: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
      pushes along it are tried";
 
 /// Remark where none is tried.
-const TIP_HELD: &str = "the tip is held: a force on it moves nothing";
+const TIP_HELD_REMARK: &str = "the tip is held: a force on it moves nothing";
 
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
@@ -104,7 +106,7 @@ pub fn relax_with_margin(
         progress(&MarginProgress::Relaxing(*step));
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
-        (true, Some(true)) => margin(scenario, &leaf, &found.levels, options, progress)?,
+        (true, Some(true)) => stability_margin(scenario, &leaf, &found.levels, options, progress)?,
         (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
         _ => Margin::none("only a leaf at rest whose stability is known has a margin"),
     });
@@ -112,91 +114,91 @@ pub fn relax_with_margin(
 }
 
 /// A stable leaf on the grid on which it is pushed, with the options.
-struct Stable<'a> {
+struct StableLeaf<'a> {
     scenario: &'a Scenario,
     /// The scenario's leaf alone, at any value of the parameter.
-    family: &'a Family<'a>,
+    family: &'a LeafFamily<'a>,
     rest: &'a Equilibrium,
     grid: Grid,
     state: State,
     accuracy: f64,
-    largest: f64,
+    largest_force: f64,
     limit: &'a Limit,
-    searches: Searches<'a>,
+    searches: SearchProgress<'a>,
 }
 
 /// Counts searches and reports their progress.
-struct Searches<'a> {
-    done: AtomicUsize,
-    all: AtomicUsize,
+struct SearchProgress<'a> {
+    finished_count: AtomicUsize,
+    total_count: AtomicUsize,
     progress: Mutex<&'a mut (dyn FnMut(&MarginProgress) + Send)>,
 }
 
-impl Searches<'_> {
-    fn report(&self, push: Option<(Direction, f64)>) {
+impl SearchProgress<'_> {
+    fn report(&self, push: Option<(AxisDirection, f64)>) {
         // If another thread is reporting, this report is skipped.
         if let Ok(mut progress) = self.progress.try_lock() {
             progress(&MarginProgress::Searching {
-                done: self.done.load(Ordering::Relaxed),
-                all: self.all.load(Ordering::Relaxed),
+                done: self.finished_count.load(Ordering::Relaxed),
+                all: self.total_count.load(Ordering::Relaxed),
                 push,
             });
         }
     }
 
     fn finish_one(&self) {
-        self.done.fetch_add(1, Ordering::Relaxed);
+        self.finished_count.fetch_add(1, Ordering::Relaxed);
         self.report(None);
     }
 }
 
 /// A start point for a saddle search, on its grid, with a direction.
-struct StartPoint {
+struct SaddleSearchStart {
     grid: Grid,
     state: State,
-    direction: Field,
+    direction: NodalField,
 }
 
-fn margin(
+fn stability_margin(
     scenario: &Scenario,
     rest: &Equilibrium,
-    levels: &[Level],
+    levels: &[GridLevel],
     options: &Options,
     progress: &mut (dyn FnMut(&MarginProgress) + Send),
 ) -> Result<Margin, MarginError> {
     let clock = Instant::now();
     let make = |_: [f64; 1]| Ok(scenario.clone());
-    let Ok(family) = Family::new(&make, [0.0, 1.0], false) else {
-        return Ok(Margin::none(UNDECIDED));
+    let Ok(family) = LeafFamily::new(&make, [0.0, 1.0], false) else {
+        return Ok(Margin::none(UNRESOLVED_EIGENVALUE_REASON));
     };
     let (grid, state) = match continuation_grid(&family, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
     let rods = scenario.rods.len();
-    memory::branches(rods, grid.segments()).map_err(RelaxError::Memory)?;
-    let weight = weight(scenario);
-    let directions = directions(scenario, rest);
+    memory::check_branch_memory(rods, grid.segments()).map_err(RelaxError::Memory)?;
+    let weight = total_weight(scenario);
+    let directions = tip_force_directions(scenario, rest);
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    let stable = Stable {
+    let stable = StableLeaf {
         scenario,
         family: &family,
         rest,
         grid,
         state,
-        accuracy: tolerance.max(ACCURACY),
-        largest: largest_push(scenario, weight),
+        accuracy: tolerance.max(BRANCH_ACCURACY),
+        largest_force: largest_tip_force(scenario, weight),
         limit: &options.limit,
-        searches: Searches {
-            done: AtomicUsize::new(0),
-            all: AtomicUsize::new(directions.len() + barrier::MODE_CLIMBS),
+        searches: SearchProgress {
+            finished_count: AtomicUsize::new(0),
+            total_count: AtomicUsize::new(directions.len() + barrier::MODE_SADDLE_SEARCHES),
             progress: Mutex::new(progress),
         },
     };
     let pushed: Vec<_> = directions
         .into_par_iter()
         .map(|direction| {
-            let pushed = push(&stable, direction, weight);
+            let pushed = find_critical_tip_force(&stable, direction, weight);
             stable.searches.finish_one();
             pushed
         })
@@ -206,22 +208,24 @@ fn margin(
         starts.extend(found);
         pushes.push(push);
     }
-    add_mirrored(&mut pushes, rods);
+    add_mirrored_forces(&mut pushes, rods);
     pushes.sort_by(|a, b| {
         let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
         a.total_cmp(&b)
     });
-    let (barrier, climbs) = barrier::barrier(&stable, starts, weight);
+    let (barrier, climbs) = barrier::lowest_energy_barrier(&stable, starts, weight);
     let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
         true => Some("the time allowed was over before all was tried".into()),
-        false if held => Some(TIP_HELD.into()),
-        false => (rest.stability.neutral_directions > 0).then(|| TURNS.into()),
+        false if held => Some(TIP_HELD_REMARK.into()),
+        false => {
+            (rest.stability.neutral_directions > 0).then(|| ZERO_ENERGY_ROTATION_REMARK.into())
+        }
     };
     Ok(Margin {
         weight,
         every_tip: !scenario.joined && rods > 1,
-        largest_push: (!held).then_some(stable.largest),
+        largest_push: (!held).then_some(stable.largest_force),
         pushes,
         barrier,
         climbs,
@@ -231,17 +235,20 @@ fn margin(
 }
 
 /// The leaf on a grid, with its softest eigenvalue there.
-struct OnGrid {
+struct LeafOnGrid {
     grid: Grid,
-    point: Point,
-    softest: f64,
+    point: EquilibriumPoint,
+    softest_eigenvalue: f64,
 }
 
-impl OnGrid {
-    fn of(equations: &mut Equations, point: &Point) -> Result<Self, Stuck> {
-        Ok(OnGrid {
+impl LeafOnGrid {
+    fn from_point(
+        equations: &mut BranchEquations,
+        point: &EquilibriumPoint,
+    ) -> Result<Self, CorrectorFailure> {
+        Ok(LeafOnGrid {
             grid: equations.grid().clone(),
-            softest: equations.softest(point)?,
+            softest_eigenvalue: equations.softest_eigenvalue(point)?,
             point: point.clone(),
         })
     }
@@ -251,10 +258,10 @@ impl OnGrid {
 /// that on the next; or, near a bifurcation, where that of a coarse grid differs, the values
 /// extrapolated from the first two and from the last two agree, and the differences fall with the
 /// square of the segments' length.
-fn is_resolved(grids: &[OnGrid]) -> bool {
-    let alike = |a: f64, b: f64| (a - b).abs() < ALIKE * b;
+fn is_softest_eigenvalue_resolved(grids: &[LeafOnGrid]) -> bool {
+    let alike = |a: f64, b: f64| (a - b).abs() < EIGENVALUE_AGREEMENT * b;
     let stable = grids.iter().all(|it| it.point.index == 0);
-    let softest: Vec<f64> = grids.iter().map(|it| it.softest).collect();
+    let softest: Vec<f64> = grids.iter().map(|it| it.softest_eigenvalue).collect();
     stable
         && match softest[..] {
             [a, b] => alike(a, b),
@@ -267,30 +274,38 @@ fn is_resolved(grids: &[OnGrid]) -> bool {
 }
 
 /// The leaf on the coarsest grid on which its softest eigenvalue is known, or why there is none.
-fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State), &'static str> {
+fn continuation_grid(
+    family: &LeafFamily,
+    levels: &[GridLevel],
+) -> Result<(Grid, State), &'static str> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
         segments.is_multiple_of(first) && (segments / first).is_power_of_two()
     });
-    let on_level = |level: &Level| {
-        let mut equations = Equations::new(family, level.leaf.grid.clone());
+    let on_level = |level: &GridLevel| {
+        let mut equations = BranchEquations::new(family, level.leaf.grid.clone());
         let point = equations.correct(&level.state, 0.0, None)?;
-        Ok::<_, Stuck>((equations, point))
+        Ok::<_, CorrectorFailure>((equations, point))
     };
-    let (mut equations, mut point) = on_level(&levels[0]).map_err(|_| UNDECIDED)?;
+    let (mut equations, mut point) =
+        on_level(&levels[0]).map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
     nested.next();
-    let mut grids: Vec<OnGrid> = Vec::new();
+    let mut grids: Vec<LeafOnGrid> = Vec::new();
     loop {
-        grids.push(OnGrid::of(&mut equations, &point).map_err(|_| UNDECIDED)?);
+        grids.push(
+            LeafOnGrid::from_point(&mut equations, &point)
+                .map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?,
+        );
         for grids in [2, 3].map(|count| grids.len().checked_sub(count).map(|k| &grids[k..])) {
-            if let Some(grids) = grids.filter(|grids| is_resolved(grids)) {
+            if let Some(grids) = grids.filter(|grids| is_softest_eigenvalue_resolved(grids)) {
                 return Ok((grids[0].grid.clone(), grids[0].point.state.clone()));
             }
         }
-        if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_NODES {
+        if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_CONTINUATION_NODES
+        {
             return Err(match point.index {
-                0 => UNDECIDED,
+                0 => UNRESOLVED_EIGENVALUE_REASON,
                 _ => "the leaf is unstable on grids finer than those of its relaxation",
             });
         }
@@ -298,15 +313,15 @@ fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State),
             Some(level) => on_level(level),
             None => on_finer(&mut equations, &point),
         };
-        (equations, point) = finer.map_err(|_| UNDECIDED)?;
+        (equations, point) = finer.map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
     }
 }
 
-fn weight(scenario: &Scenario) -> f64 {
+fn total_weight(scenario: &Scenario) -> f64 {
     scenario.total_load().length()
 }
 
-fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
+fn largest_tip_force(scenario: &Scenario, weight: f64) -> f64 {
     let rods = scenario.rods.iter();
     let axial: f64 = rods.map(|rod| rod.force_stiffness[0].min()).sum();
     let together = if scenario.joined {
@@ -314,49 +329,54 @@ fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
     } else {
         1
     } as f64;
-    let stiff = STIFF * together * scenario.scale().force();
-    (stiff + WEIGHTS * weight).min(AXIAL * axial * together / scenario.rods.len() as f64)
+    let stiff = LARGEST_BENDING_LOAD_FACTOR * together * scenario.scale().force();
+    (stiff + LARGEST_WEIGHT_FACTOR * weight)
+        .min(LARGEST_AXIAL_LOAD_FACTOR * axial * together / scenario.rods.len() as f64)
 }
 
 /// Veins at rest are each other's mirror images within this part of the leaf's length, and within
 /// this angle (radians), or the error of the leaf: the rounding of the softest of leaves.
-const IMAGES: f64 = 1e-9;
+const MIRROR_IMAGE_TOLERANCE: f64 = 1e-9;
 
 /// Whether the leaf at rest is its own mirror image in the plane y = 0.
-fn is_own_image(scenario: &Scenario, rest: &Equilibrium) -> bool {
+fn is_mirror_symmetric(scenario: &Scenario, rest: &Equilibrium) -> bool {
     let error = rest.accuracy.error_estimate.unwrap_or_default();
-    let angle = IMAGES.max(error / rest.shape.longest());
+    let angle = MIRROR_IMAGE_TOLERANCE.max(error / rest.shape.longest());
     let distance = angle * rest.shape.longest();
-    is_mirrored(scenario) && are_mirrored(&rest.shape.rods, distance, angle)
+    is_mirrored(scenario) && are_mirror_symmetric(&rest.shape.rods, distance, angle)
 }
 
 /// The directions of the pushes: none if all tips are held; for a mirror-symmetric leaf only the
 /// first of two that are mirror images.
-fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
+fn tip_force_directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<AxisDirection> {
     if scenario.holds_all_tips() {
         return Vec::new();
     }
     // Veins that turn without resistance turn towards any push across their axis.
     let turnings = match rest.stability.neutral_directions {
         0 => Vec::new(),
-        _ => scenario.turnings(),
+        _ => scenario.zero_energy_rotations(),
     };
-    let along = |direction: &Direction| {
+    let along = |direction: &AxisDirection| {
         // What only spins turns towards nothing.
         let axes = turnings.iter().map(|it| it.axis.to_array());
         let mut axes = axes.filter(|axis| *axis != [0.0; 3]);
-        axes.all(|axis| (axis[direction.axis].abs() - 1.0).abs() < IMAGES)
+        axes.all(|axis| (axis[direction.axis].abs() - 1.0).abs() < MIRROR_IMAGE_TOLERANCE)
     };
-    let mirrored = [false, is_own_image(scenario, rest), rest.model.planar];
-    let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
-    Direction::all().filter(own).filter(along).collect()
+    let mirrored = [
+        false,
+        is_mirror_symmetric(scenario, rest),
+        rest.model.planar,
+    ];
+    let own = |direction: &AxisDirection| !(direction.negative && mirrored[direction.axis]);
+    AxisDirection::all().filter(own).filter(along).collect()
 }
 
 /// Adds the mirror images of pushes whose mirror image was not computed.
-fn add_mirrored(pushes: &mut Vec<Push>, rods: usize) {
-    let has = |other: Direction| pushes.iter().any(|push| push.direction == other);
+fn add_mirrored_forces(pushes: &mut Vec<CriticalTipForce>, rods: usize) {
+    let has = |other: AxisDirection| pushes.iter().any(|push| push.direction == other);
     let alone = pushes.iter().filter(|push| !has(push.direction.opposite()));
-    let images: Vec<Push> = alone
+    let images: Vec<CriticalTipForce> = alone
         .map(|push| {
             let axis = push.direction.axis;
             let mut image = push.clone();
@@ -375,135 +395,156 @@ fn add_mirrored(pushes: &mut Vec<Push>, rods: usize) {
 }
 
 /// Longest step along the branch, and largest number of points.
-const LONGEST: f64 = 0.1;
+const LONGEST_BRANCH_STEP: f64 = 0.1;
 
-const MOST_POINTS: usize = 400;
+const MOST_BRANCH_POINTS: usize = 400;
 
 /// Points after the loss of stability that are needed to confirm it.
-const CONFIRMING: usize = 2;
+const CONFIRMING_POINTS: usize = 2;
 
 /// Grids of a critical point: for a leaf of few nodes, and for others.
 const CRITICAL_GRIDS: [usize; 2] = [4, 3];
 
-const FEW_NODES: usize = 500;
+const FEW_NODES_LIMIT: usize = 500;
 
 /// Rounding error of a force, relative to itself, and for a nearly rigid leaf relative to the
 /// total force on its tip: in eight runs of a buckled column it was at most 9e-10.
-const ROUNDING: f64 = 1e-14;
+const FORCE_ROUNDING: f64 = 1e-14;
 
-const OF_RIGID: f64 = 3e-9;
+const RIGID_LEAF_ROUNDING: f64 = 3e-9;
 
 /// Pushes a leaf in one direction until it loses its stability, or to the largest push;
 /// also returns start points for saddle searches there.
-fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push, Vec<StartPoint>) {
+fn find_critical_tip_force(
+    stable: &StableLeaf,
+    direction: AxisDirection,
+    weight: f64,
+) -> (CriticalTipForce, Vec<SaddleSearchStart>) {
     let make = |[force]: [f64; 1]| -> Result<Scenario, String> {
         let mut scenario = stable.scenario.clone();
         scenario.tip_force[direction.axis] += direction.sign() * force;
         Ok(scenario)
     };
-    let unknown = Push {
+    let unknown = CriticalTipForce {
         direction,
-        ..Push::default()
+        ..CriticalTipForce::default()
     };
-    let failed = |why: String| Push {
+    let failed = |why: String| CriticalTipForce {
         more_than: Some(0.0),
         remark: Some(why),
         ..unknown.clone()
     };
-    let family = match Family::new(&make, [0.0, stable.largest], false) {
+    let family = match LeafFamily::new(&make, [0.0, stable.largest_force], false) {
         Ok(family) => family,
         Err(out) => return (failed(out.to_string()), Vec::new()),
     };
-    let mut grids = Grids::new(&family, stable.grid.clone());
-    let followed = match follow(stable, direction, &mut grids) {
+    let mut grids = NestedBranchEquations::new(&family, stable.grid.clone());
+    let followed = match continue_to_stability_loss(stable, direction, &mut grids) {
         Ok(followed) => followed,
         Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
-    let lost = |critical: &Critical| critical.indices[0] == 0 && critical.indices[1] > 0;
+    let lost = |critical: &CriticalPoint| critical.indices[0] == 0 && critical.indices[1] > 0;
     let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
-        return (not_lost(stable, &followed, unknown), Vec::new());
+        return (
+            force_without_stability_loss(stable, &followed, unknown),
+            Vec::new(),
+        );
     };
-    let force = refined.fraction * stable.largest;
-    let then = fate(stable, &mut grids, critical);
-    let starts = starts(&mut grids, critical);
-    let error = refined.fraction_error * stable.largest + rounding(stable, force, weight);
+    let force = refined.fraction * stable.largest_force;
+    let then = postcritical_behavior(stable, &mut grids, critical);
+    let starts = saddle_search_starts(&mut grids, critical);
+    let error =
+        refined.fraction_error * stable.largest_force + force_rounding_error(stable, force, weight);
     if 2.0 * error >= force {
-        let below = power_of_ten(force + error);
+        let below = format_error_bound(force + error);
         let unknown = failed(format!("its loss, below {below}, cannot be told from zero"));
         return (unknown, starts);
     }
-    let push = Push {
+    let push = CriticalTipForce {
         kind: match critical.kind {
-            Kind::Fold => Loss::Fold,
-            Kind::Branching => Loss::BranchPoint,
+            CriticalKind::Fold => InstabilityKind::Fold,
+            CriticalKind::Branching => InstabilityKind::BranchPoint,
         },
         force: Some(force),
         error: Some(error),
         per_weight: (weight > 0.0).then(|| force / weight),
         then: Some(then),
-        neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
+        neighbour: equilibrium_beyond_fold(stable, &mut grids, (critical, refined), &starts),
         tips: family.tips(&refined.tips),
         ..unknown
     };
     (push, starts)
 }
 
-fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
+fn force_rounding_error(stable: &StableLeaf, force: f64, weight: f64) -> f64 {
     let rods = stable.scenario.rods.iter();
     let stiffness = rods.flat_map(|rod| &rod.force_stiffness);
     let stiffest = stiffness.fold(0.0, |most: f64, it| most.max(it.max_abs()));
     let rigid = stiffest > NEARLY_RIGID * stable.scenario.scale().force();
     let borne = force + weight + DVec3::from_array(stable.scenario.tip_force).length();
-    ROUNDING * force + if rigid { OF_RIGID * borne } else { 0.0 }
+    FORCE_ROUNDING * force
+        + if rigid {
+            RIGID_LEAF_ROUNDING * borne
+        } else {
+            0.0
+        }
 }
 
 /// The branch of a push, until it is known to have lost its stability.
-fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
-    let mut first = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
-    first.tangent = first.tangent.growing();
-    let enough = |points: &[Point]| {
-        let behind = points.len().checked_sub(CONFIRMING);
+fn continue_to_stability_loss(
+    stable: &StableLeaf,
+    direction: AxisDirection,
+    grids: &mut NestedBranchEquations,
+) -> Result<VerifiedBranch, CorrectorFailure> {
+    let mut first = (grids.on_grid_of(&stable.state)).correct(&stable.state, 0.0, None)?;
+    first.tangent = first.tangent.towards_larger_parameter();
+    let enough = |points: &[EquilibriumPoint]| {
+        let behind = points.len().checked_sub(CONFIRMING_POINTS);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
     };
     let nodes = stable.state.rods() * stable.grid.segments();
-    let walk = Walk {
-        longest: LONGEST,
-        most: MOST_POINTS,
-        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES)],
-        enough: Some(&enough),
+    let walk = ContinuationOptions {
+        longest_step: LONGEST_BRANCH_STEP,
+        max_points: MOST_BRANCH_POINTS,
+        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES_LIMIT)],
+        stop_criterion: Some(&enough),
     };
     let mut report = |_, fraction: f64| {
-        let push = (direction, fraction * stable.largest);
+        let push = (direction, fraction * stable.largest_force);
         stable.searches.report(Some(push));
     };
     Ok(grids.follow(first, &walk, stable.accuracy, &mut report))
 }
 
 /// The result of a push under which the leaf was stable as far as it was followed.
-fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
+fn force_without_stability_loss(
+    stable: &StableLeaf,
+    followed: &VerifiedBranch,
+    unknown: CriticalTipForce,
+) -> CriticalTipForce {
     let points = followed.branch.points.iter().zip(&followed.points);
     let stably = points.take_while(|(point, _)| point.index == 0);
     let furthest = stably.fold(0.0, |most: f64, (_, refined)| most.max(refined.fraction));
-    let reached = matches!(followed.end, End::Reached);
-    Push {
+    let reached = matches!(followed.end, BranchEnd::RangeEndReached);
+    CriticalTipForce {
         kind: match reached {
-            true => Loss::NoneUpTo,
-            false => Loss::Unknown,
+            true => InstabilityKind::NoneUpTo,
+            false => InstabilityKind::Unknown,
         },
-        more_than: Some(furthest * stable.largest),
+        more_than: Some(furthest * stable.largest_force),
         remark: match &followed.end {
-            End::Reached => None,
+            BranchEnd::RangeEndReached => None,
             _ if stable.limit.reached() => Some("the time allowed was over".into()),
-            End::Stuck(stuck) => Some(stuck.to_string()),
-            End::Unverified(doubt) => Some(doubt.to_string()),
-            End::Closed
-            | End::Returned
-            | End::Met
-            | End::MostPoints
-            | End::Enough
-            | End::Unstable
-            | End::Stopped => Some("the branch could not be followed further".into()),
+            BranchEnd::StepFailed(stuck) => Some(stuck.to_string()),
+            BranchEnd::PointUnverified(doubt) => Some(doubt.to_string()),
+            BranchEnd::LoopClosed
+            | BranchEnd::RangeStartReached
+            | BranchEnd::KnownBoundaryMet
+            | BranchEnd::PointLimitReached
+            | BranchEnd::StopCriterionMet
+            | BranchEnd::StabilityLost
+            | BranchEnd::RunLimitReached => Some("the branch could not be followed further".into()),
         },
         ..unknown
     }
@@ -511,26 +552,32 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
 
 /// What the leaf does at a critical point: if a stable branch crosses, it continues
 /// along that.
-fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
-    if critical.kind == Kind::Fold {
-        return Fate::Snaps;
+fn postcritical_behavior(
+    stable: &StableLeaf,
+    grids: &mut NestedBranchEquations,
+    critical: &CriticalPoint,
+) -> PostcriticalBehavior {
+    if critical.kind == CriticalKind::Fold {
+        return PostcriticalBehavior::Snaps;
     }
-    let branches = switch(grids.of(&critical.state), critical, stable.accuracy);
+    let branches = switch_branches(grids.on_grid_of(&critical.state), critical, stable.accuracy);
     match branches.iter().any(|point| point.index == 0) {
-        true => Fate::BendsAside,
-        false => Fate::Snaps,
+        true => PostcriticalBehavior::BendsAside,
+        false => PostcriticalBehavior::Snaps,
     }
 }
 
 /// The equilibrium to which the leaf falls from a fold, under the force there.
-fn rest_after_fold(
-    stable: &Stable,
-    grids: &mut Grids,
-    (critical, fold): (&Critical, &Refined),
-    starts: &[StartPoint],
+fn equilibrium_beyond_fold(
+    stable: &StableLeaf,
+    grids: &mut NestedBranchEquations,
+    (critical, fold): (&CriticalPoint, &ExtrapolatedPoint),
+    starts: &[SaddleSearchStart],
 ) -> Option<Neighbour> {
-    let start = starts.first().filter(|_| critical.kind == Kind::Fold)?;
-    let equations = grids.of(&critical.state);
+    let start = starts
+        .first()
+        .filter(|_| critical.kind == CriticalKind::Fold)?;
+    let equations = grids.on_grid_of(&critical.state);
     let stop = || stable.limit.reached();
     let fallen = equations.descend(&critical.state, critical.fraction, &start.direction, &stop);
     let family = equations.leaves.family;
@@ -539,12 +586,12 @@ fn rest_after_fold(
         // Not reached by the descent: relax from its last state.
         Err(state) => {
             let leaf = family.leaf([fold.fraction]).ok()?;
-            settle_from(&leaf, &start.grid, state, stable.limit)?
+            relax_from_state(&leaf, &start.grid, state, stable.limit)?
         }
     };
     let point = equations.correct(&state, fold.fraction, None);
     let point = point.ok().filter(|point| point.index == 0)?;
-    let rest = refine_at(family, &start.grid, &point, stable.accuracy).ok()?;
+    let rest = verify_at_parameter(family, &start.grid, &point, stable.accuracy).ok()?;
     let scale = family.scale();
     Some(Neighbour {
         energy: rest.energy * scale.moment(),
@@ -554,17 +601,20 @@ fn rest_after_fold(
 
 /// Start points for saddles at a critical point, along its neutral modes: at a fold
 /// onwards, at a branch point on both sides.
-fn starts(grids: &mut Grids, critical: &Critical) -> Vec<StartPoint> {
-    let equations = grids.of(&critical.state);
-    let along = |mode| equations.product(mode, &critical.tangent.increments);
+fn saddle_search_starts(
+    grids: &mut NestedBranchEquations,
+    critical: &CriticalPoint,
+) -> Vec<SaddleSearchStart> {
+    let equations = grids.on_grid_of(&critical.state);
+    let along = |mode| equations.mass_product(mode, &critical.tangent.increments);
     let mut signs = vec![1.0, -1.0];
-    if critical.kind == Kind::Fold {
+    if critical.kind == CriticalKind::Fold {
         signs = vec![along(&critical.modes[0]).signum()];
     }
-    let start = |sign| StartPoint {
+    let start = |sign| SaddleSearchStart {
         grid: equations.grid().clone(),
         state: critical.state.clone(),
-        direction: times(&critical.modes[0], sign),
+        direction: scale_field(&critical.modes[0], sign),
     };
     signs.into_iter().map(start).collect()
 }

@@ -9,7 +9,9 @@
 mod result;
 
 use crate::branch::{
-    Critical, End, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch,
+    BranchEnd, ContinuationOptions, CriticalKind, CriticalPoint, EquilibriumPoint,
+    ExtrapolatedPoint, LeafFamily, NestedBranchEquations, ParameterRange, VerifiedBranch,
+    begin_branch, switch_branches,
 };
 use crate::leaf::Grid;
 use crate::memory;
@@ -18,11 +20,11 @@ use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax, without_wind,
 };
 use crate::run::{Instant, Limit, RefusedOption};
-use crate::scenario::{Key, Part, Scenario, slips};
+use crate::scenario::{EntryPath, Key, Scenario, plausibility_warnings};
 use crate::shape::Undulation;
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
-use crate::study::vary::{Base, Vary};
-use crate::study::{Target, UnknownWord, VaryError};
+use crate::study::vary::{BaseScenario, ParameterSweep};
+use crate::study::{UnknownWord, VariableTarget, VaryError};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::collections::VecDeque;
@@ -39,10 +41,10 @@ pub const MOST_POINTS: usize = 2000;
 #[derive(Clone, Debug)]
 pub struct TraceRequest {
     /// The scenario.
-    pub base: Base,
+    pub base: BaseScenario,
     /// The number that varies, with its range; a leaf that does not change would be followed
     /// in as many steps as it has values.
-    pub vary: Vary,
+    pub vary: ParameterSweep,
     /// Whether to follow crossing branches as well.
     pub switch: bool,
     /// What ends a branch before the end of the range, if anything.
@@ -109,7 +111,7 @@ pub enum TraceError {
 
 impl TraceRequest {
     /// Validates the request before it is run.
-    pub(super) fn check(&self) -> Result<(), TraceError> {
+    pub(super) fn validate(&self) -> Result<(), TraceError> {
         without_wind(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
@@ -120,9 +122,9 @@ impl TraceRequest {
         }
         for target in keys.targets() {
             let why = match target {
-                Target::Knob(_) => "is a setting of a method, not of the leaf",
-                Target::Entry(part) => match part.key {
-                    Key::TipMoment => NO_MOMENT,
+                VariableTarget::Knob(_) => "is a setting of a method, not of the leaf",
+                VariableTarget::Entry(part) => match part.key {
+                    Key::TipMoment => DEAD_MOMENT_REFUSAL,
                     Key::Tolerance => "changes no leaf",
                     Key::Density if self.base.scenario().g != [0.0; 3] => continue,
                     key if ["dynamics.", "wind."]
@@ -140,7 +142,7 @@ impl TraceRequest {
             return Err(refuse("FROM and TO are the same"));
         }
         if self.base.scenario().has_moments() {
-            return Err(refuse(NO_MOMENT));
+            return Err(refuse(DEAD_MOMENT_REFUSAL));
         }
         if self.most_points < 2 {
             return Err(RefusedOption::new("points", self.most_points, "must be 2 or more").into());
@@ -149,13 +151,13 @@ impl TraceRequest {
     }
 }
 
-const NO_MOMENT: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";
+const DEAD_MOMENT_REFUSAL: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";
 
 /// Longest step along a branch if few values are asked for.
-const LONGEST: f64 = 0.1;
+const LONGEST_BRANCH_STEP: f64 = 0.1;
 
 /// Points closer than this (fractions of the range, lengths) are the same.
-const SAME: f64 = 1e-5;
+const SAME_POINT_DISTANCE: f64 = 1e-5;
 
 /// Follows the equilibrium of a scenario through one of its numbers. `progress` is
 /// called for each point: with the branch, the number of points, and the value.
@@ -166,7 +168,7 @@ pub fn trace(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Trace, TraceError> {
-    Ok(traced(request, progress)?.trace)
+    Ok(trace_with_points(request, progress)?.trace)
 }
 
 /// The same from a leaf at rest, which the scenario has at this `value` of its number: through that
@@ -179,63 +181,69 @@ pub fn trace_through(
     leaf: (&Equilibrium, f64),
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Trace, TraceError> {
-    Ok(traced_from(request, Some(leaf), progress)?.trace)
+    Ok(trace_with_points_from(request, Some(leaf), progress)?.trace)
 }
 
 /// A trace, with its first point and its critical points.
-pub struct Traced {
+pub struct TraceWithPoints {
     pub trace: Trace,
     /// The first point, and a grid that refines its own; none if there is no first point.
-    pub first: Option<(Point, Grid)>,
-    pub critical: Vec<(Critical, Refined)>,
+    pub first_point: Option<(EquilibriumPoint, Grid)>,
+    pub critical_points: Vec<(CriticalPoint, ExtrapolatedPoint)>,
 }
 
 /// The same as [`trace`], with those points.
-pub fn traced(
+pub fn trace_with_points(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
-) -> Result<Traced, TraceError> {
-    traced_from(request, None, progress)
+) -> Result<TraceWithPoints, TraceError> {
+    trace_with_points_from(request, None, progress)
 }
 
 /// Both: from a relaxation at the start of the range, or both ways from a given leaf.
-fn traced_from(
+fn trace_with_points_from(
     request: &TraceRequest,
     given: Option<(&Equilibrium, f64)>,
     progress: &mut dyn FnMut(usize, usize, f64),
-) -> Result<Traced, TraceError> {
-    request.check()?;
+) -> Result<TraceWithPoints, TraceError> {
+    request.validate()?;
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
     let ends = vary.ends();
     let make = |[value]: [f64; 1]| -> Result<Scenario, String> {
-        let at = request.base.at(&[(keys, value)]);
+        let at = request.base.scenario_with_values(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
     for value in ends {
-        request.base.at(&[(keys, value)])?;
+        request.base.scenario_with_values(&[(keys, value)])?;
     }
-    let family = Family::new(&make, ends, vary.log);
+    let family = LeafFamily::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let family = family.with_limit(request.limit.clone());
     let value = given.map_or(ends[0], |(_, value)| value);
-    let scenario = request.base.at(&[(keys, value)])?.scenario;
+    let scenario = request
+        .base
+        .scenario_with_values(&[(keys, value)])?
+        .scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
-    let last = request.base.at(&[(keys, ends[1])])?.scenario;
+    let last = request
+        .base
+        .scenario_with_values(&[(keys, ends[1])])?
+        .scenario;
     let leaning = total_load(&last) - total_load(&scenario);
     let (rest, options) = match given {
         Some((leaf, _)) => {
-            let options = options(request, (tolerance, leaning), request.keep_unstable);
+            let options = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
             (leaf.clone(), options)
         }
         None => first_equilibrium(request, &scenario, (tolerance, leaning))?,
     };
-    let fraction = Range {
+    let fraction = ParameterRange {
         ends,
         log: vary.log,
     }
     .fraction(value);
-    let check = |least| check_grid(&family, request.segments, least);
+    let check = |least| checked_segments(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
         scenario: scenario.name.clone(),
@@ -254,32 +262,31 @@ fn traced_from(
         until: request.until,
         complete: false,
         remark: None,
-        doubts: slips(&scenario),
+        doubts: plausibility_warnings(&scenario),
         branches: Vec::new(),
         law: None,
         factorizations: 0,
         wall_seconds: 0.0,
     };
     let began = match rest.stability.negative_eigenvalues {
-        Some(_) => {
-            begin(&family, (&rest, fraction), &options, wanted).map_err(|stuck| stuck.to_string())
-        }
+        Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted)
+            .map_err(|stuck| stuck.to_string()),
         None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
     let (mut first, mut critical) = (None, Vec::new());
     match began {
         Ok((grids, point)) => {
-            let mut run = Run {
+            let mut run = BranchTracer {
                 family: &family,
                 request,
                 grids,
                 tolerance,
                 first: None,
                 critical: Vec::new(),
-                untried: false,
+                stopped_before_crossings: false,
                 progress,
             };
-            run.follow_all(point, given.is_some(), &mut trace);
+            run.trace_all_branches(point, given.is_some(), &mut trace);
             (first, critical) = (run.first, run.critical);
         }
         Err(why) => {
@@ -289,13 +296,16 @@ fn traced_from(
         }
     }
     let branches = &trace.branches;
-    trace.complete = trace.remark.is_none() && branches.iter().all(|branch| branch.end.complete());
-    trace.law = branches.first().and_then(|branch| law(request, branch));
+    trace.complete =
+        trace.remark.is_none() && branches.iter().all(|branch| branch.end.is_complete());
+    trace.law = branches
+        .first()
+        .and_then(|branch| force_displacement_line(request, branch));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
-    Ok(Traced {
+    Ok(TraceWithPoints {
         trace,
-        first,
-        critical,
+        first_point: first,
+        critical_points: critical,
     })
 }
 
@@ -311,17 +321,17 @@ fn first_equilibrium(
     scenario: &Scenario,
     (tolerance, leaning): (f64, DVec3),
 ) -> Result<(Equilibrium, Options), RelaxError> {
-    let wanted = options(request, (tolerance, leaning), request.keep_unstable);
+    let wanted = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
     let mut rest = relax(scenario, &wanted, &mut |_| {})?;
     if request.keep_unstable && !rest.outcome.is_at_rest() {
         // Newton's method leads nowhere from this start.
-        let stable = options(request, (tolerance, leaning), false);
+        let stable = relaxation_options(request, (tolerance, leaning), false);
         rest = relax(scenario, &stable, &mut |_| {})?;
     }
     Ok((rest, wanted))
 }
 
-fn options(
+fn relaxation_options(
     request: &TraceRequest,
     (tolerance, leaning): (f64, DVec3),
     keep_unstable: bool,
@@ -329,7 +339,7 @@ fn options(
     Options {
         limit: request.limit.clone(),
         tolerance: Some(tolerance),
-        leaning,
+        bias_direction: leaning,
         method: SemiImplicit {
             keep_unstable,
             ..SemiImplicit::default()
@@ -340,17 +350,24 @@ fn options(
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
-fn check_grid(family: &Family, wanted: Option<usize>, least: usize) -> Result<usize, RelaxError> {
-    let segments = check_segments(family.first(), wanted, least)?;
-    memory::branches(family.first().rods(), segments)?;
+fn checked_segments(
+    family: &LeafFamily,
+    wanted: Option<usize>,
+    least: usize,
+) -> Result<usize, RelaxError> {
+    let segments = check_segments(family.first_leaf(), wanted, least)?;
+    memory::check_branch_memory(family.first_leaf().rods(), segments)?;
     Ok(segments)
 }
 
 /// Force against displacement, if what varies is one component of the force on the shared
 /// tip, or of the position at which it is held.
-fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
+fn force_displacement_line(
+    request: &TraceRequest,
+    branch: &TraceBranch,
+) -> Option<ForceDisplacementLine> {
     let [
-        Target::Entry(Part {
+        VariableTarget::Entry(EntryPath {
             key: Key::TipForce | Key::TipPosition,
             indices: [Some(axis), None, ..],
             scale: false,
@@ -365,44 +382,49 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
         _ => None,
     });
     let points: Option<Vec<(f64, DVec3)>> = points.collect();
-    Law::of(*axis, &points?)
+    ForceDisplacementLine::fit(*axis, &points?)
 }
 
 /// Data common to all branches.
-struct Run<'r, 'p> {
-    family: &'r Family<'r>,
+struct BranchTracer<'r, 'p> {
+    family: &'r LeafFamily<'r>,
     request: &'r TraceRequest,
     /// The grids on which branches are followed.
-    grids: Grids<'r>,
+    grids: NestedBranchEquations<'r>,
     tolerance: f64,
     /// As in [`Traced`], so far.
-    first: Option<(Point, Grid)>,
-    critical: Vec<(Critical, Refined)>,
+    first: Option<(EquilibriumPoint, Grid)>,
+    critical: Vec<(CriticalPoint, ExtrapolatedPoint)>,
     /// Whether the run was stopped before branches that cross were sought.
-    untried: bool,
+    stopped_before_crossings: bool,
     progress: &'p mut dyn FnMut(usize, usize, f64),
 }
 
-impl Run<'_, '_> {
+impl BranchTracer<'_, '_> {
     /// Follows the branch of the first point, `both_ways` or to larger fractions, and, if requested,
     /// those that cross it, breadth first.
-    fn follow_all(&mut self, mut first: Point, both_ways: bool, trace: &mut Trace) {
+    fn trace_all_branches(
+        &mut self,
+        mut first: EquilibriumPoint,
+        both_ways: bool,
+        trace: &mut Trace,
+    ) {
         trace.segments = first.state.segments();
-        first.tangent = first.tangent.growing();
+        first.tangent = first.tangent.towards_larger_parameter();
         let values = self.request.vary.values.len();
-        let longest = (1.0 / (values - 1) as f64).min(LONGEST);
-        let grows = |points: &[Point]| match points {
+        let longest = (1.0 / (values - 1) as f64).min(LONGEST_BRANCH_STEP);
+        let grows = |points: &[EquilibriumPoint]| match points {
             [.., before, last] => last.index > before.index,
             _ => false,
         };
-        let how = Walk {
-            enough: match self.request.until {
+        let how = ContinuationOptions {
+            stop_criterion: match self.request.until {
                 Some(TraceUntil::Unstable) => Some(&grows),
                 None => None,
             },
-            ..Walk::new(longest, self.request.most_points)
+            ..ContinuationOptions::new(longest, self.request.most_points)
         };
-        let back = both_ways.then(|| Point {
+        let back = both_ways.then(|| EquilibriumPoint {
             tangent: first.tangent.reversed(),
             ..first.clone()
         });
@@ -420,24 +442,32 @@ impl Run<'_, '_> {
             let (family, progress) = (self.family, &mut *self.progress);
             let mut report = |points, at| progress(number, points, family.value(at));
             let mut followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
-            if followed.end == End::Enough {
-                end_at_growth(&mut followed);
+            if followed.end == BranchEnd::StopCriterionMet {
+                truncate_at_destabilization(&mut followed);
             }
             let last = followed.branch.points.last();
             let segments = last.map_or(0, |point| point.state.segments());
             trace.segments = trace.segments.max(segments);
-            trace.branches.push(self.in_units(&followed, from));
+            trace
+                .branches
+                .push(self.branch_in_scenario_units(&followed, from));
             let begun = followed.branch.points.first().zip(followed.points.first());
             let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
             self.first = self.first.take().or(begun);
-            let missing = self.enter_crossings(&followed, number, &mut entrances);
+            let missing = self.record_crossings(&followed, number, &mut entrances);
             trace.branches[number].add_remarks(missing);
-            let left = followed.end == End::Stopped || !entrances.is_empty() || self.untried;
+            let left = followed.end == BranchEnd::RunLimitReached
+                || !entrances.is_empty()
+                || self.stopped_before_crossings;
             if left && self.family.limit.reached() {
-                trace.remark = Some(match self.untried || !entrances.is_empty() {
-                    true => "the run was stopped: branches that cross are not all followed".into(),
-                    false => "the run was stopped".into(),
-                });
+                trace.remark = Some(
+                    match self.stopped_before_crossings || !entrances.is_empty() {
+                        true => {
+                            "the run was stopped: branches that cross are not all followed".into()
+                        }
+                        false => "the run was stopped".into(),
+                    },
+                );
                 break;
             }
         }
@@ -447,24 +477,29 @@ impl Run<'_, '_> {
     /// Records the critical points of a branch; if requested, adds the first points of crossing
     /// branches, each with the indices of the branch and the point at which it was entered, if that
     /// is new. Returns where no crossing branch begins within the range.
-    fn enter_crossings(
+    fn record_crossings(
         &mut self,
-        followed: &Followed,
+        followed: &VerifiedBranch,
         number: usize,
-        entrances: &mut VecDeque<(Point, Option<[usize; 2]>)>,
+        entrances: &mut VecDeque<(EquilibriumPoint, Option<[usize; 2]>)>,
     ) -> Vec<String> {
         let mut missing = Vec::new();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
-            let mut crossings = (self.critical.iter()).filter(|(it, _)| it.kind == Kind::Branching);
-            let known = crossings.any(|(_, other)| near(other, refined));
+            let mut crossings =
+                (self.critical.iter()).filter(|(it, _)| it.kind == CriticalKind::Branching);
+            let known = crossings.any(|(_, other)| is_same_point(other, refined));
             self.critical.push((critical.clone(), refined.clone()));
-            if critical.kind != Kind::Branching || known || !self.request.switch {
+            if critical.kind != CriticalKind::Branching || known || !self.request.switch {
                 continue;
             }
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
-            let new = switch(self.grids.of(&critical.state), critical, self.tolerance);
+            let new = switch_branches(
+                self.grids.on_grid_of(&critical.state),
+                critical,
+                self.tolerance,
+            );
             if new.is_empty() && !self.family.limit.reached() {
                 let value = self.family.value(refined.fraction);
                 // As many digits as tell one crossing from the next.
@@ -474,7 +509,7 @@ impl Run<'_, '_> {
                     self.request.vary.keys.text(value)
                 ));
             }
-            self.untried |= self.family.limit.reached();
+            self.stopped_before_crossings |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.into_iter().map(|point| (point, from)));
         }
@@ -482,33 +517,37 @@ impl Run<'_, '_> {
     }
 
     /// A branch in the scenario's units.
-    fn in_units(&self, followed: &Followed, from: Option<[usize; 2]>) -> TraceBranch {
+    fn branch_in_scenario_units(
+        &self,
+        followed: &VerifiedBranch,
+        from: Option<[usize; 2]>,
+    ) -> TraceBranch {
         let branch = &followed.branch;
         let mut points = Vec::new();
         let mut critical = branch.critical.iter().zip(&followed.critical).peekable();
         for (i, (point, refined)) in branch.points.iter().zip(&followed.points).enumerate() {
             let number = points.len() + 1;
-            points.push(self.point(number, PointKind::Regular, point.index, refined));
+            points.push(self.trace_point(number, PointKind::Regular, point.index, refined));
             while let Some(((_, point), refined)) = critical.next_if(|((after, _), _)| *after == i)
             {
                 let kind = match point.kind {
-                    Kind::Fold => PointKind::Fold,
-                    Kind::Branching => PointKind::Branching(point.modes.len()),
+                    CriticalKind::Fold => PointKind::Fold,
+                    CriticalKind::Branching => PointKind::Branching(point.modes.len()),
                 };
                 let number = points.len() + 1;
-                points.push(self.point(number, kind, point.indices[1], refined));
+                points.push(self.trace_point(number, kind, point.indices[1], refined));
             }
         }
         TraceBranch {
             from,
             points,
             end: followed.end.clone(),
-            remark: self.remark(followed),
+            remark: self.branch_remark(followed),
         }
     }
 
     /// Why a branch ended, and where it met no branch that must cross it.
-    fn remark(&self, followed: &Followed) -> Option<String> {
+    fn branch_remark(&self, followed: &VerifiedBranch) -> Option<String> {
         let near = |after: &usize| {
             let near = &followed.points[*after];
             let keys = &self.request.vary.keys;
@@ -517,16 +556,21 @@ impl Run<'_, '_> {
                 "it turns back beyond {value} where another branch must cross it, which was not found"
             )
         };
-        let mut remarks: Vec<String> = followed.branch.unmet.iter().map(near).collect();
-        remarks.extend(followed.end.remark());
+        let mut remarks: Vec<String> = followed
+            .branch
+            .unmatched_vertices
+            .iter()
+            .map(near)
+            .collect();
+        remarks.extend(followed.end.failure_remark());
         (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 
     /// Waves and twist of the leaf at a point, on its finest grid.
-    fn undulation(&self, refined: &Refined) -> Option<Undulation> {
+    fn undulation_at(&self, refined: &ExtrapolatedPoint) -> Option<Undulation> {
         let scenario = self.family.scenario([refined.fraction]).ok()?;
         let rods = refined.shapes(self.family).ok()?;
-        let error = Some(refined.error * self.family.scale().length);
+        let error = Some(refined.position_error * self.family.scale().length);
         Some(Undulation::at_stations(
             &scenario,
             refined.grid.sigma(),
@@ -535,7 +579,13 @@ impl Run<'_, '_> {
         ))
     }
 
-    fn point(&self, point: usize, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
+    fn trace_point(
+        &self,
+        point: usize,
+        kind: PointKind,
+        index: usize,
+        refined: &ExtrapolatedPoint,
+    ) -> TracePoint {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
         let held = self.request.base.scenario().held_tip.is_some();
@@ -554,10 +604,10 @@ impl Run<'_, '_> {
             tips: self.family.tips(&refined.tips),
             reaction: forces.clone().next().filter(|_| held),
             grip_reactions: forces.skip(usize::from(held)).collect(),
-            error: Some(refined.error * scale.length),
+            error: Some(refined.position_error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
-            undulation: self.undulation(refined).unwrap_or_default(),
+            undulation: self.undulation_at(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),
             curves: self.family.curves(&refined.state),
         }
@@ -566,8 +616,8 @@ impl Run<'_, '_> {
 
 /// Ends a branch, whose last step its Morse index grew in, at the first critical point at which it
 /// grows.
-fn end_at_growth(followed: &mut Followed) {
-    followed.end = End::Unstable;
+fn truncate_at_destabilization(followed: &mut VerifiedBranch) {
+    followed.end = BranchEnd::StabilityLost;
     let mut critical = followed.branch.critical.iter();
     let grows = critical.position(|(_, critical)| critical.indices[1] > critical.indices[0]);
     if let Some(last) = grows {
@@ -579,21 +629,22 @@ fn end_at_growth(followed: &mut Followed) {
     }
 }
 
-fn near(a: &Refined, b: &Refined) -> bool {
-    (a.fraction - b.fraction).abs() < SAME && a.state.shift_to(&b.state) < SAME.sqrt()
+fn is_same_point(a: &ExtrapolatedPoint, b: &ExtrapolatedPoint) -> bool {
+    (a.fraction - b.fraction).abs() < SAME_POINT_DISTANCE
+        && a.state.largest_displacement_to(&b.state) < SAME_POINT_DISTANCE.sqrt()
 }
 
 /// The largest deviation of forces from a straight line, as a part of their range, for which that
 /// is their law: what a testing machine of class 1 measures differs as much (ISO 7500-1).
-const LINEAR: f64 = 0.01;
+const LINEARITY_TOLERANCE: f64 = 0.01;
 
 /// Smaller displacements, in lengths, are due to rounding.
-const ROUNDING: f64 = 1e-11;
+const DISPLACEMENT_ROUNDING: f64 = 1e-11;
 
 /// The straight line fitted to the forces on a tip as a function of its displacements
 /// along them: Hooke's law, and how well it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Law {
+pub struct ForceDisplacementLine {
     /// Axis of the force: 0, 1, 2 for x, y, z.
     #[serde(serialize_with = "serialize_axis")]
     pub axis: usize,
@@ -607,10 +658,10 @@ pub struct Law {
     pub length: f64,
 }
 
-impl Law {
+impl ForceDisplacementLine {
     /// From forces along an axis and the tips under them; `None` with fewer than three, if the
     /// tip moves by no more than rounding, or if the forces are not [`LINEAR`].
-    pub(super) fn of(axis: usize, points: &[(f64, DVec3)]) -> Option<Law> {
+    pub(super) fn fit(axis: usize, points: &[(f64, DVec3)]) -> Option<ForceDisplacementLine> {
         let (_, tip) = *points.first()?;
         let points: Vec<(f64, f64)> = (points.iter())
             .map(|(force, moved)| (moved[axis] - tip[axis], *force))
@@ -625,7 +676,7 @@ impl Law {
         let xy = mean(&|p| (p.0 - x) * (p.1 - y));
         let yy = mean(&|p| (p.1 - y) * (p.1 - y));
         let length = tip.length();
-        if xx.sqrt() <= ROUNDING * length {
+        if xx.sqrt() <= DISPLACEMENT_ROUNDING * length {
             return None;
         }
         let slope = xy / xx;
@@ -633,14 +684,14 @@ impl Law {
         let forces = points.iter().map(|p| p.1);
         let range =
             forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
-        Some(Law {
+        Some(ForceDisplacementLine {
             axis,
             slope,
             r_squared: xy * xy / (xx * yy),
             deviation: largest(points.iter().map(off)) / range,
             length,
         })
-        .filter(|law| law.slope.is_finite() && law.deviation <= LINEAR)
+        .filter(|law| law.slope.is_finite() && law.deviation <= LINEARITY_TOLERANCE)
     }
 }
 
@@ -668,14 +719,14 @@ pub enum TraceShow {
     Twist,
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl Display for TraceShow {
     fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
         match self {
-            TraceShow::Tip(axis) => f.write_str(AXES[*axis]),
-            TraceShow::Reaction(axis) => write!(f, "reaction_{}", AXES[*axis]),
-            TraceShow::Grip { grip, axis } => write!(f, "grip_{}_{}", grip + 1, AXES[*axis]),
+            TraceShow::Tip(axis) => f.write_str(AXIS_NAMES[*axis]),
+            TraceShow::Reaction(axis) => write!(f, "reaction_{}", AXIS_NAMES[*axis]),
+            TraceShow::Grip { grip, axis } => write!(f, "grip_{}_{}", grip + 1, AXIS_NAMES[*axis]),
             TraceShow::Energy => f.write_str("energy"),
             TraceShow::Twist => f.write_str("twist"),
         }
@@ -686,7 +737,7 @@ impl FromStr for TraceShow {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
-        let axis = |word: &str| AXES.iter().position(|axis| *axis == word);
+        let axis = |word: &str| AXIS_NAMES.iter().position(|axis| *axis == word);
         let parts: Vec<&str> = text.split('_').collect();
         let found = match parts.as_slice() {
             ["energy"] => Some(TraceShow::Energy),
@@ -722,10 +773,10 @@ impl FromStr for TraceShow {
 mod tests {
     use super::*;
 
-    fn law(tip: impl Fn(f64) -> f64) -> Option<Law> {
+    fn law(tip: impl Fn(f64) -> f64) -> Option<ForceDisplacementLine> {
         let forces = (0..=10).map(|k| 0.1 * f64::from(k));
         let points: Vec<_> = forces.map(|f| (f, DVec3::new(tip(f), 0.0, 0.0))).collect();
-        Law::of(0, &points)
+        ForceDisplacementLine::fit(0, &points)
     }
 
     #[test]
@@ -739,7 +790,7 @@ mod tests {
     fn of_a_tip_that_does_not_move_there_is_none() {
         let rounding = |k: i32| DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0);
         let points: Vec<_> = (0..=10).map(|k| (f64::from(k), rounding(k))).collect();
-        assert_eq!(Law::of(0, &points), None);
+        assert_eq!(ForceDisplacementLine::fit(0, &points), None);
     }
 
     /// Displacements that deviate from a line by 0.6 % of their range, and by 6 %.

@@ -1,10 +1,10 @@
 //! The result of a trace.
 
-use crate::branch::{Doubt, End, Stuck};
+use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
 use crate::scenario::Units;
 use crate::shape::{Undulation, serialize_tips};
-use crate::study::Keys;
-use crate::study::trace::{Law, TraceShow, TraceUntil};
+use crate::study::ParameterKeys;
+use crate::study::trace::{ForceDisplacementLine, TraceShow, TraceUntil};
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
@@ -15,7 +15,7 @@ pub struct Trace {
     pub scenario: String,
     /// The number that varied.
     #[serde(rename = "vary")]
-    pub keys: Keys,
+    pub keys: ParameterKeys,
     /// Its values at the ends of the range.
     pub range: [f64; 2],
     /// Whether its logarithm is spaced evenly.
@@ -59,7 +59,7 @@ pub struct Trace {
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if what varied is a tip force or the position of held tips.
-    pub law: Option<Law>,
+    pub law: Option<ForceDisplacementLine>,
     /// Number of matrices factorised by the continuation.
     pub factorizations: usize,
     /// Total time, in seconds.
@@ -75,7 +75,7 @@ pub struct TraceBranch {
     /// Its points in order, critical ones among them.
     pub points: Vec<TracePoint>,
     /// How it ended.
-    pub end: End,
+    pub end: BranchEnd,
     /// A sentence with the reason, if necessary.
     pub remark: Option<String>,
 }
@@ -126,7 +126,7 @@ impl TracePoint {
     }
 
     /// What the figure shows of it; NaN if the leaf has no such thing.
-    pub fn shown(&self, what: TraceShow) -> f64 {
+    pub fn figure_value(&self, what: TraceShow) -> f64 {
         let component =
             |vector: Option<&DVec3>, axis: usize| vector.map_or(f64::NAN, |it| it[axis]);
         match what {
@@ -167,55 +167,66 @@ impl Serialize for PointKind {
     }
 }
 
-impl End {
+impl BranchEnd {
     /// The word in files.
     pub fn word(&self) -> &'static str {
         match self {
-            End::Reached => "reached",
-            End::Returned => "returned",
-            End::Closed => "closed",
-            End::Met => "met",
-            End::MostPoints | End::Enough => "most-points",
-            End::Unstable => "unstable",
-            End::Stopped | End::Stuck(Stuck::Stopped) => "stopped",
-            End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
-            End::Stuck(Stuck::Unresolved) => "unresolved",
-            End::Stuck(Stuck::Unfolded) => "unfolds",
-            End::Stuck(Stuck::Separated) => "parts",
-            End::Stuck(_) => "stuck",
-            End::Unverified(_) => "unverified",
+            BranchEnd::RangeEndReached => "reached",
+            BranchEnd::RangeStartReached => "returned",
+            BranchEnd::LoopClosed => "closed",
+            BranchEnd::KnownBoundaryMet => "met",
+            BranchEnd::PointLimitReached | BranchEnd::StopCriterionMet => "most-points",
+            BranchEnd::StabilityLost => "unstable",
+            BranchEnd::RunLimitReached | BranchEnd::StepFailed(CorrectorFailure::Stopped) => {
+                "stopped"
+            }
+            BranchEnd::StepFailed(CorrectorFailure::OutOfRange(_)) => "out-of-range",
+            BranchEnd::StepFailed(CorrectorFailure::Unresolved) => "unresolved",
+            BranchEnd::StepFailed(CorrectorFailure::Unfolded) => "unfolds",
+            BranchEnd::StepFailed(CorrectorFailure::Separated) => "parts",
+            BranchEnd::StepFailed(_) => "stuck",
+            BranchEnd::PointUnverified(_) => "unverified",
         }
     }
 
     /// Whether the branch is known as far as requested.
-    pub fn complete(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         matches!(
             self,
-            End::Reached | End::Returned | End::Closed | End::Met | End::Unstable
+            BranchEnd::RangeEndReached
+                | BranchEnd::RangeStartReached
+                | BranchEnd::LoopClosed
+                | BranchEnd::KnownBoundaryMet
+                | BranchEnd::StabilityLost
         )
     }
 
     /// Why an incomplete branch stopped, and what may help.
-    pub(super) fn remark(&self) -> Option<String> {
+    pub(super) fn failure_remark(&self) -> Option<String> {
         match self {
             // Of a stopped run the trace says so.
-            End::Reached
-            | End::Returned
-            | End::Closed
-            | End::Met
-            | End::Unstable
-            | End::Stopped => None,
-            End::MostPoints | End::Enough => Some("there are more points: allow more".into()),
-            End::Stuck(stuck) => Some(stuck.to_string()),
-            End::Unverified(Doubt::Inaccurate) => {
-                Some(format!("{}: ask for a larger one", Doubt::Inaccurate))
+            BranchEnd::RangeEndReached
+            | BranchEnd::RangeStartReached
+            | BranchEnd::LoopClosed
+            | BranchEnd::KnownBoundaryMet
+            | BranchEnd::StabilityLost
+            | BranchEnd::RunLimitReached => None,
+            BranchEnd::PointLimitReached | BranchEnd::StopCriterionMet => {
+                Some("there are more points: allow more".into())
             }
-            End::Unverified(doubt) => Some(format!("what comes next is not verified: {doubt}")),
+            BranchEnd::StepFailed(stuck) => Some(stuck.to_string()),
+            BranchEnd::PointUnverified(VerificationFailure::Inaccurate) => Some(format!(
+                "{}: ask for a larger one",
+                VerificationFailure::Inaccurate
+            )),
+            BranchEnd::PointUnverified(doubt) => {
+                Some(format!("what comes next is not verified: {doubt}"))
+            }
         }
     }
 }
 
-impl Serialize for End {
+impl Serialize for BranchEnd {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.word())
     }
@@ -235,7 +246,7 @@ impl TraceBranch {
     }
 
     /// Its critical points, with their indices.
-    pub fn critical(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
+    pub fn critical_points(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
         let points = self.points.iter().enumerate();
         points.filter(|(_, point)| point.kind != PointKind::Regular)
     }
@@ -244,7 +255,7 @@ impl TraceBranch {
 /// Also with the numbers of its first, last and critical points.
 impl Serialize for TraceBranch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let critical: Vec<&TracePoint> = self.critical().map(|(_, point)| point).collect();
+        let critical: Vec<&TracePoint> = self.critical_points().map(|(_, point)| point).collect();
         let mut object = serializer.serialize_struct("TraceBranch", 7)?;
         object.serialize_field("from", &self.from.map(|from| from.map(|index| index + 1)))?;
         object.serialize_field("points", &self.points.len())?;

@@ -6,12 +6,15 @@
 //! Round numbers, for ticks and scales.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{Cell, TEXT_SIZE, TICK_SIZE, title};
+use crate::figure::drawing::labels::{PageRectangle, TEXT_SIZE, TICK_SIZE, draw_panel_title};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle, smooth,
+    Color, Drawing, DrawingPath, FRAME, GRID, INK, NOTE, PathStep, Stroke, TextAnchor,
+    rectangle_path, smooth_curve,
 };
-use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
+use crate::report::numbers::{
+    digit_times_power_text, format_decimals, power_of_ten_text, superscript, time_power_text,
+};
 use glam::DVec2;
 use std::ops::{Range, RangeInclusive};
 
@@ -30,130 +33,139 @@ const AFTER_LABELS: f64 = 13.0;
 
 const FARTHEST_NAME: f64 = 53.0;
 
-pub struct Curve {
+pub struct NamedCurve {
     pub name: &'static str,
     pub color: Color,
     pub points: Vec<(f64, f64)>,
 }
 
-impl Curve {
-    pub fn values(&self) -> impl Iterator<Item = f64> {
+impl NamedCurve {
+    pub fn ordinates(&self) -> impl Iterator<Item = f64> {
         self.points.iter().map(|point| point.1)
     }
 }
 
-pub struct Axes {
-    pub cell: Cell,
+pub struct PanelAxes {
+    pub cell: PageRectangle,
     pub across: Axis,
     pub up: Axis,
 }
 
-impl Axes {
+impl PanelAxes {
     /// The position of a point on the page; `None` if it cannot be drawn.
-    pub fn at(&self, (x, y): (f64, f64)) -> Option<DVec2> {
+    pub fn page_position(&self, (x, y): (f64, f64)) -> Option<DVec2> {
         let fraction = DVec2::new(self.across.fraction(x), 1.0 - self.up.fraction(y));
         let at = self.cell.corner + self.cell.size * fraction;
         at.is_finite().then_some(at)
     }
 
     /// Draws a panel of the letter and the title, with these axes.
-    pub fn titled(
+    pub fn draw_titled(
         page: &mut Drawing,
-        cell: Cell,
+        cell: PageRectangle,
         [letter, what]: [&str; 2],
         across: Axis,
         up: Axis,
     ) -> Self {
-        let axes = Axes { cell, across, up };
-        title(page, cell.corner, letter, what);
+        let axes = PanelAxes { cell, across, up };
+        draw_panel_title(page, cell.corner, letter, what);
         axes.draw(page);
         axes
     }
 
     /// Draws grid, frame, ticks and names.
     pub fn draw(&self, page: &mut Drawing) {
-        let Cell { corner, size } = self.cell;
-        let end = self.cell.end();
+        let PageRectangle { corner, size } = self.cell;
+        let end = self.cell.opposite_corner();
         let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
             true => Stroke::new(FRAME, 0.8),
             false => Stroke::new(GRID, 0.7),
         };
-        for tick in self.across.ticks(size.x, Direction::Across) {
+        for tick in self.across.ticks(size.x, AxisOrientation::Horizontal) {
             let top = corner.with_x(corner.x + tick.fraction * size.x);
-            page.line(top, top.with_y(end.y), stroke(&self.across, &tick));
+            page.draw_line(top, top.with_y(end.y), stroke(&self.across, &tick));
         }
-        for tick in self.up.ticks(size.y, Direction::Up) {
+        for tick in self.up.ticks(size.y, AxisOrientation::Vertical) {
             let left = corner.with_y(end.y - tick.fraction * size.y);
-            page.line(left, left.with_x(end.x), stroke(&self.up, &tick));
+            page.draw_line(left, left.with_x(end.x), stroke(&self.up, &tick));
         }
-        self.draw_frame(page);
+        self.draw_without_grid(page);
     }
 
     /// Draws all but the grid.
-    pub fn draw_frame(&self, page: &mut Drawing) {
-        let Cell { corner, size } = self.cell;
-        let (middle, end) = (self.cell.middle(), self.cell.end());
+    pub fn draw_without_grid(&self, page: &mut Drawing) {
+        let PageRectangle { corner, size } = self.cell;
+        let (middle, end) = (self.cell.middle(), self.cell.opposite_corner());
         let rim = Stroke::new(FRAME, 0.8);
-        page.stroke(rectangle(corner, size), rim);
+        page.draw_stroke(rectangle_path(corner, size), rim);
         let font = Font::embedded();
         let mut widest = 0.0_f64;
         for (axis, direction, length, out) in [
-            (&self.across, Direction::Across, size.x, DVec2::Y),
-            (&self.up, Direction::Up, size.y, DVec2::NEG_X),
+            (&self.across, AxisOrientation::Horizontal, size.x, DVec2::Y),
+            (&self.up, AxisOrientation::Vertical, size.y, DVec2::NEG_X),
         ] {
             let foot = |fraction: f64| match direction {
-                Direction::Across => corner + size * DVec2::new(fraction, 1.0),
-                Direction::Up => corner + size * DVec2::new(0.0, 1.0 - fraction),
+                AxisOrientation::Horizontal => corner + size * DVec2::new(fraction, 1.0),
+                AxisOrientation::Vertical => corner + size * DVec2::new(0.0, 1.0 - fraction),
             };
-            for fraction in axis.divisions(length) {
+            for fraction in axis.decade_subdivisions(length) {
                 let foot = foot(fraction);
-                page.line(foot, foot + DIVISION * out, rim);
+                page.draw_line(foot, foot + DIVISION * out, rim);
             }
             for Tick { fraction, text, .. } in axis.ticks(length, direction) {
                 let foot = foot(fraction);
-                page.line(foot, foot + TICK * out, rim);
+                page.draw_line(foot, foot + TICK * out, rim);
                 match direction {
                     _ if !axis.labelled => (),
-                    Direction::Across => {
+                    AxisOrientation::Horizontal => {
                         let base = foot + DVec2::new(0.0, TICK + 1.2 * TICK_SIZE);
-                        page.label(base, &text, TICK_SIZE, Anchor::Middle, NOTE);
+                        page.draw_label(base, &text, TICK_SIZE, TextAnchor::Middle, NOTE);
                     }
-                    Direction::Up => {
+                    AxisOrientation::Vertical => {
                         let end = foot - DVec2::new(TICK + 3.0, 0.0);
-                        page.centered_label(end, &text, TICK_SIZE, Anchor::End, NOTE);
-                        widest = widest.max(font.width(&text, TICK_SIZE));
+                        page.draw_centered_label(end, &text, TICK_SIZE, TextAnchor::End, NOTE);
+                        widest = widest.max(font.text_width(&text, TICK_SIZE));
                     }
                 }
             }
         }
         if self.across.labelled {
             let base = DVec2::new(middle.x, end.y + NAME_BELOW);
-            page.label(base, &self.across.title(), TEXT_SIZE, Anchor::Middle, INK);
+            page.draw_label(
+                base,
+                &self.across.title(),
+                TEXT_SIZE,
+                TextAnchor::Middle,
+                INK,
+            );
         }
         if self.up.labelled {
             let distance = (widest + AFTER_LABELS).clamp(NEAREST_NAME, FARTHEST_NAME);
             let base = DVec2::new(corner.x - distance, middle.y);
-            page.rotated_label(base, &self.up.title(), TEXT_SIZE, INK);
+            page.draw_rotated_label(base, &self.up.title(), TEXT_SIZE, INK);
         }
     }
 
     /// Draws the part of a curve through these points that is inside the frame, with
     /// gaps where a point cannot be drawn.
-    pub fn curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
+    pub fn draw_curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
         let columns = self.cell.size.x.ceil().max(1.0) as usize;
-        let places = thinned(points, columns).into_iter();
-        let places: Vec<Option<DVec2>> = places.map(|point| self.at(point)).collect();
-        self.line(page, &places, stroke);
+        let places = thin_points(points, columns).into_iter();
+        let places: Vec<Option<DVec2>> = places.map(|point| self.page_position(point)).collect();
+        self.draw_clipped_line(page, &places, stroke);
     }
 
     /// A smooth curve through these points as straight pieces on the page: for every point but the
     /// last those that lead to the next; none where one of both cannot be drawn.
-    pub fn smooth(&self, points: &[(f64, f64)]) -> Vec<Vec<DVec2>> {
-        let places: Vec<Option<DVec2>> = points.iter().map(|&point| self.at(point)).collect();
+    pub fn smooth_curve(&self, points: &[(f64, f64)]) -> Vec<Vec<DVec2>> {
+        let places: Vec<Option<DVec2>> = points
+            .iter()
+            .map(|&point| self.page_position(point))
+            .collect();
         let mut pieces = Vec::with_capacity(points.len());
         for run in places.split_inclusive(Option::is_none) {
             let drawn: Vec<DVec2> = run.iter().flatten().copied().collect();
-            pieces.extend(smooth(&drawn));
+            pieces.extend(smooth_curve(&drawn));
             pieces.resize(pieces.len() + usize::from(!drawn.is_empty()), Vec::new());
             pieces.resize(pieces.len() + run.len() - drawn.len(), Vec::new());
         }
@@ -163,29 +175,30 @@ impl Axes {
 
     /// Draws what is inside the frame of a line through these points on the page, with gaps where
     /// one is missing.
-    pub fn line(&self, page: &mut Drawing, places: &[Option<DVec2>], stroke: Stroke) {
-        let mut path: Path = Vec::new();
+    pub fn draw_clipped_line(&self, page: &mut Drawing, places: &[Option<DVec2>], stroke: Stroke) {
+        let mut path: DrawingPath = Vec::new();
         let mut pen = None;
         for pair in places.windows(2) {
             let inside = pair[0].zip(pair[1]);
-            let Some((from, to)) = inside.and_then(|(from, to)| self.clipped(from, to)) else {
+            let Some((from, to)) = inside.and_then(|(from, to)| self.clip_to_frame(from, to))
+            else {
                 continue;
             };
             if pen != Some(from) {
-                path.push(Step::Move(from));
+                path.push(PathStep::Move(from));
             }
-            path.push(Step::Line(to));
+            path.push(PathStep::Line(to));
             pen = Some(to);
         }
         if !path.is_empty() {
-            page.stroke(path, stroke);
+            page.draw_stroke(path, stroke);
         }
     }
 
     /// The part of a line that is inside the frame (Liang and Barsky).
-    fn clipped(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+    fn clip_to_frame(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
         let step = to - from;
-        let (low, high) = (self.cell.corner - from, self.cell.end() - from);
+        let (low, high) = (self.cell.corner - from, self.cell.opposite_corner() - from);
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
         for (step, low, high) in [(step.x, low.x, high.x), (step.y, low.y, high.y)] {
             if step == 0.0 {
@@ -207,15 +220,18 @@ impl Axes {
     }
 
     /// Draws a marker at each of these points that is inside the frame.
-    pub fn markers(
+    pub fn draw_markers(
         &self,
         page: &mut Drawing,
         points: impl IntoIterator<Item = (f64, f64)>,
         marker: Marker,
         color: Color,
     ) {
-        let (low, high) = (self.cell.corner - 0.01, self.cell.end() + 0.01);
-        for at in points.into_iter().filter_map(|point| self.at(point)) {
+        let (low, high) = (self.cell.corner - 0.01, self.cell.opposite_corner() + 0.01);
+        for at in points
+            .into_iter()
+            .filter_map(|point| self.page_position(point))
+        {
             if at.cmpge(low).all() && at.cmple(high).all() {
                 marker.draw(page, at, color);
             }
@@ -225,7 +241,7 @@ impl Axes {
 
 /// Fewer points that look the same when drawn over `columns` columns: of each
 /// the first, the last, the lowest and the highest.
-fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
+fn thin_points(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     let each = points.len().div_ceil(columns);
     if each <= 4 {
         return points.to_vec();
@@ -268,20 +284,20 @@ const BETWEEN_LABELS: f64 = 4.0;
 const DIVIDED: f64 = 60.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    Across,
-    Up,
+pub enum AxisOrientation {
+    Horizontal,
+    Vertical,
 }
 
 /// Where ticks are, and how they are labelled.
 #[derive(Clone, Debug)]
-pub enum Ticks {
+pub enum TickPlacement {
     /// Round numbers; on a logarithmic axis powers of ten.
-    Round,
+    RoundNumbers,
     /// Powers of ten, in seconds.
-    Times,
+    PowersInSeconds,
     /// Some of these whole numbers.
-    At(Vec<f64>),
+    WholeNumbers(Vec<f64>),
 }
 
 #[derive(Clone, Debug)]
@@ -292,7 +308,7 @@ pub struct Axis {
     /// Values at both ends or, on a logarithmic axis, decades; they may decrease.
     pub start: f64,
     pub end: f64,
-    pub ticks: Ticks,
+    pub ticks: TickPlacement,
     /// Least pixels between ticks, in place of the default.
     pub tick_spacing: Option<f64>,
     /// Whether the ticks and the axis are labelled.
@@ -327,7 +343,7 @@ impl Axis {
             sign: None,
             start,
             end,
-            ticks: Ticks::Round,
+            ticks: TickPlacement::RoundNumbers,
             tick_spacing: None,
             labelled: true,
             emphasizes_zero: false,
@@ -335,8 +351,9 @@ impl Axis {
     }
 
     /// A linear axis that covers these values, with padding.
-    pub fn holding(name: &str, values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = extent(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
+    pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) =
+            extent_of_values(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
         let axis = Axis::linear(name, low, high);
         let padding = PADDING * (axis.end - axis.start);
         Axis {
@@ -348,7 +365,7 @@ impl Axis {
     }
 
     /// The same axis with at least this extent: smaller variations are rounding.
-    pub fn at_least(self, extent: f64) -> Self {
+    pub fn with_least_extent(self, extent: f64) -> Self {
         let lacking = extent - (self.end - self.start);
         if lacking.is_nan() || lacking <= 0.0 {
             return self;
@@ -364,7 +381,7 @@ impl Axis {
     /// these values, with padding.
     pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {
         let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
-        let (start, end) = match extent(drawable.map(f64::log10)) {
+        let (start, end) = match extent_of_values(drawable.map(f64::log10)) {
             Some((low, high)) => {
                 let low = low.max(high - MOST_DECADES);
                 let padding = (0.5 * (fewest - (high - low))).max(PADDING_DECADES);
@@ -379,9 +396,13 @@ impl Axis {
     }
 
     /// An axis that covers these values: linear or, given their sign, logarithmic.
-    pub fn covering(name: &str, values: impl Iterator<Item = f64>, sign: Option<f64>) -> Self {
+    pub fn covering_values(
+        name: &str,
+        values: impl Iterator<Item = f64>,
+        sign: Option<f64>,
+    ) -> Self {
         match sign {
-            None => Axis::holding(name, values),
+            None => Axis::linear_covering(name, values),
             Some(sign) => Axis {
                 sign: Some(sign),
                 ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
@@ -391,7 +412,7 @@ impl Axis {
 
     /// The name, with the power of ten by which values are multiplied.
     pub fn title(&self) -> String {
-        match self.power() {
+        match self.label_power_of_ten() {
             _ if self.name.is_empty() => String::new(),
             0 => self.name.clone(),
             power => format!("{} · 10{}", self.name, superscript(-power)),
@@ -399,10 +420,12 @@ impl Axis {
     }
 
     /// The power of ten that is the unit of the tick labels.
-    pub fn power(&self) -> i32 {
+    pub fn label_power_of_ten(&self) -> i32 {
         let size = self.start.abs().max(self.end.abs()).log10();
         match (self.sign, &self.ticks) {
-            (None, Ticks::Round) if !PLAIN.contains(&size) => 3 * (size / 3.0).floor() as i32,
+            (None, TickPlacement::RoundNumbers) if !PLAIN.contains(&size) => {
+                3 * (size / 3.0).floor() as i32
+            }
             _ => 0,
         }
     }
@@ -419,15 +442,15 @@ impl Axis {
     }
 
     /// As many ticks as are readable on an axis of this length.
-    pub fn ticks(&self, length: f64, direction: Direction) -> Vec<Tick> {
+    pub fn ticks(&self, length: f64, direction: AxisOrientation) -> Vec<Tick> {
         let default = match self.ticks {
-            Ticks::Round if self.sign.is_none() => LINEAR,
+            TickPlacement::RoundNumbers if self.sign.is_none() => LINEAR,
             _ => LOGARITHMIC,
         };
         let font = Font::embedded();
         let size = |tick: &Tick| match direction {
-            Direction::Across => font.width(&tick.text, TICK_SIZE),
-            Direction::Up => TICK_SIZE,
+            AxisOrientation::Horizontal => font.text_width(&tick.text, TICK_SIZE),
+            AxisOrientation::Vertical => TICK_SIZE,
         };
         let separate = |pair: &[Tick]| {
             let distance = length * (pair[1].fraction - pair[0].fraction).abs();
@@ -448,18 +471,19 @@ impl Axis {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
         let every = |count: usize| (count as f64 * spacing).ceil().max(1.0) as usize;
         let ticks = match (&self.ticks, self.sign) {
-            (Ticks::At(values), _) => {
+            (TickPlacement::WholeNumbers(values), _) => {
                 let kept = values.iter().step_by(every(values.len()));
-                kept.map(|&value| (value, fixed(value, 0))).collect()
+                kept.map(|&value| (value, format_decimals(value, 0)))
+                    .collect()
             }
             (_, Some(sign)) => {
                 let count = (high.floor() - low.ceil() + 1.0).max(0.0) as usize;
-                self.decades(low..=high, sign, every(count) as i32, count < 2)
+                self.decade_ticks(low..=high, sign, every(count) as i32, count < 2)
             }
-            (Ticks::Round | Ticks::Times, None) => {
-                let unit = 10f64.powi(self.power());
+            (TickPlacement::RoundNumbers | TickPlacement::PowersInSeconds, None) => {
+                let unit = 10f64.powi(self.label_power_of_ten());
                 let step = round_step((high - low) * spacing / unit);
-                let found = multiples(low / unit, high / unit, step).into_iter();
+                let found = multiples_with_text(low / unit, high / unit, step).into_iter();
                 found.map(|(value, text)| (value * unit, text)).collect()
             }
         };
@@ -475,7 +499,7 @@ impl Axis {
 
     /// Powers of ten that are multiples of `every` or, if there are few, 1, 2 and 5 times
     /// every power.
-    fn decades(
+    fn decade_ticks(
         &self,
         range: RangeInclusive<f64>,
         sign: f64,
@@ -493,9 +517,9 @@ impl Axis {
             .filter(|&(digit, power)| range.contains(&(f64::from(power) + f64::log10(digit))))
             .map(|(digit, power)| {
                 let text = match self.ticks {
-                    Ticks::Times => time_of_decade(digit, power),
-                    _ if few => digit_of_decade(sign * digit, power),
-                    _ => decade(sign, power),
+                    TickPlacement::PowersInSeconds => time_power_text(digit, power),
+                    _ if few => digit_times_power_text(sign * digit, power),
+                    _ => power_of_ten_text(sign, power),
                 };
                 (sign * digit * 10f64.powi(power), text)
             })
@@ -503,9 +527,10 @@ impl Axis {
     }
 
     /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
-    pub fn divisions(&self, length: f64) -> Vec<f64> {
+    pub fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
-        let divided = length > DIVIDED * (high - low) && !matches!(self.ticks, Ticks::At(_));
+        let divided = length > DIVIDED * (high - low)
+            && !matches!(self.ticks, TickPlacement::WholeNumbers(_));
         let Some(sign) = self.sign.filter(|_| divided) else {
             return Vec::new();
         };
@@ -517,7 +542,7 @@ impl Axis {
     }
 }
 
-fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+fn extent_of_values(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let both = values.map(|value| (value, value));
     both.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
@@ -535,33 +560,33 @@ pub fn round_step(smallest: f64) -> f64 {
 }
 
 /// Multiples of `step` from `low` to `high`, each with its text.
-pub fn multiples(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
+pub fn multiples_with_text(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
     let slack = 1e-9;
     let first = (low / step - slack).ceil() as i64;
     let last = (high / step + slack).floor() as i64;
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     (first..=last)
         .map(|multiple| multiple as f64 * step)
-        .map(|value| (value, fixed(value, decimals)))
+        .map(|value| (value, format_decimals(value, decimals)))
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::formats::checked_svg_text;
 
     #[test]
     fn curves_are_clipped_at_the_frame_and_have_gaps_at_invalid_points() {
-        let axes = Axes {
-            cell: Cell::new(DVec2::new(10.0, 20.0), DVec2::new(100.0, 50.0)),
+        let axes = PanelAxes {
+            cell: PageRectangle::new(DVec2::new(10.0, 20.0), DVec2::new(100.0, 50.0)),
             across: Axis::linear("x", 0.0, 1.0),
             up: Axis::linear("y", 0.0, 1.0),
         };
         let curve = |points: &[(f64, f64)]| {
             let mut page = Drawing::new(200.0, "");
-            axes.curve(&mut page, points, Stroke::new(INK, 1.0));
-            text(&page)
+            axes.draw_curve(&mut page, points, Stroke::new(INK, 1.0));
+            checked_svg_text(&page)
         };
         let diagonal = "<path d=\"M10 70L110 20\"";
         assert!(curve(&[(-1.0, -1.0), (3.0, 3.0)]).contains(diagonal));
@@ -577,25 +602,25 @@ mod tests {
 
     #[test]
     fn smooth_curves_have_gaps_at_invalid_points() {
-        let axes = Axes {
-            cell: Cell::new(DVec2::ZERO, DVec2::splat(100.0)),
+        let axes = PanelAxes {
+            cell: PageRectangle::new(DVec2::ZERO, DVec2::splat(100.0)),
             across: Axis::linear("x", 0.0, 1.0),
             up: Axis::linear("y", 0.0, 1.0),
         };
         let x = [0.0, 0.1, f64::NAN, 0.3, f64::NAN, 0.5, 0.6, 0.8];
         let points = x.map(|x| (x, x));
-        let drawn = axes.smooth(&points);
+        let drawn = axes.smooth_curve(&points);
         let there: Vec<bool> = drawn.iter().map(|piece| !piece.is_empty()).collect();
         assert_eq!(there, [true, false, false, false, false, true, true]);
-        assert_eq!(drawn[5].first(), axes.at(points[5]).as_ref());
-        assert!(axes.smooth(&points[..1]).is_empty());
+        assert_eq!(drawn[5].first(), axes.page_position(points[5]).as_ref());
+        assert!(axes.smooth_curve(&points[..1]).is_empty());
     }
 
     #[test]
     fn thinning_keeps_peaks_and_ends() {
         let peak = |i: usize| if i == 5432 { 1.0 } else { 0.0 };
         let points: Vec<(f64, f64)> = (0..10_000).map(|i| (i as f64, peak(i))).collect();
-        let kept = thinned(&points, 100);
+        let kept = thin_points(&points, 100);
         assert!(kept.len() <= 400);
         assert!(kept.contains(&(5432.0, 1.0)));
         assert_eq!((kept[0], kept[kept.len() - 1]), (points[0], points[9999]));
@@ -606,10 +631,10 @@ mod tests {
 #[cfg(test)]
 mod axis_tests {
     use super::*;
-    use Direction::{Across, Up};
+    use AxisOrientation::{Horizontal, Vertical};
 
     fn texts(axis: &Axis, length: f64) -> Vec<String> {
-        let ticks = axis.ticks(length, Across).into_iter();
+        let ticks = axis.ticks(length, Horizontal).into_iter();
         ticks.map(|tick| tick.text).collect()
     }
 
@@ -621,9 +646,9 @@ mod axis_tests {
             (-2e7, 1e6, "t · 10⁻⁶"),
             (0.02, 0.5, "t"),
         ] {
-            let axis = Axis::holding("t", [low, high].into_iter());
+            let axis = Axis::linear_covering("t", [low, high].into_iter());
             assert_eq!(axis.title(), name);
-            let ticks = axis.ticks(300.0, Up);
+            let ticks = axis.ticks(300.0, Vertical);
             assert!((3..=12).contains(&ticks.len()), "{low} {high}: {ticks:?}");
             for tick in ticks {
                 assert!(tick.text.chars().count() <= 6, "{tick:?}");
@@ -643,11 +668,11 @@ mod axis_tests {
             vec![1e-320, 0.0],
         ] {
             for axis in [
-                Axis::holding("t", values.iter().copied()),
+                Axis::linear_covering("t", values.iter().copied()),
                 Axis::logarithmic("t", values.iter().copied(), 1.0),
             ] {
                 assert!(axis.end > axis.start, "{values:?}");
-                assert!(!axis.ticks(300.0, Up).is_empty(), "{values:?}");
+                assert!(!axis.ticks(300.0, Vertical).is_empty(), "{values:?}");
             }
         }
     }
@@ -675,10 +700,10 @@ mod axis_tests {
         for values in [vec![1e308], vec![1e308, 1e-300], vec![-1.7e308, 1.7e308]] {
             for axis in [
                 Axis::logarithmic("t", values.iter().copied(), 3.0),
-                Axis::holding("t", values.iter().copied()),
+                Axis::linear_covering("t", values.iter().copied()),
                 Axis::linear("t", values[0], *values.last().unwrap()),
             ] {
-                for tick in axis.ticks(300.0, Up) {
+                for tick in axis.ticks(300.0, Vertical) {
                     assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?} of {axis:?}");
                 }
             }
@@ -690,7 +715,7 @@ mod axis_tests {
         let axis = Axis::logarithmic("", [2e-3, 0.5].into_iter(), 1.0);
         assert_eq!(texts(&axis, 400.0), ["10⁻²", "10⁻¹"]);
         let axis = Axis {
-            ticks: Ticks::Times,
+            ticks: TickPlacement::PowersInSeconds,
             ..axis
         };
         assert_eq!(texts(&axis, 400.0), ["10 ms", "100 ms"]);
@@ -700,13 +725,13 @@ mod axis_tests {
         let axis = Axis { sign, ..axis };
         assert_eq!(texts(&axis, 400.0), ["\u{2212}2", "\u{2212}5"]);
         let axis = Axis {
-            ticks: Ticks::At((1..=40).map(f64::from).collect()),
+            ticks: TickPlacement::WholeNumbers((1..=40).map(f64::from).collect()),
             ..Axis::linear("", 0.5, 40.5)
         };
         assert_eq!(texts(&axis, 200.0).len(), 5);
         assert_eq!(texts(&axis, 2000.0).len(), 40);
         let axis = Axis::linear("", 1000.001, 1000.009);
-        for pair in axis.ticks(300.0, Across).windows(2) {
+        for pair in axis.ticks(300.0, Horizontal).windows(2) {
             let apart = 300.0 * (pair[1].fraction - pair[0].fraction);
             assert!(apart > 62.0, "{pair:?}");
         }
@@ -729,7 +754,7 @@ mod round_tests {
     #[test]
     fn multiples_reach_both_ends_and_have_equal_decimals() {
         let texts = |low, high, step| -> Vec<String> {
-            let found = multiples(low, high, step).into_iter();
+            let found = multiples_with_text(low, high, step).into_iter();
             found.map(|(_, text)| text).collect()
         };
         let even = ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"];

@@ -4,7 +4,9 @@
 //!
 //! The embedded font: how wide a text is, and its outlines for the PNG.
 
-use crate::figure::drawing::{Anchor, Color, Drawing, Label, Mark, Path, Step, Stroke};
+use crate::figure::drawing::{
+    Color, Drawing, DrawingElement, DrawingPath, PathStep, Stroke, TextAnchor, TextLabel,
+};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::io;
@@ -24,81 +26,94 @@ pub fn write_svg(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
          viewBox=\"0 0 {width} {height}\" role=\"img\" fill=\"none\" stroke-linecap=\"round\" \
          stroke-linejoin=\"round\" font-family=\"DejaVu Sans, Verdana, sans-serif\">"
     )?;
-    writeln!(out, "<title>{}</title>", escaped(&drawing.description))?;
+    writeln!(out, "<title>{}</title>", escape_xml(&drawing.description))?;
     writeln!(
         out,
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>"
     )?;
-    for mark in &drawing.marks {
+    for mark in &drawing.elements {
         match mark {
             // No id, as there may be several of a kind.
-            Mark::Group(name) => writeln!(out, "<g class=\"{name}\">")?,
-            Mark::EndGroup => writeln!(out, "</g>")?,
-            Mark::Shape { path, fill, stroke } => {
+            DrawingElement::Group(name) => writeln!(out, "<g class=\"{name}\">")?,
+            DrawingElement::EndGroup => writeln!(out, "</g>")?,
+            DrawingElement::Shape { path, fill, stroke } => {
                 write!(out, "<path d=\"")?;
                 for step in path {
                     match step {
-                        Step::Move(to) => write!(out, "M{}", point(to))?,
-                        Step::Line(to) => write!(out, "L{}", point(to))?,
-                        Step::Cubic(a, b, to) => {
-                            write!(out, "C{} {} {}", point(a), point(b), point(to))?;
+                        PathStep::Move(to) => write!(out, "M{}", format_point(to))?,
+                        PathStep::Line(to) => write!(out, "L{}", format_point(to))?,
+                        PathStep::Cubic(a, b, to) => {
+                            write!(
+                                out,
+                                "C{} {} {}",
+                                format_point(a),
+                                format_point(b),
+                                format_point(to)
+                            )?;
                         }
-                        Step::Close => write!(out, "Z")?,
+                        PathStep::Close => write!(out, "Z")?,
                     }
                 }
                 write!(out, "\"")?;
                 if let Some(fill) = fill {
-                    write!(out, " fill=\"{}\"", hex(*fill))?;
+                    write!(out, " fill=\"{}\"", hex_color(*fill))?;
                 }
                 if let Some(stroke) = stroke {
-                    let color = hex(stroke.color);
+                    let color = hex_color(stroke.color);
                     write!(out, " stroke=\"{color}\" stroke-width=\"{}\"", stroke.width)?;
                     let dash: Vec<String> =
-                        (stroke.dash.lengths().iter().map(f64::to_string)).collect();
+                        (stroke.dash.dash_lengths().iter().map(f64::to_string)).collect();
                     if !dash.is_empty() {
                         write!(out, " stroke-dasharray=\"{}\"", dash.join(" "))?;
                     }
                 }
                 writeln!(out, "/>")?;
             }
-            Mark::Label(label) => write_label(label, out)?,
+            DrawingElement::Label(label) => write_label(label, out)?,
         }
     }
     writeln!(out, "</svg>")
 }
 
-fn write_label(label: &Label, out: &mut dyn Write) -> io::Result<()> {
-    let (x, y) = (number(label.at.x), number(label.at.y));
+fn write_label(label: &TextLabel, out: &mut dyn Write) -> io::Result<()> {
+    let (x, y) = (
+        format_coordinate(label.position.x),
+        format_coordinate(label.position.y),
+    );
     match label.rotated {
         true => write!(out, "<text transform=\"translate({x} {y}) rotate(-90)\"")?,
         false => write!(out, "<text x=\"{x}\" y=\"{y}\"")?,
     }
     match label.anchor {
-        Anchor::Start => (),
-        Anchor::Middle => write!(out, " text-anchor=\"middle\"")?,
-        Anchor::End => write!(out, " text-anchor=\"end\"")?,
+        TextAnchor::Start => (),
+        TextAnchor::Middle => write!(out, " text-anchor=\"middle\"")?,
+        TextAnchor::End => write!(out, " text-anchor=\"end\"")?,
     }
-    let (size, color, text) = (label.size, hex(label.color), escaped(&label.text));
+    let (size, color, text) = (label.size, hex_color(label.color), escape_xml(&label.text));
     writeln!(out, " font-size=\"{size}\" fill=\"{color}\">{text}</text>")
 }
 
-fn point(point: &DVec2) -> String {
-    format!("{} {}", number(point.x), number(point.y))
+fn format_point(point: &DVec2) -> String {
+    format!(
+        "{} {}",
+        format_coordinate(point.x),
+        format_coordinate(point.y)
+    )
 }
 
 /// Rounds to a hundredth of a pixel, without trailing zeros.
-fn number(value: f64) -> String {
+fn format_coordinate(value: f64) -> String {
     let hundredths = (value * 100.0).round() / 100.0;
     // Adding zero turns -0 into 0.
     (hundredths + 0.0).to_string()
 }
 
-pub fn hex(Color(red, green, blue): Color) -> String {
+pub fn hex_color(Color(red, green, blue): Color) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Escapes text for XML and leaves out control characters.
-pub fn escaped(text: &str) -> String {
+pub fn escape_xml(text: &str) -> String {
     text.chars()
         .filter(|c| !c.is_control())
         .map(|c| match c {
@@ -112,7 +127,7 @@ pub fn escaped(text: &str) -> String {
 
 /// The picture as text; checks that groups are closed, ids do not repeat and numbers are finite.
 #[cfg(test)]
-pub fn text(drawing: &Drawing) -> String {
+pub fn checked_svg_text(drawing: &Drawing) -> String {
     let mut bytes = Vec::new();
     write_svg(drawing, &mut bytes).unwrap();
     let svg = String::from_utf8(bytes).unwrap();
@@ -140,8 +155,8 @@ const DOTS_PER_METRE: u32 = 7559;
 const BAND: u32 = 320;
 
 pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
-    let [width, height] = size(drawing);
-    let shapes = shapes(drawing);
+    let [width, height] = pixel_size(drawing);
+    let shapes = painted_shapes(drawing);
     let starts = (0..height).step_by(BAND as usize);
     let bands: Vec<Range<u32>> = starts.map(|at| at..(at + BAND).min(height)).collect();
     let together = bands.chunks(rayon::current_num_threads());
@@ -149,59 +164,59 @@ pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
         let each = some.par_iter().cloned();
         each.map(|rows| paint_rows(&shapes, width, rows)).collect()
     });
-    encode([width, height], painted, out)
+    encode_bands([width, height], painted, out)
 }
 
 /// Pixels of a drawing, across and down.
-fn size(drawing: &Drawing) -> [u32; 2] {
+fn pixel_size(drawing: &Drawing) -> [u32; 2] {
     [drawing.width, drawing.height].map(|length| (length * SCALE).ceil() as u32)
 }
 
-pub fn paint(drawing: &Drawing) -> Pixmap {
-    let [width, height] = size(drawing);
-    paint_rows(&shapes(drawing), width, 0..height)
+pub fn rasterize(drawing: &Drawing) -> Pixmap {
+    let [width, height] = pixel_size(drawing);
+    paint_rows(&painted_shapes(drawing), width, 0..height)
 }
 
 /// A path to be painted `before` pixels left of a place on the page, and then rotated about
 /// that place by `turn` degrees.
-struct Shape {
+struct PaintedShape {
     path: tiny_skia::Path,
     fill: Option<Color>,
     stroke: Option<Stroke>,
-    at: DVec2,
-    turn: f32,
-    before: f64,
+    anchor: DVec2,
+    rotation: f32,
+    left_offset: f64,
 }
 
-fn shapes(drawing: &Drawing) -> Vec<Shape> {
+fn painted_shapes(drawing: &Drawing) -> Vec<PaintedShape> {
     let font = Font::embedded();
-    let shape = |mark: &Mark| match mark {
-        Mark::Group(_) | Mark::EndGroup => None,
-        Mark::Shape { path, fill, stroke } => Some(Shape {
-            path: outline(path)?,
+    let shape = |mark: &DrawingElement| match mark {
+        DrawingElement::Group(_) | DrawingElement::EndGroup => None,
+        DrawingElement::Shape { path, fill, stroke } => Some(PaintedShape {
+            path: skia_path(path)?,
             fill: *fill,
             stroke: *stroke,
-            at: DVec2::ZERO,
-            turn: 0.0,
-            before: 0.0,
+            anchor: DVec2::ZERO,
+            rotation: 0.0,
+            left_offset: 0.0,
         }),
-        Mark::Label(label) => Some(Shape {
-            path: outline(&font.outline(&label.text, label.size))?,
+        DrawingElement::Label(label) => Some(PaintedShape {
+            path: skia_path(&font.text_outline(&label.text, label.size))?,
             fill: Some(label.color),
             stroke: None,
-            at: label.at,
-            turn: if label.rotated { -90.0 } else { 0.0 },
-            before: match label.anchor {
-                Anchor::Start => 0.0,
-                Anchor::Middle => 0.5,
-                Anchor::End => 1.0,
-            } * font.width(&label.text, label.size),
+            anchor: label.position,
+            rotation: if label.rotated { -90.0 } else { 0.0 },
+            left_offset: match label.anchor {
+                TextAnchor::Start => 0.0,
+                TextAnchor::Middle => 0.5,
+                TextAnchor::End => 1.0,
+            } * font.text_width(&label.text, label.size),
         }),
     };
-    drawing.marks.iter().filter_map(shape).collect()
+    drawing.elements.iter().filter_map(shape).collect()
 }
 
-fn paint_rows(shapes: &[Shape], width: u32, rows: Range<u32>) -> Pixmap {
+fn paint_rows(shapes: &[PaintedShape], width: u32, rows: Range<u32>) -> Pixmap {
     let height = rows.end - rows.start;
     let mut canvas = Pixmap::new(width, height).expect("a page has a width and a height");
     // White.
@@ -211,16 +226,16 @@ fn paint_rows(shapes: &[Shape], width: u32, rows: Range<u32>) -> Pixmap {
     for shape in shapes {
         let path = &shape.path;
         let place = page
-            .pre_translate(shape.at.x as f32, shape.at.y as f32)
-            .pre_rotate(shape.turn)
-            .pre_translate(-shape.before as f32, 0.0);
+            .pre_translate(shape.anchor.x as f32, shape.anchor.y as f32)
+            .pre_rotate(shape.rotation)
+            .pre_translate(-shape.left_offset as f32, 0.0);
         let rim = (SCALE * shape.stroke.map_or(1.0, |stroke| 1.0 + stroke.width)) as f32;
         let outside = |it: Rect| it.bottom() + rim < 0.0 || it.top() - rim > height as f32;
         if path.bounds().transform(place).is_some_and(outside) {
             continue;
         }
         if let Some(color) = shape.fill {
-            canvas.fill_path(path, &ink(color), FillRule::Winding, place, None);
+            canvas.fill_path(path, &solid_paint(color), FillRule::Winding, place, None);
         }
         if let Some(stroke) = &shape.stroke {
             stroke_path(&mut canvas, path, stroke, place);
@@ -230,30 +245,34 @@ fn paint_rows(shapes: &[Shape], width: u32, rows: Range<u32>) -> Pixmap {
 }
 
 /// The path; `None` if there is nothing to paint, as for a single point.
-fn outline(path: &Path) -> Option<tiny_skia::Path> {
+fn skia_path(path: &DrawingPath) -> Option<tiny_skia::Path> {
     let mut builder = PathBuilder::with_capacity(path.len(), 3 * path.len());
     for step in path {
         match *step {
-            Step::Move(to) => builder.move_to(to.x as f32, to.y as f32),
-            Step::Line(to) => builder.line_to(to.x as f32, to.y as f32),
-            Step::Cubic(a, b, to) => {
+            PathStep::Move(to) => builder.move_to(to.x as f32, to.y as f32),
+            PathStep::Line(to) => builder.line_to(to.x as f32, to.y as f32),
+            PathStep::Cubic(a, b, to) => {
                 let [a, b, to] = [a, b, to].map(|point| point.as_vec2());
                 builder.cubic_to(a.x, a.y, b.x, b.y, to.x, to.y);
             }
-            Step::Close => builder.close(),
+            PathStep::Close => builder.close(),
         }
     }
     builder.finish()
 }
 
-fn ink(Color(red, green, blue): Color) -> Paint<'static> {
+fn solid_paint(Color(red, green, blue): Color) -> Paint<'static> {
     let mut paint = Paint::default();
     paint.set_color_rgba8(red, green, blue, 255);
     paint
 }
 
 fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, transform: Transform) {
-    let dash = stroke.dash.lengths().iter().map(|&length| length as f32);
+    let dash = stroke
+        .dash
+        .dash_lengths()
+        .iter()
+        .map(|&length| length as f32);
     let pen = Pen {
         width: stroke.width as f32,
         line_cap: LineCap::Round,
@@ -262,11 +281,11 @@ fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, tra
         dash: StrokeDash::new(dash.collect(), 0.0),
         ..Pen::default()
     };
-    canvas.stroke_path(path, &ink(stroke.color), &pen, transform, None);
+    canvas.stroke_path(path, &solid_paint(stroke.color), &pen, transform, None);
 }
 
 /// Writes rows as they are painted.
-fn encode(
+fn encode_bands(
     [width, height]: [u32; 2],
     bands: impl Iterator<Item = Pixmap>,
     out: &mut dyn Write,
@@ -299,7 +318,7 @@ fn encode(
     Ok(writer.finish()?)
 }
 
-static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+static FONT_FILE: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 
 pub struct Font {
     face: Face<'static>,
@@ -308,24 +327,24 @@ pub struct Font {
 impl Font {
     pub fn embedded() -> Self {
         Font {
-            face: Face::parse(FONT, 0).expect("the embedded font is whole"),
+            face: Face::parse(FONT_FILE, 0).expect("the embedded font is whole"),
         }
     }
 
-    pub fn width(&self, text: &str, size: f64) -> f64 {
+    pub fn text_width(&self, text: &str, size: f64) -> f64 {
         text.chars()
-            .map(|c| self.advance(self.glyph(c)))
+            .map(|c| self.glyph_advance(self.glyph_of_character(c)))
             .sum::<f64>()
-            * self.scale(size)
+            * self.units_to_size(size)
     }
 
     /// The text in lines no wider than `width`, unless a single word is.
-    pub fn wrapped(&self, text: &str, size: f64, width: f64) -> Vec<String> {
+    pub fn wrap_text(&self, text: &str, size: f64, width: f64) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         for word in text.split_whitespace() {
             if let Some(line) = lines.last_mut() {
                 let longer = format!("{line} {word}");
-                if self.width(&longer, size) <= width {
+                if self.text_width(&longer, size) <= width {
                     *line = longer;
                     continue;
                 }
@@ -336,90 +355,90 @@ impl Font {
     }
 
     /// The text, cut off with an ellipsis where it does not fit.
-    pub fn shortened(&self, text: &str, size: f64, width: f64) -> String {
+    pub fn shorten_text(&self, text: &str, size: f64, width: f64) -> String {
         let mut shown: String = text.chars().filter(|c| !c.is_control()).collect();
-        if self.width(&shown, size) <= width {
+        if self.text_width(&shown, size) <= width {
             return shown;
         }
-        while self.width(&shown, size) + size > width && shown.pop().is_some() {}
+        while self.text_width(&shown, size) + size > width && shown.pop().is_some() {}
         shown + "…"
     }
 
     /// The outlines of a text that starts at the origin of its base line.
-    pub fn outline(&self, text: &str, size: f64) -> Path {
-        let mut outline = Outline {
-            scale: self.scale(size),
-            start: 0.0,
+    pub fn text_outline(&self, text: &str, size: f64) -> DrawingPath {
+        let mut outline = GlyphOutlineBuilder {
+            scale: self.units_to_size(size),
+            line_position: 0.0,
             at: DVec2::ZERO,
             path: Vec::new(),
         };
-        for glyph in text.chars().map(|c| self.glyph(c)) {
+        for glyph in text.chars().map(|c| self.glyph_of_character(c)) {
             // Blanks have no outline.
             let _ = self.face.outline_glyph(glyph, &mut outline);
-            outline.start += self.advance(glyph) * outline.scale;
+            outline.line_position += self.glyph_advance(glyph) * outline.scale;
         }
         outline.path
     }
 
-    fn scale(&self, size: f64) -> f64 {
+    fn units_to_size(&self, size: f64) -> f64 {
         size / f64::from(self.face.units_per_em())
     }
 
     /// Characters that the font lacks appear as its empty box.
-    fn glyph(&self, c: char) -> GlyphId {
+    fn glyph_of_character(&self, c: char) -> GlyphId {
         self.face.glyph_index(c).unwrap_or(GlyphId(0))
     }
 
-    fn advance(&self, glyph: GlyphId) -> f64 {
+    fn glyph_advance(&self, glyph: GlyphId) -> f64 {
         f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0))
     }
 }
 
 /// Collects the outlines of glyphs: scaled, with y down as on the page, and moved along
 /// the base line.
-struct Outline {
+struct GlyphOutlineBuilder {
     scale: f64,
-    start: f64,
+    line_position: f64,
     at: DVec2,
-    path: Path,
+    path: DrawingPath,
 }
 
-impl Outline {
-    fn place(&mut self, x: f32, y: f32) -> DVec2 {
+impl GlyphOutlineBuilder {
+    fn page_point(&mut self, x: f32, y: f32) -> DVec2 {
         let point = self.scale * DVec2::new(f64::from(x), -f64::from(y));
-        self.at = point + DVec2::new(self.start, 0.0);
+        self.at = point + DVec2::new(self.line_position, 0.0);
         self.at
     }
 }
 
-impl OutlineBuilder for Outline {
+impl OutlineBuilder for GlyphOutlineBuilder {
     fn move_to(&mut self, x: f32, y: f32) {
-        let to = self.place(x, y);
-        self.path.push(Step::Move(to));
+        let to = self.page_point(x, y);
+        self.path.push(PathStep::Move(to));
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
-        let to = self.place(x, y);
-        self.path.push(Step::Line(to));
+        let to = self.page_point(x, y);
+        self.path.push(PathStep::Line(to));
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
         let from = self.at;
-        let control = self.place(x1, y1);
-        let to = self.place(x, y);
+        let control = self.page_point(x1, y1);
+        let to = self.page_point(x, y);
         // The equivalent cubic curve.
         let (a, b) = (from.lerp(control, 2.0 / 3.0), to.lerp(control, 2.0 / 3.0));
-        self.path.push(Step::Cubic(a, b, to));
+        self.path.push(PathStep::Cubic(a, b, to));
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let (a, b) = (self.place(x1, y1), self.place(x2, y2));
-        let to = self.place(x, y);
-        self.path.push(Step::Cubic(a, b, to));
+        let (a, b) = (self.page_point(x1, y1), self.page_point(x2, y2));
+        let to = self.page_point(x, y);
+        self.path.push(PathStep::Cubic(a, b, to));
     }
 
     fn close(&mut self) {
-        self.path.push(Step::Close);
+        self.path.push(PathStep::Close);
     }
 }
 
@@ -429,16 +448,16 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        assert_eq!(number(12.3456), "12.35");
-        assert_eq!(number(-0.001), "0");
-        assert_eq!(number(7.0), "7");
+        assert_eq!(format_coordinate(12.3456), "12.35");
+        assert_eq!(format_coordinate(-0.001), "0");
+        assert_eq!(format_coordinate(7.0), "7");
     }
 }
 
 #[cfg(test)]
 mod png_tests {
     use super::*;
-    use crate::figure::drawing::{DOT, INK, circle, rectangle};
+    use crate::figure::drawing::{DOT, INK, circle_path, rectangle_path};
     use std::io::Cursor;
 
     #[test]
@@ -446,22 +465,22 @@ mod png_tests {
         let mut page = Drawing::new(300.0, "");
         page.height = 700.0;
         let (corner, size) = (DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0));
-        page.shape(rectangle(corner, size), DOT, None);
+        page.draw_shape(rectangle_path(corner, size), DOT, None);
         for k in 0..14 {
             let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
-            page.stroke(circle(at, 45.0), Stroke::new(INK, 3.0));
-            page.label(at, "name", 20.0, Anchor::Start, INK);
-            page.rotated_label(at, "a long name of an axis", 20.0, INK);
+            page.draw_stroke(circle_path(at, 45.0), Stroke::new(INK, 3.0));
+            page.draw_label(at, "name", 20.0, TextAnchor::Start, INK);
+            page.draw_rotated_label(at, "a long name of an axis", 20.0, INK);
         }
         let (from, to) = (DVec2::new(0.0, 10.0), DVec2::new(300.0, 690.0));
-        page.line(from, to, Stroke::new(INK, 4.0));
+        page.draw_line(from, to, Stroke::new(INK, 4.0));
         let mut bytes = Vec::new();
         write_png(&page, &mut bytes).unwrap();
         let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
         let mut reader = reader.unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut pixels).unwrap();
-        let whole = paint(&page);
+        let whole = rasterize(&page);
         assert_eq!(4 * pixels.len(), 3 * whole.data().len());
         // Up to rounding at antialiased edges, by four subpixels each way.
         let pairs = pixels.chunks_exact(3).zip(whole.data().chunks_exact(4));
@@ -489,17 +508,17 @@ mod font_tests {
     #[test]
     fn lines_are_filled_up_to_the_width() {
         let font = Font::embedded();
-        let width = font.width("use more", 12.0) + 0.1;
-        let lines = font.wrapped("use more intervals or more", 12.0, width);
+        let width = font.text_width("use more", 12.0) + 0.1;
+        let lines = font.wrap_text("use more intervals or more", 12.0, width);
         assert_eq!(lines, ["use more", "intervals", "or more"]);
-        assert!(font.wrapped("", 12.0, width).is_empty());
+        assert!(font.wrap_text("", 12.0, width).is_empty());
     }
 
     #[test]
     fn long_names_are_cut() {
         let font = Font::embedded();
-        assert_eq!(font.shortened("explicit", 10.5, 200.0), "explicit");
-        let long = font.shortened(&"explicit ".repeat(20), 10.5, 200.0);
-        assert!(long.ends_with('…') && font.width(&long, 10.5) <= 200.0);
+        assert_eq!(font.shorten_text("explicit", 10.5, 200.0), "explicit");
+        let long = font.shorten_text(&"explicit ".repeat(20), 10.5, 200.0);
+        assert!(long.ends_with('…') && font.text_width(&long, 10.5) <= 200.0);
     }
 }

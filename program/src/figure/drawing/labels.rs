@@ -6,18 +6,20 @@
 //!
 //! Several leaves in small panels, seen by one camera, to one scale.
 
-use crate::figure::drawing::axes::{Axes, round_step};
+use crate::figure::drawing::axes::{PanelAxes, round_step};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::markers::{Marker, hold_marker, tip_marker};
-use crate::figure::drawing::space::{Camera, Margins, OBLIQUE, Scene, View, common_box};
-use crate::figure::drawing::{
-    Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color,
+use crate::figure::drawing::markers::{Marker, draw_support_marker, draw_tip_marker};
+use crate::figure::drawing::space::{
+    BoxMargins, OBLIQUE, ParallelProjection, SpacePanel, ViewAngles, common_bounding_box,
 };
-use crate::figure::leaf::Veins;
-use crate::figure::scenario::Setting;
-use crate::report::numbers::short;
+use crate::figure::drawing::{
+    CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, rectangle_path, vein_color,
+};
+use crate::figure::leaf::DrawnVeins;
+use crate::figure::scenario::FigureSetting;
+use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
-use leafdyn::scenario::Hold;
+use leafdyn::scenario::SupportKind;
 
 /// Spacing in pixels of the points on curves that labels keep clear of.
 const SPACING: f64 = 4.0;
@@ -36,52 +38,56 @@ const CLEAR: f64 = 5.0;
 /// Points closer than this share a label.
 const CLOSE: f64 = 10.0;
 
-pub struct Labels {
-    cell: Cell,
+pub struct LabelPlacement {
+    cell: PageRectangle,
     /// Points on curves.
-    taken: Vec<DVec2>,
+    curve_points: Vec<DVec2>,
     /// Labels drawn so far.
-    drawn: Vec<Cell>,
+    drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
-    wanted: Vec<(DVec2, String)>,
+    requested_labels: Vec<(DVec2, String)>,
 }
 
-impl Labels {
-    pub fn within(cell: Cell) -> Self {
-        Labels {
+impl LabelPlacement {
+    pub fn in_rectangle(cell: PageRectangle) -> Self {
+        LabelPlacement {
             cell,
-            taken: Vec::new(),
-            drawn: Vec::new(),
-            wanted: Vec::new(),
+            curve_points: Vec::new(),
+            drawn_labels: Vec::new(),
+            requested_labels: Vec::new(),
         }
     }
 
     /// Makes labels keep clear of a curve through these points.
-    pub fn avoid(&mut self, axes: &Axes, points: &[(f64, f64)]) {
-        let places: Vec<DVec2> = points.iter().filter_map(|&point| axes.at(point)).collect();
-        self.taken.extend(places.first());
+    pub fn avoid_curve(&mut self, axes: &PanelAxes, points: &[(f64, f64)]) {
+        let places: Vec<DVec2> = points
+            .iter()
+            .filter_map(|&point| axes.page_position(point))
+            .collect();
+        self.curve_points.extend(places.first());
         for pair in places.windows(2) {
             let parts = (pair[0].distance(pair[1]) / SPACING).ceil().max(1.0);
-            let room = MOST_PLACES.saturating_sub(self.taken.len());
+            let room = MOST_PLACES.saturating_sub(self.curve_points.len());
             let parts = (parts as usize).min(room);
             let place = |k: usize| pair[0].lerp(pair[1], k as f64 / parts as f64);
-            self.taken.extend((1..=parts).map(place));
+            self.curve_points.extend((1..=parts).map(place));
         }
     }
 
     /// Requests a label next to a point; points close to each other share one.
-    pub fn add(&mut self, at: DVec2, text: &str) {
-        let mut wanted = self.wanted.iter_mut();
+    pub fn request_label(&mut self, at: DVec2, text: &str) {
+        let mut wanted = self.requested_labels.iter_mut();
         match wanted.find(|(place, _)| place.distance(at) < CLOSE) {
             Some((_, texts)) => *texts += &format!(", {text}"),
-            None => self.wanted.push((at, text.into())),
+            None => self.requested_labels.push((at, text.into())),
         }
     }
 
     /// Draws all requested labels.
-    pub fn draw(&mut self, page: &mut Drawing) {
-        self.taken.extend(self.wanted.iter().map(|(at, _)| *at));
-        for (at, text) in std::mem::take(&mut self.wanted) {
+    pub fn draw_requested(&mut self, page: &mut Drawing) {
+        self.curve_points
+            .extend(self.requested_labels.iter().map(|(at, _)| *at));
+        for (at, text) in std::mem::take(&mut self.requested_labels) {
             let size = label_size(&text);
             let places = DISTANCES.into_iter().flat_map(|distance| {
                 (0..DIRECTIONS).map(move |k| {
@@ -93,39 +99,48 @@ impl Labels {
             let cells = places.map(|offset| {
                 // Wide labels are placed farther to the side.
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
-                Cell::new(at + offset + side - 0.5 * size, size)
+                PageRectangle::new(at + offset + side - 0.5 * size, size)
             });
-            if let Some((_, cell)) = clearest(cells, |cell| self.clearance(cell)) {
-                self.write(page, cell, &text, INK);
+            if let Some((_, cell)) = clearest_label(cells, |cell| self.clearance(cell)) {
+                self.draw_label_at(page, cell, &text, INK);
             }
         }
     }
 
-    pub fn write(&mut self, page: &mut Drawing, cell: Cell, text: &str, color: Color) {
-        page.centered_label(cell.middle(), text, TICK_SIZE, Anchor::Middle, color);
-        self.drawn.push(cell);
+    pub fn draw_label_at(
+        &mut self,
+        page: &mut Drawing,
+        cell: PageRectangle,
+        text: &str,
+        color: Color,
+    ) {
+        page.draw_centered_label(cell.middle(), text, TICK_SIZE, TextAnchor::Middle, color);
+        self.drawn_labels.push(cell);
     }
 
     /// The distance of a label from curves, at most [`CLEAR`]; negative where it leaves
     /// the panel or covers another label.
-    pub fn clearance(&self, label: &Cell) -> f64 {
+    pub fn clearance(&self, label: &PageRectangle) -> f64 {
         let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
-            && label.end().cmple(self.cell.end() - 2.0).all();
-        let apart = |other: &Cell| {
-            label.corner.cmpgt(other.end() + 1.0).any()
-                || label.end().cmplt(other.corner - 1.0).any()
+            && label
+                .opposite_corner()
+                .cmple(self.cell.opposite_corner() - 2.0)
+                .all();
+        let apart = |other: &PageRectangle| {
+            label.corner.cmpgt(other.opposite_corner() + 1.0).any()
+                || label.opposite_corner().cmplt(other.corner - 1.0).any()
         };
-        if !inside || !self.drawn.iter().all(apart) {
+        if !inside || !self.drawn_labels.iter().all(apart) {
             return -1.0;
         }
         let (middle, half) = (label.middle(), 0.5 * label.size);
         let far = |place: &DVec2| ((*place - middle).abs() - half).max(DVec2::ZERO).length();
-        self.taken.iter().map(far).fold(CLEAR, f64::min)
+        self.curve_points.iter().map(far).fold(CLEAR, f64::min)
     }
 }
 
 /// The first of these labels that is clear enough, or the clearest of all.
-pub fn clearest<T>(
+pub fn clearest_label<T>(
     labels: impl Iterator<Item = T>,
     clearance: impl Fn(&T) -> f64,
 ) -> Option<(f64, T)> {
@@ -143,7 +158,7 @@ pub fn clearest<T>(
 }
 
 pub fn label_size(text: &str) -> DVec2 {
-    DVec2::new(Font::embedded().width(text, TICK_SIZE), TICK_SIZE)
+    DVec2::new(Font::embedded().text_width(text, TICK_SIZE), TICK_SIZE)
 }
 
 pub const WIDTH: f64 = 900.0;
@@ -168,32 +183,32 @@ pub const TEXT_SIZE: f64 = 12.0;
 pub const TICK_SIZE: f64 = 10.5;
 
 #[derive(Clone, Copy)]
-pub struct Cell {
+pub struct PageRectangle {
     pub corner: DVec2,
     pub size: DVec2,
 }
 
-impl Cell {
+impl PageRectangle {
     pub fn new(corner: DVec2, size: DVec2) -> Self {
-        Cell { corner, size }
+        PageRectangle { corner, size }
     }
 
     /// A panel across the page that leaves this width on the right for a key.
-    pub fn left_of_key(top: f64, height: f64, key: f64) -> Self {
-        Cell::new(
+    pub fn left_of_legend(top: f64, height: f64, key: f64) -> Self {
+        PageRectangle::new(
             DVec2::new(LEFT, top),
             DVec2::new(WIDTH - LEFT - RIGHT - key, height),
         )
     }
 
-    pub fn end(&self) -> DVec2 {
+    pub fn opposite_corner(&self) -> DVec2 {
         self.corner + self.size
     }
 
     /// Of the four points at this inset from its corners, the one farthest from all points
     /// `taken`.
-    pub fn free_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
-        let (low, high) = (self.corner + inset, self.end() - inset);
+    pub fn emptiest_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
+        let (low, high) = (self.corner + inset, self.opposite_corner() - inset);
         let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
         let mut free = [f64::INFINITY; 4];
         for point in taken {
@@ -216,27 +231,33 @@ impl Cell {
         [self.middle() - half, self.middle() + half]
     }
 
-    pub fn line(&self, page: &mut Drawing, stroke: Stroke) {
+    pub fn draw_midline(&self, page: &mut Drawing, stroke: Stroke) {
         let [from, to] = self.midline();
-        page.line(from, to, stroke);
+        page.draw_line(from, to, stroke);
     }
 }
 
 /// Draws a panel's title above its frame.
-pub fn title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
-    title_in(page, corner, letter, text, NOTE);
+pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
+    draw_colored_title(page, corner, letter, text, NOTE);
 }
 
 /// Draws a panel's title above its frame, with the text in this colour.
-pub fn title_in(page: &mut Drawing, corner: DVec2, letter: &str, text: &str, color: Color) {
+pub fn draw_colored_title(
+    page: &mut Drawing,
+    corner: DVec2,
+    letter: &str,
+    text: &str,
+    color: Color,
+) {
     let base = corner - DVec2::new(0.0, 8.0);
-    page.label(base, letter, TEXT_SIZE, Anchor::Start, INK);
+    page.draw_label(base, letter, TEXT_SIZE, TextAnchor::Start, INK);
     let base = base + DVec2::new(24.0, 0.0);
-    page.label(base, text, TEXT_SIZE, Anchor::Start, color);
+    page.draw_label(base, text, TEXT_SIZE, TextAnchor::Start, color);
 }
 
 /// Letters of panels: `(a)`, `(b)`, ...
-pub fn letters() -> impl Iterator<Item = String> + Clone {
+pub fn panel_letters() -> impl Iterator<Item = String> + Clone {
     (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
 }
 
@@ -246,38 +267,50 @@ const TITLE_BASE: f64 = 38.0;
 pub const NOTE_BASE: f64 = 60.0;
 
 /// A page of the default width with a header whose text begins at `left`.
-pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) -> Drawing {
+pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&DrawnVeins>) -> Drawing {
     let mut drawing = Drawing::new(WIDTH, title);
-    drawing.group("header", |page| header(page, left, title, notes, leaf));
+    drawing.draw_group("header", |page| draw_header(page, left, title, notes, leaf));
     drawing
 }
 
 /// Draws the title, cut off where it does not fit, the notes and, given a leaf, the key
 /// to its veins. The text begins at `left`.
-pub fn header(page: &mut Drawing, left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) {
+pub fn draw_header(
+    page: &mut Drawing,
+    left: f64,
+    title: &str,
+    notes: &[String],
+    leaf: Option<&DrawnVeins>,
+) {
     let font = Font::embedded();
     let right = match leaf {
-        Some(veins) => key(page, veins, &font) - 20.0,
+        Some(veins) => draw_vein_legend(page, veins, &font) - 20.0,
         None => page.width - RIGHT,
     };
-    let title = font.shortened(title, TITLE_SIZE, right - left);
+    let title = font.shorten_text(title, TITLE_SIZE, right - left);
     let base = DVec2::new(left, TITLE_BASE);
-    page.label(base, &title, TITLE_SIZE, Anchor::Start, INK);
+    page.draw_label(base, &title, TITLE_SIZE, TextAnchor::Start, INK);
     // Spaces that SVG does not collapse.
     let notes = notes.join("\u{a0}\u{a0}·\u{a0}\u{a0}");
     let base = DVec2::new(left, NOTE_BASE);
-    page.label(base, &notes, TEXT_SIZE, Anchor::Start, NOTE);
+    page.draw_label(base, &notes, TEXT_SIZE, TextAnchor::Start, NOTE);
 }
 
 /// Draws the key at the right end of the header; returns where it starts.
-fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
+fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 {
     const MIDDLE: f64 = 32.0;
     const BAR: DVec2 = DVec2::new(120.0, 9.0);
     const BAR_STEPS: u32 = 60;
     let mut x = page.width - RIGHT;
     let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
-        page.centered_label(DVec2::new(*x, MIDDLE), text, TEXT_SIZE, Anchor::End, NOTE);
-        *x -= font.width(text, TEXT_SIZE) + 6.0;
+        page.draw_centered_label(
+            DVec2::new(*x, MIDDLE),
+            text,
+            TEXT_SIZE,
+            TextAnchor::End,
+            NOTE,
+        );
+        *x -= font.text_width(text, TEXT_SIZE) + 6.0;
     };
     if veins.count > 1 {
         text_before(page, &mut x, &veins.count.to_string());
@@ -290,16 +323,16 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
             let overlap = if i + 1 < BAR_STEPS { 0.5 } else { 0.0 };
             let start = corner + f64::from(i) * DVec2::new(part.x, 0.0);
             let size = part + DVec2::new(overlap, 0.0);
-            page.shape(rectangle(start, size), color, None);
+            page.draw_shape(rectangle_path(start, size), color, None);
         }
         x -= 6.0;
         text_before(page, &mut x, "vein 1");
         x -= 16.0;
     }
-    let held = |how: Hold| {
+    let held = |how: SupportKind| {
         let mut grips = veins.grips.iter();
-        let ends = veins.base_held == how || veins.tip_held == Some(how);
-        ends || grips.any(|grip| grip.held == how)
+        let ends = veins.base_support == how || veins.tip_support == Some(how);
+        ends || grips.any(|grip| grip.support == how)
     };
     let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
     let mut entry = |page: &mut Drawing, name: &str, marker: &dyn Fn(&mut Drawing, DVec2)| {
@@ -307,12 +340,15 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
         marker(page, DVec2::new(x - 3.0, MIDDLE));
         x -= 26.0;
     };
-    if veins.tip_held.is_none() {
-        entry(page, tips, &tip_marker);
+    if veins.tip_support.is_none() {
+        entry(page, tips, &draw_tip_marker);
     }
-    for (how, name) in [(Hold::Clamped, "clamp"), (Hold::Pinned, "pinned")] {
+    for (how, name) in [
+        (SupportKind::Clamped, "clamp"),
+        (SupportKind::Pinned, "pinned"),
+    ] {
         if held(how) {
-            entry(page, name, &|page, at| hold_marker(page, at, how));
+            entry(page, name, &|page, at| draw_support_marker(page, at, how));
         }
     }
     x + 16.0
@@ -336,71 +372,73 @@ const SAMPLE_HEIGHT: f64 = 12.0;
 pub const MOST_NAMED: usize = 7;
 
 /// The key of a panel: a column of samples with their names.
-pub struct Key {
+pub struct Legend {
     /// Left end and middle of the next entry's first line.
     at: DVec2,
 }
 
-impl Key {
+impl Legend {
     const SAMPLE: f64 = 26.0;
 
-    pub fn right_of(panel: Cell) -> Self {
-        Key {
-            at: DVec2::new(panel.end().x + 14.0, panel.corner.y + 8.0),
+    pub fn right_of(panel: PageRectangle) -> Self {
+        Legend {
+            at: DVec2::new(panel.opposite_corner().x + 14.0, panel.corner.y + 8.0),
         }
     }
 
     /// Adds a sample with a name and a note, in as many lines as they need.
-    pub fn entry(
+    pub fn add_entry(
         &mut self,
         page: &mut Drawing,
         name: &str,
         note: &str,
-        sample: impl FnOnce(&mut Drawing, Cell),
+        sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
         let font = Font::embedded();
-        sample(page, sample_cell(self.at, Self::SAMPLE));
+        sample(page, sample_rectangle(self.at, Self::SAMPLE));
         let left = self.at.x + Self::SAMPLE + GAP;
         let room = page.width - 6.0 - left;
         for (text, color) in [(name, INK), (note, NOTE)] {
-            for line in font.wrapped(text, TICK_SIZE, room) {
-                let line = font.shortened(&line, TICK_SIZE, room);
+            for line in font.wrap_text(text, TICK_SIZE, room) {
+                let line = font.shorten_text(&line, TICK_SIZE, room);
                 let at = DVec2::new(left, self.at.y);
-                page.centered_label(at, &line, TICK_SIZE, Anchor::Start, color);
+                page.draw_centered_label(at, &line, TICK_SIZE, TextAnchor::Start, color);
                 self.at.y += LINE;
             }
         }
         self.at.y += ENTRY_GAP;
     }
 
-    pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
-        self.entry(page, name, note, |page, cell| cell.line(page, stroke));
+    pub fn add_line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
+        self.add_entry(page, name, note, |page, cell| {
+            cell.draw_midline(page, stroke)
+        });
     }
 
     /// Adds the first of numbered curves with their names and notes.
-    pub fn curves(
+    pub fn add_curves(
         &mut self,
         page: &mut Drawing,
         curves: impl ExactSizeIterator<Item = (String, String)>,
     ) {
         let more = curves.len().saturating_sub(MOST_NAMED);
         for ((name, note), color) in curves.take(MOST_NAMED).zip(CURVES) {
-            self.line(page, &name, &note, Stroke::new(color, 1.8));
+            self.add_line(page, &name, &note, Stroke::new(color, 1.8));
         }
         if more > 0 {
-            self.entry(page, "", &format!("and {more} more"), |_, _| ());
+            self.add_entry(page, "", &format!("and {more} more"), |_, _| ());
         }
     }
 
     /// Adds a line with marked points.
-    pub fn marked_line(&mut self, page: &mut Drawing, name: &str, note: &str, color: Color) {
-        self.entry(page, name, note, |page, cell| {
-            cell.line(page, Stroke::new(color, 1.6));
+    pub fn add_marked_line(&mut self, page: &mut Drawing, name: &str, note: &str, color: Color) {
+        self.add_entry(page, name, note, |page, cell| {
+            cell.draw_midline(page, Stroke::new(color, 1.6));
             Marker::Dot.draw(page, cell.middle(), color);
         });
     }
 
-    pub fn marker(
+    pub fn add_marker(
         &mut self,
         page: &mut Drawing,
         name: &str,
@@ -408,53 +446,53 @@ impl Key {
         marker: Marker,
         color: Color,
     ) {
-        self.entry(page, name, note, |page, cell| {
+        self.add_entry(page, name, note, |page, cell| {
             marker.draw(page, cell.middle(), color)
         });
     }
 }
 
 /// A key above the panels: rows of samples with their names.
-pub struct KeyRows {
+pub struct LegendRows {
     left: f64,
     at: DVec2,
     sample: f64,
 }
 
-impl KeyRows {
+impl LegendRows {
     /// Rows that begin at `left`, the first with its base line at `base`, with samples of
     /// this width.
-    pub fn at(left: f64, base: f64, sample: f64) -> Self {
-        KeyRows {
+    pub fn starting_at(left: f64, base: f64, sample: f64) -> Self {
+        LegendRows {
             left,
             at: DVec2::new(left, base - 0.36 * TEXT_SIZE),
             sample,
         }
     }
 
-    pub fn entry(
+    pub fn add_entry(
         &mut self,
         page: &mut Drawing,
         name: &str,
-        sample: impl FnOnce(&mut Drawing, Cell),
+        sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
-        let width = self.sample + GAP + Font::embedded().width(name, TEXT_SIZE);
+        let width = self.sample + GAP + Font::embedded().text_width(name, TEXT_SIZE);
         if self.at.x > self.left && self.at.x + width > page.width - RIGHT {
             self.at = DVec2::new(self.left, self.at.y + ROW);
         }
-        sample(page, sample_cell(self.at, self.sample));
+        sample(page, sample_rectangle(self.at, self.sample));
         let text = self.at + DVec2::new(self.sample + GAP, 0.0);
-        page.centered_label(text, name, TEXT_SIZE, Anchor::Start, INK);
+        page.draw_centered_label(text, name, TEXT_SIZE, TextAnchor::Start, INK);
         self.at.x += width + ROW_ENTRY_GAP;
     }
 
-    pub fn end(&self) -> f64 {
+    pub fn bottom(&self) -> f64 {
         self.at.y + 18.0
     }
 }
 
-fn sample_cell(at: DVec2, width: f64) -> Cell {
-    Cell::new(
+fn sample_rectangle(at: DVec2, width: f64) -> PageRectangle {
+    PageRectangle::new(
         at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
         DVec2::new(width, SAMPLE_HEIGHT),
     )
@@ -479,7 +517,7 @@ const GRID: f64 = 17.0;
 /// Factor of the line width of veins in small panels.
 pub const THINNER: f64 = 0.75;
 
-const MARGINS: Margins = Margins {
+const MARGINS: BoxMargins = BoxMargins {
     left: 14.0,
     right: 14.0,
     below: 14.0,
@@ -488,9 +526,9 @@ const MARGINS: Margins = Margins {
 /// Where the panels are, and the box that all of them show.
 pub struct SmallPanels<'s> {
     bounds: [DVec3; 2],
-    setting: &'s Setting,
+    setting: &'s FigureSetting,
     /// Displayed width of a square of the grid.
-    step: f64,
+    grid_step: f64,
     size: DVec2,
     top: f64,
     count: usize,
@@ -498,21 +536,21 @@ pub struct SmallPanels<'s> {
 
 impl<'s> SmallPanels<'s> {
     /// `count` panels from `top` on that can hold any of these shapes.
-    pub fn holding<'a>(
-        shapes: impl Iterator<Item = &'a Veins>,
+    pub fn fitted_to_shapes<'a>(
+        shapes: impl Iterator<Item = &'a DrawnVeins>,
         count: usize,
-        setting: &'s Setting,
+        setting: &'s FigureSetting,
         top: f64,
     ) -> Self {
-        let bounds = common_box(shapes);
+        let bounds = common_bounding_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * PANEL_GAP) / COLUMNS as f64;
-        let extent = Camera::facing(OBLIQUE).extent(bounds);
+        let extent = ParallelProjection::from_view(OBLIQUE).projected_extent(bounds);
         let height = (width - MARGINS.left - MARGINS.right) * extent.y / extent.x + MARGINS.below;
         let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
-        let scale = (MARGINS.inside(size) / extent).min_element();
+        let scale = (MARGINS.inner_size(size) / extent).min_element();
         SmallPanels {
             bounds,
-            step: round_step(setting.scale() * GRID / scale),
+            grid_step: round_step(setting.value_per_length() * GRID / scale),
             setting,
             size,
             top,
@@ -522,50 +560,60 @@ impl<'s> SmallPanels<'s> {
 
     /// Formats the width of a square of the grid.
     pub fn grid_width(&self) -> String {
-        format!("{} {}", short(self.step), self.setting.unit())
+        format!(
+            "{} {}",
+            format_four_digits(self.grid_step),
+            self.setting.length_unit()
+        )
     }
 
-    fn cell(&self, index: usize) -> Cell {
+    fn panel_rectangle(&self, index: usize) -> PageRectangle {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
         let pitch = self.size + DVec2::new(PANEL_GAP, PANEL_TITLE + PANEL_GAP);
-        Cell::new(
+        PageRectangle::new(
             DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
             self.size,
         )
     }
 
-    pub fn end(&self) -> f64 {
+    pub fn bottom(&self) -> f64 {
         let rows = self.count.div_ceil(COLUMNS).max(1);
         let row = PANEL_TITLE + self.size.y + PANEL_GAP;
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
     /// Draws a leaf with its letter and title in its panel.
-    pub fn draw(&self, page: &mut Drawing, index: usize, veins: &Veins, caption: [&str; 2]) {
+    pub fn draw_leaf(
+        &self,
+        page: &mut Drawing,
+        index: usize,
+        veins: &DrawnVeins,
+        caption: [&str; 2],
+    ) {
         let [letter, text] = caption;
-        let scene = self.begin(page, (index, 0.0), OBLIQUE, (letter, text, NOTE));
+        let scene = self.draw_empty_panel(page, (index, 0.0), OBLIQUE, (letter, text, NOTE));
         scene.draw_leaf(page, veins, THINNER * veins.line_width());
     }
 
     /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
     /// title in a colour. The first also shows the names of the axes and gravity, and each the wind
     /// if that changes.
-    pub fn begin(
+    pub fn draw_empty_panel(
         &self,
         page: &mut Drawing,
         (index, time): (usize, f64),
-        view: View,
+        view: ViewAngles,
         (letter, text, color): (&str, &str, Color),
-    ) -> Scene<'s> {
-        let cell = self.cell(index);
-        title_in(page, cell.corner, letter, text, color);
-        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.step));
-        let scene = Scene::new(bounds, setting, view, cell, MARGINS, step);
+    ) -> SpacePanel<'s> {
+        let cell = self.panel_rectangle(index);
+        draw_colored_title(page, cell.corner, letter, text, color);
+        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
+        let scene = SpacePanel::new(bounds, setting, view, cell, MARGINS, step);
         scene.draw_box(page);
         if index == 0 {
-            scene.draw_names(page, 9.0, false);
+            scene.draw_axis_names(page, 9.0, false);
         }
-        scene.draw_arrows(page, index == 0, time);
+        scene.draw_direction_arrows(page, index == 0, time);
         scene
     }
 }
@@ -573,54 +621,58 @@ impl<'s> SmallPanels<'s> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::drawing::Mark;
+    use crate::figure::drawing::DrawingElement;
     use crate::figure::drawing::axes::Axis;
 
     #[test]
     fn labels_cover_neither_curves_nor_each_other() {
-        let cell = Cell::new(DVec2::ZERO, DVec2::new(300.0, 200.0));
-        let axes = Axes {
+        let cell = PageRectangle::new(DVec2::ZERO, DVec2::new(300.0, 200.0));
+        let axes = PanelAxes {
             cell,
             across: Axis::linear("", 0.0, 1.0),
             up: Axis::linear("", 0.0, 1.0),
         };
         let curves = [0.3, 0.5].map(|slope| [(0.0, 0.2), (1.0, 0.2 + slope)]);
-        let mut labels = Labels::within(cell);
+        let mut labels = LabelPlacement::in_rectangle(cell);
         let mut points = Vec::new();
         for curve in &curves {
-            labels.avoid(&axes, curve);
+            labels.avoid_curve(&axes, curve);
             let at = |x: f64| (x, curve[0].1 + x * (curve[1].1 - curve[0].1));
             points.extend([0.0, 0.1, 0.5, 1.0].map(at));
         }
         for (k, &point) in points.iter().enumerate() {
-            labels.add(axes.at(point).unwrap(), &(k + 1).to_string());
+            labels.request_label(axes.page_position(point).unwrap(), &(k + 1).to_string());
         }
-        let taken = labels.taken.clone();
+        let taken = labels.curve_points.clone();
         let mut page = Drawing::new(300.0, "");
-        labels.draw(&mut page);
+        labels.draw_requested(&mut page);
         let label = |mark| match mark {
-            Mark::Label(label) => Some(label),
+            DrawingElement::Label(label) => Some(label),
             _ => None,
         };
-        let texts: Vec<_> = page.marks.into_iter().filter_map(label).collect();
+        let texts: Vec<_> = page.elements.into_iter().filter_map(label).collect();
         // Both curves begin at one point: labels there are shared.
         assert_eq!(texts[0].text, "1, 5");
         assert_eq!(texts.len(), 6);
         let font = Font::embedded();
         let boxes = texts.iter().map(|label| {
-            let size = DVec2::new(font.width(&label.text, label.size), 0.7 * label.size);
-            let corner = label.at - DVec2::new(0.5 * size.x, size.y);
-            Cell { corner, size }
+            let size = DVec2::new(font.text_width(&label.text, label.size), 0.7 * label.size);
+            let corner = label.position - DVec2::new(0.5 * size.x, size.y);
+            PageRectangle { corner, size }
         });
-        let boxes: Vec<Cell> = boxes.collect();
+        let boxes: Vec<PageRectangle> = boxes.collect();
         for (k, one) in boxes.iter().enumerate() {
-            let covers =
-                |place: &DVec2| place.cmpgt(one.corner).all() && place.cmplt(one.end()).all();
+            let covers = |place: &DVec2| {
+                place.cmpgt(one.corner).all() && place.cmplt(one.opposite_corner()).all()
+            };
             assert!(!taken.iter().any(covers), "{}", texts[k].text);
-            assert!(one.corner.cmpge(cell.corner).all() && one.end().cmple(cell.end()).all());
+            assert!(
+                one.corner.cmpge(cell.corner).all()
+                    && one.opposite_corner().cmple(cell.opposite_corner()).all()
+            );
             for other in &boxes[..k] {
-                let apart =
-                    one.corner.cmpgt(other.end()).any() || one.end().cmplt(other.corner).any();
+                let apart = one.corner.cmpgt(other.opposite_corner()).any()
+                    || one.opposite_corner().cmplt(other.corner).any();
                 assert!(apart, "{}", texts[k].text);
             }
         }

@@ -6,15 +6,16 @@
 //! Dead moments on a rod as curved arrows about their axes, by the right-hand rule.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{Cell, TICK_SIZE};
+use crate::figure::drawing::labels::{PageRectangle, TICK_SIZE};
 use crate::figure::drawing::{
-    Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, polyline, rectangle,
+    Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, polygon_path,
+    polyline_path, rectangle_path,
 };
-use crate::figure::leaf::{Gripped, Veins};
-use crate::figure::scenario::{Action, LoadMark, load_marks};
-use crate::report::numbers::short;
+use crate::figure::leaf::{DrawnVeins, GrippedStretch};
+use crate::figure::scenario::{LoadKind, LoadMark, load_marks};
+use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
-use leafdyn::scenario::{Hold, Scenario};
+use leafdyn::scenario::{Scenario, SupportKind};
 use std::f64::consts::PI;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,102 +35,102 @@ impl Marker {
     pub fn draw(self, page: &mut Drawing, at: DVec2, color: Color) {
         let shape = |corners: &[[f64; 2]]| {
             let corners = corners.iter().map(|&corner| at + DVec2::from_array(corner));
-            polygon(&corners.collect::<Vec<_>>())
+            polygon_path(&corners.collect::<Vec<_>>())
         };
         let path = match self {
-            Marker::Dot => circle(at, 2.4),
-            Marker::Circle => circle(at, 3.4),
+            Marker::Dot => circle_path(at, 2.4),
+            Marker::Circle => circle_path(at, 3.4),
             Marker::Square => shape(&[[-3.1, -3.1], [3.1, -3.1], [3.1, 3.1], [-3.1, 3.1]]),
             Marker::Triangle => shape(&[[0.0, -4.2], [4.0, 3.0], [-4.0, 3.0]]),
             Marker::Wedge => shape(&[[0.0, 4.2], [4.0, -3.0], [-4.0, -3.0]]),
             Marker::Diamond => shape(&[[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]]),
             Marker::Ring => {
-                return page.shape(circle(at, 3.4), WHITE, Some(Stroke::new(color, 1.4)));
+                return page.draw_shape(circle_path(at, 3.4), WHITE, Some(Stroke::new(color, 1.4)));
             }
-            Marker::Cross => return cross(page, at, 3.6, Stroke::new(color, 1.7)),
+            Marker::Cross => return draw_cross(page, at, 3.6, Stroke::new(color, 1.7)),
         };
-        page.shape(path, color, Some(Stroke::new(WHITE, 0.8)));
+        page.draw_shape(path, color, Some(Stroke::new(WHITE, 0.8)));
     }
 }
 
-fn cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
+fn draw_cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
     for arm in [DVec2::new(half, half), DVec2::new(half, -half)] {
-        page.line(at - arm, at + arm, stroke);
+        page.draw_line(at - arm, at + arm, stroke);
     }
 }
 
 /// Marks where the rods are clamped; larger than the tip's marker, which may cover it.
-pub fn clamp_marker(page: &mut Drawing, at: DVec2) {
+pub fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
     let rim = Some(Stroke::new(WHITE, 1.0));
-    page.shape(rectangle(at - half, 2.0 * half), INK, rim);
+    page.draw_shape(rectangle_path(at - half, 2.0 * half), INK, rim);
 }
 
 /// Marks the joint tip, or the tip of a single rod.
-pub fn tip_marker(page: &mut Drawing, at: DVec2) {
+pub fn draw_tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
 /// Marks what is held of a vein's end.
-pub fn hold_marker(page: &mut Drawing, at: DVec2, held: Hold) {
+pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
     match held {
-        Hold::Clamped => clamp_marker(page, at),
-        Hold::Pinned => Marker::Triangle.draw(page, at, INK),
+        SupportKind::Clamped => draw_clamp_marker(page, at),
+        SupportKind::Pinned => Marker::Triangle.draw(page, at, INK),
     }
 }
 
 /// Draws the markers of a leaf: those along its veins, and of its bases and tips.
-pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
-    vein_markers(page, veins, &place);
+pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
+    draw_vein_markers(page, veins, &place);
     let mut bases: Vec<DVec3> = Vec::new();
     for base in veins.bases() {
         if !bases.contains(&base) {
-            hold_marker(page, place(base), veins.base_held);
+            draw_support_marker(page, place(base), veins.base_support);
             bases.push(base);
         }
     }
     if let [(tip, _)] = veins.tips.as_slice() {
-        return match veins.tip_held {
-            Some(held) => hold_marker(page, place(*tip), held),
-            None => tip_marker(page, place(*tip)),
+        return match veins.tip_support {
+            Some(held) => draw_support_marker(page, place(*tip), held),
+            None => draw_tip_marker(page, place(*tip)),
         };
     }
     // Many are small.
     let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
     for (tip, color) in &veins.tips {
         let rim = Stroke::new(*color, 0.5 * radius);
-        page.shape(circle(place(*tip), radius), WHITE, Some(rim));
+        page.draw_shape(circle_path(place(*tip), radius), WHITE, Some(rim));
     }
 }
 
 /// Draws the markers along veins: points of a second solution, moments and grips.
-pub fn vein_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
+pub fn draw_vein_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
-        dot(page, place(point), radius);
+        draw_second_solution_dot(page, place(point), radius);
     }
     for moment in &veins.moments {
-        moment.draw(page, veins.extent(), &place);
+        moment.draw(page, veins.largest_extent(), &place);
     }
     for grip in &veins.grips {
-        grip_markers(page, grip, veins.line_width(), &place);
+        draw_grip_markers(page, grip, veins.line_width(), &place);
     }
 }
 
 /// Marks where a grip holds a vein: a stretch with both of its ends, or a point; pinned or clamped.
-fn grip_markers(
+fn draw_grip_markers(
     page: &mut Drawing,
-    grip: &Gripped,
+    grip: &GrippedStretch,
     line_width: f64,
     place: impl Fn(DVec3) -> DVec2,
 ) {
     let points: Vec<DVec2> = grip.points.iter().map(|&point| place(point)).collect();
-    let marker = match grip.held {
-        Hold::Clamped => Marker::Square,
-        Hold::Pinned => Marker::Triangle,
+    let marker = match grip.support {
+        SupportKind::Clamped => Marker::Square,
+        SupportKind::Pinned => Marker::Triangle,
     };
     if let [first, .., last] = points.as_slice() {
-        page.stroke(polyline(&points), Stroke::new(INK, 1.6 + line_width));
+        page.draw_stroke(polyline_path(&points), Stroke::new(INK, 1.6 + line_width));
         marker.draw(page, *first, INK);
         marker.draw(page, *last, INK);
     } else if let [point] = points.as_slice() {
@@ -138,8 +139,8 @@ fn grip_markers(
 }
 
 /// Marks a point of a second solution, in a colour that no vein has.
-pub fn dot(page: &mut Drawing, at: DVec2, radius: f64) {
-    page.shape(circle(at, radius), DOT, None);
+pub fn draw_second_solution_dot(page: &mut Drawing, at: DVec2, radius: f64) {
+    page.draw_shape(circle_path(at, radius), DOT, None);
 }
 
 /// Length in pixels of an arrow that lies in the plane of the page.
@@ -154,31 +155,35 @@ const INSET: DVec2 = DVec2::new(28.0, 32.0);
 /// Draws a direction with its name in the corner of a panel that is farthest from the points
 /// `taken`; returns where. `direction` is the projection of its unit vector onto the page, `toward`
 /// whether it points towards the viewer.
-pub fn draw_arrow(
+pub fn draw_direction_arrow(
     page: &mut Drawing,
-    cell: Cell,
+    cell: PageRectangle,
     taken: &[DVec2],
     (direction, toward): (DVec2, bool),
     name: &str,
 ) -> DVec2 {
-    let at = cell.free_corner(INSET, taken.iter().copied());
+    let at = cell.emptiest_corner(INSET, taken.iter().copied());
     let stroke = Stroke::new(INK, 1.3);
     if direction.length() < END_ON {
-        page.stroke(circle(at, 6.0), stroke);
+        page.draw_stroke(circle_path(at, 6.0), stroke);
         match toward {
-            true => page.shape(circle(at, 1.8), INK, None),
-            false => cross(page, at, 4.2, stroke),
+            true => page.draw_shape(circle_path(at, 1.8), INK, None),
+            false => draw_cross(page, at, 4.2, stroke),
         }
     } else {
         let (half, along) = (0.5 * ARROW * direction, direction.normalize());
         let (end, across) = (at + half, 3.4 * along.perp());
         let neck = end - 8.0 * along;
-        page.line(at - half, neck, stroke);
-        page.shape(polygon(&[end, neck + across, neck - across]), INK, None);
+        page.draw_line(at - half, neck, stroke);
+        page.draw_shape(
+            polygon_path(&[end, neck + across, neck - across]),
+            INK,
+            None,
+        );
     }
     let below = 0.5 * ARROW * direction.y.abs().max(0.4) + 11.0;
     let foot = at + DVec2::new(0.0, below);
-    page.label(foot, name, TICK_SIZE, Anchor::Middle, NOTE);
+    page.draw_label(foot, name, TICK_SIZE, TextAnchor::Middle, NOTE);
     at
 }
 
@@ -194,7 +199,7 @@ const GAP: f64 = 9.0;
 const ARROW_END_ON: f64 = 6.0;
 
 /// The arrow of a force on a rod.
-pub struct Force {
+pub struct ForceArrow {
     /// From its tail to its head.
     pub ends: [DVec3; 2],
     head: [f64; 2],
@@ -204,47 +209,50 @@ pub struct Force {
 
 /// The forces on a single rod whose largest extent is `extent`; `at` gives the point at a fraction of
 /// its length, with the tangent there.
-pub fn forces(
+pub fn force_arrows(
     scenario: &Scenario,
     extent: f64,
     at: impl Fn(f64) -> Option<(DVec3, DVec3)>,
-) -> Vec<Force> {
+) -> Vec<ForceArrow> {
     let unit = scenario.units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     let marks = load_marks(scenario, None).into_iter();
     let arrow = |mark: LoadMark| {
         let (place, tangent) = at(mark.at)?;
-        let along = mark.action == Action::Distributed;
+        let along = mark.action == LoadKind::Distributed;
         // One that pushes against the rod ends at the point, any other begins there.
         let pushes = mark.direction.dot(tangent) < -0.5;
         let start = if pushes || along { -1.0 } else { 0.0 };
         let reach = mark.length * extent * mark.direction;
-        Some(Force {
+        Some(ForceArrow {
             ends: [start, start + 1.0].map(|part| place + part * reach),
             head: if along { SMALL_HEAD } else { HEAD },
             label: match along {
                 true => String::new(),
-                false => format!("force {}{unit}", short(mark.size)),
+                false => format!("force {}{unit}", format_four_digits(mark.size)),
             },
         })
     };
-    let forces = marks.filter(|mark| mark.action != Action::Moment);
+    let forces = marks.filter(|mark| mark.action != LoadKind::Moment);
     forces.filter_map(arrow).collect()
 }
 
-impl Force {
+impl ForceArrow {
     /// Draws it; its label stays inside the panel.
-    pub fn draw(&self, page: &mut Drawing, cell: Cell, place: impl Fn(DVec3) -> DVec2) {
+    pub fn draw(&self, page: &mut Drawing, cell: PageRectangle, place: impl Fn(DVec3) -> DVec2) {
         let [tail, tip] = self.ends.map(place);
         let [length, half] = self.head;
         let along = (tip - tail).normalize_or_zero();
         if (tip - tail).length() > ARROW_END_ON {
             let (neck, side) = (tip - length * along, half * along.perp());
-            page.line(tail, neck, Stroke::new(INK, 1.5));
-            page.shape(polygon(&[tip, neck + side, neck - side]), INK, None);
+            page.draw_line(tail, neck, Stroke::new(INK, 1.5));
+            page.draw_shape(polygon_path(&[tip, neck + side, neck - side]), INK, None);
         }
         // Beside the middle of the arrow, or below it where it lies flat.
-        let size = DVec2::new(Font::embedded().width(&self.label, TICK_SIZE), TICK_SIZE);
+        let size = DVec2::new(
+            Font::embedded().text_width(&self.label, TICK_SIZE),
+            TICK_SIZE,
+        );
         let side = if along.x.abs() < 0.7 {
             DVec2::X
         } else {
@@ -254,10 +262,10 @@ impl Force {
         let middle = 0.5 * (tail + tip) + reach * side;
         let (low, high) = (
             cell.corner + 0.5 * size + 3.0,
-            cell.end() - 0.5 * size - 3.0,
+            cell.opposite_corner() - 0.5 * size - 3.0,
         );
         let middle = middle.max(low).min(high);
-        page.centered_label(middle, &self.label, TICK_SIZE, Anchor::Middle, NOTE);
+        page.draw_centered_label(middle, &self.label, TICK_SIZE, TextAnchor::Middle, NOTE);
     }
 }
 
@@ -273,43 +281,43 @@ const PIECES: usize = 24;
 const ARC_HEAD: [f64; 2] = [8.0, 3.4];
 
 /// A dead moment on a rod.
-pub struct Moment {
-    pub at: DVec3,
+pub struct MomentArrow {
+    pub position: DVec3,
     /// Of length one.
     pub axis: DVec3,
     pub size: f64,
 }
 
 /// The moments on a leaf, of those that load it; `at` gives the point at a fraction of its only rod.
-pub fn moments(marks: &[LoadMark], at: impl Fn(f64) -> Option<DVec3>) -> Vec<Moment> {
-    let moments = marks.iter().filter(|mark| mark.action == Action::Moment);
+pub fn moment_arrows(marks: &[LoadMark], at: impl Fn(f64) -> Option<DVec3>) -> Vec<MomentArrow> {
+    let moments = marks.iter().filter(|mark| mark.action == LoadKind::Moment);
     let moment = |mark: &LoadMark| {
-        Some(Moment {
+        Some(MomentArrow {
             axis: mark.direction,
             size: mark.size,
-            at: at(mark.at)?,
+            position: at(mark.at)?,
         })
     };
     moments.filter_map(moment).collect()
 }
 
-impl Moment {
+impl MomentArrow {
     /// Draws it on a leaf of this extent.
     pub fn draw(&self, page: &mut Drawing, extent: f64, place: impl Fn(DVec3) -> DVec2) {
         let across = self.axis.any_orthonormal_vector();
         let other = self.axis.cross(across);
         let point = |k: usize| {
             let (sin, cos) = (ANGLE * k as f64 / PIECES as f64).sin_cos();
-            place(self.at + RADIUS * extent * (cos * across + sin * other))
+            place(self.position + RADIUS * extent * (cos * across + sin * other))
         };
         let points: Vec<DVec2> = (0..=PIECES).map(point).collect();
-        page.stroke(polyline(&points), Stroke::new(INK, 1.3));
+        page.draw_stroke(polyline_path(&points), Stroke::new(INK, 1.3));
         let end = points[PIECES];
         if let Some(along) = (end - points[PIECES - 1]).try_normalize() {
             let [length, half] = ARC_HEAD;
             let (tip, side) = (end + 0.5 * length * along, half * along.perp());
             let back = tip - length * along;
-            page.shape(polygon(&[tip, back + side, back - side]), INK, None);
+            page.draw_shape(polygon_path(&[tip, back + side, back - side]), INK, None);
         }
     }
 }

@@ -19,19 +19,19 @@ pub struct Drawing {
     pub height: f64,
     /// What the page shows, in words.
     pub description: String,
-    pub marks: Vec<Mark>,
+    pub elements: Vec<DrawingElement>,
 }
 
-pub enum Mark {
+pub enum DrawingElement {
     /// Begins a named group, for editing the SVG.
     Group(&'static str),
     EndGroup,
     Shape {
-        path: Path,
+        path: DrawingPath,
         fill: Option<Color>,
         stroke: Option<Stroke>,
     },
-    Label(Label),
+    Label(TextLabel),
 }
 
 /// A line drawn with round caps and joins.
@@ -39,7 +39,7 @@ pub enum Mark {
 pub struct Stroke {
     pub color: Color,
     pub width: f64,
-    pub dash: Dash,
+    pub dash: DashPattern,
 }
 
 impl Stroke {
@@ -47,63 +47,72 @@ impl Stroke {
         Stroke {
             color,
             width,
-            dash: Dash::Solid,
+            dash: DashPattern::Solid,
         }
     }
 
-    pub fn dashed(self, dashed: bool) -> Self {
-        let dash = if dashed { Dash::Dashed } else { Dash::Solid };
+    pub fn with_dashes(self, dashed: bool) -> Self {
+        let dash = if dashed {
+            DashPattern::Dashed
+        } else {
+            DashPattern::Solid
+        };
         Stroke { dash, ..self }
     }
 }
 
 /// How a line is interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dash {
+pub enum DashPattern {
     Solid,
     Dashed,
     Dotted,
     Alternating,
 }
 
-impl Dash {
-    pub const ALL: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::Alternating];
+impl DashPattern {
+    pub const ALL: [DashPattern; 4] = [
+        DashPattern::Solid,
+        DashPattern::Dashed,
+        DashPattern::Dotted,
+        DashPattern::Alternating,
+    ];
 
     /// Lengths of dashes and of the gaps between them, in turn; none of a solid line.
-    pub fn lengths(self) -> &'static [f64] {
+    pub fn dash_lengths(self) -> &'static [f64] {
         match self {
-            Dash::Solid => &[],
-            Dash::Dashed => &[5.0, 4.0],
-            Dash::Dotted => &[0.1, 4.0],
-            Dash::Alternating => &[8.0, 4.0, 0.1, 4.0],
+            DashPattern::Solid => &[],
+            DashPattern::Dashed => &[5.0, 4.0],
+            DashPattern::Dotted => &[0.1, 4.0],
+            DashPattern::Alternating => &[8.0, 4.0, 0.1, 4.0],
         }
     }
 }
 
 #[derive(Clone, Copy)]
-pub enum Step {
+pub enum PathStep {
     Move(DVec2),
     Line(DVec2),
     Cubic(DVec2, DVec2, DVec2),
     Close,
 }
 
-pub type Path = Vec<Step>;
+pub type DrawingPath = Vec<PathStep>;
 
 /// Where a label's text lies relative to its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Anchor {
+pub enum TextAnchor {
     Start,
     Middle,
     End,
 }
 
-pub struct Label {
+pub struct TextLabel {
     /// On the base line, at the text's start, middle or end.
-    pub at: DVec2,
+    pub position: DVec2,
     pub text: String,
     pub size: f64,
-    pub anchor: Anchor,
+    pub anchor: TextAnchor,
     pub color: Color,
     /// Rotated to read from bottom to top.
     pub rotated: bool,
@@ -118,40 +127,49 @@ impl Drawing {
             width,
             height: 0.0,
             description: description.into(),
-            marks: Vec::new(),
+            elements: Vec::new(),
         }
     }
 
-    pub fn group(&mut self, name: &'static str, fill: impl FnOnce(&mut Self)) {
-        self.marks.push(Mark::Group(name));
+    pub fn draw_group(&mut self, name: &'static str, fill: impl FnOnce(&mut Self)) {
+        self.elements.push(DrawingElement::Group(name));
         fill(self);
-        self.marks.push(Mark::EndGroup);
+        self.elements.push(DrawingElement::EndGroup);
     }
 
-    pub fn stroke(&mut self, path: Path, stroke: Stroke) {
+    pub fn draw_stroke(&mut self, path: DrawingPath, stroke: Stroke) {
         let (fill, stroke) = (None, Some(stroke));
-        self.marks.push(Mark::Shape { path, fill, stroke });
+        self.elements
+            .push(DrawingElement::Shape { path, fill, stroke });
     }
 
-    pub fn shape(&mut self, path: Path, fill: Color, stroke: Option<Stroke>) {
+    pub fn draw_shape(&mut self, path: DrawingPath, fill: Color, stroke: Option<Stroke>) {
         let fill = Some(fill);
-        self.marks.push(Mark::Shape { path, fill, stroke });
+        self.elements
+            .push(DrawingElement::Shape { path, fill, stroke });
     }
 
-    pub fn line(&mut self, from: DVec2, to: DVec2, stroke: Stroke) {
-        self.stroke(vec![Step::Move(from), Step::Line(to)], stroke);
+    pub fn draw_line(&mut self, from: DVec2, to: DVec2, stroke: Stroke) {
+        self.draw_stroke(vec![PathStep::Move(from), PathStep::Line(to)], stroke);
     }
 
-    fn add(&mut self, label: Label) {
+    fn add_label(&mut self, label: TextLabel) {
         if !label.text.is_empty() {
-            self.marks.push(Mark::Label(label));
+            self.elements.push(DrawingElement::Label(label));
         }
     }
 
     /// Adds a label unless it is empty.
-    pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
-        self.add(Label {
-            at,
+    pub fn draw_label(
+        &mut self,
+        at: DVec2,
+        text: &str,
+        size: f64,
+        anchor: TextAnchor,
+        color: Color,
+    ) {
+        self.add_label(TextLabel {
+            position: at,
             text: text.into(),
             size,
             anchor,
@@ -161,47 +179,47 @@ impl Drawing {
     }
 
     /// Adds a label that is vertically centred at `at`.
-    pub fn centered_label(
+    pub fn draw_centered_label(
         &mut self,
         at: DVec2,
         text: &str,
         size: f64,
-        anchor: Anchor,
+        anchor: TextAnchor,
         color: Color,
     ) {
         let base = at + DVec2::new(0.0, HALF_CAPITAL * size);
-        self.label(base, text, size, anchor, color);
+        self.draw_label(base, text, size, anchor, color);
     }
 
     /// Adds a label that reads from bottom to top.
-    pub fn rotated_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        self.add(Label {
-            at,
+    pub fn draw_rotated_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
+        self.add_label(TextLabel {
+            position: at,
             text: text.into(),
             size,
-            anchor: Anchor::Middle,
+            anchor: TextAnchor::Middle,
             color,
             rotated: true,
         });
     }
 }
 
-pub fn polyline(points: &[DVec2]) -> Path {
-    let mut path: Path = points.iter().map(|&point| Step::Line(point)).collect();
+pub fn polyline_path(points: &[DVec2]) -> DrawingPath {
+    let mut path: DrawingPath = points.iter().map(|&point| PathStep::Line(point)).collect();
     if let Some(first) = points.first() {
-        path[0] = Step::Move(*first);
+        path[0] = PathStep::Move(*first);
     }
     path
 }
 
-pub fn polygon(corners: &[DVec2]) -> Path {
-    let mut path = polyline(corners);
-    path.push(Step::Close);
+pub fn polygon_path(corners: &[DVec2]) -> DrawingPath {
+    let mut path = polyline_path(corners);
+    path.push(PathStep::Close);
     path
 }
 
-pub fn rectangle(corner: DVec2, size: DVec2) -> Path {
-    polygon(&[
+pub fn rectangle_path(corner: DVec2, size: DVec2) -> DrawingPath {
+    polygon_path(&[
         corner,
         corner + DVec2::new(size.x, 0.0),
         corner + size,
@@ -209,18 +227,18 @@ pub fn rectangle(corner: DVec2, size: DVec2) -> Path {
     ])
 }
 
-pub fn circle(center: DVec2, radius: f64) -> Path {
+pub fn circle_path(center: DVec2, radius: f64) -> DrawingPath {
     /// Control points of a quarter circle lie this far along its tangents.
     const QUARTER: f64 = 0.552_284_749_8;
     let point = |x: f64, y: f64| center + radius * DVec2::new(x, y);
     let q = QUARTER;
     vec![
-        Step::Move(point(1.0, 0.0)),
-        Step::Cubic(point(1.0, q), point(q, 1.0), point(0.0, 1.0)),
-        Step::Cubic(point(-q, 1.0), point(-1.0, q), point(-1.0, 0.0)),
-        Step::Cubic(point(-1.0, -q), point(-q, -1.0), point(0.0, -1.0)),
-        Step::Cubic(point(q, -1.0), point(1.0, -q), point(1.0, 0.0)),
-        Step::Close,
+        PathStep::Move(point(1.0, 0.0)),
+        PathStep::Cubic(point(1.0, q), point(q, 1.0), point(0.0, 1.0)),
+        PathStep::Cubic(point(-q, 1.0), point(-1.0, q), point(-1.0, 0.0)),
+        PathStep::Cubic(point(-1.0, -q), point(-q, -1.0), point(0.0, -1.0)),
+        PathStep::Cubic(point(q, -1.0), point(1.0, -q), point(1.0, 0.0)),
+        PathStep::Close,
     ]
 }
 
@@ -313,7 +331,7 @@ const MOST_PIECES: usize = 24;
 /// from it to the next. Between two points it is a cubic with the tangents of parabolas through
 /// three points each, over the lengths of the chords. Where the chords turn back the curve has a
 /// corner.
-pub fn smooth(points: &[DVec2]) -> Vec<Vec<DVec2>> {
+pub fn smooth_curve(points: &[DVec2]) -> Vec<Vec<DVec2>> {
     let chords: Vec<DVec2> = points.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let slope = |k: usize| chords[k].normalize_or_zero();
     let length = |k: usize| chords[k].length();
@@ -360,7 +378,11 @@ pub fn is_drawable(point: DVec3) -> bool {
 
 /// The points of a curve through nodes at these stations from one fraction of its length to another,
 /// or at one.
-pub fn stretch(stations: &[f64], curve: &[DVec3], [from, to]: [f64; 2]) -> Vec<DVec3> {
+pub fn curve_between_fractions(
+    stations: &[f64],
+    curve: &[DVec3],
+    [from, to]: [f64; 2],
+) -> Vec<DVec3> {
     let nodes = || stations.iter().copied().zip(curve.iter().copied());
     let at = |sigma: f64| {
         let before = nodes().take_while(|(at, _)| *at <= sigma).last();
@@ -391,7 +413,7 @@ mod tests {
             let points: Vec<DVec2> = (0..=count)
                 .map(|k| 200.0 * DVec2::from_angle(angle(k)))
                 .collect();
-            let drawn = smooth(&points);
+            let drawn = smooth_curve(&points);
             let off = drawn.iter().flatten().map(|it| (it.length() - 200.0).abs());
             off.fold(0.0, f64::max)
         };
@@ -405,17 +427,17 @@ mod tests {
     #[test]
     fn corners_and_repeated_points_stay() {
         let back = [[0.0, 0.0], [10.0, 0.0], [0.0, 1.0]].map(DVec2::from_array);
-        let drawn = smooth(&back);
+        let drawn = smooth_curve(&back);
         assert_eq!(drawn.len(), 2);
         assert!(drawn[0].iter().all(|it| it.y == 0.0 && it.x <= 10.0));
         let twice = [DVec2::X, DVec2::X, 2.0 * DVec2::X];
         assert!(
-            smooth(&twice)
+            smooth_curve(&twice)
                 .iter()
                 .flatten()
                 .all(|it| it.is_finite() && it.y == 0.0)
         );
-        assert!(smooth(&[]).is_empty() && smooth(&[DVec2::X]).is_empty());
+        assert!(smooth_curve(&[]).is_empty() && smooth_curve(&[DVec2::X]).is_empty());
     }
 }
 
@@ -427,13 +449,13 @@ mod curve_tests {
     fn a_stretch_ends_between_nodes() {
         let (stations, curve) = ([0.0, 0.5, 1.0], [0.0, 1.0, 3.0].map(|x| x * DVec3::X));
         let of = |at| -> Vec<f64> {
-            let points = stretch(&stations, &curve, at).into_iter();
+            let points = curve_between_fractions(&stations, &curve, at).into_iter();
             points.map(|point| point.x).collect()
         };
         assert_eq!(of([0.25, 0.75]), [0.5, 1.0, 2.0]);
         assert_eq!(of([0.5, 1.0]), [1.0, 3.0]);
         assert_eq!(of([0.75, 0.75]), [2.0]);
         assert_eq!(of([1.0, 1.0]), [3.0]);
-        assert!(stretch(&[], &[], [0.5, 1.0]).is_empty());
+        assert!(curve_between_fractions(&[], &[], [0.5, 1.0]).is_empty());
     }
 }

@@ -1,24 +1,25 @@
 //! The panel in space: a parallel projection of the leaf in a box, with its shadow
 //! on the floor.
 
-use crate::figure::drawing::axes::{multiples, round_step};
+use crate::figure::drawing::axes::{multiples_with_text, round_step};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{Cell, TEXT_SIZE, TICK_SIZE};
-use crate::figure::drawing::markers::{draw_arrow, leaf_markers};
+use crate::figure::drawing::labels::{PageRectangle, TEXT_SIZE, TICK_SIZE};
+use crate::figure::drawing::markers::{draw_direction_arrow, draw_leaf_markers};
 use crate::figure::drawing::{
-    Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
+    Drawing, FLOOR, FRAME, GRID, INK, NOTE, PathStep, SHADOW, Stroke, TextAnchor, polygon_path,
+    polyline_path,
 };
-use crate::figure::leaf::{Piece, Vein, Veins};
-use crate::figure::scenario::{Arrow, Setting};
+use crate::figure::leaf::{BezierPiece, DrawnVein, DrawnVeins};
+use crate::figure::scenario::{DirectionArrow, FigureSetting};
 use glam::{DVec2, DVec3};
 
 /// Directions from which the box is seen: azimuth from the xi axis and elevation above the
 /// floor, in degrees. From above one of its edges, and along the xi axis from a little above.
-pub type View = [f64; 2];
+pub type ViewAngles = [f64; 2];
 
-pub const OBLIQUE: View = [-55.0, 28.0];
+pub const OBLIQUE: ViewAngles = [-55.0, 28.0];
 
-pub const FRONT: View = [-8.0, 12.0];
+pub const FRONT: ViewAngles = [-8.0, 12.0];
 
 /// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_SIDE: f64 = 0.4;
@@ -28,15 +29,15 @@ const PADDING: f64 = 0.06;
 
 /// Margins around the box, for the labels of its axes.
 #[derive(Clone, Copy)]
-pub struct Margins {
+pub struct BoxMargins {
     pub left: f64,
     pub right: f64,
     pub below: f64,
 }
 
-impl Margins {
+impl BoxMargins {
     /// Pixels that are left to the box, of a cell of this size.
-    pub fn inside(self, size: DVec2) -> DVec2 {
+    pub fn inner_size(self, size: DVec2) -> DVec2 {
         size - DVec2::new(self.left + self.right, self.below)
     }
 }
@@ -57,15 +58,15 @@ const NEAR_NAME: f64 = 14.0;
 const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
 /// A box around all of these shapes.
-pub fn common_box<'a>(shapes: impl Iterator<Item = &'a Veins>) -> [DVec3; 2] {
+pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> [DVec3; 2] {
     let boxes = shapes.map(|veins| (veins.low, veins.high));
     let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = all.unwrap_or_default();
-    surrounding_box(low, high)
+    padded_box(low, high)
 }
 
 /// The box with padding around it, and no side too short.
-pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
+pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
     let padding = DVec3::splat(PADDING * if extent > 1e-9 { extent } else { 1.0 });
     let (low, high) = (low - padding, high + padding);
@@ -76,7 +77,7 @@ pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
 }
 
 /// A parallel projection.
-pub struct Camera {
+pub struct ParallelProjection {
     right: DVec3,
     up: DVec3,
     pub toward: DVec3,
@@ -86,10 +87,10 @@ pub struct Camera {
     origin: DVec2,
 }
 
-impl Camera {
+impl ParallelProjection {
     /// The origin is in the corner of the page, and a pixel a length.
     pub fn new(right: DVec3, up: DVec3) -> Self {
-        Camera {
+        ParallelProjection {
             right,
             up,
             toward: right.cross(up),
@@ -98,30 +99,30 @@ impl Camera {
         }
     }
 
-    pub fn facing(view: View) -> Self {
+    pub fn from_view(view: ViewAngles) -> Self {
         let [(sin_a, cos_a), (sin_e, cos_e)] = view.map(|angle| angle.to_radians().sin_cos());
         let right = DVec3::new(-sin_a, cos_a, 0.0);
-        Camera::new(right, DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e))
+        ParallelProjection::new(right, DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e))
     }
 
     /// Shows a point at a place on the page.
-    pub fn placed(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
+    pub fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
         self.scale = scale;
-        self.origin += at - self.place(point);
+        self.origin += at - self.project_point(point);
         self
     }
 
-    pub fn place(&self, point: DVec3) -> DVec2 {
-        self.origin + self.turned(point)
+    pub fn project_point(&self, point: DVec3) -> DVec2 {
+        self.origin + self.project_direction(point)
     }
 
-    fn turned(&self, vector: DVec3) -> DVec2 {
+    fn project_direction(&self, vector: DVec3) -> DVec2 {
         self.scale * DVec2::new(self.right.dot(vector), -self.up.dot(vector))
     }
 
     /// Width and height of a box on the page.
-    pub fn extent(&self, bounds: [DVec3; 2]) -> DVec2 {
-        let corners = || corners(bounds).map(|corner| self.place(corner));
+    pub fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
+        let corners = || box_corners(bounds).map(|corner| self.project_point(corner));
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
     }
@@ -130,79 +131,81 @@ impl Camera {
     pub fn draw_arrows(
         &self,
         page: &mut Drawing,
-        arrows: &[Arrow],
-        cell: Cell,
+        arrows: &[DirectionArrow],
+        cell: PageRectangle,
         taken: impl Iterator<Item = DVec2>,
     ) {
         let mut taken: Vec<DVec2> = taken.collect();
-        for Arrow { direction, name } in arrows {
-            let shown = self.turned(*direction) / self.scale;
+        for DirectionArrow { direction, name } in arrows {
+            let shown = self.project_direction(*direction) / self.scale;
             let toward = self.toward.dot(*direction) > 0.0;
-            let at = draw_arrow(page, cell, &taken, (shown, toward), name);
+            let at = draw_direction_arrow(page, cell, &taken, (shown, toward), name);
             taken.push(at);
         }
     }
 }
 
-fn corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+fn box_corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     let side = move |corner: usize, axis: usize| bounds[corner >> axis & 1][axis];
     (0..8).map(move |k| DVec3::new(side(k, 0), side(k, 1), side(k, 2)))
 }
 
 /// One axis along an edge of the box.
-struct Edge {
+struct AxisEdge {
     axis: usize,
     from: DVec3,
     to: DVec3,
     /// Away from the box, on the page.
-    out: DVec2,
+    outward: DVec2,
     /// Offsets from a point on the edge along its grid lines: to the corner between the two
     /// walls, and to the end of the second.
-    walls: [DVec3; 2],
+    grid_line_offsets: [DVec3; 2],
     ticks: Vec<(DVec3, String)>,
 }
 
 /// A box in space, and the leaf in it.
-pub struct Scene<'s> {
+pub struct SpacePanel<'s> {
     low: DVec3,
     high: DVec3,
-    camera: Camera,
-    edges: [Edge; 3],
-    setting: &'s Setting,
-    cell: Cell,
+    camera: ParallelProjection,
+    edges: [AxisEdge; 3],
+    setting: &'s FigureSetting,
+    cell: PageRectangle,
 }
 
-impl<'s> Scene<'s> {
+impl<'s> SpacePanel<'s> {
     /// The box in a cell with these margins; its grid is spaced by `step`, in the unit that is
     /// shown, or, without it, as close as is readable.
     pub fn new(
         [low, high]: [DVec3; 2],
-        setting: &'s Setting,
-        view: View,
-        cell: Cell,
-        margins: Margins,
+        setting: &'s FigureSetting,
+        view: ViewAngles,
+        cell: PageRectangle,
+        margins: BoxMargins,
         step: Option<f64>,
     ) -> Self {
-        let camera = Camera::facing(view);
-        let scale = margins.inside(cell.size) / camera.extent([low, high]);
+        let camera = ParallelProjection::from_view(view);
+        let scale = margins.inner_size(cell.size) / camera.projected_extent([low, high]);
         let shift = DVec2::new(margins.left - margins.right, -margins.below);
         let (middle, at) = (0.5 * (low + high), cell.middle() + 0.5 * shift);
-        let camera = camera.placed(scale.min_element(), middle, at);
-        let unit = setting.scale();
+        let camera = camera.with_point_at(scale.min_element(), middle, at);
+        let unit = setting.value_per_length();
         let edge = |axis: usize, from: DVec3, outward: DVec3, walls: [DVec3; 2]| {
             let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
             let step = step.unwrap_or_else(|| {
-                round_step(unit * TICK_DISTANCE / camera.turned(DVec3::AXES[axis]).length())
+                round_step(
+                    unit * TICK_DISTANCE / camera.project_direction(DVec3::AXES[axis]).length(),
+                )
             });
             let inset = 0.02 * (high - low)[axis];
             let ends = [low[axis] + inset, high[axis] - inset].map(|end| unit * end);
-            let ticks = multiples(ends[0], ends[1], step).into_iter();
-            Edge {
+            let ticks = multiples_with_text(ends[0], ends[1], step).into_iter();
+            AxisEdge {
                 axis,
                 from,
                 to: at(high[axis]),
-                out: camera.turned(outward).normalize(),
-                walls,
+                outward: camera.project_direction(outward).normalize(),
+                grid_line_offsets: walls,
                 ticks: ticks
                     .map(|(value, text)| (at(value / unit), text))
                     .collect(),
@@ -214,7 +217,7 @@ impl<'s> Scene<'s> {
             edge(1, low.with_x(high.x), DVec3::X, [-x, z - x]),
             edge(2, low, -camera.right, [y, y + x]),
         ];
-        Scene {
+        SpacePanel {
             low,
             high,
             camera,
@@ -224,8 +227,8 @@ impl<'s> Scene<'s> {
         }
     }
 
-    pub fn place(&self, point: DVec3) -> DVec2 {
-        self.camera.place(point)
+    pub fn project_point(&self, point: DVec3) -> DVec2 {
+        self.camera.project_point(point)
     }
 
     /// Draws the floor, the two walls behind the leaf, and their grid.
@@ -236,13 +239,17 @@ impl<'s> Scene<'s> {
         let near = DVec3::new(high.x, low.y, low.z);
         let far = DVec3::new(low.x, high.y, low.z);
         let right = near.with_y(high.y);
-        let floor = [low, near, right, far].map(|corner| self.place(corner));
-        page.shape(polygon(&floor), FLOOR, None);
+        let floor = [low, near, right, far].map(|corner| self.project_point(corner));
+        page.draw_shape(polygon_path(&floor), FLOOR, None);
         for edge in &self.edges {
             for &(start, _) in &edge.ticks {
-                let line = [start, start + edge.walls[0], start + edge.walls[1]];
-                let line = line.map(|point| self.place(point));
-                page.stroke(polyline(&line), Stroke::new(GRID, 0.7));
+                let line = [
+                    start,
+                    start + edge.grid_line_offsets[0],
+                    start + edge.grid_line_offsets[1],
+                ];
+                let line = line.map(|point| self.project_point(point));
+                page.draw_stroke(polyline_path(&line), Stroke::new(GRID, 0.7));
             }
         }
         let top = |corner: DVec3| corner.with_z(high.z);
@@ -257,91 +264,100 @@ impl<'s> Scene<'s> {
             (top(far), high),
             (right, high),
         ] {
-            page.line(self.place(from), self.place(to), Stroke::new(FRAME, 0.8));
+            page.draw_line(
+                self.project_point(from),
+                self.project_point(to),
+                Stroke::new(FRAME, 0.8),
+            );
         }
     }
 
     /// Draws the axes with their names at this distance from the edges.
     pub fn draw_axes(&self, page: &mut Drawing, distance: f64) {
-        for Edge { out, ticks, .. } in &self.edges {
+        for AxisEdge {
+            outward: out,
+            ticks,
+            ..
+        } in &self.edges
+        {
             for (point, text) in ticks {
-                let foot = self.place(*point);
-                page.line(foot, foot + 4.0 * *out, Stroke::new(FRAME, 0.8));
+                let foot = self.project_point(*point);
+                page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME, 0.8));
                 let at = foot + label_offset(*out, 17.0);
-                page.centered_label(at, text, TICK_SIZE, Anchor::Middle, NOTE);
+                page.draw_centered_label(at, text, TICK_SIZE, TextAnchor::Middle, NOTE);
             }
         }
-        self.draw_names(page, distance, true);
+        self.draw_axis_names(page, distance, true);
     }
 
     /// The middles of the edges that have axes.
-    fn middles(&self) -> [DVec2; 3] {
-        let middle = |edge: &Edge| self.place(0.5 * (edge.from + edge.to));
+    fn edge_middles(&self) -> [DVec2; 3] {
+        let middle = |edge: &AxisEdge| self.project_point(0.5 * (edge.from + edge.to));
         self.edges.each_ref().map(middle)
     }
 
     /// Draws the names of all axes at a distance from their edges, with units if values
     /// are shown.
-    pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
-        for (edge, middle) in self.edges.iter().zip(self.middles()) {
+    pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
+        for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
-            let widths = widths.map(|(_, text)| Font::embedded().width(text, TICK_SIZE));
+            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, TICK_SIZE));
             let beyond = BEYOND_LABELS + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
             } else {
                 distance
             };
-            let at = middle + label_offset(edge.out, distance);
-            let name = self.setting.brief_axis(edge.axis, values);
+            let at = middle + label_offset(edge.outward, distance);
+            let name = self.setting.brief_axis_name(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
             let size = TEXT_SIZE + 1.0;
-            let most = page.width - Font::embedded().width(&name, size) - PAGE_EDGE;
+            let most = page.width - Font::embedded().text_width(&name, size) - PAGE_EDGE;
             let (at, anchor) = match edge.axis {
-                _ if name.chars().count() < 3 => (at, Anchor::Middle),
-                0 => (at, Anchor::End),
-                1 => (at.with_x(at.x.min(most)), Anchor::Start),
-                _ => (self.place(edge.to) + ABOVE, Anchor::End),
+                _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
+                0 => (at, TextAnchor::End),
+                1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
+                _ => (self.project_point(edge.to) + ABOVE, TextAnchor::End),
             };
-            page.centered_label(at, &name, size, anchor, INK);
+            page.draw_centered_label(at, &name, size, anchor, INK);
         }
     }
 
     /// Draws the directions of gravity and of the wind at a time outside the box, or in a panel that
     /// is not the first what may differ from it.
-    pub fn draw_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
-        let taken = corners([self.low, self.high]).map(|corner| self.place(corner));
-        let names = self.edges.iter().zip(self.middles());
-        let names = names.flat_map(|(edge, middle)| [middle, middle + NEAR_NAME * edge.out]);
+    pub fn draw_direction_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
+        let taken = box_corners([self.low, self.high]).map(|corner| self.project_point(corner));
+        let names = self.edges.iter().zip(self.edge_middles());
+        let names = names.flat_map(|(edge, middle)| [middle, middle + NEAR_NAME * edge.outward]);
         let taken = taken.chain(names);
-        let arrows = self.setting.arrows(first, time);
+        let arrows = self.setting.direction_arrows(first, time);
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
     }
 
     /// Draws the shadows of all veins on the floor.
-    pub fn draw_shadows(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+    pub fn draw_shadows(&self, page: &mut Drawing, veins: &DrawnVeins, width: f64) {
         for vein in &veins.veins {
-            let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
-            page.stroke(shadow, Stroke::new(SHADOW, width));
+            let shadow = vein.projected_path(|point| self.project_point(point.with_z(self.low.z)));
+            page.draw_stroke(shadow, Stroke::new(SHADOW, width));
         }
     }
 
     /// Draws the shadows of all veins on the floor, the pieces of the veins, those
     /// farther away first, and the leaf's markers.
-    pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+    pub fn draw_leaf(&self, page: &mut Drawing, veins: &DrawnVeins, width: f64) {
         self.draw_shadows(page, veins, width);
-        let depth = |piece: &Piece| self.camera.toward.dot(piece[0] + piece[3]);
-        let mut pieces: Vec<(f64, &Piece, &Vein)> = Vec::new();
+        let depth = |piece: &BezierPiece| self.camera.toward.dot(piece[0] + piece[3]);
+        let mut pieces: Vec<(f64, &BezierPiece, &DrawnVein)> = Vec::new();
         for vein in &veins.veins {
             pieces.extend(vein.pieces.iter().map(|piece| (depth(piece), piece, vein)));
         }
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, piece, vein) in pieces {
-            let [start, a, b, end] = piece.map(|point| self.place(point));
-            let path = vec![Step::Move(start), Step::Cubic(a, b, end)];
-            page.stroke(path, Stroke::new(vein.color, width));
+            let [start, a, b, end] = piece.map(|point| self.project_point(point));
+            let path = vec![PathStep::Move(start), PathStep::Cubic(a, b, end)];
+            page.draw_stroke(path, Stroke::new(vein.color, width));
         }
-        leaf_markers(page, veins, |point| self.place(point));
+        draw_leaf_markers(page, veins, |point| self.project_point(point));
     }
 }
 

@@ -18,7 +18,7 @@ const TEXT: &str = r#"
     shear_3 = 100
 "#;
 
-fn with(overrides: &[&str]) -> ScenarioResult<Scenario> {
+fn scenario_with_overrides(overrides: &[&str]) -> ScenarioResult<Scenario> {
     let overrides: Vec<String> = overrides.iter().map(|given| given.to_string()).collect();
     Scenario::from_toml_with(TEXT, "three.toml", &overrides)
 }
@@ -48,10 +48,14 @@ fn parts_and_scales_are_whole_values() {
     ";
     for (parts, whole) in pairs(table) {
         let parts: Vec<&str> = parts.split("; ").collect();
-        assert_eq!(with(&parts).unwrap(), with(&[whole]).unwrap(), "{parts:?}");
+        assert_eq!(
+            scenario_with_overrides(&parts).unwrap(),
+            scenario_with_overrides(&[whole]).unwrap(),
+            "{parts:?}"
+        );
     }
     let fewer = "leaf.rods=2; coupling.z=1; stiffness.bending_3=1; stiffness.shear_2[1]=7";
-    let refused = with(&fewer.split("; ").collect::<Vec<_>>()).unwrap_err();
+    let refused = scenario_with_overrides(&fewer.split("; ").collect::<Vec<_>>()).unwrap_err();
     assert!(refused.to_string().contains("has 3 entries"), "{refused}");
 }
 
@@ -84,7 +88,7 @@ fn slips_are_explained() {
         load.gravity[2] => must be KEY=VALUE
     "#;
     for (given, part) in pairs(table) {
-        let message = with(&[given]).unwrap_err().to_string();
+        let message = scenario_with_overrides(&[given]).unwrap_err().to_string();
         assert!(message.contains(part), "{given}: {message}");
         assert!(message.len() < 300, "{message}");
     }
