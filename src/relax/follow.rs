@@ -181,19 +181,19 @@ const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.1;
 /// A leaf at rest, which can follow.
 ///
 /// ```
-/// use leafdyn::relax::{Followed, Follower, Options, RelaxError};
+/// use leafdyn::relax::{EquilibriumTracker, Options, RelaxError, TrackOutcome};
 /// use leafdyn::scenario::Scenario;
 ///
 /// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
 /// let weight = scenario.gravity[2];
-/// let (_, follower) = Follower::begin(&scenario, &Options::default())?;
-/// let mut follower = follower.expect("the leaf is at rest");
+/// let (_, tracker) = EquilibriumTracker::begin(&scenario, &Options::default())?;
+/// let mut tracker = tracker.expect("the leaf is at rest");
 /// let heavier = |part: f64| {
 ///     let mut scenario = scenario.clone();
 ///     scenario.gravity[2] = weight * (1.0 + part);
 ///     Ok::<_, RelaxError>(scenario)
 /// };
-/// let Followed::There(heavy) = follower.follow(&heavier)? else {
+/// let TrackOutcome::Arrived(heavy) = tracker.follow(&heavier)? else {
 ///     panic!("it bends further");
 /// };
 /// assert_eq!(heavy.stable(), Some(true));

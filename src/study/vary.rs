@@ -5,10 +5,10 @@
 //! of a key (`scale:stiffness.bending_2`), or a setting of a method
 //! (`method.step`). Several keys joined by `+` take the same value. The
 //! values are substituted as by `--set`, so that every limit of the
-//! format applies to them ([`Base::at`]); the text is parsed only once.
+//! format applies to them ([`BaseScenario::scenario_with_values`]); the text is parsed only once.
 //!
 //! ```
-//! use leafdyn::study::{Base, Vary};
+//! use leafdyn::study::{BaseScenario, ParameterSweep};
 //!
 //! let text = r#"
 //!     name = "vein"
@@ -16,10 +16,10 @@
 //!     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
 //!     load = { gravity = [0.0, 0.0, -1.0] }
 //! "#;
-//! let base = Base::of_text(text.into(), "vein.toml".into(), &[])?;
-//! let weight: Vary = "load.gravity[2]=-0.01..-100:5log".parse()?;
+//! let base = BaseScenario::from_text(text.into(), "vein.toml".into(), &[])?;
+//! let weight: ParameterSweep = "load.gravity[2]=-0.01..-100:5log".parse()?;
 //! assert_eq!(weight.values, [-0.01, -0.1, -1.0, -10.0, -100.0]);
-//! let heavy = base.at(&[(&weight.keys, -100.0)])?;
+//! let heavy = base.scenario_with_values(&[(&weight.keys, -100.0)])?;
 //! assert_eq!(heavy.scenario.gravity, [0.0, 0.0, -100.0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -172,11 +172,11 @@ pub fn result_file_names<R: WrittenResult>(result: &R) -> Vec<&'static str> {
 ///
 /// ```
 /// # use leafdyn::scenario::Scenario;
-/// use leafdyn_program::files::{self, Document};
+/// use leafdyn_program::files::{self, ResultDocument};
 /// let scenario = Scenario::read("../scenarios/paper/fig04.toml")?;
 /// let leaf = scenario.relax()?;
-/// let document = Document::new(&leaf, &scenario, None);
-/// let picture = files::contents(&document, "figure.svg").unwrap_or_default();
+/// let document = ResultDocument::new(&leaf, &scenario, None);
+/// let picture = files::result_file_contents(&document, "figure.svg").unwrap_or_default();
 /// assert!(picture.starts_with(b"<svg"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

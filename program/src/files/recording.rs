@@ -31,7 +31,7 @@ const FILM_STRIP_SHAPES: usize = 8;
 /// The files of a running simulation.
 ///
 /// ```
-/// use leafdyn_program::files::{Document, Recording, Selection};
+/// use leafdyn_program::files::{FileSelection, MotionRecording, ResultDocument};
 /// use leafdyn::scenario::Scenario;
 /// use leafdyn::simulate::{Options, Simulation};
 ///
@@ -45,13 +45,13 @@ const FILM_STRIP_SHAPES: usize = 8;
 /// # let folder = folder.path();
 /// let scenario = Scenario::from_toml(cantilever)?;
 /// let mut simulation = Simulation::new(&scenario, &Options::default())?;
-/// let mut recording = Recording::begin(folder, &mut simulation, &Selection::default())?;
+/// let mut recording = MotionRecording::begin(folder, &mut simulation, &FileSelection::default())?;
 /// while !simulation.done() {
 ///     let frame = simulation.next_frame()?;
-///     recording.add(&simulation, &frame)?;
+///     recording.add_output(&simulation, &frame)?;
 /// }
-/// let record = recording.record(&simulation, None)?;
-/// let files = recording.finish(&Document::new(&record, &scenario, None))?;
+/// let record = recording.finished_record(&simulation, None)?;
+/// let files = recording.finish(&ResultDocument::new(&record, &scenario, None))?;
 /// assert_eq!(files.len(), 7);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

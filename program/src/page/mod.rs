@@ -10,7 +10,7 @@
 //!
 //! let scenario = Scenario::read("../scenarios/paper/fig04.toml")?;
 //! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
-//! let page = page::page(&leaf, &scenario);
+//! let page = page::html_page(&leaf, &scenario);
 //! assert!(page.starts_with("<!DOCTYPE html>") && page.len() < 1_000_000);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -57,7 +57,7 @@ docs/command-line.md: number of points of a branch; default {} - `--show
 src/study/trace/mod.rs: MOST_BRANCHES: usize = {};
 docs/command-line.md: that cross these, at most {} in all
 
-src/study/equilibria.rs: IN_VAIN: usize = {};
+src/study/equilibria.rs: MOST_FRUITLESS_STARTS: usize = {};
 docs/command-line.md: ends when {} consecutive starts
 
 docs/command-line.md: equilibria from {} starts

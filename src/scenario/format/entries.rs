@@ -29,7 +29,7 @@ pub const MOST_RODS: usize = 100_000;
 /// use leafdyn::scenario::Entries;
 ///
 /// let text = "name = 'rod'\nleaf = { rods = 1, length = 1.0, fan = [0.0] }";
-/// let entries = Entries::of_text(text, "rod.toml")?;
+/// let entries = Entries::from_text(text, "rod.toml")?;
 /// assert!(entries.check().is_err(), "not all that is needed");
 /// assert!(entries.replaced(&["leaf.rod=2".into()]).is_err(), "no key");
 /// # Ok::<(), leafdyn::scenario::ScenarioError>(())
