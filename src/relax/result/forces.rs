@@ -15,6 +15,11 @@ use serde::Serialize;
 /// Rounding error of a strain, per segment of a rod.
 const STRAIN_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// The error by the defect is taken unless it is this many times that of the extrapolation: of nearly
+/// rigid rods the response to a jump by rounding is a force that is none. At 1, the lesser of both
+/// was too small in 2 of 344 random leaves, where the extrapolation's was small by chance.
+const SPURIOUS_DEFECT: f64 = 30.0;
+
 /// The reaction at a held tip: what the leaf exerts on its holder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reaction {
@@ -124,13 +129,12 @@ impl NestedEquilibrium {
             let largest_moment = largest(tips().map(|tip| tip.m.length()));
             let own = bar(off(2).sum(), force.length());
             let own_of_moments = bar(largest(off(3)), largest_moment);
-            // Of nearly rigid rods the response to a jump by rounding is a force that is none.
-            if error.is_none_or(|error| own < error) {
+            if error.is_none_or(|error| own < SPURIOUS_DEFECT * error) {
                 let forces = tips().enumerate();
                 force = forces.map(|(j, tip)| level.tip_force(j) - tip.n).sum();
                 error = Some(own);
             }
-            if moments_error.is_none_or(|error| own_of_moments < error) {
+            if moments_error.is_none_or(|error| own_of_moments < SPURIOUS_DEFECT * error) {
                 moments = tips()
                     .map(|tip| level.dead_moment_at(1.0) - tip.m)
                     .collect();
