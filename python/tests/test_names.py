@@ -104,7 +104,7 @@ def test_bounds_of_a_fit_are_any_pair() -> None:
 
 
 def test_the_keys_are_those_of_the_format() -> None:
-    source = (ROOT / "src/scenario/key.rs").read_text()
+    source = (ROOT / "src/scenario/format/mod.rs").read_text()
     rows = re.findall(r'/// (.*)\n\s+\w+ "([\w.]+)": [^;]*?, \[(-?\d+), (-?\d+), (-?\d+)\], (\w+)', source)
     keys = {key.path: key for key in leafdyn.keys()}
     assert {path for _, path, *_ in rows} == set(keys)
