@@ -34,7 +34,7 @@ use glam::{DMat3, DVec3};
 
 /// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, since a
 /// larger one loses digits. The eigenvalues do not change to first order.
-const MAX_MATRIX_STIFFNESS: f64 = 1e6;
+const STIFFNESS_CAP_IN_MATRIX: f64 = 1e6;
 
 /// That stiffness is at least this multiple of the largest force carried.
 const STIFFNESS_FORCE_RATIO: f64 = 1e4;
@@ -185,8 +185,9 @@ fn soften_leaf(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
-        *section = section
-            .limit_condensing_stiffness(MAX_MATRIX_STIFFNESS.max(STIFFNESS_FORCE_RATIO * tension));
+        *section = section.limit_condensing_stiffness(
+            STIFFNESS_CAP_IN_MATRIX.max(STIFFNESS_FORCE_RATIO * tension),
+        );
         let added = section.condensing.recip() - section.compliance;
         section.condensing = (section.compliance + times * added).recip();
     }

@@ -436,7 +436,7 @@ const OF_SIGNS: f64 = 0.06;
 /// Elsewhere: the safety factor on the error of an eigenvalue, and lower bound of its last change as a
 /// part of the change before. From two grids the error is at least so many of their differences, as
 /// there is no other change.
-const SAFETY: f64 = 2.0;
+const ERROR_SAFETY_FACTOR: f64 = 2.0;
 
 const LEAST_CHANGE: f64 = 0.1;
 
@@ -515,7 +515,7 @@ impl EigenvalueSeries {
                 (_, 0) => LEAST_CHANGE * table.change_before(),
                 _ => 0.0,
             };
-            SAFETY * best.error.max(least)
+            ERROR_SAFETY_FACTOR * best.error.max(least)
         };
         (table.extrapolated()[0], table.best().map(error))
     }

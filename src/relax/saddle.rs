@@ -304,7 +304,7 @@ pub fn lower_energy_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, boo
 }
 
 /// The saddle at a state, in the units of the scenario.
-pub fn saddle_at_state(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
+pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
     let scale = leaf.leaf.scale;
     Saddle {
         energy: leaf.energy(state) * scale.moment(),

@@ -8,16 +8,17 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, LabelPlacement, Legend, MOST_NAMED, PANEL_AXIS, PANEL_TITLE, PageRectangle,
-    SmallPanels, TICK_SIZE, clearest_label, draw_panel_title, label_size, new_page,
+    HEADER, LabelPlacement, Legend, MOST_CURVES_NAMED, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
+    PANEL_TITLE_HEIGHT, PageRectangle, SmallPanels, TICK_FONT_SIZE, clearest_label,
+    draw_panel_title, label_size, new_page,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, DashPattern, Drawing, GREEN, INK, NOTE, PURPLE, SKY, SLATE, Stroke, TextAnchor,
-    VERMILION, polygon_path,
+    BLUE, Color, DashPattern, Drawing, GREEN, NOTE_COLOR, PURPLE, SKY, SLATE, Stroke, TEXT_COLOR,
+    TextAnchor, VERMILION, polygon_path,
 };
 use crate::figure::leaf::{DrawnVeins, longest_curve, vein_tips};
-use crate::figure::map::{DARKEST_INDEX, PALE, fill_index};
+use crate::figure::map::{DARKEST_MORSE_INDEX, PALE, fill_cell_by_index};
 use crate::figure::scenario::{FigureSetting, QuantityLabel};
 use crate::report::numbers::{
     count_in_words, format_error_bound, format_four_digits, vein_count_text,
@@ -30,35 +31,36 @@ use leafdyn::study::{
 };
 use std::collections::{BTreeSet, HashMap};
 
-const DIAGRAM: f64 = 400.0;
+const DIAGRAM_HEIGHT: f64 = 400.0;
 
 /// Right of the panel, for the key.
-const KEY: f64 = 210.0;
+const LEGEND_WIDTH: f64 = 210.0;
 
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
-const VISIBLE: f64 = 0.1;
+const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
 
 /// Most leaves drawn, each at a named point.
-const MOST_LEAVES: usize = 4;
+const MOST_LEAVES_DRAWN: usize = 4;
 
 /// Colours of neighbouring curves; they also differ in their dashes.
-const COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
+const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
 pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
     let shown: Vec<CaptionedLeaf> = (boundary.curves.iter())
         .flat_map(|curve| (curve.beside.iter()).map(|leaf| CaptionedLeaf::new(curve.kind, leaf)))
-        .take(MOST_LEAVES)
+        .take(MOST_LEAVES_DRAWN)
         .collect();
     let longest = longest_curve(shown.iter().flat_map(|it| &it.leaf.curves));
     let shapes: Vec<DrawnVeins> = (shown.iter())
         .map(|it| DrawnVeins::from_curves(&it.curves, &it.tips, longest).with_supports(scenario))
         .collect();
-    let diagram = PageRectangle::left_of_legend(HEADER + PANEL_TITLE, DIAGRAM, KEY);
-    let below = diagram.opposite_corner().y + PANEL_AXIS;
+    let diagram =
+        PageRectangle::left_of_legend(HEADER + PANEL_TITLE_HEIGHT, DIAGRAM_HEIGHT, LEGEND_WIDTH);
+    let below = diagram.opposite_corner().y + PANEL_AXIS_HEIGHT;
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
-    let mut drawing = new_page(LEFT, &name, &header_notes(boundary), None);
+    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(boundary), None);
     drawing.height = panels.bottom();
     drawing.draw_group("curves", |page| {
         draw_curves(page, boundary, &scenario.units, &shown, diagram)
@@ -104,7 +106,7 @@ impl<'b> CaptionedLeaf<'b> {
         let mut curves = leaf.curves.clone();
         let largest = curves.iter().flatten().zip(from.iter().flatten());
         let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
-        let visible = VISIBLE * longest_curve(&curves);
+        let visible = LEAST_VISIBLE_DISPLACEMENT * longest_curve(&curves);
         let mut caption = "buckled".to_string();
         if 0.0 < largest && largest < visible {
             let factor = round_step(visible / largest);
@@ -179,10 +181,10 @@ fn draw_curves(
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
-        axes.draw_markers(page, special.map(at), marker, INK);
+        axes.draw_markers(page, special.map(at), marker, TEXT_COLOR);
     }
     let places = || (shown.iter()).map(|it| (it.leaf.values[0], it.leaf.values[1]));
-    axes.draw_markers(page, places(), Marker::Dot, INK);
+    axes.draw_markers(page, places(), Marker::Dot, TEXT_COLOR);
     for (number, place) in places().enumerate() {
         if let Some(place) = axes.page_position(place) {
             labels.request_label(place, &leaf_letter(number));
@@ -210,7 +212,7 @@ fn curve_stroke(number: usize, line: &BoundaryLine) -> Stroke {
     Stroke {
         dash: DashPattern::ALL[number % DashPattern::ALL.len()],
         ..Stroke::new(
-            COLORS[number % COLORS.len()],
+            BOUNDARY_COLORS[number % BOUNDARY_COLORS.len()],
             if line.bounds_stable_region() {
                 2.0
             } else {
@@ -252,12 +254,12 @@ fn draw_index_cells(
             };
             let corner = a.min(b);
             let cell = PageRectangle::new(corner, a.max(b) - corner);
-            fill_index(page, cell, *index);
+            fill_cell_by_index(page, cell, *index);
         }
     }
     for [c, r] in &map.disagreeing {
         if let Some(at) = axes.page_position((map.first[c - 1], map.second[r - 1])) {
-            page.draw_label(at, "×", TICK_SIZE, TextAnchor::Middle, INK);
+            page.draw_label(at, "×", TICK_FONT_SIZE, TextAnchor::Middle, TEXT_COLOR);
         }
     }
 }
@@ -298,8 +300,10 @@ fn draw_legend(
     cell: PageRectangle,
 ) {
     let mut key = Legend::right_of(cell);
-    let more = lines.len().saturating_sub(MOST_NAMED);
-    for (c, (curve, line)) in (boundary.curves.iter().zip(lines).enumerate()).take(MOST_NAMED) {
+    let more = lines.len().saturating_sub(MOST_CURVES_NAMED);
+    for (c, (curve, line)) in
+        (boundary.curves.iter().zip(lines).enumerate()).take(MOST_CURVES_NAMED)
+    {
         let what = index_change_text(curve).unwrap_or_else(|| "not verified".into());
         key.add_line(
             page,
@@ -313,47 +317,51 @@ fn draw_legend(
     }
     if shaded {
         key.add_entry(page, "", &stability_phrase(0), |page, cell| {
-            fill_index(page, cell, 0)
+            fill_cell_by_index(page, cell, 0)
         });
     }
     if let Some(map) = &boundary.map {
         let found = map.index.iter().flatten().flatten();
-        let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();
+        let indices: BTreeSet<usize> = found
+            .map(|index| *index.min(&DARKEST_MORSE_INDEX))
+            .collect();
         for index in indices {
-            let more = if index == DARKEST_INDEX {
+            let more = if index == DARKEST_MORSE_INDEX {
                 " or more"
             } else {
                 ""
             };
             let name = stability_phrase(index) + more;
-            key.add_entry(page, "", &name, |page, cell| fill_index(page, cell, index));
+            key.add_entry(page, "", &name, |page, cell| {
+                fill_cell_by_index(page, cell, index)
+            });
         }
     }
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         if points().any(|point| point.kind == kind) {
-            key.add_marker(page, kind, "", marker, INK);
+            key.add_marker(page, kind, "", marker, TEXT_COLOR);
         }
     }
 }
 
 /// Spacing of the places that are tried along a curve, and their largest number.
-const STEP: f64 = 5.0;
+const PLACE_SPACING: f64 = 5.0;
 
-const MOST_TRIED: usize = 400;
+const MOST_PLACES_TRIED: usize = 400;
 
 /// Curves closer than this are labelled together, with the indices outside them.
-const NEIGHBOURS: f64 = 16.0;
+const NEIGHBOUR_DISTANCE: f64 = 16.0;
 
 /// From a curve to its label.
 const GAP: f64 = 4.0;
 
 /// Labels need at least this clearance.
-const LEAST: f64 = 2.0;
+const LEAST_CLEARANCE: f64 = 2.0;
 
 /// The normal of a curve must have at least this component along the first number, which
 /// distinguishes the sides.
-const ACROSS: f64 = 0.15;
+const LEAST_NORMAL_COMPONENT: f64 = 0.15;
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
@@ -371,9 +379,9 @@ pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &m
                 room.fold(f64::INFINITY, f64::min)
             },
         );
-        if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST) {
+        if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST_CLEARANCE) {
             for (cell, text) in sides.texts {
-                labels.draw_label_at(page, cell, &text, NOTE);
+                labels.draw_label_at(page, cell, &text, NOTE_COLOR);
             }
             sides.curves.iter().for_each(|&curve| named[curve] = true);
         }
@@ -476,7 +484,7 @@ impl BoundaryLine {
     fn label_places(&self) -> Vec<LabelPlace> {
         let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
         let whole: f64 = self.pieces.iter().map(|(ends, _)| length(ends)).sum();
-        let spacing = STEP.max(whole / MOST_TRIED as f64);
+        let spacing = PLACE_SPACING.max(whole / MOST_PLACES_TRIED as f64);
         let (mut places, mut before) = (Vec::new(), 0.0);
         for (ends, sides) in &self.pieces {
             let (own, step) = (length(ends), ends[1] - ends[0]);
@@ -486,7 +494,7 @@ impl BoundaryLine {
             for k in 0..count {
                 let part = (k as f64 + 0.5) / count as f64;
                 let off = (before + part * own - 0.5 * whole).abs();
-                if normal.x > ACROSS {
+                if normal.x > LEAST_NORMAL_COMPONENT {
                     places.push((off, (ends[0] + part * step, normal, *sides)));
                 }
             }
@@ -547,7 +555,9 @@ impl SideLabels {
             others.sort_by(|a, b| (sign * a.0).total_cmp(&(sign * b.0)));
             let (mut along, mut index) = (0.0, sides[out]);
             for (at, it, k) in &others {
-                if (0.0..NEIGHBOURS).contains(&(sign * (at - along))) && it[1 - out] == index {
+                if (0.0..NEIGHBOUR_DISTANCE).contains(&(sign * (at - along)))
+                    && it[1 - out] == index
+                {
                     (along, index) = (*at, it[out]);
                     named.push(*k);
                 }
@@ -565,7 +575,7 @@ impl SideLabels {
 /// Distance in pixels of the rows in which crossings with curves are looked for, and of the columns.
 const ROW: f64 = 2.0;
 
-const COLUMN: f64 = 4.0;
+const COLUMN_SPACING: f64 = 4.0;
 
 /// Least distance of a column from the ends of a stretch in which it is.
 const BESIDE: f64 = 0.5;
@@ -679,7 +689,7 @@ fn connected_regions(
     curves: &[BoundaryLine],
     y: impl Fn(usize) -> f64,
 ) -> Vec<usize> {
-    let columns = (cell.size.x / COLUMN).ceil().max(1.0) as usize;
+    let columns = (cell.size.x / COLUMN_SPACING).ceil().max(1.0) as usize;
     let x = |k: usize| cell.corner.x + (k as f64 + 0.5) * cell.size.x / columns as f64;
     let crossed: Vec<Vec<f64>> = (0..columns)
         .map(|k| {

@@ -6,12 +6,12 @@
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, Legend, PANEL_AXIS, PageRectangle, TICK_SIZE, new_page,
+    HEADER, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PageRectangle, TICK_FONT_SIZE, new_page,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, Drawing, GREEN, INK, NOTE, ORANGE, PURPLE, SHADOW, SKY, SLATE, Stroke, TextAnchor,
-    VERMILION, circle_path, rectangle_path,
+    BLUE, Color, Drawing, GREEN, NOTE_COLOR, ORANGE, PURPLE, SHADOW_COLOR, SKY, SLATE, Stroke,
+    TEXT_COLOR, TextAnchor, VERMILION, circle_path, rectangle_path,
 };
 use crate::report::contender_name;
 use crate::report::numbers::format_error_bound;
@@ -21,20 +21,20 @@ use leafdyn::study::{Chart, ChartRow, PeerProgram, ScalingStudy, SolverConfig};
 
 /// Fixed colours of the peers that come with this crate, the same in every chart;
 /// other peers take the rest in turn.
-const KNOWN_PEERS: [(&str, Color); 3] = [
+const KNOWN_PEER_COLORS: [(&str, Color); 3] = [
     ("solve_bvp", Color(120, 120, 128)),
     ("exudyn", Color(150, 105, 60)),
     ("pyelastica", Color(100, 130, 90)),
 ];
 
-const OTHER_PEERS: [Color; 3] = [
+const OTHER_PEER_COLORS: [Color; 3] = [
     Color(125, 100, 160),
     Color(70, 130, 140),
     Color(165, 120, 130),
 ];
 
 /// Smaller errors are drawn here.
-const SMALLEST: f64 = 1e-17;
+const SMALLEST_ERROR_DRAWN: f64 = 1e-17;
 
 const FEWEST_DECADES: f64 = 1.0;
 
@@ -109,7 +109,7 @@ fn time_axis(values: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
-    let mut drawing = new_page(LEFT, title, notes, None);
+    let mut drawing = new_page(PAGE_LEFT_MARGIN, title, notes, None);
     drawing.height = (HEADER + panel.total_height()).ceil();
     drawing.draw_group("chart", |page| panel.draw(page, HEADER));
     drawing
@@ -146,7 +146,7 @@ fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartS
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
                 true => (rods, seconds),
-                false => (seconds, error.max(SMALLEST)),
+                false => (seconds, error.max(SMALLEST_ERROR_DRAWN)),
             };
             match row.seconds.zip(row.seconds_and_error()) {
                 Some((seconds, (median, error))) => series.points.push(ChartPoint {
@@ -172,8 +172,11 @@ fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartS
 }
 
 fn peer_color(name: &str, others: usize) -> Color {
-    let known = KNOWN_PEERS.iter().find(|(known, _)| *known == name);
-    known.map_or(OTHER_PEERS[others % OTHER_PEERS.len()], |(_, color)| *color)
+    let known = KNOWN_PEER_COLORS.iter().find(|(known, _)| *known == name);
+    known.map_or(
+        OTHER_PEER_COLORS[others % OTHER_PEER_COLORS.len()],
+        |(_, color)| *color,
+    )
 }
 
 /// One dashed line for each peer, from large errors to small.
@@ -191,7 +194,10 @@ fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
             ));
             all.len() - 1
         });
-        match peer.seconds_and_error().map(|(x, y)| (x, y.max(SMALLEST))) {
+        match peer
+            .seconds_and_error()
+            .map(|(x, y)| (x, y.max(SMALLEST_ERROR_DRAWN)))
+        {
             Some(at) => all[place].points.push(ChartPoint {
                 coordinates: at,
                 spread: [peer.seconds.q1, peer.seconds.q3].map(|x| (x, at.1)),
@@ -216,17 +222,17 @@ const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.
 const KEY: f64 = 252.0;
 
-const LANE: f64 = 16.0;
+const LANE_HEIGHT: f64 = 16.0;
 
 const LANE_GAP: f64 = 7.0;
 
 /// Colour of the points on the Pareto front and of the band that joins them.
-const FRONT: Color = Color(247, 205, 92);
+const PARETO_FRONT_COLOR: Color = Color(247, 205, 92);
 
 /// Colour of the area below the accuracy of the reference.
-const FLOOR: Color = Color(240, 240, 243);
+const REFERENCE_ACCURACY_COLOR: Color = Color(240, 240, 243);
 
-const LANES: Color = Color(250, 240, 238);
+const FAILURE_LANES_COLOR: Color = Color(250, 240, 238);
 
 /// A point, in the units of the axes.
 #[derive(Clone, Copy, Debug)]
@@ -298,13 +304,13 @@ impl ChartPanel {
     fn lanes_height(&self) -> f64 {
         match self.failure_lanes().len() {
             0 => 0.0,
-            lanes => lanes as f64 * LANE + LANE_GAP,
+            lanes => lanes as f64 * LANE_HEIGHT + LANE_GAP,
         }
     }
 
     /// Height of the panel with lanes and axis.
     pub fn total_height(&self) -> f64 {
-        self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS
+        self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS_HEIGHT
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
@@ -332,7 +338,7 @@ impl ChartPanel {
             );
         }
         for (lane, word) in self.failure_lanes().into_iter().enumerate() {
-            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LANE, word);
+            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LANE_HEIGHT, word);
         }
         self.draw_legend(page, axes.cell);
     }
@@ -342,11 +348,11 @@ impl ChartPanel {
         let height = cell.size.y * self.up.fraction(floor).clamp(0.0, 1.0);
         let start = DVec2::new(cell.corner.x, cell.opposite_corner().y - height);
         let area = DVec2::new(cell.size.x, height);
-        page.draw_shape(rectangle_path(start, area), FLOOR, None);
+        page.draw_shape(rectangle_path(start, area), REFERENCE_ACCURACY_COLOR, None);
         page.draw_line(
             start,
             start.with_x(cell.opposite_corner().x),
-            Stroke::new(SHADOW, 1.0),
+            Stroke::new(SHADOW_COLOR, 1.0),
         );
     }
 
@@ -356,7 +362,7 @@ impl ChartPanel {
         let front = points.filter(|point| point.is_on_front);
         let mut front: Vec<(f64, f64)> = front.map(|point| point.coordinates).collect();
         front.sort_by(|a, b| a.0.total_cmp(&b.0));
-        axes.draw_curve(page, &front, Stroke::new(FRONT, 8.0));
+        axes.draw_curve(page, &front, Stroke::new(PARETO_FRONT_COLOR, 8.0));
         for place in front
             .into_iter()
             .filter_map(|point| axes.page_position(point))
@@ -367,15 +373,15 @@ impl ChartPanel {
 
     /// Draws crosses for the runs that failed with this word, and the word.
     fn draw_failure_lane(&self, page: &mut Drawing, cell: PageRectangle, top: f64, word: &str) {
-        const SPACING: f64 = 11.0;
+        const CROSS_SPACING: f64 = 11.0;
         let (left, right) = (cell.corner.x, cell.opposite_corner().x);
-        let middle = top + 0.5 * LANE;
-        let area = DVec2::new(cell.size.x, LANE - 2.0);
+        let middle = top + 0.5 * LANE_HEIGHT;
+        let area = DVec2::new(cell.size.x, LANE_HEIGHT - 2.0);
         let start = DVec2::new(left, top + 1.0);
-        page.draw_shape(rectangle_path(start, area), LANES, None);
-        let name = Font::embedded().shorten_text(word, TICK_SIZE, KEY - 14.0);
+        page.draw_shape(rectangle_path(start, area), FAILURE_LANES_COLOR, None);
+        let name = Font::embedded().shorten_text(word, TICK_FONT_SIZE, KEY - 14.0);
         let at = DVec2::new(right + 10.0, middle);
-        page.draw_centered_label(at, &name, TICK_SIZE, TextAnchor::Start, NOTE);
+        page.draw_centered_label(at, &name, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
         let mut from_right = right;
         for series in &self.series {
             let failures = || series.failures.iter().filter(|it| it.word == word);
@@ -385,7 +391,7 @@ impl ChartPanel {
                 Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
             }
             if failures().any(|failure| failure.x.is_none()) {
-                from_right -= SPACING;
+                from_right -= CROSS_SPACING;
                 Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
             }
         }
@@ -403,26 +409,34 @@ impl ChartPanel {
         if points().any(|point| point.is_on_front) {
             let note = "nothing is both faster and more accurate";
             key.add_entry(page, "Pareto front", note, |page, cell| {
-                cell.draw_midline(page, Stroke::new(FRONT, 8.0));
+                cell.draw_midline(page, Stroke::new(PARETO_FRONT_COLOR, 8.0));
                 draw_halo(page, cell.middle());
             });
         }
         if !self.failure_lanes().is_empty() {
             let note = "failed or not run: see above";
-            key.add_marker(page, "", note, Marker::Cross, NOTE);
+            key.add_marker(page, "", note, Marker::Cross, NOTE_COLOR);
         }
         if self.floor.is_some() {
             let note = "below what is known of the reference itself";
             key.add_entry(page, "", note, |page, cell| {
-                let rim = Stroke::new(SHADOW, 1.0);
-                page.draw_shape(rectangle_path(cell.corner, cell.size), FLOOR, Some(rim));
+                let rim = Stroke::new(SHADOW_COLOR, 1.0);
+                page.draw_shape(
+                    rectangle_path(cell.corner, cell.size),
+                    REFERENCE_ACCURACY_COLOR,
+                    Some(rim),
+                );
             });
         }
     }
 }
 
 fn draw_halo(page: &mut Drawing, at: DVec2) {
-    page.draw_shape(circle_path(at, 7.5), FRONT, Some(Stroke::new(INK, 0.8)));
+    page.draw_shape(
+        circle_path(at, 7.5),
+        PARETO_FRONT_COLOR,
+        Some(Stroke::new(TEXT_COLOR, 0.8)),
+    );
 }
 
 #[cfg(test)]

@@ -4,11 +4,14 @@
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT,
-    TEXT_SIZE, WIDTH, draw_header, draw_panel_title,
+    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN,
+    PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, WIDTH, draw_header,
+    draw_panel_title,
 };
 use crate::figure::drawing::markers::{Marker, draw_second_solution_dot};
-use crate::figure::drawing::{CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, vein_color};
+use crate::figure::drawing::{
+    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, vein_color,
+};
 use crate::figure::leaf::{DrawnVeins, LeafPanels};
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_error_bound;
@@ -17,7 +20,7 @@ use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, CheckVerdict, ComparedQuantity};
 
-const LINE: f64 = 19.0;
+const LINE_HEIGHT: f64 = 19.0;
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -32,25 +35,31 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     );
     // Why the solutions could not be compared.
     let reason = match &check.verdict {
-        CheckVerdict::NotCompared(why) | CheckVerdict::NotIndependent(why) => {
-            Font::embedded().wrap_text(why, TEXT_SIZE, WIDTH - LEFT - RIGHT)
-        }
+        CheckVerdict::NotCompared(why) | CheckVerdict::NotIndependent(why) => Font::embedded()
+            .wrap_text(
+                why,
+                TEXT_FONT_SIZE,
+                WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN,
+            ),
         _ => Vec::new(),
     };
-    let key_line = NOTE_BASE + LINE * (reason.len() + 1) as f64;
-    let panels = LeafPanels::placed_below(HEADER - NOTE_BASE + key_line, &veins);
+    let key_line = NOTES_BASE_LINE + LINE_HEIGHT * (reason.len() + 1) as f64;
+    let panels = LeafPanels::placed_below(HEADER - NOTES_BASE_LINE + key_line, &veins);
     let compared = !check.along.is_empty();
-    let below = if compared { HEIGHT } else { 0.0 };
+    let below = if compared { PANEL_HEIGHT } else { 0.0 };
     let mut drawing = Drawing::new(WIDTH, &title);
     drawing.height = (panels.bottom() + below).ceil();
     drawing.draw_group("header", |page| {
         let notes = header_notes(check, &veins, &setting);
-        draw_header(page, LEFT, &title, &notes, Some(&veins));
+        draw_header(page, PAGE_LEFT_MARGIN, &title, &notes, Some(&veins));
         for (line, text) in reason.iter().enumerate() {
-            let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
-            page.draw_label(base, text, TEXT_SIZE, TextAnchor::Start, INK);
+            let base = DVec2::new(
+                PAGE_LEFT_MARGIN,
+                NOTES_BASE_LINE + LINE_HEIGHT * (line + 1) as f64,
+            );
+            page.draw_label(base, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
         }
-        let mut key = LegendRows::starting_at(LEFT, key_line, 26.0);
+        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, key_line, 26.0);
         let stroke = Stroke::new(vein_color(0.3), veins.line_width());
         key.add_entry(page, "relaxed", |page, cell| {
             cell.draw_midline(page, stroke)
@@ -94,14 +103,14 @@ const FRAME_HEIGHT: f64 = 216.0;
 /// Right of the frame, for the key.
 const KEY: f64 = 212.0;
 
-const HEIGHT: f64 = PANEL_TITLE + FRAME_HEIGHT + PANEL_AXIS;
+const PANEL_HEIGHT: f64 = PANEL_TITLE_HEIGHT + FRAME_HEIGHT + PANEL_AXIS_HEIGHT;
 
 const FEWEST_DECADES: f64 = 3.0;
 
 /// Height of the strip below for differences of exactly zero: one lane per quantity.
-const ZERO_STRIP: f64 = 30.0;
+const ZERO_STRIP_HEIGHT: f64 = 30.0;
 
-const MOST_MARKED: usize = 70;
+const MOST_STATIONS_MARKED: usize = 70;
 
 /// Differences of a quantity along the veins, and the largest one at which the
 /// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
@@ -134,11 +143,11 @@ fn difference_curve(
 }
 
 fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
-    let quantities = ComparedQuantity::ALL.into_iter().zip(CURVES);
+    let quantities = ComparedQuantity::ALL.into_iter().zip(CURVE_COLORS);
     let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
         .unzip();
-    let mut cell = PageRectangle::left_of_legend(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
+    let mut cell = PageRectangle::left_of_legend(start + PANEL_TITLE_HEIGHT, FRAME_HEIGHT, KEY);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {
@@ -148,7 +157,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let mut across = stations.clone();
     let mut values = curves.iter().flat_map(NamedCurve::ordinates);
     if values.any(|value| value == 0.0) {
-        cell.size.y -= ZERO_STRIP;
+        cell.size.y -= ZERO_STRIP_HEIGHT;
         across.labelled = false;
         draw_zero_strip(page, &curves, cell, stations);
     }
@@ -168,7 +177,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     }
     for curve in &curves {
         axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        if curve.points.len() <= MOST_MARKED {
+        if curve.points.len() <= MOST_STATIONS_MARKED {
             axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
         }
     }
@@ -186,7 +195,7 @@ fn draw_zero_strip(
     let strip = PanelAxes {
         cell: PageRectangle::new(
             DVec2::new(above.corner.x, above.opposite_corner().y),
-            DVec2::new(above.size.x, ZERO_STRIP),
+            DVec2::new(above.size.x, ZERO_STRIP_HEIGHT),
         ),
         across: stations,
         up: Axis {
@@ -211,7 +220,7 @@ fn draw_legend(page: &mut Drawing, curves: &[NamedCurve], cell: PageRectangle) {
         };
         key.add_marked_line(page, curve.name, &largest, curve.color);
     }
-    let dashed = Stroke::new(NOTE, 1.0).with_dashes(true);
+    let dashed = Stroke::new(NOTE_COLOR, 1.0).with_dashes(true);
     key.add_line(page, "allowed difference", "", dashed);
 }
 

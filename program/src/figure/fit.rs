@@ -10,13 +10,13 @@
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, Legend, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TICK_SIZE, WIDTH,
-    new_page, panel_letters,
+    HEADER, Legend, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
+    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page, panel_letters,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, color_of_vein,
-    polygon_path, rectangle_path,
+    BLUE, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
+    circle_path, color_of_vein, polygon_path, rectangle_path,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::numbers::{
@@ -30,7 +30,7 @@ use std::collections::HashMap;
 const BOTTOM: f64 = 4.0;
 
 /// Most panels of results, and most leaves, that are drawn.
-const MOST_RESULTS: usize = 8;
+const MOST_RESULT_PANELS: usize = 8;
 
 const MOST_LEAVES: usize = 3;
 
@@ -48,14 +48,14 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
             fit.degrees_of_freedom
         )),
     }
-    let mut page = new_page(LEFT, &name, &notes, None);
+    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut top = HEADER;
     page.draw_group("numbers", |page| {
         top = draw_fit_parameters(page, top, &letter(), &fit.parameters, units);
     });
-    for results in result_series_by_kind(fit).iter().take(MOST_RESULTS) {
+    for results in result_series_by_kind(fit).iter().take(MOST_RESULT_PANELS) {
         page.draw_group("result", |page| {
             top = draw_results(page, top, &letter(), units, results);
         });
@@ -73,16 +73,16 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
 }
 
 /// Left of the intervals, for the numbers in words; right of them, for the values; and a row.
-const WORDS: f64 = 216.0;
+const WORDS_WIDTH: f64 = 216.0;
 
-const VALUES: f64 = 200.0;
+const VALUES_WIDTH: f64 = 200.0;
 
-const ROW: f64 = 24.0;
+const ROW_HEIGHT: f64 = 24.0;
 
-const MOST_NUMBERS: usize = 30;
+const MOST_NUMBERS_DRAWN: usize = 30;
 
 /// Intervals are drawn up to this part of the value.
-const WIDEST: f64 = 1.0;
+const WIDEST_RELATIVE_INTERVAL: f64 = 1.0;
 
 /// Draws the free numbers with their intervals; returns where that ends.
 pub fn draw_fit_parameters(
@@ -92,11 +92,11 @@ pub fn draw_fit_parameters(
     all: &[FitParameter],
     units: &Units,
 ) -> f64 {
-    let shown = &all[..all.len().min(MOST_NUMBERS)];
-    let corner = DVec2::new(LEFT + WORDS, top + PANEL_TITLE);
+    let shown = &all[..all.len().min(MOST_NUMBERS_DRAWN)];
+    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS_WIDTH, top + PANEL_TITLE_HEIGHT);
     let size = DVec2::new(
-        WIDTH - RIGHT - VALUES - corner.x,
-        ROW * shown.len().max(1) as f64,
+        WIDTH - PAGE_RIGHT_MARGIN - VALUES_WIDTH - corner.x,
+        ROW_HEIGHT * shown.len().max(1) as f64,
     );
     let cell = PageRectangle::new(corner, size);
     // The ends of the intervals as parts of the values.
@@ -106,14 +106,14 @@ pub fn draw_fit_parameters(
     };
     let known = shown.iter().flat_map(parts).flatten();
     let widest = known.map(f64::abs).filter(|it| it.is_finite());
-    let widest = widest.fold(0.0, f64::max).min(WIDEST);
+    let widest = widest.fold(0.0, f64::max).min(WIDEST_RELATIVE_INTERVAL);
     let open = shown
         .iter()
         .flat_map(parts)
-        .any(|end| end.is_none_or(|it| it.abs() > WIDEST));
+        .any(|end| end.is_none_or(|it| it.abs() > WIDEST_RELATIVE_INTERVAL));
     let end = 110.0
         * if open || widest == 0.0 {
-            WIDEST
+            WIDEST_RELATIVE_INTERVAL
         } else {
             widest
         };
@@ -128,17 +128,23 @@ pub fn draw_fit_parameters(
     };
     let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
     for (k, it) in shown.iter().enumerate() {
-        let middle = corner.y + ROW * (k as f64 + 0.5);
+        let middle = corner.y + ROW_HEIGHT * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
-            let text = Font::embedded().shorten_text(text, TICK_SIZE, room);
-            page.draw_centered_label(DVec2::new(x, middle), &text, TICK_SIZE, anchor, INK);
+            let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
+            page.draw_centered_label(
+                DVec2::new(x, middle),
+                &text,
+                TICK_FONT_SIZE,
+                anchor,
+                TEXT_COLOR,
+            );
         };
         let number = QuantityLabel::from_keys(&it.key, units);
         label(
             page,
             corner.x - 10.0,
             &number.words,
-            WORDS + LEFT - 16.0,
+            WORDS_WIDTH + PAGE_LEFT_MARGIN - 16.0,
             TextAnchor::End,
         );
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
@@ -157,7 +163,7 @@ pub fn draw_fit_parameters(
                 .map(|at| at.with_y(middle))
         };
         let ends = [(low, -1.0), (high, 1.0)].map(|(part, sign)| {
-            let inside = part.filter(|part| part.abs() <= WIDEST);
+            let inside = part.filter(|part| part.abs() <= WIDEST_RELATIVE_INTERVAL);
             (
                 inside.is_some(),
                 place(inside.unwrap_or(0.0099 * sign * end)),
@@ -179,7 +185,7 @@ pub fn draw_fit_parameters(
             Marker::Circle.draw(page, value, BLUE);
         }
     }
-    cell.opposite_corner().y + PANEL_AXIS
+    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
 }
 
 /// A fitted number with its interval, without digits below it.
@@ -201,37 +207,37 @@ fn value_with_interval(it: &FitParameter) -> String {
     }
 }
 
-const RESULT: f64 = 190.0;
+const RESULT_HEIGHT: f64 = 190.0;
 
-const RESIDUALS: f64 = 70.0;
+const RESIDUALS_HEIGHT: f64 = 70.0;
 
 /// Least pixels between ticks of residuals.
-const RESIDUAL_TICKS: f64 = 16.0;
+const RESIDUAL_TICK_SPACING: f64 = 16.0;
 
 /// Between results and their residuals.
-const GAP: f64 = 12.0;
+const RESIDUALS_GAP: f64 = 12.0;
 
 /// Heights of a leaf, and between its two views.
-const LOWEST: f64 = 110.0;
+const LEAST_LEAF_HEIGHT: f64 = 110.0;
 
-const HIGHEST: f64 = 300.0;
+const LARGEST_LEAF_HEIGHT: f64 = 300.0;
 
 const VIEWS_GAP: f64 = 70.0;
 
 /// Right of the panels, for the key.
 const KEY: f64 = 200.0;
 
-const BAND: Color = Color(200, 222, 238);
+const CONFIDENCE_BAND_COLOR: Color = Color(200, 222, 238);
 
-const MODEL: Stroke = Stroke::new(BLUE, 1.6);
+const MODEL_STROKE: Stroke = Stroke::new(BLUE, 1.6);
 
 /// Half the width of the band of a single experiment, in pixels.
-const SINGLE: f64 = 5.0;
+const SINGLE_EXPERIMENT_HALF_WIDTH: f64 = 5.0;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Views, and their axes.
-const VIEWS: [(&str, [usize; 2]); 3] = [
+const LEAF_VIEWS: [(&str, [usize; 2]); 3] = [
     ("from above", [0, 1]),
     ("from the side", [0, 2]),
     ("along x", [1, 2]),
@@ -264,7 +270,7 @@ pub fn draw_results(
     units: &Units,
     results: &ResultSeries,
 ) -> f64 {
-    let cell = PageRectangle::left_of_legend(top + PANEL_TITLE, RESULT, KEY);
+    let cell = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, RESULT_HEIGHT, KEY);
     let quantity = result_label(results.kind, units);
     let values = results.all_residuals().flat_map(|(_, r)| {
         let (band, sd) = (r.band, 2.0 * r.sd);
@@ -303,13 +309,13 @@ pub fn draw_results(
     }
     for (x, r) in results.all_residuals() {
         let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
-        axes.draw_curve(page, &bar, Stroke::new(DOT, 1.0));
+        axes.draw_curve(page, &bar, Stroke::new(SECOND_SOLUTION_COLOR, 1.0));
     }
     axes.draw_markers(
         page,
         results.all_residuals().map(|(x, r)| (x, r.data)),
         Marker::Dot,
-        DOT,
+        SECOND_SOLUTION_COLOR,
     );
     let mut key = Legend::right_of(cell);
     key.add_marker(
@@ -317,20 +323,24 @@ pub fn draw_results(
         "data",
         "with two standard deviations",
         Marker::Dot,
-        DOT,
+        SECOND_SOLUTION_COLOR,
     );
-    key.add_line(page, "model", "", MODEL);
+    key.add_line(page, "model", "", MODEL_STROKE);
     key.add_entry(
         page,
         "95 % band",
         "what the data leave open",
         |page, cell| {
-            page.draw_shape(rectangle_path(cell.corner, cell.size), BAND, None);
+            page.draw_shape(
+                rectangle_path(cell.corner, cell.size),
+                CONFIDENCE_BAND_COLOR,
+                None,
+            );
         },
     );
     let points = results
         .all_residuals()
-        .map(|(x, r)| (x, r.residual, INK))
+        .map(|(x, r)| (x, r.residual, TEXT_COLOR))
         .collect();
     draw_residuals(page, cell, across, points)
 }
@@ -346,10 +356,10 @@ fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitRe
     let mut band = line(&|r| r.model + r.band);
     band.extend(line(&|r| r.model - r.band).into_iter().rev());
     if !band.is_empty() {
-        page.draw_shape(polygon_path(&band), BAND, None);
+        page.draw_shape(polygon_path(&band), CONFIDENCE_BAND_COLOR, None);
     }
     let model: Vec<Option<DVec2>> = line(&|r| r.model).into_iter().map(Some).collect();
-    axes.draw_clipped_line(page, &model, MODEL);
+    axes.draw_clipped_line(page, &model, MODEL_STROKE);
     if let [(x, r)] = once[..] {
         draw_single_experiments(page, axes, &[(x, r)]);
     }
@@ -364,13 +374,13 @@ fn draw_single_experiments(
     for (x, r) in experiments {
         let ends = [r.model + r.band, r.model - r.band].map(|y| axes.page_position((*x, y)));
         if let ([Some(top), Some(end)], Some(at)) = (ends, axes.page_position((*x, r.model))) {
-            let half = DVec2::new(SINGLE, 0.0);
+            let half = DVec2::new(SINGLE_EXPERIMENT_HALF_WIDTH, 0.0);
             page.draw_shape(
                 rectangle_path(top - half, end - top + 2.0 * half),
-                BAND,
+                CONFIDENCE_BAND_COLOR,
                 None,
             );
-            page.draw_line(at - half, at + half, MODEL);
+            page.draw_line(at - half, at + half, MODEL_STROKE);
         }
     }
 }
@@ -382,18 +392,18 @@ fn draw_residuals(
     across: Axis,
     points: Vec<(f64, f64, Color)>,
 ) -> f64 {
-    let corner = DVec2::new(above.corner.x, above.opposite_corner().y + GAP);
-    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS));
+    let corner = DVec2::new(above.corner.x, above.opposite_corner().y + RESIDUALS_GAP);
+    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS_HEIGHT));
     let sizes = points.iter().map(|(_, residual, _)| residual.abs());
     let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
         emphasizes_zero: true,
-        tick_spacing: Some(RESIDUAL_TICKS),
+        tick_spacing: Some(RESIDUAL_TICK_SPACING),
         ..Axis::linear("residual", -most, most)
     };
     let axes = PanelAxes { cell, across, up };
     axes.draw(page);
-    let two = Stroke::new(NOTE, 1.0).with_dashes(true);
+    let two = Stroke::new(NOTE_COLOR, 1.0).with_dashes(true);
     for bound in [-2.0, 2.0] {
         let fraction = 1.0 - axes.up.fraction(bound);
         let from = corner + DVec2::new(0.0, fraction * cell.size.y);
@@ -404,8 +414,8 @@ fn draw_residuals(
     }
     let mut key = Legend::right_of(cell);
     let note = "in standard deviations";
-    key.add_marker(page, "data less model", note, Marker::Dot, INK);
-    cell.opposite_corner().y + PANEL_AXIS
+    key.add_marker(page, "data less model", note, Marker::Dot, TEXT_COLOR);
+    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
 }
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
@@ -422,16 +432,16 @@ pub fn draw_measured_veins(
         let mut points = leaf.traced.iter();
         points.any(|(_, at)| at[*a].is_some() && at[*b].is_some())
     };
-    let mut views: Vec<_> = VIEWS.into_iter().filter(measured).collect();
+    let mut views: Vec<_> = LEAF_VIEWS.into_iter().filter(measured).collect();
     if views.is_empty() {
         // Of marked points a single coordinate.
-        views = VIEWS.into();
+        views = LEAF_VIEWS.into();
     }
     views.truncate(2);
-    let whole = WIDTH - LEFT - RIGHT - KEY;
+    let whole = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - KEY;
     let width = match views.len() {
         1 => whole,
-        _ => 0.5 * (WIDTH - LEFT - RIGHT - VIEWS_GAP),
+        _ => 0.5 * (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - VIEWS_GAP),
     };
     let count = leaf.curves.len();
     let panels: Vec<_> = (views.iter())
@@ -458,14 +468,17 @@ pub fn draw_measured_veins(
         .iter()
         .map(tall)
         .fold(0.0, f64::max)
-        .clamp(LOWEST, HIGHEST);
+        .clamp(LEAST_LEAF_HEIGHT, LARGEST_LEAF_HEIGHT);
     let experiment = match experiment {
         "as it is" => "traced veins".to_string(),
         name => format!("traced veins, experiment {name}"),
     };
-    let mut below = PageRectangle::left_of_legend(top + PANEL_TITLE, height, KEY);
+    let mut below = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, height, KEY);
     for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
-        let corner = DVec2::new(LEFT + k as f64 * (width + VIEWS_GAP), top + PANEL_TITLE);
+        let corner = DVec2::new(
+            PAGE_LEFT_MARGIN + k as f64 * (width + VIEWS_GAP),
+            top + PANEL_TITLE_HEIGHT,
+        );
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
         let what = format!("{experiment}, {view}");
@@ -484,14 +497,14 @@ pub fn draw_measured_veins(
         }
         if views.len() == 1 {
             let mut key = Legend::right_of(cell);
-            key.add_line(page, "model", "each vein in its colour", MODEL);
+            key.add_line(page, "model", "each vein in its colour", MODEL_STROKE);
             key.add_entry(page, "traced points", "", |page, cell| {
                 let rim = Stroke::new(BLUE, 1.2);
                 page.draw_shape(circle_path(cell.middle(), 2.6), WHITE, Some(rim));
             });
         }
     }
-    below.corner.y += PANEL_AXIS - GAP;
+    below.corner.y += PANEL_AXIS_HEIGHT - RESIDUALS_GAP;
     let along = Axis::linear("fraction of the length", 0.0, 1.0);
     let points = residuals.iter().filter_map(|it| {
         let color = color_of_vein(it.rod?.checked_sub(1)?, count);
@@ -513,10 +526,10 @@ fn equalize_axis_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, A
 }
 
 /// Fewest experiments of a series among others.
-const FEWEST: usize = 4;
+const FEWEST_EXPERIMENTS: usize = 4;
 
 /// Experiments are in line up to this part of their distance.
-const IN_LINE: f64 = 1e-6;
+const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 
 /// Results of one kind, drawn in one panel.
 pub struct ResultSeries<'f> {
@@ -563,7 +576,7 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
             let whole = (from == 0).then(|| most_varying_setting(&own)).flatten();
             let found = match whole {
                 Some(key) => Some((of.len(), key)),
-                None => (from + FEWEST..=of.len())
+                None => (from + FEWEST_EXPERIMENTS..=of.len())
                     .map_while(|to| Some((to, most_varying_setting(&own[from..to])?)))
                     .last(),
             };
@@ -636,7 +649,7 @@ fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
             .iter()
             .zip(longest)
             .map(|(a, b)| (a - part * b).powi(2));
-        off.sum::<f64>() <= IN_LINE * IN_LINE * square
+        off.sum::<f64>() <= COLLINEARITY_TOLERANCE * COLLINEARITY_TOLERANCE * square
     };
     if !steps.iter().all(in_line) {
         return None;

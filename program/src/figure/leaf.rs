@@ -10,12 +10,12 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, SIDE, SmallPanels, TICK_SIZE,
-    WIDTH, draw_panel_title, new_page,
+    HEADER, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
+    PageRectangle, SIDE_MARGIN, SmallPanels, TICK_FONT_SIZE, WIDTH, draw_panel_title, new_page,
 };
 use crate::figure::drawing::markers::{MomentArrow, draw_leaf_markers, moment_arrows};
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE, ParallelProjection, SpacePanel, padded_box,
+    BoxMargins, OBLIQUE_VIEW, ParallelProjection, SpacePanel, padded_box,
 };
 use crate::figure::drawing::{
     Color, Drawing, DrawingPath, PathStep, Stroke, color_of_vein, curve_between_fractions,
@@ -39,7 +39,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         1 => rod::draw(leaf, scenario, &veins, &setting, &notes),
         _ => {
             let panels = LeafPanels::placed_below(HEADER, &veins);
-            let mut drawing = new_page(LEFT, &leaf.scenario, &notes, Some(&veins));
+            let mut drawing = new_page(PAGE_LEFT_MARGIN, &leaf.scenario, &notes, Some(&veins));
             drawing.height = panels.bottom().ceil();
             panels.draw(&mut drawing, &veins, &setting);
             drawing
@@ -77,11 +77,11 @@ fn header_notes(
 }
 
 /// Most equilibria drawn.
-const MOST_EQUILIBRIA: usize = 24;
+const MOST_EQUILIBRIA_DRAWN: usize = 24;
 
 pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
-    let shown = &all.found[..all.found.len().min(MOST_EQUILIBRIA)];
+    let shown = &all.found[..all.found.len().min(MOST_EQUILIBRIA_DRAWN)];
     let shapes = shown
         .iter()
         .map(|found| DrawnVeins::from_equilibrium(&found.equilibrium, scenario));
@@ -90,10 +90,10 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
     let count = all.found.len();
     let mut notes = vec![format!("{count} found from {} starts", all.starts)];
-    if count > MOST_EQUILIBRIA {
-        notes.push(format!("the first {MOST_EQUILIBRIA} drawn"));
+    if count > MOST_EQUILIBRIA_DRAWN {
+        notes.push(format!("the first {MOST_EQUILIBRIA_DRAWN} drawn"));
     }
-    let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
+    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, shapes.first());
     drawing.height = panels.bottom();
     for (index, (found, veins)) in shown.iter().zip(&shapes).enumerate() {
         let negative = found.equilibrium.stability.negative_eigenvalues;
@@ -112,17 +112,17 @@ const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.
 const COLUMN_GAP: f64 = 74.0;
 
-const COLUMNS: f64 = WIDTH - LEFT - RIGHT - COLUMN_GAP;
+const COLUMNS_WIDTH: f64 = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - COLUMN_GAP;
 
 /// Panels are at least this large, however flat the leaf is.
-const NARROWEST_COLUMN: f64 = 340.0;
+const LEAST_COLUMN_WIDTH: f64 = 340.0;
 
-const LOWEST_TOP: f64 = 270.0;
+const LEAST_TOP_HEIGHT: f64 = 270.0;
 
-const LOWEST_BOTTOM: f64 = 130.0;
+const MIN_BOTTOM_ROW_HEIGHT: f64 = 130.0;
 
 /// Both rows together are at most this high, however tall the leaf is.
-const HIGHEST_ROWS: f64 = 800.0;
+const LARGEST_ROWS_HEIGHT: f64 = 800.0;
 
 /// Padding around the leaf, as a fraction of its largest extent.
 const PADDING: f64 = 0.06;
@@ -131,7 +131,7 @@ const PADDING: f64 = 0.06;
 const TICK_DISTANCE: f64 = 36.0;
 
 /// The flat panels: names of their groups, letters, titles, and the two axes.
-const FLAT: [(&str, &str, &str, [usize; 2]); 3] = [
+const PLANE_PANELS: [(&str, &str, &str, [usize; 2]); 3] = [
     ("top", "(a)", "from above", [0, 1]),
     ("side", "(b)", "from the side", [0, 2]),
     ("front", "(c)", "from the front", [1, 2]),
@@ -217,25 +217,28 @@ impl LeafPanels {
             veins.high - veins.low + DVec3::splat(2.0 * PADDING * veins.largest_extent());
         // The largest scale that lets every panel hold the leaf.
         let scale = [
-            COLUMNS / (x + y),
-            (COLUMNS - NARROWEST_COLUMN) / x.max(y),
-            HIGHEST_ROWS / (y + z),
-            (HIGHEST_ROWS - LOWEST_BOTTOM) / y,
-            (HIGHEST_ROWS - LOWEST_TOP) / z,
+            COLUMNS_WIDTH / (x + y),
+            (COLUMNS_WIDTH - LEAST_COLUMN_WIDTH) / x.max(y),
+            LARGEST_ROWS_HEIGHT / (y + z),
+            (LARGEST_ROWS_HEIGHT - MIN_BOTTOM_ROW_HEIGHT) / y,
+            (LARGEST_ROWS_HEIGHT - LEAST_TOP_HEIGHT) / z,
         ]
         .into_iter()
         .fold(f64::INFINITY, f64::min);
 
-        let widths = [x, y].map(|extent| (scale * extent).max(NARROWEST_COLUMN));
-        let spare = COLUMNS - widths[0] - widths[1];
+        let widths = [x, y].map(|extent| (scale * extent).max(LEAST_COLUMN_WIDTH));
+        let spare = COLUMNS_WIDTH - widths[0] - widths[1];
         let widths = widths.map(|width| width + 0.5 * spare);
-        let heights = [(scale * y).max(LOWEST_TOP), (scale * z).max(LOWEST_BOTTOM)];
-        let top = start + PANEL_TITLE;
-        let bottom = top + heights[0] + PANEL_AXIS + PANEL_TITLE;
+        let heights = [
+            (scale * y).max(LEAST_TOP_HEIGHT),
+            (scale * z).max(MIN_BOTTOM_ROW_HEIGHT),
+        ];
+        let top = start + PANEL_TITLE_HEIGHT;
+        let bottom = top + heights[0] + PANEL_AXIS_HEIGHT + PANEL_TITLE_HEIGHT;
         LeafPanels {
             columns: [
-                (LEFT, widths[0]),
-                (LEFT + widths[0] + COLUMN_GAP, widths[1]),
+                (PAGE_LEFT_MARGIN, widths[0]),
+                (PAGE_LEFT_MARGIN + widths[0] + COLUMN_GAP, widths[1]),
             ],
             rows: [(top, heights[0]), (bottom, heights[1])],
             scale,
@@ -243,7 +246,7 @@ impl LeafPanels {
     }
 
     pub fn bottom(&self) -> f64 {
-        self.rows[1].0 + self.rows[1].1 + PANEL_AXIS + BOTTOM
+        self.rows[1].0 + self.rows[1].1 + PANEL_AXIS_HEIGHT + BOTTOM
     }
 
     pub fn draw(&self, drawing: &mut Drawing, veins: &DrawnVeins, setting: &FigureSetting) {
@@ -253,7 +256,7 @@ impl LeafPanels {
             PageRectangle::new(DVec2::new(column.0, row.0), DVec2::new(column.1, row.1))
         };
         let cells = [(left, top), (left, bottom), (right, bottom)];
-        for ((name, letter, text, axes), (column, row)) in FLAT.into_iter().zip(cells) {
+        for ((name, letter, text, axes), (column, row)) in PLANE_PANELS.into_iter().zip(cells) {
             let cell = cell(column, row);
             drawing.draw_group(name, |page| {
                 draw_panel_title(page, cell.corner, letter, text);
@@ -264,11 +267,11 @@ impl LeafPanels {
         let shift = 0.5 * COLUMN_GAP;
         let cell = cell(
             (right.0 - shift, right.1 + shift),
-            (top.0, top.1 + PANEL_AXIS - TICK_SIZE),
+            (top.0, top.1 + PANEL_AXIS_HEIGHT - TICK_FONT_SIZE),
         );
         drawing.draw_group("space", |page| {
             let bounds = padded_box(veins.low, veins.high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
             draw_panel_title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
             scene.draw_axes(page, 38.0);
@@ -279,18 +282,18 @@ impl LeafPanels {
 }
 
 /// Of a wider leaf only some veins are drawn: more could not be distinguished.
-const MOST_VEINS: usize = 200;
+const MOST_VEINS_DRAWN: usize = 200;
 
 /// Largest distance of a drawn curve from the computed points, in lengths: a
 /// quarter of a pixel.
-const MAX_DEVIATION: f64 = 3e-4;
+const LARGEST_CURVE_DEVIATION: f64 = 3e-4;
 
 /// Curves are drawn with at least this many pieces, if they have as many segments.
-const FEWEST_PIECES: usize = 8;
+const FEWEST_PIECES_PER_CURVE: usize = 8;
 
 /// Dots of a second solution: about the most veins with dots, about the most dots in
 /// total, dots per extent of the leaf, and the fewest on a vein that has as many nodes.
-const MOST_DOTTED: usize = 24;
+const MOST_VEINS_DOTTED: usize = 24;
 
 const MOST_DOTS: usize = 160;
 
@@ -452,7 +455,7 @@ impl DrawnVeins {
     /// Adds a second solution as dots, on as many veins and at as many nodes as can be
     /// distinguished.
     pub fn add_second_solution(&mut self, rods: &[RodShape]) {
-        let every = self.count.div_ceil(MOST_DOTTED).max(1);
+        let every = self.count.div_ceil(MOST_VEINS_DOTTED).max(1);
         let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
         // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.largest_extent();
@@ -513,7 +516,7 @@ impl DrawnVeins {
 }
 
 fn vein_stride(count: usize) -> usize {
-    count.div_ceil(MOST_VEINS).max(1)
+    count.div_ceil(MOST_VEINS_DRAWN).max(1)
 }
 
 /// Whether a vein is drawn: of a wide leaf only every n-th vein and the last are.
@@ -565,13 +568,14 @@ fn drawable_points(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
 fn smooth_vein(points: &[DVec3]) -> Vec<BezierPiece> {
     let segments = points.len().saturating_sub(1);
     let mut stride = 1;
-    while segments.is_multiple_of(2 * stride) && segments / (2 * stride) >= FEWEST_PIECES {
+    while segments.is_multiple_of(2 * stride) && segments / (2 * stride) >= FEWEST_PIECES_PER_CURVE
+    {
         stride *= 2;
     }
     loop {
         let kept: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
         let pieces = interpolate_pieces(&kept);
-        if stride == 1 || largest_deviation(&pieces, points, stride) < MAX_DEVIATION {
+        if stride == 1 || largest_deviation(&pieces, points, stride) < LARGEST_CURVE_DEVIATION {
             return pieces;
         }
         stride /= 2;
@@ -639,8 +643,8 @@ mod tests {
             let [x, y, z] = size.map(|extent| found.scale * extent);
             let fits = left >= x && right >= y && top >= y && bottom >= z;
             assert!(fits, "{size:?}");
-            assert!((left + right - COLUMNS).abs() < 1e-8, "{size:?}");
-            assert!(top + bottom <= HIGHEST_ROWS + 1e-8, "{size:?}");
+            assert!((left + right - COLUMNS_WIDTH).abs() < 1e-8, "{size:?}");
+            assert!(top + bottom <= LARGEST_ROWS_HEIGHT + 1e-8, "{size:?}");
         }
     }
 }

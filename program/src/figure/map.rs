@@ -7,13 +7,13 @@
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TEXT_SIZE,
-    TICK_SIZE, WIDTH, draw_header,
+    Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
+    PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, WIDTH, draw_header,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, rectangle_path,
-    vein_color,
+    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path,
+    rectangle_path, vein_color,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::map_title;
@@ -24,55 +24,55 @@ use leafdyn::study::{
     SolverSetting,
 };
 
-const SWATCH: f64 = 12.0;
+const SWATCH_SIZE: f64 = 12.0;
 
 /// Room below each panel for ticks and, below the last, for the name of the axis.
-const TICKS: f64 = 26.0;
+const TICKS_HEIGHT: f64 = 26.0;
 
-const NAME: f64 = 26.0;
+const AXIS_NAME_HEIGHT: f64 = 26.0;
 
 /// Between panels, for the ticks of the right one.
 const GAP: f64 = 44.0;
 
-const MOST_COLUMNS: usize = 3;
+const MOST_PANEL_COLUMNS: usize = 3;
 
 const WIDEST: f64 = 470.0;
 
 /// Explains a map of waves.
-const MEANING: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
+const WAVES_EXPLANATION: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
     of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
 
 /// Width of a page with one panel.
-const NARROW: f64 = 600.0;
+const SINGLE_PANEL_PAGE_WIDTH: f64 = 600.0;
 
 /// Between the strip of a single method and its curves.
 const CURVES_GAP: f64 = 12.0;
 
 /// Height over width of a panel.
-const ASPECT: f64 = 0.86;
+const PANEL_ASPECT_RATIO: f64 = 0.86;
 
 /// With one axis: height of a method's strip, the gap below it, and room for its name
 /// and count.
-const STRIP: f64 = 30.0;
+const STRIP_HEIGHT: f64 = 30.0;
 
 const STRIP_GAP: f64 = 9.0;
 
-const METHOD: f64 = 130.0;
+const METHOD_NAME_WIDTH: f64 = 130.0;
 
-const COUNT: f64 = 100.0;
+const COUNT_WIDTH: f64 = 100.0;
 
 pub fn draw(map: &Map) -> Drawing {
     let name = &map.request.base.scenario().name;
     let title = format!("{name}: {}", map_title(map.show));
     let width = match (map.request.axes.len(), map.request.methods.len()) {
-        (2, 1) => NARROW,
+        (2, 1) => SINGLE_PANEL_PAGE_WIDTH,
         _ => WIDTH,
     };
     let mut drawing = Drawing::new(width, &title);
     let mut end = 0.0;
     drawing.draw_group("header", |page| {
-        draw_header(page, LEFT, &title, &header_notes(map), None);
-        end = draw_legend(page, map, NOTE_BASE + 20.0);
+        draw_header(page, PAGE_LEFT_MARGIN, &title, &header_notes(map), None);
+        end = draw_legend(page, map, NOTES_BASE_LINE + 20.0);
         if map.show == MapShow::Waves {
             end = draw_waves_explanation(page, end);
         }
@@ -108,7 +108,7 @@ fn header_notes(map: &Map) -> Vec<String> {
 
 /// Draws the key of the outcomes and marks that occur; returns where it ends.
 fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
-    let mut key = LegendRows::starting_at(LEFT, base, SWATCH);
+    let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, base, SWATCH_SIZE);
     for outcome in MapOutcome::ALL {
         let shown =
             |row: &MapRow| row.outcome == outcome && stable_waves_shown(map.show, row).is_none();
@@ -147,7 +147,7 @@ fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
     }
     if has_step_axis(map) {
         key.add_entry(page, "longest step known to be stable", |page, cell| {
-            cell.draw_midline(page, BOUND);
+            cell.draw_midline(page, STABLE_STEP_STROKE);
         });
     }
     key.bottom()
@@ -155,11 +155,11 @@ fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
 
 /// Draws the explanation of a map of waves; returns where it ends.
 fn draw_waves_explanation(page: &mut Drawing, mut top: f64) -> f64 {
-    let room = page.width - LEFT - RIGHT;
-    for line in Font::embedded().wrap_text(MEANING, TICK_SIZE, room) {
-        let base = DVec2::new(LEFT, top + TICK_SIZE);
-        page.draw_label(base, &line, TICK_SIZE, TextAnchor::Start, NOTE);
-        top += 1.4 * TICK_SIZE;
+    let room = page.width - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
+    for line in Font::embedded().wrap_text(WAVES_EXPLANATION, TICK_FONT_SIZE, room) {
+        let base = DVec2::new(PAGE_LEFT_MARGIN, top + TICK_FONT_SIZE);
+        page.draw_label(base, &line, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
+        top += 1.4 * TICK_FONT_SIZE;
     }
     top + 6.0
 }
@@ -190,20 +190,20 @@ fn draw_panels(
     start: f64,
 ) -> f64 {
     let methods = &map.request.methods;
-    let columns = y.map_or(1, |_| methods.len().clamp(1, MOST_COLUMNS));
+    let columns = y.map_or(1, |_| methods.len().clamp(1, MOST_PANEL_COLUMNS));
     let (corner, size, pitch) = match y {
         Some(_) => {
-            let left = LEFT + 18.0;
-            let room = WIDTH - RIGHT - left - (columns - 1) as f64 * GAP;
+            let left = PAGE_LEFT_MARGIN + 18.0;
+            let room = WIDTH - PAGE_RIGHT_MARGIN - left - (columns - 1) as f64 * GAP;
             let width = (room / columns as f64).min(WIDEST);
-            let size = DVec2::new(width, ASPECT * width);
-            let pitch = size + DVec2::new(GAP, PANEL_TITLE + TICKS + 6.0);
-            (DVec2::new(left, start + PANEL_TITLE), size, pitch)
+            let size = DVec2::new(width, PANEL_ASPECT_RATIO * width);
+            let pitch = size + DVec2::new(GAP, PANEL_TITLE_HEIGHT + TICKS_HEIGHT + 6.0);
+            (DVec2::new(left, start + PANEL_TITLE_HEIGHT), size, pitch)
         }
         None => {
-            let left = LEFT + METHOD;
-            let size = DVec2::new(WIDTH - RIGHT - COUNT - left, STRIP);
-            let pitch = DVec2::new(0.0, STRIP + STRIP_GAP);
+            let left = PAGE_LEFT_MARGIN + METHOD_NAME_WIDTH;
+            let size = DVec2::new(WIDTH - PAGE_RIGHT_MARGIN - COUNT_WIDTH - left, STRIP_HEIGHT);
+            let pitch = DVec2::new(0.0, STRIP_HEIGHT + STRIP_GAP);
             (DVec2::new(left, start + 10.0), size, pitch)
         }
     };
@@ -227,15 +227,21 @@ fn draw_panels(
     if let (None, [_]) = (y, methods.as_slice()) {
         return draw_curves(drawing, map, x, last, last.opposite_corner().y + CURVES_GAP);
     }
-    let end = last.opposite_corner().y + TICKS;
+    let end = last.opposite_corner().y + TICKS_HEIGHT;
     let across = columns as f64 * (size.x + GAP) - GAP;
     let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
-    drawing.draw_label(below, &x.axis.title(), TEXT_SIZE, TextAnchor::Middle, INK);
+    drawing.draw_label(
+        below,
+        &x.axis.title(),
+        TEXT_FONT_SIZE,
+        TextAnchor::Middle,
+        TEXT_COLOR,
+    );
     if let Some(y) = y {
         let middle = DVec2::new(24.0, 0.5 * (corner.y + last.opposite_corner().y));
-        drawing.draw_rotated_label(middle, &y.axis.title(), TEXT_SIZE, INK);
+        drawing.draw_rotated_label(middle, &y.axis.title(), TEXT_FONT_SIZE, TEXT_COLOR);
     }
-    end + NAME
+    end + AXIS_NAME_HEIGHT
 }
 
 /// Draws a method's name and count, above a panel or to both sides of a strip.
@@ -249,22 +255,34 @@ fn draw_method_name(
     let (name, count) = (method.word(), outcome_count_text(map, method));
     if above {
         let base = cell.corner - DVec2::new(0.0, 8.0);
-        page.draw_label(base, name, TEXT_SIZE, TextAnchor::Start, INK);
+        page.draw_label(base, name, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
         let base = base.with_x(cell.opposite_corner().x);
-        return page.draw_label(base, &count, TICK_SIZE, TextAnchor::End, NOTE);
+        return page.draw_label(base, &count, TICK_FONT_SIZE, TextAnchor::End, NOTE_COLOR);
     }
     let [left, right] = cell.midline();
     let gap = DVec2::new(10.0, 0.0);
-    page.draw_centered_label(left - gap, name, TEXT_SIZE, TextAnchor::End, INK);
-    page.draw_centered_label(right + gap, &count, TICK_SIZE, TextAnchor::Start, NOTE);
+    page.draw_centered_label(
+        left - gap,
+        name,
+        TEXT_FONT_SIZE,
+        TextAnchor::End,
+        TEXT_COLOR,
+    );
+    page.draw_centered_label(
+        right + gap,
+        &count,
+        TICK_FONT_SIZE,
+        TextAnchor::Start,
+        NOTE_COLOR,
+    );
 }
 
 /// Smaller variations are rounding.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING_VARIATION: f64 = 1e-9;
 
-const TALL: f64 = 260.0;
+const TALL_CURVE_PANEL: f64 = 260.0;
 
-const LOW: f64 = 150.0;
+const LOW_CURVE_PANEL: f64 = 150.0;
 
 /// A curve: its name, its colour, and its value in a row.
 type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
@@ -279,34 +297,34 @@ fn curve_panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
                 "where the tip is",
                 name_with_unit("tip", length),
                 vec![
-                    ("x", CURVES[0], |row| row.tip_x),
-                    ("y", CURVES[1], |row| row.tip_y),
-                    ("z", CURVES[2], |row| row.tip_z),
+                    ("x", CURVE_COLORS[0], |row| row.tip_x),
+                    ("y", CURVE_COLORS[1], |row| row.tip_y),
+                    ("z", CURVE_COLORS[2], |row| row.tip_z),
                 ],
             ),
             (
                 "energy",
                 name_with_unit("energy", units.energy().as_deref()),
-                vec![("energy", CURVES[3], |row| row.energy)],
+                vec![("energy", CURVE_COLORS[3], |row| row.energy)],
             ),
         ],
         MapShow::Waves => vec![
             (
                 "waves along the margins, of stable leaves",
                 "waves".into(),
-                vec![("waves", CURVES[0], MapRow::stable_waves)],
+                vec![("waves", CURVE_COLORS[0], MapRow::stable_waves)],
             ),
             (
                 "their amplitude",
                 name_with_unit("amplitude", Some("L")),
-                vec![("amplitude", CURVES[1], |row| {
+                vec![("amplitude", CURVE_COLORS[1], |row| {
                     row.stable_waves().and(row.margin_amplitude)
                 })],
             ),
             (
                 "mean twist of the veins",
                 name_with_unit("twist", Some("rad")),
-                vec![("twist", CURVES[3], |row| row.twist)],
+                vec![("twist", CURVE_COLORS[3], |row| row.twist)],
             ),
         ],
     }
@@ -323,9 +341,13 @@ fn draw_curves(
     let values = &map.request.axes[0].values;
     let mut top = start;
     for (what, name, curves) in curve_panels(map) {
-        let height = if curves.len() > 1 { TALL } else { LOW };
+        let height = if curves.len() > 1 {
+            TALL_CURVE_PANEL
+        } else {
+            LOW_CURVE_PANEL
+        };
         let cell = PageRectangle::new(
-            DVec2::new(strip.corner.x, top + PANEL_TITLE),
+            DVec2::new(strip.corner.x, top + PANEL_TITLE_HEIGHT),
             DVec2::new(strip.size.x, height),
         );
         let lines = curves.iter().map(|(_, _, of)| {
@@ -338,7 +360,7 @@ fn draw_curves(
         let lines: Vec<_> = lines.collect();
         let known = lines.iter().flatten().map(|point| point.1);
         let up = Axis::linear_covering(&name, known.filter(|value| value.is_finite()))
-            .with_least_extent(ROUNDING);
+            .with_least_extent(ROUNDING_VARIATION);
         page.draw_group("curves", |page| {
             let axes = PanelAxes::draw_titled(page, cell, ["", what], x.axis.clone(), up);
             let mut key = Legend::right_of(cell);
@@ -348,24 +370,24 @@ fn draw_curves(
                 key.add_marked_line(page, name, "", *color);
             }
         });
-        top = cell.opposite_corner().y + PANEL_AXIS;
+        top = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
     }
     top
 }
 
 /// Smaller cells have no gaps between them and no marks.
-const SEPARATE: f64 = 5.0;
+const LEAST_SEPARATED_CELL: f64 = 5.0;
 
 /// Smaller cells have no numbers.
-const NUMBERED: f64 = 13.0;
+const LEAST_NUMBERED_CELL: f64 = 13.0;
 
-const NUMBER_SIZE: f64 = 8.0;
+const NUMBER_FONT_SIZE: f64 = 8.0;
 
 /// Of stable leaves.
 pub const PALE: Color = Color(226, 236, 226);
 
 /// More waves than this have the same colour.
-const MOST_WAVES: f64 = 2.5;
+const MOST_WAVES_DISTINGUISHED: f64 = 2.5;
 
 /// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
 /// light. Those that are alike without colours also differ in their marks.
@@ -394,7 +416,7 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
         outcome_color(outcome),
         None,
     );
-    if cell.size.min_element() < SEPARATE {
+    if cell.size.min_element() < LEAST_SEPARATED_CELL {
         return;
     }
     let inset = 0.25 * cell.size;
@@ -402,8 +424,8 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
     let rising = (low.with_y(high.y), high.with_y(low.y));
     let level = (low.with_y(cell.middle().y), high.with_y(cell.middle().y));
     let (color, lines): (Color, &[(DVec2, DVec2)]) = match outcome {
-        MapOutcome::Refused => (NOTE, &[(low, high), rising]),
-        MapOutcome::OtherEquilibrium => (NOTE, &[(low, high)]),
+        MapOutcome::Refused => (NOTE_COLOR, &[(low, high), rising]),
+        MapOutcome::OtherEquilibrium => (NOTE_COLOR, &[(low, high)]),
         MapOutcome::NotConverged => (WHITE, &[rising]),
         MapOutcome::Inaccurate => (WHITE, &[level]),
         _ => return,
@@ -416,16 +438,16 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
 pub fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
     let color = match waves {
         0.0 => PALE,
-        waves => vein_color((waves - 1.0) / (MOST_WAVES - 1.0)),
+        waves => vein_color((waves - 1.0) / (MOST_WAVES_DISTINGUISHED - 1.0)),
     };
     page.draw_shape(rectangle_path(cell.corner, cell.size), color, None);
 }
 
 /// Indices from this one on have the same colour.
-pub const DARKEST_INDEX: usize = 4;
+pub const DARKEST_MORSE_INDEX: usize = 4;
 
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
-pub fn fill_index(page: &mut Drawing, cell: PageRectangle, index: usize) {
+pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize) {
     let color = match index {
         0 => PALE,
         1 => Color(255, 240, 222),
@@ -447,14 +469,14 @@ pub fn mark_unconfirmed_reference(
     let at = cell.corner.with_x(cell.opposite_corner().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
     let (color, rim) = match reference {
         ReferenceConfidence::Confirmed => return,
-        ReferenceConfidence::Unconfirmed => (INK, Stroke::new(WHITE, 0.5)),
-        ReferenceConfidence::None => (WHITE, Stroke::new(INK, 0.8)),
+        ReferenceConfidence::Unconfirmed => (TEXT_COLOR, Stroke::new(WHITE, 0.5)),
+        ReferenceConfidence::None => (WHITE, Stroke::new(TEXT_COLOR, 0.8)),
     };
     page.draw_shape(circle_path(at, radius), color, Some(rim));
 }
 
 /// Stroke of the longest stable step.
-pub const BOUND: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
+pub const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
 pub struct VariedAxis {
     pub axis: Axis,
@@ -562,7 +584,7 @@ impl<'a> MapPanel<'a> {
 
     fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
         let mut cell = self.cell_rectangle(row.cell);
-        let large = cell.size.min_element() >= SEPARATE;
+        let large = cell.size.min_element() >= LEAST_SEPARATED_CELL;
         if large {
             let inset = DVec2::splat(0.4);
             cell.corner += inset;
@@ -580,11 +602,11 @@ impl<'a> MapPanel<'a> {
             (_, _, Some(waves)) if waves > 0.0 => waves.to_string(),
             _ => return,
         };
-        if cell.size.min_element() >= NUMBERED {
+        if cell.size.min_element() >= LEAST_NUMBERED_CELL {
             page.draw_centered_label(
                 cell.middle(),
                 &number,
-                NUMBER_SIZE,
+                NUMBER_FONT_SIZE,
                 TextAnchor::Middle,
                 WHITE,
             );
@@ -620,7 +642,7 @@ impl<'a> MapPanel<'a> {
                     tile.opposite_corner().with_y(place.y),
                 ),
             };
-            page.draw_line(from, to, BOUND);
+            page.draw_line(from, to, STABLE_STEP_STROKE);
         }
     }
 }

@@ -1,8 +1,12 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
-use crate::figure::drawing::labels::{HEADER, SIDE, SmallPanels, THINNER, new_page};
-use crate::figure::drawing::space::{FRONT, OBLIQUE, ViewAngles};
-use crate::figure::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
+use crate::figure::drawing::labels::{
+    HEADER, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels, new_page,
+};
+use crate::figure::drawing::space::{FRONT, OBLIQUE_VIEW, ViewAngles};
+use crate::figure::drawing::{
+    Color, Drawing, FRAME_COLOR, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke,
+};
 use crate::figure::leaf::{DrawnVeins, vein_tips};
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_four_digits;
@@ -11,20 +15,20 @@ use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Scenario;
 
-const MOST: usize = 12;
+const MOST_MODES_DRAWN: usize = 12;
 
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [ViewAngles; 2] = [OBLIQUE, FRONT];
+const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
-const AMPLITUDE: f64 = 0.2;
+const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
 
 pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
     let name = format!("{}: modes", equilibrium.scenario);
     let rest = DrawnVeins::from_equilibrium(equilibrium, scenario);
     let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
-    let drawn = &modes[..modes.len().min(MOST)];
+    let drawn = &modes[..modes.len().min(MOST_MODES_DRAWN)];
     let shapes = drawn
         .iter()
         .map(|mode| displaced_veins(equilibrium, &rest, mode));
@@ -38,24 +42,27 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
         relaxation_verdict(equilibrium),
     ];
     notes.push(match modes.len() {
-        count if count > MOST => format!("the lowest {MOST} of {count}"),
+        count if count > MOST_MODES_DRAWN => format!("the lowest {MOST_MODES_DRAWN} of {count}"),
         count => format!("the lowest {count}"),
     });
     notes.push("grey: at rest".into());
     notes.extend(rest.leaf_notes(&setting));
-    let mut drawing = new_page(SIDE, &name, &notes, Some(&rest));
+    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, Some(&rest));
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
             let (number, (text, color)) = ((index + 1).to_string(), mode_caption(mode));
-            let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
+            let captions = [
+                (&*number, &*text, color),
+                ("", "from the front", NOTE_COLOR),
+            ];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
                 let scene =
                     panels.draw_empty_panel(page, (VIEWS.len() * index + k, 0.0), view, caption);
-                let width = THINNER * veins.line_width();
+                let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
                 for vein in &rest.veins {
                     let path = vein.projected_path(|point| scene.project_point(point));
-                    page.draw_stroke(path, Stroke::new(FRAME, 0.6 * width));
+                    page.draw_stroke(path, Stroke::new(FRAME_COLOR, 0.6 * width));
                 }
                 scene.draw_leaf(page, veins, width);
             }
@@ -67,14 +74,14 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
 /// The frequency of a mode or, if it is unstable, its growth rate in red.
 fn mode_caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
-        (true, _) => ("neutral: ω = 0".into(), NOTE),
+        (true, _) => ("neutral: ω = 0".into(), NOTE_COLOR),
         (_, None) => {
             let frequency = format_four_digits(mode.frequency().unwrap_or_default());
-            (format!("ω = {frequency}"), NOTE)
+            (format!("ω = {frequency}"), NOTE_COLOR)
         }
         (_, Some(growth)) => (
             format!("unstable: grows at {}", format_four_digits(growth)),
-            DOT,
+            SECOND_SOLUTION_COLOR,
         ),
     }
 }
@@ -84,7 +91,7 @@ fn displaced_veins(equilibrium: &Equilibrium, rest: &DrawnVeins, mode: &Mode) ->
     let largest = mode.displacement.iter().fold(0.0, |m, d| most(d).max(m));
     let size = match largest > 0.0 {
         // Never magnified: displacements are small in a mode of rotation alone.
-        true => (AMPLITUDE * rest.largest_extent() * rest.unit / largest).min(1.0),
+        true => (LARGEST_DRAWN_AMPLITUDE * rest.largest_extent() * rest.unit / largest).min(1.0),
         false => 0.0,
     };
     let shape = &equilibrium.shape;
@@ -118,10 +125,10 @@ mod tests {
             };
             leaf.stability.modes = Some(vec![mode; 14]);
             let svg = checked_svg_text(&draw(&leaf, &sample::sample_scenario("fan", 3)));
-            assert_eq!(svg.matches(caption).count(), MOST, "{caption}");
+            assert_eq!(svg.matches(caption).count(), MOST_MODES_DRAWN, "{caption}");
             assert!(svg.contains("the lowest 12 of 14"));
             // Every mode in a second view.
-            assert_eq!(svg.matches(">from the front<").count(), MOST);
+            assert_eq!(svg.matches(">from the front<").count(), MOST_MODES_DRAWN);
         }
     }
 }

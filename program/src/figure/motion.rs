@@ -7,13 +7,14 @@
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, Legend, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, SIDE,
-    SmallPanels, TEXT_SIZE, THINNER, new_page, panel_letters,
+    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
+    PANEL_TITLE_HEIGHT, PageRectangle, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels,
+    TEXT_FONT_SIZE, new_page, panel_letters,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE, SpacePanel, common_bounding_box};
+use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, common_bounding_box};
 use crate::figure::drawing::{
-    CURVES, Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, is_drawable, polyline_path,
-    vein_color,
+    CURVE_COLORS, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR,
+    TextAnchor, WHITE, is_drawable, polyline_path, vein_color,
 };
 use crate::figure::leaf::DrawnVeins;
 use crate::figure::scenario::{FigureSetting, name_with_unit};
@@ -28,16 +29,16 @@ use std::io;
 use std::io::Write;
 use tiny_skia::Pixmap;
 
-const ENERGIES: f64 = 300.0;
+const ENERGIES_HEIGHT: f64 = 300.0;
 
-const BALANCE: f64 = 120.0;
+const BALANCE_HEIGHT: f64 = 120.0;
 
-const TIP: f64 = 200.0;
+const TIP_HEIGHT: f64 = 200.0;
 
 /// Gap above the lower panels, for the tick labels of the upper ones.
 const BETWEEN: f64 = 30.0;
 
-const BOTTOM: f64 = 4.0;
+const BOTTOM_MARGIN: f64 = 4.0;
 
 /// Right of the panels, for the key.
 const KEY: f64 = 200.0;
@@ -56,11 +57,11 @@ pub fn header_notes(record: &Record) -> Vec<String> {
 
 pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
-    let upper = HEADER + PANEL_TITLE;
-    let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
-    let mut drawing = new_page(LEFT, &name, &header_notes(record), None);
-    let lowest = lower + BALANCE + BETWEEN + PANEL_TITLE;
-    drawing.height = lowest + TIP + PANEL_AXIS + BOTTOM;
+    let upper = HEADER + PANEL_TITLE_HEIGHT;
+    let lower = upper + ENERGIES_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
+    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(record), None);
+    let lowest = lower + BALANCE_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
+    drawing.height = lowest + TIP_HEIGHT + PANEL_AXIS_HEIGHT + BOTTOM_MARGIN;
     let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
@@ -72,7 +73,7 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let energy = name_with_unit("energy", unit.as_deref());
     let across = Axis::linear("", 0.0, end);
     let up = Axis::linear_covering(&energy, values.chain([0.0]));
-    let cell = PageRectangle::left_of_legend(upper, ENERGIES, KEY);
+    let cell = PageRectangle::left_of_legend(upper, ENERGIES_HEIGHT, KEY);
     drawing.draw_group("energies", |page| {
         let what = "where the energy is";
         let axes = PanelAxes::draw_titled(page, cell, ["(a)", what], across.clone(), up);
@@ -85,16 +86,16 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
             draw_legend_line(page, &mut key, curve);
         }
     });
-    let cell = PageRectangle::left_of_legend(lower, BALANCE, KEY);
+    let cell = PageRectangle::left_of_legend(lower, BALANCE_HEIGHT, KEY);
     let name = name_with_unit("balance", unit.as_deref());
     let up = Axis::linear_covering(&name, balance.ordinates().chain([0.0]));
     drawing.draw_group("balance", |page| {
         let what =
             "its balance, which no motion changes, magnified: all energies less the work put in";
         let axes = PanelAxes::draw_titled(page, cell, ["(b)", what], across, up);
-        axes.draw_curve(page, &balance.points, Stroke::new(INK, 1.3));
+        axes.draw_curve(page, &balance.points, Stroke::new(TEXT_COLOR, 1.3));
     });
-    let cell = PageRectangle::left_of_legend(lowest, TIP, KEY);
+    let cell = PageRectangle::left_of_legend(lowest, TIP_HEIGHT, KEY);
     drawing.draw_group("tip", |page| {
         draw_tip_coordinates(page, record, &scenario.units, cell, end)
     });
@@ -111,7 +112,7 @@ fn draw_tip_coordinates(
 ) {
     let coordinate = |axis: usize| NamedCurve {
         name: ["x", "y", "z"][axis],
-        color: CURVES[axis],
+        color: CURVE_COLORS[axis],
         points: (record.moments.iter())
             .map(|moment| (moment.time, moment.tip[axis]))
             .collect(),
@@ -158,35 +159,37 @@ fn energy_curves(record: &Record) -> Vec<NamedCurve> {
             .collect(),
     };
     let mut curves = vec![
-        curve("kinetic", CURVES[0], &|e| e.kinetic),
-        curve("elastic and coupling", CURVES[1], &|e| {
+        curve("kinetic", CURVE_COLORS[0], &|e| e.kinetic),
+        curve("elastic and coupling", CURVE_COLORS[1], &|e| {
             e.elastic + e.coupling
         }),
-        curve("potential, from the start", CURVES[2], &|e| {
+        curve("potential, from the start", CURVE_COLORS[2], &|e| {
             e.potential - first.potential
         }),
-        curve("dissipated", CURVES[3], &|e| e.dissipated),
-        curve("work put in", CURVES[4], &|e| e.work),
+        curve("dissipated", CURVE_COLORS[3], &|e| e.dissipated),
+        curve("work put in", CURVE_COLORS[4], &|e| e.work),
     ];
     curves.retain(|curve| curve.ordinates().any(|value| value != 0.0));
-    curves.push(curve("balance", INK, &|e| e.balance() - first.balance()));
+    curves.push(curve("balance", TEXT_COLOR, &|e| {
+        e.balance() - first.balance()
+    }));
     curves
 }
 
 /// Duration of the film in hundredths of a second, and its most pictures.
-const DURATION: f64 = 1000.0;
+const FILM_DURATION: f64 = 1000.0;
 
-const MOST_PICTURES: usize = 140;
+const MOST_FILM_PICTURES: usize = 140;
 
 /// Delays of a picture: browsers show shorter ones for longer.
-const SHORTEST: usize = 2;
+const SHORTEST_DELAY: usize = 2;
 
-const LONGEST: usize = 100;
+const LONGEST_DELAY: usize = 100;
 
 /// Size of the page: half as many as it has pixels.
-const SIZE: DVec2 = DVec2::new(320.0, 240.0);
+const FILM_PAGE_SIZE: DVec2 = DVec2::new(320.0, 240.0);
 
-const TITLE: f64 = 26.0;
+const TITLE_HEIGHT: f64 = 26.0;
 
 const MARGINS: BoxMargins = BoxMargins {
     left: 46.0,
@@ -195,7 +198,7 @@ const MARGINS: BoxMargins = BoxMargins {
 };
 
 /// Index of a pixel that has not changed.
-const SAME: u8 = 255;
+const UNCHANGED_PIXEL_INDEX: u8 = 255;
 
 /// Writes the film; a single picture where no motion is recorded.
 pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
@@ -228,7 +231,7 @@ pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> 
 
 /// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
 fn sampled_shapes(film: &[ShapeSnapshot]) -> Vec<&ShapeSnapshot> {
-    let count = film.len().min(MOST_PICTURES);
+    let count = film.len().min(MOST_FILM_PICTURES);
     let last = film.len().saturating_sub(1);
     let place = |k: usize| k * last / (count - 1).max(1);
     (0..count).map(|k| &film[place(k)]).collect()
@@ -241,19 +244,21 @@ fn picture_delays(times: &[f64]) -> Vec<u16> {
         return Vec::new();
     };
     let count = times.len() as f64;
-    let moving = DURATION * (count - 1.0) / count;
+    let moving = FILM_DURATION * (count - 1.0) / count;
     let mut elapsed = 0;
     let ends = times[1..]
         .iter()
         .map(|time| moving * (time - from) / (to - from));
-    (ends.chain([DURATION]))
+    (ends.chain([FILM_DURATION]))
         .map(|end| {
             let end = if end.is_finite() {
                 end.round() as usize
             } else {
                 0
             };
-            let delay = end.saturating_sub(elapsed).clamp(SHORTEST, LONGEST);
+            let delay = end
+                .saturating_sub(elapsed)
+                .clamp(SHORTEST_DELAY, LONGEST_DELAY);
             elapsed += delay;
             delay as u16
         })
@@ -266,16 +271,23 @@ fn draw_picture(
     setting: &FigureSetting,
     (text, time): (&str, f64),
 ) -> Drawing {
-    let mut page = Drawing::new(SIZE.x, text);
-    page.height = SIZE.y;
-    let cell = PageRectangle::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
-    let scene = SpacePanel::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+    let mut page = Drawing::new(FILM_PAGE_SIZE.x, text);
+    page.height = FILM_PAGE_SIZE.y;
+    let cell = PageRectangle::new(
+        DVec2::new(0.0, TITLE_HEIGHT),
+        FILM_PAGE_SIZE - DVec2::new(0.0, TITLE_HEIGHT),
+    );
+    let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_axes(&mut page, 36.0);
     scene.draw_direction_arrows(&mut page, true, time);
-    scene.draw_leaf(&mut page, veins, THINNER * veins.line_width());
+    scene.draw_leaf(
+        &mut page,
+        veins,
+        SMALL_LINE_WIDTH_FACTOR * veins.line_width(),
+    );
     let corner = DVec2::new(10.0, 17.0);
-    page.draw_label(corner, text, TEXT_SIZE, TextAnchor::Start, INK);
+    page.draw_label(corner, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
     page
 }
 
@@ -288,7 +300,7 @@ struct ColorPalette {
 
 impl ColorPalette {
     fn new() -> Self {
-        let mut colors = vec![WHITE, INK, NOTE, DOT];
+        let mut colors = vec![WHITE, TEXT_COLOR, NOTE_COLOR, SECOND_SOLUTION_COLOR];
         let mix = |Color(r, g, b): Color, part: f64| {
             let of = |x: u8| (255.0 + part * (f64::from(x) - 255.0)).round() as u8;
             Color(of(r), of(g), of(b))
@@ -300,7 +312,7 @@ impl ColorPalette {
             let color = vein_color(f64::from(vein) / 33.0);
             colors.extend([1.0, 0.8, 0.6, 0.45, 0.3, 0.15].map(|part| mix(color, part)));
         }
-        colors.truncate(usize::from(SAME));
+        colors.truncate(usize::from(UNCHANGED_PIXEL_INDEX));
         ColorPalette {
             colors,
             indices_by_color: HashMap::new(),
@@ -332,7 +344,9 @@ fn encode_gif(
     delays: &[u16],
     out: &mut dyn Write,
 ) -> Result<(), gif::EncodingError> {
-    let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
+    let [width, height] = (2.0 * FILM_PAGE_SIZE)
+        .to_array()
+        .map(|pixels| pixels as u16);
     let colors = ColorPalette::new().colors.into_iter();
     let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
     table.resize(3 * 256, 0);
@@ -346,7 +360,7 @@ fn encode_gif(
             top: rows.start as u16,
             width,
             height: rows.len() as u16,
-            transparent: before.map(|_| SAME),
+            transparent: before.map(|_| UNCHANGED_PIXEL_INDEX),
             dispose: gif::DisposalMethod::Keep,
             buffer: pixels.into(),
             ..gif::Frame::default()
@@ -367,9 +381,9 @@ fn changed_rows(
         return (0..picture.len() / width, picture.to_vec());
     };
     let pixels = before.iter().zip(picture);
-    let pixels = pixels.map(|(a, b)| if a == b { SAME } else { *b });
+    let pixels = pixels.map(|(a, b)| if a == b { UNCHANGED_PIXEL_INDEX } else { *b });
     let pixels: Vec<u8> = pixels.collect();
-    let differs = |pixel: &u8| *pixel != SAME;
+    let differs = |pixel: &u8| *pixel != UNCHANGED_PIXEL_INDEX;
     let first = pixels.iter().position(differs).unwrap_or(0) / width;
     let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
     let rows = first..last + 1;
@@ -378,10 +392,10 @@ fn changed_rows(
 }
 
 /// Below the notes.
-const KEY_LINE: f64 = 20.0;
+const LEGEND_BASE_LINE: f64 = 20.0;
 
 /// Colour of the earlier path of the tip.
-const PALE: Color = Color(240, 190, 176);
+const EARLIER_PATH_COLOR: Color = Color(240, 190, 176);
 
 /// Most points of the tip's path that are drawn between two panels.
 const MOST_PATH_POINTS: usize = 400;
@@ -394,20 +408,25 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
         .map(|it| DrawnVeins::from_motion(record, it, scenario))
         .collect();
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
-    let top = if has_path { HEADER + KEY_LINE } else { HEADER };
+    let top = if has_path {
+        HEADER + LEGEND_BASE_LINE
+    } else {
+        HEADER
+    };
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shapes.len(), &setting, top);
     let mut notes = header_notes(record);
     let first = shapes.first();
     notes.extend(first.map_or(Vec::new(), |veins| veins.leaf_notes(&setting)));
     let width = panels.grid_width();
     notes.push(format!("a square of the grid is {width} wide"));
-    let mut drawing = new_page(SIDE, &name, &notes, first);
+    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, first);
     drawing.height = panels.bottom();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
-    let strokes = [DOT, PALE].map(|color| Stroke::new(color, 1.0));
+    let strokes = [SECOND_SOLUTION_COLOR, EARLIER_PATH_COLOR].map(|color| Stroke::new(color, 1.0));
     if has_path {
         drawing.draw_group("key", |page| {
-            let mut key = LegendRows::starting_at(SIDE, NOTE_BASE + KEY_LINE, 22.0);
+            let mut key =
+                LegendRows::starting_at(SIDE_MARGIN, NOTES_BASE_LINE + LEGEND_BASE_LINE, 22.0);
             for (name, stroke) in ["the tip's way since the picture before", "and before that"]
                 .into_iter()
                 .zip(strokes)
@@ -427,8 +446,8 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
                 "t = {}",
                 number_in_unit(format_four_digits(time), &scenario.units, TIME)
             );
-            let caption = (letter.as_str(), when.as_str(), NOTE);
-            let scene = panels.draw_empty_panel(page, (index, time), OBLIQUE, caption);
+            let caption = (letter.as_str(), when.as_str(), NOTE_COLOR);
+            let scene = panels.draw_empty_panel(page, (index, time), OBLIQUE_VIEW, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path
                     .iter()
@@ -438,7 +457,7 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
                     page.draw_stroke(polyline_path(&path), stroke);
                 }
             }
-            scene.draw_leaf(page, veins, THINNER * veins.line_width());
+            scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
         });
     }
     drawing
@@ -488,8 +507,8 @@ mod film_tests {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
         let mut decoder = options.read_info(bytes).unwrap();
-        let width = 2 * SIZE.x as usize;
-        let mut canvas = vec![0; 4 * width * 2 * SIZE.y as usize];
+        let width = 2 * FILM_PAGE_SIZE.x as usize;
+        let mut canvas = vec![0; 4 * width * 2 * FILM_PAGE_SIZE.y as usize];
         let (mut delays, mut pictures) = (Vec::new(), Vec::new());
         while let Some(frame) = decoder.read_next_frame().unwrap() {
             assert_eq!((frame.left, usize::from(frame.width)), (0, width));
@@ -584,7 +603,7 @@ mod filmstrip_tests {
         let mut record = sample::sample_record(5, 8);
         let paths = |record: &Record| {
             let svg = checked_svg_text(&draw_filmstrip(record, &scenario));
-            [DOT, PALE].map(|color| {
+            [SECOND_SOLUTION_COLOR, EARLIER_PATH_COLOR].map(|color| {
                 svg.matches(&format!("stroke=\"{}\"", hex_color(color)))
                     .count()
             })

@@ -2,16 +2,16 @@
 //! its supports and its unloaded shape.
 
 use crate::figure::drawing::labels::{
-    LEFT, LegendRows, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, WIDTH,
-    draw_panel_title, new_page,
+    LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
+    PANEL_TITLE_HEIGHT, PageRectangle, WIDTH, draw_panel_title, new_page,
 };
 use crate::figure::drawing::markers::{
     ForceArrow, draw_support_marker, draw_tip_marker, draw_vein_markers, force_arrows,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE, SpacePanel, padded_box};
+use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, padded_box};
 use crate::figure::drawing::{
-    Drawing, DrawingPath, FRAME, INK, PathStep, Stroke, curve_between_fractions, is_drawable,
-    polyline_path,
+    Drawing, DrawingPath, FRAME_COLOR, PathStep, Stroke, TEXT_COLOR, curve_between_fractions,
+    is_drawable, polyline_path,
 };
 use crate::figure::leaf::{DrawnVeins, draw_plane_panel};
 use crate::figure::scenario::FigureSetting;
@@ -40,21 +40,21 @@ const VISIBLE: f64 = 0.004;
 const FARTHEST: f64 = 4.0;
 
 /// Points of the unloaded shape.
-const POINTS: usize = 96;
+const UNLOADED_SHAPE_POINTS: usize = 96;
 
 const LINE: f64 = 2.4;
 
-const UNLOADED: Stroke = Stroke::new(FRAME, 1.4);
+const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
 
 /// Half the length of a wall, the depth of its hatching, and the strokes of that.
-const WALL: f64 = 15.0;
+const HALF_WALL_LENGTH: f64 = 15.0;
 
-const DEPTH: f64 = 8.0;
+const HATCHING_DEPTH: f64 = 8.0;
 
-const STROKES: i32 = 3;
+const HATCHING_STROKES: i32 = 3;
 
 /// Names of planes, and their two axes.
-const PLANES: [(&str, [usize; 2]); 3] = [
+const VIEW_PLANES: [(&str, [usize; 2]); 3] = [
     ("from above", [0, 1]),
     ("from the side", [0, 2]),
     ("from the front", [1, 2]),
@@ -85,13 +85,13 @@ pub fn draw(
     notes: &[String],
 ) -> Drawing {
     let rod = DrawnRod::from_equilibrium(leaf, scenario, veins);
-    let mut page = new_page(LEFT, &leaf.scenario, notes, None);
+    let mut page = new_page(PAGE_LEFT_MARGIN, &leaf.scenario, notes, None);
     let mut top = 0.0;
     page.draw_group("key", |page| top = rod.draw_legend(page));
     let (low, high) = rod.bounding_corners();
     let extent = high - low;
-    let corner = DVec2::new(LEFT, top + PANEL_TITLE);
-    let width = WIDTH - LEFT - RIGHT;
+    let corner = DVec2::new(PAGE_LEFT_MARGIN, top + PANEL_TITLE_HEIGHT);
+    let width = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
     let height = match rod.viewing_plane() {
         Some((what, axes)) => {
             let [across, up] = axes.map(|axis| extent[axis]);
@@ -107,12 +107,12 @@ pub fn draw(
                     .map(|point| camera.project_point(point));
                 camera.draw_arrows(page, &setting.direction_arrows(true, 0.0), cell, taken);
             });
-            height + PANEL_AXIS
+            height + PANEL_AXIS_HEIGHT
         }
         None => {
             let cell = PageRectangle::new(corner, DVec2::new(width, HIGHEST));
             let bounds = padded_box(low, high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
             page.draw_group("rod", |page| {
                 draw_panel_title(page, corner, "", "in space, with its shadow on the floor");
                 scene.draw_box(page);
@@ -131,8 +131,16 @@ pub fn draw(
 impl<'a> DrawnRod<'a> {
     fn from_equilibrium(leaf: &Equilibrium, scenario: &Scenario, veins: &'a DrawnVeins) -> Self {
         let natural = Natural::new(scenario, true);
-        let at = |k: usize| natural.vein_pose(0, k as f64 / POINTS as f64).0 / veins.unit;
-        let mut unloaded: Vec<DVec3> = (0..=POINTS).map(at).filter(|&it| is_drawable(it)).collect();
+        let at = |k: usize| {
+            natural
+                .vein_pose(0, k as f64 / UNLOADED_SHAPE_POINTS as f64)
+                .0
+                / veins.unit
+        };
+        let mut unloaded: Vec<DVec3> = (0..=UNLOADED_SHAPE_POINTS)
+            .map(at)
+            .filter(|&it| is_drawable(it))
+            .collect();
         let (stations, curve) = match leaf.shape.curves.first() {
             Some(curve) => (&leaf.shape.curve_stations[..], &curve[..]),
             None => Default::default(),
@@ -141,10 +149,12 @@ impl<'a> DrawnRod<'a> {
             let point = curve_between_fractions(stations, curve, [sigma; 2]).pop()? / veins.unit;
             is_drawable(point).then_some(point)
         };
-        let differs = (0..=POINTS).zip(&unloaded).any(|(k, natural)| {
-            let there = point(k as f64 / POINTS as f64);
-            there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.largest_extent())
-        });
+        let differs = (0..=UNLOADED_SHAPE_POINTS)
+            .zip(&unloaded)
+            .any(|(k, natural)| {
+                let there = point(k as f64 / UNLOADED_SHAPE_POINTS as f64);
+                there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.largest_extent())
+            });
         let extent = |(low, high): (DVec3, DVec3)| (high - low).max_element();
         let own = extent((veins.low, veins.high));
         let whole = unloaded
@@ -195,7 +205,7 @@ impl<'a> DrawnRod<'a> {
         let (low, high) = self.bounding_corners();
         let extent = high - low - DVec3::splat(2.0 * PADDING * (high - low).max_element());
         let seen = |(_, [a, b]): &(&str, [usize; 2])| extent[*a].min(extent[*b]);
-        let best = PLANES.into_iter().reduce(|one, other| {
+        let best = VIEW_PLANES.into_iter().reduce(|one, other| {
             if seen(&other) > seen(&one) {
                 other
             } else {
@@ -208,8 +218,12 @@ impl<'a> DrawnRod<'a> {
 
     /// Draws the key; returns where it ends.
     fn draw_legend(&self, page: &mut Drawing) -> f64 {
-        let mut key = LegendRows::starting_at(LEFT, NOTE_BASE + 22.0, 26.0);
-        let own = self.veins.veins.first().map_or(INK, |vein| vein.color);
+        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, NOTES_BASE_LINE + 22.0, 26.0);
+        let own = self
+            .veins
+            .veins
+            .first()
+            .map_or(TEXT_COLOR, |vein| vein.color);
         key.add_entry(page, "at rest", |page, cell| {
             cell.draw_midline(page, Stroke::new(own, LINE))
         });
@@ -219,7 +233,7 @@ impl<'a> DrawnRod<'a> {
                 false => "unloaded",
             };
             key.add_entry(page, name, |page, cell| {
-                cell.draw_midline(page, UNLOADED.with_dashes(true));
+                cell.draw_midline(page, UNLOADED_SHAPE_STROKE.with_dashes(true));
             });
         }
         let veins = self.veins;
@@ -256,7 +270,10 @@ impl<'a> DrawnRod<'a> {
             .map(|&point| place(point))
             .collect();
         if !points.is_empty() {
-            page.draw_stroke(polyline_path(&points), UNLOADED.with_dashes(true));
+            page.draw_stroke(
+                polyline_path(&points),
+                UNLOADED_SHAPE_STROKE.with_dashes(true),
+            );
         }
         for vein in &self.veins.veins {
             page.draw_stroke(vein.projected_path(&place), Stroke::new(vein.color, LINE));
@@ -293,15 +310,15 @@ fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: SupportKind)
 
 /// Draws a wall across the end of a rod, hatched behind.
 fn draw_wall(page: &mut Drawing, at: DVec2, inward: DVec2, size: f64) {
-    let along = size * WALL * inward.perp();
-    page.draw_line(at - along, at + along, Stroke::new(INK, 2.0));
+    let along = size * HALF_WALL_LENGTH * inward.perp();
+    page.draw_line(at - along, at + along, Stroke::new(TEXT_COLOR, 2.0));
     let mut path: DrawingPath = Vec::new();
-    for k in -STROKES..=STROKES {
-        let from = at + f64::from(k) / f64::from(STROKES) * along;
-        let behind = size * DEPTH * (0.6 * inward.perp() - inward);
+    for k in -HATCHING_STROKES..=HATCHING_STROKES {
+        let from = at + f64::from(k) / f64::from(HATCHING_STROKES) * along;
+        let behind = size * HATCHING_DEPTH * (0.6 * inward.perp() - inward);
         path.extend([PathStep::Move(from), PathStep::Line(from + behind)]);
     }
-    page.draw_stroke(path, Stroke::new(INK, 1.0));
+    page.draw_stroke(path, Stroke::new(TEXT_COLOR, 1.0));
 }
 
 #[cfg(test)]

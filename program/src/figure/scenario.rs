@@ -18,7 +18,7 @@ const LONGEST: f64 = 0.16;
 const SHORTEST: f64 = 0.35;
 
 /// Length of the arrow of the largest force along a vein, likewise, and how many there are.
-const ALONG: f64 = 0.07;
+const DISTRIBUTED_ARROW_LENGTH: f64 = 0.07;
 
 const COUNT: usize = 9;
 
@@ -109,7 +109,7 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
         })
         .collect();
     let kinds = [
-        (LoadKind::Distributed, along, ALONG, 0.0),
+        (LoadKind::Distributed, along, DISTRIBUTED_ARROW_LENGTH, 0.0),
         (LoadKind::Force, single, LONGEST, SHORTEST),
         (LoadKind::Moment, moments, LONGEST, SHORTEST),
     ];
@@ -187,9 +187,9 @@ pub struct DirectionArrow {
 }
 
 /// Names of the axes as fractions of L, with what they mean.
-const FRACTIONS: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
+const FRACTION_AXIS_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
 
-const COORDINATES: [&str; 3] = ["x", "y", "z"];
+const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl FigureSetting {
     pub fn from_scenario(scenario: &Scenario) -> Self {
@@ -231,8 +231,8 @@ impl FigureSetting {
 
     /// The name of an axis whose values are shown.
     pub fn axis_name(&self, axis: usize) -> String {
-        match (&self.units.length, FRACTIONS[axis]) {
-            (Some(unit), _) => name_with_unit(COORDINATES[axis], Some(unit)),
+        match (&self.units.length, FRACTION_AXIS_NAMES[axis]) {
+            (Some(unit), _) => name_with_unit(COORDINATE_NAMES[axis], Some(unit)),
             (None, (name, meaning)) => format!("{name} = {meaning}"),
         }
     }
@@ -241,8 +241,8 @@ impl FigureSetting {
     pub fn brief_axis_name(&self, axis: usize, values: bool) -> String {
         match (&self.units.length, values) {
             (Some(_), true) => self.axis_name(axis),
-            (Some(_), false) => COORDINATES[axis].into(),
-            (None, _) => FRACTIONS[axis].0.into(),
+            (Some(_), false) => COORDINATE_NAMES[axis].into(),
+            (None, _) => FRACTION_AXIS_NAMES[axis].0.into(),
         }
     }
 
@@ -377,7 +377,7 @@ const WORDS: &[(&str, &str, ListEntryOwner)] = &[
 ];
 
 /// Of more keys than this only the first and the last are named.
-const NAMED: usize = 3;
+const MOST_KEYS_NAMED: usize = 3;
 
 /// A number of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -396,7 +396,9 @@ impl QuantityLabel {
             None => {
                 let words: Vec<String> = parts.iter().map(KeyPart::words).collect();
                 match words.as_slice() {
-                    [first, .., last] if words.len() > NAMED => format!("{first} = … = {last}"),
+                    [first, .., last] if words.len() > MOST_KEYS_NAMED => {
+                        format!("{first} = … = {last}")
+                    }
                     few => few.join(" = "),
                 }
             }

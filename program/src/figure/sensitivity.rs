@@ -4,10 +4,12 @@
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, PageRectangle, RIGHT, TICK_SIZE, WIDTH, new_page,
+    HEADER, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
+    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page,
 };
 use crate::figure::drawing::{
-    BLUE, Drawing, FRAME, INK, NOTE, Stroke, TextAnchor, VERMILION, rectangle_path,
+    BLUE, Drawing, FRAME_COLOR, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, VERMILION,
+    rectangle_path,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, round_to_error};
@@ -25,23 +27,23 @@ const ROW: f64 = 34.0;
 const BAR: f64 = 12.0;
 
 /// From a bar to its value.
-const VALUE: f64 = 4.0;
+const BAR_VALUE_GAP: f64 = 4.0;
 
 /// Room for the values beside the longest bars, as a fraction of the panel.
-const BESIDE: f64 = 0.42;
+const VALUE_ROOM_FRACTION: f64 = 0.42;
 
 /// Least pixels between ticks.
 const TICKS: f64 = 40.0;
 
 /// Values are shown to this part of them.
-const SHOWN: f64 = 5e-3;
+const SHOWN_VALUE_PRECISION: f64 = 5e-3;
 
 const BOTTOM: f64 = 4.0;
 
 const MOST_ROWS: usize = 40;
 
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
-const PART: f64 = 0.01;
+const RELATIVE_CHANGE: f64 = 0.01;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -59,10 +61,13 @@ impl SensitivityRow {
         let number = QuantityLabel::from_keys(&found.key, units);
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
         let (factor, by) = match found.value {
-            0.0 => (PART, format!("0, by {}{unit}", format_four_digits(PART))),
+            0.0 => (
+                RELATIVE_CHANGE,
+                format!("0, by {}{unit}", format_four_digits(RELATIVE_CHANGE)),
+            ),
             value => {
                 let value = format!("{}{unit}", format_four_digits(value));
-                (PART * found.value, format!("by 1 % of {value}"))
+                (RELATIVE_CHANGE * found.value, format!("by 1 % of {value}"))
             }
         };
         let (change, error) = match &found.reaction {
@@ -120,19 +125,22 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
             format_error_bound(error)
         ));
     }
-    let mut page = new_page(LEFT, &name, &notes, None);
+    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
     let height = ROW * rows.len().max(1) as f64;
-    page.height = HEADER + PANEL_TITLE + height + PANEL_AXIS + BOTTOM;
-    let width = (WIDTH - LEFT - RIGHT - WORDS - 2.0 * GAP) / 3.0;
-    let corner = DVec2::new(LEFT + WORDS, HEADER + PANEL_TITLE);
+    page.height = HEADER + PANEL_TITLE_HEIGHT + height + PANEL_AXIS_HEIGHT + BOTTOM;
+    let width = (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - WORDS - 2.0 * GAP) / 3.0;
+    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS, HEADER + PANEL_TITLE_HEIGHT);
     page.draw_group("words", |page| {
         for (k, row) in rows.iter().enumerate() {
             let middle = corner + DVec2::new(-10.0, ROW * (k as f64 + 0.5));
-            let room = WORDS + LEFT - 16.0;
-            for (text, up, color) in [(&row.words, -6.5, INK), (&row.change_text, 7.0, NOTE)] {
-                let text = Font::embedded().shorten_text(text, TICK_SIZE, room);
+            let room = WORDS + PAGE_LEFT_MARGIN - 16.0;
+            for (text, up, color) in [
+                (&row.words, -6.5, TEXT_COLOR),
+                (&row.change_text, 7.0, NOTE_COLOR),
+            ] {
+                let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
                 let at = middle + DVec2::new(0.0, up);
-                page.draw_centered_label(at, &text, TICK_SIZE, TextAnchor::End, color);
+                page.draw_centered_label(at, &text, TICK_FONT_SIZE, TextAnchor::End, color);
             }
         }
     });
@@ -141,7 +149,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         (rows.iter()).flat_map(|row| [0, 1, 2].map(|axis| row.significant_component(axis).abs()));
     let largest = largest.filter(|it| it.is_finite()).fold(0.0, f64::max);
     let end = if largest > 0.0 {
-        (1.0 + 2.0 * BESIDE) * largest
+        (1.0 + 2.0 * VALUE_ROOM_FRACTION) * largest
     } else {
         1.0
     };
@@ -200,15 +208,21 @@ fn draw_bars(
         } else {
             TextAnchor::End
         };
-        let at = DVec2::new(end.x + side * VALUE, middle);
-        let shown = round_to_error(value, SHOWN * value.abs()) / unit;
-        page.draw_centered_label(at, &format_four_digits(shown), TICK_SIZE, anchor, NOTE);
+        let at = DVec2::new(end.x + side * BAR_VALUE_GAP, middle);
+        let shown = round_to_error(value, SHOWN_VALUE_PRECISION * value.abs()) / unit;
+        page.draw_centered_label(
+            at,
+            &format_four_digits(shown),
+            TICK_FONT_SIZE,
+            anchor,
+            NOTE_COLOR,
+        );
     }
     let line = zero.with_y(cell.corner.y);
     page.draw_line(
         line,
         line.with_y(cell.opposite_corner().y),
-        Stroke::new(FRAME, 0.8),
+        Stroke::new(FRAME_COLOR, 0.8),
     );
 }
 

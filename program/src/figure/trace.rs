@@ -3,11 +3,11 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::labels::{
-    HEADER, LEFT, LabelPlacement, Legend, PANEL_AXIS, PANEL_TITLE, PageRectangle, SmallPanels,
-    new_page, panel_letters,
+    HEADER, LabelPlacement, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
+    PageRectangle, SmallPanels, new_page, panel_letters,
 };
 use crate::figure::drawing::markers::Marker;
-use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
+use crate::figure::drawing::{CURVE_COLORS, Drawing, Stroke, TEXT_COLOR};
 use crate::figure::leaf::{DrawnVeins, longest_curve};
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
@@ -21,12 +21,12 @@ use leafdyn::study::{ForceDisplacementLine, PointKind, Trace, TraceBranch, Trace
 const DIAGRAM: f64 = 380.0;
 
 /// Height of the further panels.
-const MORE: f64 = 220.0;
+const FURTHER_PANEL_HEIGHT: f64 = 220.0;
 
 /// Right of the panel, for the key.
 const KEY: f64 = 190.0;
 
-const LAW: f64 = 240.0;
+const FORCE_LINE_HEIGHT: f64 = 240.0;
 
 const BETWEEN: f64 = 26.0;
 
@@ -37,7 +37,7 @@ const MOST_LEAVES: usize = 8;
 const VISIBLE: f64 = 0.04;
 
 /// Equal parts of each vein at whose ends leaves are compared.
-const PARTS: usize = 8;
+const COMPARED_PARTS_PER_VEIN: usize = 8;
 
 /// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
@@ -58,13 +58,17 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
-    let mut drawing = new_page(LEFT, &name, &header_notes(trace), None);
+    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(trace), None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut below = HEADER;
     for (place, &quantity) in quantities.iter().enumerate() {
-        let height = if place == 0 { DIAGRAM } else { MORE };
-        let cell = PageRectangle::left_of_legend(below + PANEL_TITLE, height, KEY);
+        let height = if place == 0 {
+            DIAGRAM
+        } else {
+            FURTHER_PANEL_HEIGHT
+        };
+        let cell = PageRectangle::left_of_legend(below + PANEL_TITLE_HEIGHT, height, KEY);
         drawing.draw_group("branches", |page| {
             let axis = varied_number_axis(trace, &varied);
             draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
@@ -72,14 +76,18 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
                 draw_legend(page, trace, cell);
             }
         });
-        below = cell.opposite_corner().y + PANEL_AXIS;
+        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
-        let cell = PageRectangle::left_of_legend(below + BETWEEN + PANEL_TITLE, LAW, KEY);
+        let cell = PageRectangle::left_of_legend(
+            below + BETWEEN + PANEL_TITLE_HEIGHT,
+            FORCE_LINE_HEIGHT,
+            KEY,
+        );
         drawing.draw_group("law", |page| {
             draw_force_displacement_line(page, trace, law, branch, cell, &letter())
         });
-        below = cell.opposite_corner().y + PANEL_AXIS;
+        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
     }
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     drawing.height = panels.bottom();
@@ -143,10 +151,13 @@ fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
 fn largest_leaf_distance(one: &TracePoint, other: &TracePoint) -> f64 {
     let at = |curve: &[DVec3], part: usize| {
         let last = curve.len().saturating_sub(1);
-        curve.get((part * last + PARTS / 2) / PARTS).copied()
+        curve
+            .get((part * last + COMPARED_PARTS_PER_VEIN / 2) / COMPARED_PARTS_PER_VEIN)
+            .copied()
     };
     let pairs = || one.curves.iter().zip(&other.curves);
-    let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
+    let points = pairs()
+        .flat_map(|(a, b)| (0..=COMPARED_PARTS_PER_VEIN).map(move |k| at(a, k).zip(at(b, k))));
     let distances = points.flatten().map(|(a, b)| a.distance(b));
     let size = longest_curve(one.curves.iter().chain(&other.curves));
     distances.fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
@@ -255,7 +266,8 @@ fn draw_branches(
         let mut begun = 0;
         for (count, stable) in stability_pieces(&points, origin.is_some()) {
             let width = if stable { 2.0 } else { 1.2 };
-            let stroke = Stroke::new(CURVES[b % CURVES.len()], width).with_dashes(!stable);
+            let stroke =
+                Stroke::new(CURVE_COLORS[b % CURVE_COLORS.len()], width).with_dashes(!stable);
             let piece: Vec<Option<DVec2>> = (drawn[begun..begun + count].iter())
                 .flat_map(|run| {
                     if run.is_empty() {
@@ -273,7 +285,12 @@ fn draw_branches(
     for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
         let critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
         let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
-        axes.draw_markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
+        axes.draw_markers(
+            page,
+            of_kind.map(|(_, point)| at(point)),
+            marker,
+            TEXT_COLOR,
+        );
     }
     for (index, &[b, p]) in shown.iter().enumerate() {
         if let Some(place) = axes.page_position(at(&trace.branches[b].points[p])) {
@@ -301,10 +318,10 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
             true => "--switch follows them",
             false => "",
         };
-        key.add_marker(page, "branches cross", how, Marker::Diamond, INK);
+        key.add_marker(page, "branches cross", how, Marker::Diamond, TEXT_COLOR);
     }
     if critical().any(folds) {
-        key.add_marker(page, "fold", "", Marker::Ring, INK);
+        key.add_marker(page, "fold", "", Marker::Ring, TEXT_COLOR);
     }
 }
 
@@ -363,12 +380,12 @@ fn draw_force_displacement_line(
     let up = Axis::linear_covering(&up, drawn().map(|p| p.1));
     let what = "force against displacement of the tip";
     let axes = PanelAxes::draw_titled(page, cell, [letter, what], across, up);
-    let line = Stroke::new(CURVES[2], 1.4);
+    let line = Stroke::new(CURVE_COLORS[2], 1.4);
     axes.draw_curve(page, &ends, line);
-    axes.draw_markers(page, points, Marker::Dot, CURVES[0]);
+    axes.draw_markers(page, points, Marker::Dot, CURVE_COLORS[0]);
     let mut key = Legend::right_of(cell);
     let which = "of the first branch";
-    key.add_marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
+    key.add_marker(page, "equilibria", which, Marker::Dot, CURVE_COLORS[0]);
     let slope = format!(
         "slope {}{}",
         format_four_digits(law.slope),

@@ -27,7 +27,7 @@ use crate::relax::path::Event;
 use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
 use crate::relax::rest::{BUDGET, COARSEST, RelaxationProblem, WorkLog};
 use crate::relax::saddle;
-use crate::relax::saddle::saddle_at_state;
+use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
 pub use crate::relax::solve_on_grid::semi_implicit::softens;
 use crate::relax::solve_on_grid::start::{disturb, initial_state};
@@ -290,7 +290,7 @@ fn solve_semi_implicit(
                 rest = Ok(accuracy);
                 break;
             }
-            Some(index) => history.saddle = Some(saddle_at_state(&leaf, state, index)),
+            Some(index) => history.saddle = Some(saddle_summary(&leaf, state, index)),
             None => {}
         }
         let leaning = problem.options.bias_direction;
@@ -442,7 +442,7 @@ pub fn check_stability(
             .rejoin_finest(level)
             .into_failure(EquilibriumFailure::Saddle);
     }
-    found.history.saddle = Some(saddle_at_state(&level.leaf, &level.state, index));
+    found.history.saddle = Some(saddle_summary(&level.leaf, &level.state, index));
     found.history.saddle_escapes += 1;
     if found.history.saddle_escapes > MAX_SADDLES {
         return found

@@ -451,7 +451,7 @@ pub fn remove_repeated_ends(curve: &mut ContinuedBoundary, known: &[ContinuedBou
         let singular = SingularPointSample {
             params: point.params,
             tips: &point.tips,
-            error: total_error_bound(point),
+            error: parameter_and_tip_error(point),
             kind: point.kind,
             modes: curve.neutral,
             adjacent_indices: sorted_indices(point.indices),
@@ -514,13 +514,13 @@ impl SingularPointSample<'_> {
             let target = parameters_and_tips(self.params, &mirror_image_of_tips(self.tips, *signs));
             if let [only] = &points[..] {
                 return parameter_distance(&points_of_curve[0], &target)
-                    < SAME_POINT_DISTANCE + self.error + total_error_bound(only);
+                    < SAME_POINT_DISTANCE + self.error + parameter_and_tip_error(only);
             }
             (1..points.len()).any(|k| {
                 let pair = &points[k - 1..=k];
                 let within = pair
                     .iter()
-                    .map(|it| total_error_bound(it))
+                    .map(|it| parameter_and_tip_error(it))
                     .fold(0.0, f64::max);
                 let mut sides = pair.iter().map(|it| sorted_indices(it.indices));
                 let same_sides = crossed || sides.any(|sides| sides == self.adjacent_indices);
@@ -543,7 +543,7 @@ pub fn mirror_image_of_tips(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
 }
 
 /// Sum of the error bounds of a point.
-fn total_error_bound(point: &VerifiedBoundaryPoint) -> f64 {
+fn parameter_and_tip_error(point: &VerifiedBoundaryPoint) -> f64 {
     point.errors[0] + point.errors[1] + point.error
 }
 

@@ -335,7 +335,7 @@ fn fitted_leaves(stats: &FitStatistics) -> Vec<(String, FitLeaf)> {
         let curves = finest.state.x.chunks(nodes);
         let curves = curves.map(|rod| rod.iter().map(|x| *x * length).collect());
         let curves: Vec<_> = curves.collect();
-        let view = at.observation_model();
+        let view = at.photo_projection();
         for observed in &case.experiments {
             let traced = observed.traced.iter();
             let leaf = FitLeaf {

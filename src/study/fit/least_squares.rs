@@ -43,7 +43,7 @@ const REMAINING_GAIN_LIMIT: f64 = 0.1;
 
 /// The part of the way to a sum that the longest step must be expected to lead, and that of the
 /// way back to a known minimum that it may lead.
-const EXPECTED_PROGRESS: f64 = 0.5;
+const HOPELESS_STEP_THRESHOLD: f64 = 0.5;
 
 const RETURN_TO_KNOWN_MINIMUM: f64 = 0.5;
 
@@ -59,7 +59,7 @@ const HUBER_TUNING_CONSTANT: f64 = 1.345;
 
 /// The standard deviation assumed if none is known, in lengths of the
 /// leaf, until it is estimated from the residuals.
-pub(super) const ASSUMED_RELATIVE_DEVIATION: f64 = 1e-3;
+pub(super) const ASSUMED_DEVIATION_PER_LENGTH: f64 = 1e-3;
 
 /// As [`NULL_SINGULAR_VALUE`], for the less accurate derivatives of the search.
 const NULL_SINGULAR_VALUE_SEARCH: f64 = 3e-7;
@@ -173,7 +173,7 @@ impl ExcludedMinimum<'_> {
             coordinate_change(self.theta, theta).norm() < RETURN_TO_KNOWN_MINIMUM * self.distance;
         returns
             || expected - self.largest_sum
-                > (1.0 - EXPECTED_PROGRESS) * (sum - self.largest_sum).max(0.0)
+                > (1.0 - HOPELESS_STEP_THRESHOLD) * (sum - self.largest_sum).max(0.0)
     }
 }
 

@@ -29,7 +29,7 @@ pub use crate::study::fit::data::{
     ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, MeasuredColumn,
     MeasuredQuantity, MeasuredValue, RowCondition, RowFilter, TracedVeinPoint,
 };
-use crate::study::fit::least_squares::{ASSUMED_RELATIVE_DEVIATION, Weighting};
+use crate::study::fit::least_squares::{ASSUMED_DEVIATION_PER_LENGTH, Weighting};
 use crate::study::fit::minima::{FitStart, GlobalFitSearch};
 use crate::study::fit::model::{EvaluationBudget, FitModel};
 use crate::study::{BaseScenario, ParameterKeys, VariableTarget, VaryError};
@@ -124,7 +124,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let data = (request.data.clone(), EvaluationBudget::new(most));
     let model = FitModel::new(base, &coordinates, &options, data)?;
     let weighting = Weighting {
-        assumed_deviation: ASSUMED_RELATIVE_DEVIATION * model.data_length_unit(),
+        assumed_deviation: ASSUMED_DEVIATION_PER_LENGTH * model.data_length_unit(),
         is_robust: request.robust,
     };
     let mut told = |seconds: f64| {

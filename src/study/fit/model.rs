@@ -666,7 +666,7 @@ impl CaseSolution {
         veins: &mut Vec<Option<VeinInterpolant<'v>>>,
     ) -> Vec<ScalarDatum> {
         let mut components = Vec::new();
-        let view = self.observation_model();
+        let view = self.photo_projection();
         for measured in &of.experiment.measured {
             components.push(ScalarDatum {
                 experiment: of.number,
@@ -771,7 +771,7 @@ impl CaseSolution {
     }
 
     /// How points on its veins are seen.
-    pub fn observation_model(&self) -> ObservationModel<'_> {
+    pub fn photo_projection(&self) -> ObservationModel<'_> {
         ObservationModel::new(self.photograph())
     }
 
@@ -903,7 +903,7 @@ impl CaseSolution {
         point: &[&ScalarDatum],
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
-        let (view, stencils) = (self.observation_model(), self.equilibrium.stencils(sigma));
+        let (view, stencils) = (self.photo_projection(), self.equilibrium.stencils(sigma));
         let coordinates = point.iter().map(|component| match component.quantity {
             DatumQuantity::Vein { coordinate, .. } => coordinate,
             DatumQuantity::Result(_) => 0,

@@ -526,7 +526,7 @@ fn header_with_known_columns(
 }
 
 /// Of the lines of words above a number the one with most of them; without such lines, the first.
-fn guess_header(lines: &[TableLine]) -> usize {
+fn guess_header_line(lines: &[TableLine]) -> usize {
     let last = lines.iter().rposition(|line| line.cells().any(is_number));
     let above = lines[..last.unwrap_or(0)].iter().enumerate();
     let words = above.filter(|(_, line)| line.may_be_header());
@@ -551,7 +551,7 @@ impl TableLines {
                 continue;
             };
             let (at, count) =
-                header_with_known_columns(&lines, known).unwrap_or((guess_header(&lines), 0));
+                header_with_known_columns(&lines, known).unwrap_or((guess_header_line(&lines), 0));
             let width = lines[at].len();
             let fits = lines[at..].iter().all(|line| line.len() == width);
             // Where no name is known, the most cells.

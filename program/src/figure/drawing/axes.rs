@@ -6,11 +6,13 @@
 //! Round numbers, for ticks and scales.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TEXT_SIZE, TICK_SIZE, draw_panel_title};
+use crate::figure::drawing::labels::{
+    PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, draw_panel_title,
+};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Color, Drawing, DrawingPath, FRAME, GRID, INK, NOTE, PathStep, Stroke, TextAnchor,
-    rectangle_path, smooth_curve,
+    Color, Drawing, DrawingPath, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, Stroke, TEXT_COLOR,
+    TextAnchor, rectangle_path, smooth_curve,
 };
 use crate::report::numbers::{
     digit_times_power_text, format_decimals, power_of_ten_text, superscript, time_power_text,
@@ -18,20 +20,20 @@ use crate::report::numbers::{
 use glam::DVec2;
 use std::ops::{Range, RangeInclusive};
 
-const TICK: f64 = 4.0;
+const TICK_LENGTH: f64 = 4.0;
 
-const DIVISION: f64 = 2.0;
+const SUBDIVISION_TICK_LENGTH: f64 = 2.0;
 
 /// From the frame to the base line of the name of the horizontal axis.
-const NAME_BELOW: f64 = 34.0;
+const HORIZONTAL_NAME_DISTANCE: f64 = 34.0;
 
 /// From the frame to that of the vertical axis: the least distance, the gap after the
 /// labels, and the largest distance.
-const NEAREST_NAME: f64 = 42.0;
+const LEAST_NAME_DISTANCE: f64 = 42.0;
 
-const AFTER_LABELS: f64 = 13.0;
+const NAME_LABEL_GAP: f64 = 13.0;
 
-const FARTHEST_NAME: f64 = 53.0;
+const LARGEST_NAME_DISTANCE: f64 = 53.0;
 
 pub struct NamedCurve {
     pub name: &'static str,
@@ -78,7 +80,7 @@ impl PanelAxes {
         let PageRectangle { corner, size } = self.cell;
         let end = self.cell.opposite_corner();
         let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
-            true => Stroke::new(FRAME, 0.8),
+            true => Stroke::new(FRAME_COLOR, 0.8),
             false => Stroke::new(GRID, 0.7),
         };
         for tick in self.across.ticks(size.x, AxisOrientation::Horizontal) {
@@ -96,7 +98,7 @@ impl PanelAxes {
     pub fn draw_without_grid(&self, page: &mut Drawing) {
         let PageRectangle { corner, size } = self.cell;
         let (middle, end) = (self.cell.middle(), self.cell.opposite_corner());
-        let rim = Stroke::new(FRAME, 0.8);
+        let rim = Stroke::new(FRAME_COLOR, 0.8);
         page.draw_stroke(rectangle_path(corner, size), rim);
         let font = Font::embedded();
         let mut widest = 0.0_f64;
@@ -110,39 +112,52 @@ impl PanelAxes {
             };
             for fraction in axis.decade_subdivisions(length) {
                 let foot = foot(fraction);
-                page.draw_line(foot, foot + DIVISION * out, rim);
+                page.draw_line(foot, foot + SUBDIVISION_TICK_LENGTH * out, rim);
             }
             for Tick { fraction, text, .. } in axis.ticks(length, direction) {
                 let foot = foot(fraction);
-                page.draw_line(foot, foot + TICK * out, rim);
+                page.draw_line(foot, foot + TICK_LENGTH * out, rim);
                 match direction {
                     _ if !axis.labelled => (),
                     AxisOrientation::Horizontal => {
-                        let base = foot + DVec2::new(0.0, TICK + 1.2 * TICK_SIZE);
-                        page.draw_label(base, &text, TICK_SIZE, TextAnchor::Middle, NOTE);
+                        let base = foot + DVec2::new(0.0, TICK_LENGTH + 1.2 * TICK_FONT_SIZE);
+                        page.draw_label(
+                            base,
+                            &text,
+                            TICK_FONT_SIZE,
+                            TextAnchor::Middle,
+                            NOTE_COLOR,
+                        );
                     }
                     AxisOrientation::Vertical => {
-                        let end = foot - DVec2::new(TICK + 3.0, 0.0);
-                        page.draw_centered_label(end, &text, TICK_SIZE, TextAnchor::End, NOTE);
-                        widest = widest.max(font.text_width(&text, TICK_SIZE));
+                        let end = foot - DVec2::new(TICK_LENGTH + 3.0, 0.0);
+                        page.draw_centered_label(
+                            end,
+                            &text,
+                            TICK_FONT_SIZE,
+                            TextAnchor::End,
+                            NOTE_COLOR,
+                        );
+                        widest = widest.max(font.text_width(&text, TICK_FONT_SIZE));
                     }
                 }
             }
         }
         if self.across.labelled {
-            let base = DVec2::new(middle.x, end.y + NAME_BELOW);
+            let base = DVec2::new(middle.x, end.y + HORIZONTAL_NAME_DISTANCE);
             page.draw_label(
                 base,
                 &self.across.title(),
-                TEXT_SIZE,
+                TEXT_FONT_SIZE,
                 TextAnchor::Middle,
-                INK,
+                TEXT_COLOR,
             );
         }
         if self.up.labelled {
-            let distance = (widest + AFTER_LABELS).clamp(NEAREST_NAME, FARTHEST_NAME);
+            let distance =
+                (widest + NAME_LABEL_GAP).clamp(LEAST_NAME_DISTANCE, LARGEST_NAME_DISTANCE);
             let base = DVec2::new(corner.x - distance, middle.y);
-            page.draw_rotated_label(base, &self.up.title(), TEXT_SIZE, INK);
+            page.draw_rotated_label(base, &self.up.title(), TEXT_FONT_SIZE, TEXT_COLOR);
         }
     }
 
@@ -260,28 +275,28 @@ fn thin_points(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
 }
 
 /// Padding at both ends: as a fraction of a linear extent, and in decades.
-const PADDING: f64 = 0.06;
+const LINEAR_PADDING: f64 = 0.06;
 
-const PADDING_DECADES: f64 = 0.12;
+const LOGARITHMIC_PADDING: f64 = 0.12;
 
 /// Most decades of an axis: smaller values are below rounding.
 const MOST_DECADES: f64 = 18.0;
 
 /// Larger values are diverged and not drawn.
-const LARGEST: f64 = 1e290;
+const LARGEST_DRAWN_VALUE: f64 = 1e290;
 
 /// Powers of ten for which a linear axis writes values without a factor.
-const PLAIN: Range<f64> = -2.0..4.0;
+const POWERS_WITHOUT_FACTOR: Range<f64> = -2.0..4.0;
 
 /// Least pixels between ticks, across and up, and between their labels.
-const LINEAR: [f64; 2] = [62.0, 25.0];
+const LINEAR_TICK_SPACING: [f64; 2] = [62.0, 25.0];
 
-const LOGARITHMIC: [f64; 2] = [38.0, 22.0];
+const LOGARITHMIC_TICK_SPACING: [f64; 2] = [38.0, 22.0];
 
-const BETWEEN_LABELS: f64 = 4.0;
+const LABEL_GAP: f64 = 4.0;
 
 /// A decade wider than this many pixels is subdivided.
-const DIVIDED: f64 = 60.0;
+const SUBDIVIDED_DECADE_WIDTH: f64 = 60.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisOrientation {
@@ -327,7 +342,8 @@ pub struct Tick {
 
 impl Axis {
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
-        let [start, end] = [start, end].map(|value| value.clamp(-LARGEST, LARGEST));
+        let [start, end] =
+            [start, end].map(|value| value.clamp(-LARGEST_DRAWN_VALUE, LARGEST_DRAWN_VALUE));
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
         // An extent that is only rounding counts as zero.
@@ -353,9 +369,10 @@ impl Axis {
     /// A linear axis that covers these values, with padding.
     pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) =
-            extent_of_values(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
+            extent_of_values(values.filter(|value| value.abs() < LARGEST_DRAWN_VALUE))
+                .unwrap_or_default();
         let axis = Axis::linear(name, low, high);
-        let padding = PADDING * (axis.end - axis.start);
+        let padding = LINEAR_PADDING * (axis.end - axis.start);
         Axis {
             start: axis.start - padding,
             end: axis.end + padding,
@@ -384,7 +401,7 @@ impl Axis {
         let (start, end) = match extent_of_values(drawable.map(f64::log10)) {
             Some((low, high)) => {
                 let low = low.max(high - MOST_DECADES);
-                let padding = (0.5 * (fewest - (high - low))).max(PADDING_DECADES);
+                let padding = (0.5 * (fewest - (high - low))).max(LOGARITHMIC_PADDING);
                 (low - padding, high + padding)
             }
             None => (-fewest, 0.0),
@@ -423,7 +440,7 @@ impl Axis {
     pub fn label_power_of_ten(&self) -> i32 {
         let size = self.start.abs().max(self.end.abs()).log10();
         match (self.sign, &self.ticks) {
-            (None, TickPlacement::RoundNumbers) if !PLAIN.contains(&size) => {
+            (None, TickPlacement::RoundNumbers) if !POWERS_WITHOUT_FACTOR.contains(&size) => {
                 3 * (size / 3.0).floor() as i32
             }
             _ => 0,
@@ -435,7 +452,7 @@ impl Axis {
     pub fn fraction(&self, value: f64) -> f64 {
         let at = match self.sign {
             Some(sign) => (sign * value).log10(),
-            None if value.abs() < LARGEST => value,
+            None if value.abs() < LARGEST_DRAWN_VALUE => value,
             None => f64::NAN,
         };
         (at - self.start) / (self.end - self.start)
@@ -444,17 +461,17 @@ impl Axis {
     /// As many ticks as are readable on an axis of this length.
     pub fn ticks(&self, length: f64, direction: AxisOrientation) -> Vec<Tick> {
         let default = match self.ticks {
-            TickPlacement::RoundNumbers if self.sign.is_none() => LINEAR,
-            _ => LOGARITHMIC,
+            TickPlacement::RoundNumbers if self.sign.is_none() => LINEAR_TICK_SPACING,
+            _ => LOGARITHMIC_TICK_SPACING,
         };
         let font = Font::embedded();
         let size = |tick: &Tick| match direction {
-            AxisOrientation::Horizontal => font.text_width(&tick.text, TICK_SIZE),
-            AxisOrientation::Vertical => TICK_SIZE,
+            AxisOrientation::Horizontal => font.text_width(&tick.text, TICK_FONT_SIZE),
+            AxisOrientation::Vertical => TICK_FONT_SIZE,
         };
         let separate = |pair: &[Tick]| {
             let distance = length * (pair[1].fraction - pair[0].fraction).abs();
-            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > BETWEEN_LABELS
+            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > LABEL_GAP
         };
         let mut spacing = self.tick_spacing.unwrap_or(default[direction as usize]);
         loop {
@@ -529,7 +546,7 @@ impl Axis {
     /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
     pub fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
-        let divided = length > DIVIDED * (high - low)
+        let divided = length > SUBDIVIDED_DECADE_WIDTH * (high - low)
             && !matches!(self.ticks, TickPlacement::WholeNumbers(_));
         let Some(sign) = self.sign.filter(|_| divided) else {
             return Vec::new();
@@ -585,7 +602,7 @@ mod tests {
         };
         let curve = |points: &[(f64, f64)]| {
             let mut page = Drawing::new(200.0, "");
-            axes.draw_curve(&mut page, points, Stroke::new(INK, 1.0));
+            axes.draw_curve(&mut page, points, Stroke::new(TEXT_COLOR, 1.0));
             checked_svg_text(&page)
         };
         let diagonal = "<path d=\"M10 70L110 20\"";

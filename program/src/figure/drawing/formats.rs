@@ -143,10 +143,10 @@ pub fn checked_svg_text(drawing: &Drawing) -> String {
     svg
 }
 
-const SCALE: f64 = 2.0;
+const PIXELS_PER_UNIT: f64 = 2.0;
 
 /// Bytes per chunk of the file.
-const CHUNK: usize = 1 << 16;
+const CHUNK_BYTES: usize = 1 << 16;
 
 /// 192 dots per inch, in dots per metre as the file states it.
 const DOTS_PER_METRE: u32 = 7559;
@@ -169,7 +169,7 @@ pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
 
 /// Pixels of a drawing, across and down.
 fn pixel_size(drawing: &Drawing) -> [u32; 2] {
-    [drawing.width, drawing.height].map(|length| (length * SCALE).ceil() as u32)
+    [drawing.width, drawing.height].map(|length| (length * PIXELS_PER_UNIT).ceil() as u32)
 }
 
 pub fn rasterize(drawing: &Drawing) -> Pixmap {
@@ -222,14 +222,14 @@ fn paint_rows(shapes: &[PaintedShape], width: u32, rows: Range<u32>) -> Pixmap {
     // White.
     canvas.data_mut().fill(u8::MAX);
     let page = Transform::from_translate(0.0, -(rows.start as f32));
-    let page = page.pre_scale(SCALE as f32, SCALE as f32);
+    let page = page.pre_scale(PIXELS_PER_UNIT as f32, PIXELS_PER_UNIT as f32);
     for shape in shapes {
         let path = &shape.path;
         let place = page
             .pre_translate(shape.anchor.x as f32, shape.anchor.y as f32)
             .pre_rotate(shape.rotation)
             .pre_translate(-shape.left_offset as f32, 0.0);
-        let rim = (SCALE * shape.stroke.map_or(1.0, |stroke| 1.0 + stroke.width)) as f32;
+        let rim = (PIXELS_PER_UNIT * shape.stroke.map_or(1.0, |stroke| 1.0 + stroke.width)) as f32;
         let outside = |it: Rect| it.bottom() + rim < 0.0 || it.top() - rim > height as f32;
         if path.bounds().transform(place).is_some_and(outside) {
             continue;
@@ -304,7 +304,7 @@ fn encode_bands(
     }));
     // Row by row: buffers of the whole page would cost more than the encoding.
     let mut writer = encoder.write_header()?;
-    let mut rows = writer.stream_writer_with_size(CHUNK)?;
+    let mut rows = writer.stream_writer_with_size(CHUNK_BYTES)?;
     let mut rgb = vec![[0; 3]; width as usize];
     for band in bands {
         for row in band.data().chunks_exact(4 * width as usize) {
@@ -457,7 +457,7 @@ mod tests {
 #[cfg(test)]
 mod png_tests {
     use super::*;
-    use crate::figure::drawing::{DOT, INK, circle_path, rectangle_path};
+    use crate::figure::drawing::{SECOND_SOLUTION_COLOR, TEXT_COLOR, circle_path, rectangle_path};
     use std::io::Cursor;
 
     #[test]
@@ -465,15 +465,15 @@ mod png_tests {
         let mut page = Drawing::new(300.0, "");
         page.height = 700.0;
         let (corner, size) = (DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0));
-        page.draw_shape(rectangle_path(corner, size), DOT, None);
+        page.draw_shape(rectangle_path(corner, size), SECOND_SOLUTION_COLOR, None);
         for k in 0..14 {
             let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
-            page.draw_stroke(circle_path(at, 45.0), Stroke::new(INK, 3.0));
-            page.draw_label(at, "name", 20.0, TextAnchor::Start, INK);
-            page.draw_rotated_label(at, "a long name of an axis", 20.0, INK);
+            page.draw_stroke(circle_path(at, 45.0), Stroke::new(TEXT_COLOR, 3.0));
+            page.draw_label(at, "name", 20.0, TextAnchor::Start, TEXT_COLOR);
+            page.draw_rotated_label(at, "a long name of an axis", 20.0, TEXT_COLOR);
         }
         let (from, to) = (DVec2::new(0.0, 10.0), DVec2::new(300.0, 690.0));
-        page.draw_line(from, to, Stroke::new(INK, 4.0));
+        page.draw_line(from, to, Stroke::new(TEXT_COLOR, 4.0));
         let mut bytes = Vec::new();
         write_png(&page, &mut bytes).unwrap();
         let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();

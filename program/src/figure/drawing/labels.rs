@@ -10,10 +10,11 @@ use crate::figure::drawing::axes::{PanelAxes, round_step};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::markers::{Marker, draw_support_marker, draw_tip_marker};
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE, ParallelProjection, SpacePanel, ViewAngles, common_bounding_box,
+    BoxMargins, OBLIQUE_VIEW, ParallelProjection, SpacePanel, ViewAngles, common_bounding_box,
 };
 use crate::figure::drawing::{
-    CURVES, Color, Drawing, INK, NOTE, Stroke, TextAnchor, rectangle_path, vein_color,
+    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, rectangle_path,
+    vein_color,
 };
 use crate::figure::leaf::DrawnVeins;
 use crate::figure::scenario::FigureSetting;
@@ -28,15 +29,15 @@ const SPACING: f64 = 4.0;
 const MOST_PLACES: usize = 20_000;
 
 /// From a point to the middle of its label.
-const DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
+const LABEL_DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
 
-const DIRECTIONS: usize = 16;
+const LABEL_DIRECTIONS: usize = 16;
 
 /// A clearance that is large enough.
-const CLEAR: f64 = 5.0;
+const SUFFICIENT_CLEARANCE: f64 = 5.0;
 
 /// Points closer than this share a label.
-const CLOSE: f64 = 10.0;
+const SHARED_LABEL_DISTANCE: f64 = 10.0;
 
 pub struct LabelPlacement {
     cell: PageRectangle,
@@ -77,7 +78,7 @@ impl LabelPlacement {
     /// Requests a label next to a point; points close to each other share one.
     pub fn request_label(&mut self, at: DVec2, text: &str) {
         let mut wanted = self.requested_labels.iter_mut();
-        match wanted.find(|(place, _)| place.distance(at) < CLOSE) {
+        match wanted.find(|(place, _)| place.distance(at) < SHARED_LABEL_DISTANCE) {
             Some((_, texts)) => *texts += &format!(", {text}"),
             None => self.requested_labels.push((at, text.into())),
         }
@@ -89,10 +90,10 @@ impl LabelPlacement {
             .extend(self.requested_labels.iter().map(|(at, _)| *at));
         for (at, text) in std::mem::take(&mut self.requested_labels) {
             let size = label_size(&text);
-            let places = DISTANCES.into_iter().flat_map(|distance| {
-                (0..DIRECTIONS).map(move |k| {
+            let places = LABEL_DISTANCES.into_iter().flat_map(|distance| {
+                (0..LABEL_DIRECTIONS).map(move |k| {
                     let angle = -0.25 * std::f64::consts::PI
-                        + std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
+                        + std::f64::consts::TAU * k as f64 / LABEL_DIRECTIONS as f64;
                     distance * DVec2::from_angle(angle)
                 })
             });
@@ -102,7 +103,7 @@ impl LabelPlacement {
                 PageRectangle::new(at + offset + side - 0.5 * size, size)
             });
             if let Some((_, cell)) = clearest_label(cells, |cell| self.clearance(cell)) {
-                self.draw_label_at(page, cell, &text, INK);
+                self.draw_label_at(page, cell, &text, TEXT_COLOR);
             }
         }
     }
@@ -114,7 +115,13 @@ impl LabelPlacement {
         text: &str,
         color: Color,
     ) {
-        page.draw_centered_label(cell.middle(), text, TICK_SIZE, TextAnchor::Middle, color);
+        page.draw_centered_label(
+            cell.middle(),
+            text,
+            TICK_FONT_SIZE,
+            TextAnchor::Middle,
+            color,
+        );
         self.drawn_labels.push(cell);
     }
 
@@ -135,7 +142,10 @@ impl LabelPlacement {
         }
         let (middle, half) = (label.middle(), 0.5 * label.size);
         let far = |place: &DVec2| ((*place - middle).abs() - half).max(DVec2::ZERO).length();
-        self.curve_points.iter().map(far).fold(CLEAR, f64::min)
+        self.curve_points
+            .iter()
+            .map(far)
+            .fold(SUFFICIENT_CLEARANCE, f64::min)
     }
 }
 
@@ -150,7 +160,7 @@ pub fn clearest_label<T>(
         if best.as_ref().is_none_or(|(most, _)| clear > *most) {
             best = Some((clear, label));
         }
-        if clear >= CLEAR {
+        if clear >= SUFFICIENT_CLEARANCE {
             break;
         }
     }
@@ -158,29 +168,32 @@ pub fn clearest_label<T>(
 }
 
 pub fn label_size(text: &str) -> DVec2 {
-    DVec2::new(Font::embedded().text_width(text, TICK_SIZE), TICK_SIZE)
+    DVec2::new(
+        Font::embedded().text_width(text, TICK_FONT_SIZE),
+        TICK_FONT_SIZE,
+    )
 }
 
 pub const WIDTH: f64 = 900.0;
 
-pub const LEFT: f64 = 64.0;
+pub const PAGE_LEFT_MARGIN: f64 = 64.0;
 
-pub const RIGHT: f64 = 22.0;
+pub const PAGE_RIGHT_MARGIN: f64 = 22.0;
 
 /// Where the title and the notes end and the panels may begin.
 pub const HEADER: f64 = 74.0;
 
 /// Room above a panel, for its title.
-pub const PANEL_TITLE: f64 = 24.0;
+pub const PANEL_TITLE_HEIGHT: f64 = 24.0;
 
 /// Room below a panel, for its axis.
-pub const PANEL_AXIS: f64 = 48.0;
+pub const PANEL_AXIS_HEIGHT: f64 = 48.0;
 
-pub const TITLE_SIZE: f64 = 19.0;
+pub const TITLE_FONT_SIZE: f64 = 19.0;
 
-pub const TEXT_SIZE: f64 = 12.0;
+pub const TEXT_FONT_SIZE: f64 = 12.0;
 
-pub const TICK_SIZE: f64 = 10.5;
+pub const TICK_FONT_SIZE: f64 = 10.5;
 
 #[derive(Clone, Copy)]
 pub struct PageRectangle {
@@ -196,8 +209,8 @@ impl PageRectangle {
     /// A panel across the page that leaves this width on the right for a key.
     pub fn left_of_legend(top: f64, height: f64, key: f64) -> Self {
         PageRectangle::new(
-            DVec2::new(LEFT, top),
-            DVec2::new(WIDTH - LEFT - RIGHT - key, height),
+            DVec2::new(PAGE_LEFT_MARGIN, top),
+            DVec2::new(WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - key, height),
         )
     }
 
@@ -239,7 +252,7 @@ impl PageRectangle {
 
 /// Draws a panel's title above its frame.
 pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
-    draw_colored_title(page, corner, letter, text, NOTE);
+    draw_colored_title(page, corner, letter, text, NOTE_COLOR);
 }
 
 /// Draws a panel's title above its frame, with the text in this colour.
@@ -251,9 +264,9 @@ pub fn draw_colored_title(
     color: Color,
 ) {
     let base = corner - DVec2::new(0.0, 8.0);
-    page.draw_label(base, letter, TEXT_SIZE, TextAnchor::Start, INK);
+    page.draw_label(base, letter, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
     let base = base + DVec2::new(24.0, 0.0);
-    page.draw_label(base, text, TEXT_SIZE, TextAnchor::Start, color);
+    page.draw_label(base, text, TEXT_FONT_SIZE, TextAnchor::Start, color);
 }
 
 /// Letters of panels: `(a)`, `(b)`, ...
@@ -261,10 +274,10 @@ pub fn panel_letters() -> impl Iterator<Item = String> + Clone {
     (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
 }
 
-const TITLE_BASE: f64 = 38.0;
+const TITLE_BASE_LINE: f64 = 38.0;
 
 /// Base line of the notes.
-pub const NOTE_BASE: f64 = 60.0;
+pub const NOTES_BASE_LINE: f64 = 60.0;
 
 /// A page of the default width with a header whose text begins at `left`.
 pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&DrawnVeins>) -> Drawing {
@@ -285,42 +298,45 @@ pub fn draw_header(
     let font = Font::embedded();
     let right = match leaf {
         Some(veins) => draw_vein_legend(page, veins, &font) - 20.0,
-        None => page.width - RIGHT,
+        None => page.width - PAGE_RIGHT_MARGIN,
     };
-    let title = font.shorten_text(title, TITLE_SIZE, right - left);
-    let base = DVec2::new(left, TITLE_BASE);
-    page.draw_label(base, &title, TITLE_SIZE, TextAnchor::Start, INK);
+    let title = font.shorten_text(title, TITLE_FONT_SIZE, right - left);
+    let base = DVec2::new(left, TITLE_BASE_LINE);
+    page.draw_label(base, &title, TITLE_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
     // Spaces that SVG does not collapse.
     let notes = notes.join("\u{a0}\u{a0}·\u{a0}\u{a0}");
-    let base = DVec2::new(left, NOTE_BASE);
-    page.draw_label(base, &notes, TEXT_SIZE, TextAnchor::Start, NOTE);
+    let base = DVec2::new(left, NOTES_BASE_LINE);
+    page.draw_label(base, &notes, TEXT_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
 }
 
 /// Draws the key at the right end of the header; returns where it starts.
 fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 {
-    const MIDDLE: f64 = 32.0;
-    const BAR: DVec2 = DVec2::new(120.0, 9.0);
-    const BAR_STEPS: u32 = 60;
-    let mut x = page.width - RIGHT;
+    const LEGEND_MIDDLE: f64 = 32.0;
+    const COLOR_BAR_SIZE: DVec2 = DVec2::new(120.0, 9.0);
+    const COLOR_BAR_STEPS: u32 = 60;
+    let mut x = page.width - PAGE_RIGHT_MARGIN;
     let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
         page.draw_centered_label(
-            DVec2::new(*x, MIDDLE),
+            DVec2::new(*x, LEGEND_MIDDLE),
             text,
-            TEXT_SIZE,
+            TEXT_FONT_SIZE,
             TextAnchor::End,
-            NOTE,
+            NOTE_COLOR,
         );
-        *x -= font.text_width(text, TEXT_SIZE) + 6.0;
+        *x -= font.text_width(text, TEXT_FONT_SIZE) + 6.0;
     };
     if veins.count > 1 {
         text_before(page, &mut x, &veins.count.to_string());
-        x -= BAR.x;
-        let corner = DVec2::new(x, MIDDLE - 0.5 * BAR.y);
-        let part = DVec2::new(BAR.x / f64::from(BAR_STEPS), BAR.y);
-        for i in 0..BAR_STEPS {
-            let color = vein_color(f64::from(i) / f64::from(BAR_STEPS - 1));
+        x -= COLOR_BAR_SIZE.x;
+        let corner = DVec2::new(x, LEGEND_MIDDLE - 0.5 * COLOR_BAR_SIZE.y);
+        let part = DVec2::new(
+            COLOR_BAR_SIZE.x / f64::from(COLOR_BAR_STEPS),
+            COLOR_BAR_SIZE.y,
+        );
+        for i in 0..COLOR_BAR_STEPS {
+            let color = vein_color(f64::from(i) / f64::from(COLOR_BAR_STEPS - 1));
             // Each part extends below the next, so that there are no gaps.
-            let overlap = if i + 1 < BAR_STEPS { 0.5 } else { 0.0 };
+            let overlap = if i + 1 < COLOR_BAR_STEPS { 0.5 } else { 0.0 };
             let start = corner + f64::from(i) * DVec2::new(part.x, 0.0);
             let size = part + DVec2::new(overlap, 0.0);
             page.draw_shape(rectangle_path(start, size), color, None);
@@ -337,7 +353,7 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
     let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
     let mut entry = |page: &mut Drawing, name: &str, marker: &dyn Fn(&mut Drawing, DVec2)| {
         text_before(page, &mut x, name);
-        marker(page, DVec2::new(x - 3.0, MIDDLE));
+        marker(page, DVec2::new(x - 3.0, LEGEND_MIDDLE));
         x -= 26.0;
     };
     if veins.tip_support.is_none() {
@@ -369,7 +385,7 @@ const ROW: f64 = 20.0;
 const SAMPLE_HEIGHT: f64 = 12.0;
 
 /// Most of many curves that a key names.
-pub const MOST_NAMED: usize = 7;
+pub const MOST_CURVES_NAMED: usize = 7;
 
 /// The key of a panel: a column of samples with their names.
 pub struct Legend {
@@ -378,7 +394,7 @@ pub struct Legend {
 }
 
 impl Legend {
-    const SAMPLE: f64 = 26.0;
+    const SAMPLE_WIDTH: f64 = 26.0;
 
     pub fn right_of(panel: PageRectangle) -> Self {
         Legend {
@@ -395,14 +411,14 @@ impl Legend {
         sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
         let font = Font::embedded();
-        sample(page, sample_rectangle(self.at, Self::SAMPLE));
-        let left = self.at.x + Self::SAMPLE + GAP;
+        sample(page, sample_rectangle(self.at, Self::SAMPLE_WIDTH));
+        let left = self.at.x + Self::SAMPLE_WIDTH + GAP;
         let room = page.width - 6.0 - left;
-        for (text, color) in [(name, INK), (note, NOTE)] {
-            for line in font.wrap_text(text, TICK_SIZE, room) {
-                let line = font.shorten_text(&line, TICK_SIZE, room);
+        for (text, color) in [(name, TEXT_COLOR), (note, NOTE_COLOR)] {
+            for line in font.wrap_text(text, TICK_FONT_SIZE, room) {
+                let line = font.shorten_text(&line, TICK_FONT_SIZE, room);
                 let at = DVec2::new(left, self.at.y);
-                page.draw_centered_label(at, &line, TICK_SIZE, TextAnchor::Start, color);
+                page.draw_centered_label(at, &line, TICK_FONT_SIZE, TextAnchor::Start, color);
                 self.at.y += LINE;
             }
         }
@@ -421,8 +437,8 @@ impl Legend {
         page: &mut Drawing,
         curves: impl ExactSizeIterator<Item = (String, String)>,
     ) {
-        let more = curves.len().saturating_sub(MOST_NAMED);
-        for ((name, note), color) in curves.take(MOST_NAMED).zip(CURVES) {
+        let more = curves.len().saturating_sub(MOST_CURVES_NAMED);
+        for ((name, note), color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
             self.add_line(page, &name, &note, Stroke::new(color, 1.8));
         }
         if more > 0 {
@@ -465,7 +481,7 @@ impl LegendRows {
     pub fn starting_at(left: f64, base: f64, sample: f64) -> Self {
         LegendRows {
             left,
-            at: DVec2::new(left, base - 0.36 * TEXT_SIZE),
+            at: DVec2::new(left, base - 0.36 * TEXT_FONT_SIZE),
             sample,
         }
     }
@@ -476,13 +492,13 @@ impl LegendRows {
         name: &str,
         sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
-        let width = self.sample + GAP + Font::embedded().text_width(name, TEXT_SIZE);
-        if self.at.x > self.left && self.at.x + width > page.width - RIGHT {
+        let width = self.sample + GAP + Font::embedded().text_width(name, TEXT_FONT_SIZE);
+        if self.at.x > self.left && self.at.x + width > page.width - PAGE_RIGHT_MARGIN {
             self.at = DVec2::new(self.left, self.at.y + ROW);
         }
         sample(page, sample_rectangle(self.at, self.sample));
         let text = self.at + DVec2::new(self.sample + GAP, 0.0);
-        page.draw_centered_label(text, name, TEXT_SIZE, TextAnchor::Start, INK);
+        page.draw_centered_label(text, name, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
         self.at.x += width + ROW_ENTRY_GAP;
     }
 
@@ -501,7 +517,7 @@ fn sample_rectangle(at: DVec2, width: f64) -> PageRectangle {
 const COLUMNS: usize = 4;
 
 /// Margin to the left and right of the panels.
-pub const SIDE: f64 = 22.0;
+pub const SIDE_MARGIN: f64 = 22.0;
 
 const PANEL_GAP: f64 = 12.0;
 
@@ -512,12 +528,12 @@ const HIGHEST: f64 = 330.0;
 const BOTTOM: f64 = 10.0;
 
 /// Least pixels between grid lines.
-const GRID: f64 = 17.0;
+const LEAST_GRID_SPACING: f64 = 17.0;
 
 /// Factor of the line width of veins in small panels.
-pub const THINNER: f64 = 0.75;
+pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
 
-const MARGINS: BoxMargins = BoxMargins {
+const SPACE_PANEL_MARGINS: BoxMargins = BoxMargins {
     left: 14.0,
     right: 14.0,
     below: 14.0,
@@ -543,14 +559,16 @@ impl<'s> SmallPanels<'s> {
         top: f64,
     ) -> Self {
         let bounds = common_bounding_box(shapes);
-        let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * PANEL_GAP) / COLUMNS as f64;
-        let extent = ParallelProjection::from_view(OBLIQUE).projected_extent(bounds);
-        let height = (width - MARGINS.left - MARGINS.right) * extent.y / extent.x + MARGINS.below;
+        let width = (WIDTH - 2.0 * SIDE_MARGIN - (COLUMNS - 1) as f64 * PANEL_GAP) / COLUMNS as f64;
+        let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
+        let height = (width - SPACE_PANEL_MARGINS.left - SPACE_PANEL_MARGINS.right) * extent.y
+            / extent.x
+            + SPACE_PANEL_MARGINS.below;
         let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
-        let scale = (MARGINS.inner_size(size) / extent).min_element();
+        let scale = (SPACE_PANEL_MARGINS.inner_size(size) / extent).min_element();
         SmallPanels {
             bounds,
-            grid_step: round_step(setting.value_per_length() * GRID / scale),
+            grid_step: round_step(setting.value_per_length() * LEAST_GRID_SPACING / scale),
             setting,
             size,
             top,
@@ -569,16 +587,16 @@ impl<'s> SmallPanels<'s> {
 
     fn panel_rectangle(&self, index: usize) -> PageRectangle {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
-        let pitch = self.size + DVec2::new(PANEL_GAP, PANEL_TITLE + PANEL_GAP);
+        let pitch = self.size + DVec2::new(PANEL_GAP, PANEL_TITLE_HEIGHT + PANEL_GAP);
         PageRectangle::new(
-            DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
+            DVec2::new(SIDE_MARGIN, self.top + PANEL_TITLE_HEIGHT) + place * pitch,
             self.size,
         )
     }
 
     pub fn bottom(&self) -> f64 {
         let rows = self.count.div_ceil(COLUMNS).max(1);
-        let row = PANEL_TITLE + self.size.y + PANEL_GAP;
+        let row = PANEL_TITLE_HEIGHT + self.size.y + PANEL_GAP;
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
@@ -591,8 +609,9 @@ impl<'s> SmallPanels<'s> {
         caption: [&str; 2],
     ) {
         let [letter, text] = caption;
-        let scene = self.draw_empty_panel(page, (index, 0.0), OBLIQUE, (letter, text, NOTE));
-        scene.draw_leaf(page, veins, THINNER * veins.line_width());
+        let scene =
+            self.draw_empty_panel(page, (index, 0.0), OBLIQUE_VIEW, (letter, text, NOTE_COLOR));
+        scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
     }
 
     /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
@@ -608,7 +627,7 @@ impl<'s> SmallPanels<'s> {
         let cell = self.panel_rectangle(index);
         draw_colored_title(page, cell.corner, letter, text, color);
         let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
-        let scene = SpacePanel::new(bounds, setting, view, cell, MARGINS, step);
+        let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_PANEL_MARGINS, step);
         scene.draw_box(page);
         if index == 0 {
             scene.draw_axis_names(page, 9.0, false);

@@ -6,10 +6,10 @@
 //! Dead moments on a rod as curved arrows about their axes, by the right-hand rule.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TICK_SIZE};
+use crate::figure::drawing::labels::{PageRectangle, TICK_FONT_SIZE};
 use crate::figure::drawing::{
-    Color, DOT, Drawing, INK, NOTE, Stroke, TextAnchor, WHITE, circle_path, polygon_path,
-    polyline_path, rectangle_path,
+    Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
+    circle_path, polygon_path, polyline_path, rectangle_path,
 };
 use crate::figure::leaf::{DrawnVeins, GrippedStretch};
 use crate::figure::scenario::{LoadKind, LoadMark, load_marks};
@@ -63,19 +63,19 @@ fn draw_cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
 pub fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
     let rim = Some(Stroke::new(WHITE, 1.0));
-    page.draw_shape(rectangle_path(at - half, 2.0 * half), INK, rim);
+    page.draw_shape(rectangle_path(at - half, 2.0 * half), TEXT_COLOR, rim);
 }
 
 /// Marks the joint tip, or the tip of a single rod.
 pub fn draw_tip_marker(page: &mut Drawing, at: DVec2) {
-    Marker::Ring.draw(page, at, INK);
+    Marker::Ring.draw(page, at, TEXT_COLOR);
 }
 
 /// Marks what is held of a vein's end.
 pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
     match held {
         SupportKind::Clamped => draw_clamp_marker(page, at),
-        SupportKind::Pinned => Marker::Triangle.draw(page, at, INK),
+        SupportKind::Pinned => Marker::Triangle.draw(page, at, TEXT_COLOR),
     }
 }
 
@@ -130,27 +130,30 @@ fn draw_grip_markers(
         SupportKind::Pinned => Marker::Triangle,
     };
     if let [first, .., last] = points.as_slice() {
-        page.draw_stroke(polyline_path(&points), Stroke::new(INK, 1.6 + line_width));
-        marker.draw(page, *first, INK);
-        marker.draw(page, *last, INK);
+        page.draw_stroke(
+            polyline_path(&points),
+            Stroke::new(TEXT_COLOR, 1.6 + line_width),
+        );
+        marker.draw(page, *first, TEXT_COLOR);
+        marker.draw(page, *last, TEXT_COLOR);
     } else if let [point] = points.as_slice() {
-        marker.draw(page, *point, INK);
+        marker.draw(page, *point, TEXT_COLOR);
     }
 }
 
 /// Marks a point of a second solution, in a colour that no vein has.
 pub fn draw_second_solution_dot(page: &mut Drawing, at: DVec2, radius: f64) {
-    page.draw_shape(circle_path(at, radius), DOT, None);
+    page.draw_shape(circle_path(at, radius), SECOND_SOLUTION_COLOR, None);
 }
 
 /// Length in pixels of an arrow that lies in the plane of the page.
-const ARROW: f64 = 30.0;
+const ARROW_LENGTH: f64 = 30.0;
 
 /// A shorter arrow is drawn end-on.
-const END_ON: f64 = 0.2;
+const END_ON_LENGTH: f64 = 0.2;
 
 /// From the sides of a panel to the middle of the arrow.
-const INSET: DVec2 = DVec2::new(28.0, 32.0);
+const ARROW_INSET: DVec2 = DVec2::new(28.0, 32.0);
 
 /// Draws a direction with its name in the corner of a panel that is farthest from the points
 /// `taken`; returns where. `direction` is the projection of its unit vector onto the page, `toward`
@@ -162,35 +165,35 @@ pub fn draw_direction_arrow(
     (direction, toward): (DVec2, bool),
     name: &str,
 ) -> DVec2 {
-    let at = cell.emptiest_corner(INSET, taken.iter().copied());
-    let stroke = Stroke::new(INK, 1.3);
-    if direction.length() < END_ON {
+    let at = cell.emptiest_corner(ARROW_INSET, taken.iter().copied());
+    let stroke = Stroke::new(TEXT_COLOR, 1.3);
+    if direction.length() < END_ON_LENGTH {
         page.draw_stroke(circle_path(at, 6.0), stroke);
         match toward {
-            true => page.draw_shape(circle_path(at, 1.8), INK, None),
+            true => page.draw_shape(circle_path(at, 1.8), TEXT_COLOR, None),
             false => draw_cross(page, at, 4.2, stroke),
         }
     } else {
-        let (half, along) = (0.5 * ARROW * direction, direction.normalize());
+        let (half, along) = (0.5 * ARROW_LENGTH * direction, direction.normalize());
         let (end, across) = (at + half, 3.4 * along.perp());
         let neck = end - 8.0 * along;
         page.draw_line(at - half, neck, stroke);
         page.draw_shape(
             polygon_path(&[end, neck + across, neck - across]),
-            INK,
+            TEXT_COLOR,
             None,
         );
     }
-    let below = 0.5 * ARROW * direction.y.abs().max(0.4) + 11.0;
+    let below = 0.5 * ARROW_LENGTH * direction.y.abs().max(0.4) + 11.0;
     let foot = at + DVec2::new(0.0, below);
-    page.draw_label(foot, name, TICK_SIZE, TextAnchor::Middle, NOTE);
+    page.draw_label(foot, name, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
     at
 }
 
 /// Length and half the width of the heads of arrows, in pixels.
-const HEAD: [f64; 2] = [10.0, 4.2];
+const ARROW_HEAD_SIZE: [f64; 2] = [10.0, 4.2];
 
-const SMALL_HEAD: [f64; 2] = [6.0, 2.6];
+const SMALL_ARROW_HEAD_SIZE: [f64; 2] = [6.0, 2.6];
 
 /// From an arrow to the middle of its label.
 const GAP: f64 = 9.0;
@@ -226,7 +229,11 @@ pub fn force_arrows(
         let reach = mark.length * extent * mark.direction;
         Some(ForceArrow {
             ends: [start, start + 1.0].map(|part| place + part * reach),
-            head: if along { SMALL_HEAD } else { HEAD },
+            head: if along {
+                SMALL_ARROW_HEAD_SIZE
+            } else {
+                ARROW_HEAD_SIZE
+            },
             label: match along {
                 true => String::new(),
                 false => format!("force {}{unit}", format_four_digits(mark.size)),
@@ -245,13 +252,17 @@ impl ForceArrow {
         let along = (tip - tail).normalize_or_zero();
         if (tip - tail).length() > ARROW_END_ON {
             let (neck, side) = (tip - length * along, half * along.perp());
-            page.draw_line(tail, neck, Stroke::new(INK, 1.5));
-            page.draw_shape(polygon_path(&[tip, neck + side, neck - side]), INK, None);
+            page.draw_line(tail, neck, Stroke::new(TEXT_COLOR, 1.5));
+            page.draw_shape(
+                polygon_path(&[tip, neck + side, neck - side]),
+                TEXT_COLOR,
+                None,
+            );
         }
         // Beside the middle of the arrow, or below it where it lies flat.
         let size = DVec2::new(
-            Font::embedded().text_width(&self.label, TICK_SIZE),
-            TICK_SIZE,
+            Font::embedded().text_width(&self.label, TICK_FONT_SIZE),
+            TICK_FONT_SIZE,
         );
         let side = if along.x.abs() < 0.7 {
             DVec2::X
@@ -265,17 +276,23 @@ impl ForceArrow {
             cell.opposite_corner() - 0.5 * size - 3.0,
         );
         let middle = middle.max(low).min(high);
-        page.draw_centered_label(middle, &self.label, TICK_SIZE, TextAnchor::Middle, NOTE);
+        page.draw_centered_label(
+            middle,
+            &self.label,
+            TICK_FONT_SIZE,
+            TextAnchor::Middle,
+            NOTE_COLOR,
+        );
     }
 }
 
 /// Radius of an arrow, as a part of the leaf's largest extent.
-const RADIUS: f64 = 0.06;
+const ARROW_RADIUS: f64 = 0.06;
 
 /// Angle along the arrow, and pieces of which it is drawn.
-const ANGLE: f64 = 1.5 * PI;
+const ARROW_ANGLE: f64 = 1.5 * PI;
 
-const PIECES: usize = 24;
+const ARROW_PIECES: usize = 24;
 
 /// Length and half the width of its head, in pixels.
 const ARC_HEAD: [f64; 2] = [8.0, 3.4];
@@ -307,17 +324,21 @@ impl MomentArrow {
         let across = self.axis.any_orthonormal_vector();
         let other = self.axis.cross(across);
         let point = |k: usize| {
-            let (sin, cos) = (ANGLE * k as f64 / PIECES as f64).sin_cos();
-            place(self.position + RADIUS * extent * (cos * across + sin * other))
+            let (sin, cos) = (ARROW_ANGLE * k as f64 / ARROW_PIECES as f64).sin_cos();
+            place(self.position + ARROW_RADIUS * extent * (cos * across + sin * other))
         };
-        let points: Vec<DVec2> = (0..=PIECES).map(point).collect();
-        page.draw_stroke(polyline_path(&points), Stroke::new(INK, 1.3));
-        let end = points[PIECES];
-        if let Some(along) = (end - points[PIECES - 1]).try_normalize() {
+        let points: Vec<DVec2> = (0..=ARROW_PIECES).map(point).collect();
+        page.draw_stroke(polyline_path(&points), Stroke::new(TEXT_COLOR, 1.3));
+        let end = points[ARROW_PIECES];
+        if let Some(along) = (end - points[ARROW_PIECES - 1]).try_normalize() {
             let [length, half] = ARC_HEAD;
             let (tip, side) = (end + 0.5 * length * along, half * along.perp());
             let back = tip - length * along;
-            page.draw_shape(polygon_path(&[tip, back + side, back - side]), INK, None);
+            page.draw_shape(
+                polygon_path(&[tip, back + side, back - side]),
+                TEXT_COLOR,
+                None,
+            );
         }
     }
 }

@@ -119,7 +119,7 @@ pub struct TextLabel {
 }
 
 /// Height of the middle of digits and capitals above the base line, in font sizes.
-const HALF_CAPITAL: f64 = 0.36;
+const HALF_CAPITAL_HEIGHT: f64 = 0.36;
 
 impl Drawing {
     pub fn new(width: f64, description: &str) -> Self {
@@ -187,7 +187,7 @@ impl Drawing {
         anchor: TextAnchor,
         color: Color,
     ) {
-        let base = at + DVec2::new(0.0, HALF_CAPITAL * size);
+        let base = at + DVec2::new(0.0, HALF_CAPITAL_HEIGHT * size);
         self.draw_label(base, text, size, anchor, color);
     }
 
@@ -229,9 +229,9 @@ pub fn rectangle_path(corner: DVec2, size: DVec2) -> DrawingPath {
 
 pub fn circle_path(center: DVec2, radius: f64) -> DrawingPath {
     /// Control points of a quarter circle lie this far along its tangents.
-    const QUARTER: f64 = 0.552_284_749_8;
+    const QUARTER_CIRCLE_TANGENT: f64 = 0.552_284_749_8;
     let point = |x: f64, y: f64| center + radius * DVec2::new(x, y);
-    let q = QUARTER;
+    let q = QUARTER_CIRCLE_TANGENT;
     vec![
         PathStep::Move(point(1.0, 0.0)),
         PathStep::Cubic(point(1.0, q), point(q, 1.0), point(0.0, 1.0)),
@@ -247,11 +247,11 @@ pub struct Color(pub u8, pub u8, pub u8);
 
 pub const WHITE: Color = Color(255, 255, 255);
 
-pub const INK: Color = Color(32, 32, 36);
+pub const TEXT_COLOR: Color = Color(32, 32, 36);
 
-pub const NOTE: Color = Color(84, 84, 92);
+pub const NOTE_COLOR: Color = Color(84, 84, 92);
 
-pub const FRAME: Color = Color(120, 120, 128);
+pub const FRAME_COLOR: Color = Color(120, 120, 128);
 
 pub const GRID: Color = Color(226, 227, 232);
 
@@ -259,9 +259,9 @@ pub const GRID: Color = Color(226, 227, 232);
 pub const FLOOR: Color = Color(247, 247, 249);
 
 /// Shadows on that floor.
-pub const SHADOW: Color = Color(212, 213, 220);
+pub const SHADOW_COLOR: Color = Color(212, 213, 220);
 
-pub const DOT: Color = Color(213, 60, 30);
+pub const SECOND_SOLUTION_COLOR: Color = Color(213, 60, 30);
 
 /// Colours that the colour-blind can distinguish, too (after Okabe and Ito).
 pub const BLUE: Color = Color(0, 114, 178);
@@ -281,10 +281,10 @@ const BROWN: Color = Color(120, 80, 45);
 pub const SLATE: Color = Color(60, 60, 66);
 
 /// Colours of the curves in one panel, in this order.
-pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
+pub const CURVE_COLORS: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 
 /// Viridis (Smith and van der Walt, matplotlib), equally spaced.
-const VIRIDIS: [Color; 11] = [
+const VIRIDIS_COLORS: [Color; 11] = [
     Color(68, 1, 84),
     Color(72, 36, 117),
     Color(65, 68, 135),
@@ -299,13 +299,13 @@ const VIRIDIS: [Color; 11] = [
 ];
 
 /// The bright end of viridis is left out: thin yellow lines vanish on white.
-const BRIGHTEST: f64 = 0.88;
+const BRIGHTEST_VIRIDIS_FRACTION: f64 = 0.88;
 
 /// The colour of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
 pub fn vein_color(t: f64) -> Color {
-    let place = BRIGHTEST * t.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
-    let left = (place as usize).min(VIRIDIS.len() - 2);
-    let (a, b) = (VIRIDIS[left], VIRIDIS[left + 1]);
+    let place = BRIGHTEST_VIRIDIS_FRACTION * t.clamp(0.0, 1.0) * (VIRIDIS_COLORS.len() - 1) as f64;
+    let left = (place as usize).min(VIRIDIS_COLORS.len() - 2);
+    let (a, b) = (VIRIDIS_COLORS[left], VIRIDIS_COLORS[left + 1]);
     let mix = |a: u8, b: u8| {
         let (a, b) = (f64::from(a), f64::from(b));
         (a + (place - left as f64) * (b - a)).round() as u8
@@ -323,9 +323,9 @@ pub fn color_of_vein(index: usize, count: usize) -> Color {
 
 /// Length in pixels of the straight pieces of which a curve is drawn, and the most pieces between
 /// two of its points.
-const PIECE: f64 = 5.0;
+const PIECE_LENGTH: f64 = 5.0;
 
-const MOST_PIECES: usize = 24;
+const MOST_PIECES_BETWEEN_POINTS: usize = 24;
 
 /// A curve through these points as straight pieces: for every point but the last those that lead
 /// from it to the next. Between two points it is a cubic with the tangents of parabolas through
@@ -354,7 +354,8 @@ pub fn smooth_curve(points: &[DVec2]) -> Vec<Vec<DVec2>> {
         .map(|k| {
             let [from, to] = tangents(k).map(|tangent| length(k) * tangent);
             let (a, b) = (points[k], points[k + 1]);
-            let count = ((length(k) / PIECE).ceil() as usize).clamp(1, MOST_PIECES);
+            let count =
+                ((length(k) / PIECE_LENGTH).ceil() as usize).clamp(1, MOST_PIECES_BETWEEN_POINTS);
             let at = |i: usize| {
                 let t = i as f64 / count as f64;
                 let s = 1.0 - t;
@@ -369,11 +370,11 @@ pub fn smooth_curve(points: &[DVec2]) -> Vec<Vec<DVec2>> {
 }
 
 /// Points farther away than this many lengths are diverged and not drawn.
-const FARTHEST: f64 = 1e4;
+const FARTHEST_DRAWN_DISTANCE: f64 = 1e4;
 
 /// Whether a point, in lengths, is finite and not too far away to be drawn.
 pub fn is_drawable(point: DVec3) -> bool {
-    point.is_finite() && point.abs().max_element() < FARTHEST
+    point.is_finite() && point.abs().max_element() < FARTHEST_DRAWN_DISTANCE
 }
 
 /// The points of a curve through nodes at these stations from one fraction of its length to another,

@@ -3,11 +3,11 @@
 
 use crate::figure::drawing::axes::{multiples_with_text, round_step};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TEXT_SIZE, TICK_SIZE};
+use crate::figure::drawing::labels::{PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE};
 use crate::figure::drawing::markers::{draw_direction_arrow, draw_leaf_markers};
 use crate::figure::drawing::{
-    Drawing, FLOOR, FRAME, GRID, INK, NOTE, PathStep, SHADOW, Stroke, TextAnchor, polygon_path,
-    polyline_path,
+    Drawing, FLOOR, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR,
+    TextAnchor, polygon_path, polyline_path,
 };
 use crate::figure::leaf::{BezierPiece, DrawnVein, DrawnVeins};
 use crate::figure::scenario::{DirectionArrow, FigureSetting};
@@ -17,12 +17,12 @@ use glam::{DVec2, DVec3};
 /// floor, in degrees. From above one of its edges, and along the xi axis from a little above.
 pub type ViewAngles = [f64; 2];
 
-pub const OBLIQUE: ViewAngles = [-55.0, 28.0];
+pub const OBLIQUE_VIEW: ViewAngles = [-55.0, 28.0];
 
 pub const FRONT: ViewAngles = [-8.0, 12.0];
 
 /// No side of the box is shorter than this fraction of the longest.
-const SHORTEST_SIDE: f64 = 0.4;
+const SHORTEST_BOX_SIDE: f64 = 0.4;
 
 /// Padding around the leaf, as a fraction of its largest extent.
 const PADDING: f64 = 0.06;
@@ -46,16 +46,16 @@ impl BoxMargins {
 const TICK_DISTANCE: f64 = 30.0;
 
 /// Least distance of a name from the right edge of the page.
-const PAGE_EDGE: f64 = 6.0;
+const NAME_PAGE_EDGE_DISTANCE: f64 = 6.0;
 
 /// Least distance of the name of an axis from its edge, besides half of its widest label.
-const BEYOND_LABELS: f64 = 25.0;
+const NAME_LABEL_DISTANCE: f64 = 25.0;
 
 /// From the middle of an edge to the name of its axis in a small panel.
-const NEAR_NAME: f64 = 14.0;
+const SMALL_PANEL_NAME_DISTANCE: f64 = 14.0;
 
 /// From the top of a vertical edge to its name.
-const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
+const VERTICAL_NAME_OFFSET: DVec2 = DVec2::new(6.0, -12.0);
 
 /// A box around all of these shapes.
 pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> [DVec3; 2] {
@@ -72,7 +72,7 @@ pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let (low, high) = (low - padding, high + padding);
     let middle = 0.5 * (low + high);
     let sides = high - low;
-    let half = 0.5 * sides.max(DVec3::splat(SHORTEST_SIDE * sides.max_element()));
+    let half = 0.5 * sides.max(DVec3::splat(SHORTEST_BOX_SIDE * sides.max_element()));
     [middle - half, middle + half]
 }
 
@@ -267,7 +267,7 @@ impl<'s> SpacePanel<'s> {
             page.draw_line(
                 self.project_point(from),
                 self.project_point(to),
-                Stroke::new(FRAME, 0.8),
+                Stroke::new(FRAME_COLOR, 0.8),
             );
         }
     }
@@ -282,9 +282,9 @@ impl<'s> SpacePanel<'s> {
         {
             for (point, text) in ticks {
                 let foot = self.project_point(*point);
-                page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME, 0.8));
+                page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME_COLOR, 0.8));
                 let at = foot + label_offset(*out, 17.0);
-                page.draw_centered_label(at, text, TICK_SIZE, TextAnchor::Middle, NOTE);
+                page.draw_centered_label(at, text, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
             }
         }
         self.draw_axis_names(page, distance, true);
@@ -301,8 +301,8 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
-            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, TICK_SIZE));
-            let beyond = BEYOND_LABELS + 0.5 * widths.fold(0.0, f64::max);
+            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, TICK_FONT_SIZE));
+            let beyond = NAME_LABEL_DISTANCE + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
             } else {
@@ -311,15 +311,19 @@ impl<'s> SpacePanel<'s> {
             let at = middle + label_offset(edge.outward, distance);
             let name = self.setting.brief_axis_name(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
-            let size = TEXT_SIZE + 1.0;
-            let most = page.width - Font::embedded().text_width(&name, size) - PAGE_EDGE;
+            let size = TEXT_FONT_SIZE + 1.0;
+            let most =
+                page.width - Font::embedded().text_width(&name, size) - NAME_PAGE_EDGE_DISTANCE;
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
                 0 => (at, TextAnchor::End),
                 1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
-                _ => (self.project_point(edge.to) + ABOVE, TextAnchor::End),
+                _ => (
+                    self.project_point(edge.to) + VERTICAL_NAME_OFFSET,
+                    TextAnchor::End,
+                ),
             };
-            page.draw_centered_label(at, &name, size, anchor, INK);
+            page.draw_centered_label(at, &name, size, anchor, TEXT_COLOR);
         }
     }
 
@@ -328,7 +332,8 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_direction_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
         let taken = box_corners([self.low, self.high]).map(|corner| self.project_point(corner));
         let names = self.edges.iter().zip(self.edge_middles());
-        let names = names.flat_map(|(edge, middle)| [middle, middle + NEAR_NAME * edge.outward]);
+        let names = names
+            .flat_map(|(edge, middle)| [middle, middle + SMALL_PANEL_NAME_DISTANCE * edge.outward]);
         let taken = taken.chain(names);
         let arrows = self.setting.direction_arrows(first, time);
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
@@ -338,7 +343,7 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_shadows(&self, page: &mut Drawing, veins: &DrawnVeins, width: f64) {
         for vein in &veins.veins {
             let shadow = vein.projected_path(|point| self.project_point(point.with_z(self.low.z)));
-            page.draw_stroke(shadow, Stroke::new(SHADOW, width));
+            page.draw_stroke(shadow, Stroke::new(SHADOW_COLOR, width));
         }
     }
 
