@@ -33,12 +33,14 @@
 //!
 //! Transfer of boundary points to finer and coarser grids.
 
+mod codimension_two;
 mod continuation;
 mod refine;
 mod singular_point;
 
+pub use crate::branch::boundary::codimension_two::CodimensionTwoKind;
 pub use crate::branch::boundary::continuation::{
-    BoundaryContinuationOptions, CodimensionTwoKind, ContinuedBoundary, follow_boundary,
+    BoundaryContinuationOptions, ContinuedBoundary, follow_boundary,
 };
 pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
 pub(crate) use crate::branch::boundary::singular_point::TwoParameterDirection;

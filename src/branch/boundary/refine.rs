@@ -2,7 +2,7 @@
 //!
 //! A point of a boundary, extrapolated over finer and finer grids.
 
-use crate::branch::boundary::continuation::{CodimensionTwoKind, locate_codimension_two};
+use crate::branch::boundary::codimension_two::{CodimensionTwoKind, locate_codimension_two};
 use crate::branch::boundary::singular_point::{
     BoundaryPointSearch, SingularPoint, TwoParameterDirection, TwoParameterEquations,
     TwoParameterProblem, TwoParameterState,

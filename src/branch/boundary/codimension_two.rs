@@ -1,0 +1,190 @@
+//! Special points of a boundary: cusps, and crossings with another boundary.
+
+use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
+use crate::branch::critical::CriticalKind;
+use crate::branch::equations::CorrectorFailure;
+
+/// Largest number of evaluations in the search along the boundary.
+const EVALUATIONS: usize = 25;
+
+/// Accuracy along the boundary: at a cusp the parameters are accurate to its square; at a
+/// crossing it is that of the parameters.
+const CODIMENSION_TWO_ACCURACY: f64 = 1e-11;
+
+/// Differences over less than this do not give a reliable slope.
+const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-7;
+
+/// Largest distance of the point from its initial guess, along the boundary.
+const LARGEST_SEARCH_DISTANCE: f64 = 0.3;
+
+/// Modes of which the eigenvalues are below this, relative to their derivative along the boundary,
+/// become neutral at one crossing.
+const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
+
+/// Accuracy of the boundary points during the search.
+const SEARCH_POINT_ACCURACY: f64 = 1e-13;
+
+/// Accuracy of points at a given parameter.
+const GIVEN_PARAMETER_ACCURACY: f64 = 1e-12;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CodimensionTwoKind {
+    /// A curve of folds turns back: two folds meet and vanish.
+    Cusp,
+    /// Another mode also becomes neutral: two boundaries cross or touch.
+    Crossing,
+}
+
+impl CodimensionTwoKind {
+    /// The function that vanishes there, at a point of the boundary.
+    fn test_function(self, point: &SingularPoint) -> f64 {
+        match self {
+            CodimensionTwoKind::Cusp => point.fold_speed,
+            CodimensionTwoKind::Crossing => {
+                let others = point.others.iter().copied();
+                let nearest = others.min_by(|a, b| a.abs().total_cmp(&b.abs()));
+                nearest.unwrap_or(f64::INFINITY)
+            }
+        }
+    }
+}
+
+/// The point of the boundary in the plane normal to its tangent at a distance `step` along it.
+pub fn boundary_point_at_distance(
+    manifold: &mut TwoParameterEquations,
+    now: &SingularPoint,
+    step: f64,
+    accuracy: f64,
+    furthest: f64,
+) -> Result<(SingularPoint, f64), CorrectorFailure> {
+    let solution = manifold.displace_along_direction(&now.solution, &now.tangent, step)?;
+    let search = now.search(manifold, None, solution, (accuracy, furthest));
+    let found = search.secant(manifold)?;
+    let off = found.distance.abs();
+    Ok((now.with_own_directions(manifold, found)?, off))
+}
+
+/// The special point near an approximation to it, and the derivative of the vanishing function
+/// along the boundary.
+pub fn locate_codimension_two(
+    manifold: &mut TwoParameterEquations,
+    near: &SingularPoint,
+    special: CodimensionTwoKind,
+) -> Result<(SingularPoint, f64), CorrectorFailure> {
+    let first = boundary_point_at_distance(
+        manifold,
+        near,
+        0.0,
+        SEARCH_POINT_ACCURACY,
+        LARGEST_SEARCH_DISTANCE,
+    )?
+    .0;
+    let away = 1e-2;
+    let second = boundary_point_at_distance(
+        manifold,
+        &first,
+        away,
+        SEARCH_POINT_ACCURACY,
+        LARGEST_SEARCH_DISTANCE,
+    )?
+    .0;
+    let slope = (special.test_function(&second) - special.test_function(&first)) / away;
+    secant_codimension_two(
+        manifold,
+        &first,
+        special,
+        slope,
+        [-LARGEST_SEARCH_DISTANCE, LARGEST_SEARCH_DISTANCE],
+    )
+}
+
+/// The zero by a secant method, from a point of the boundary.
+fn secant_codimension_two(
+    manifold: &mut TwoParameterEquations,
+    now: &SingularPoint,
+    special: CodimensionTwoKind,
+    mut slope: f64,
+    [least, most]: [f64; 2],
+) -> Result<(SingularPoint, f64), CorrectorFailure> {
+    let mut best = now.clone();
+    let (mut at, mut value) = (0.0, special.test_function(now));
+    let mut worse = 0;
+    for _ in 0..EVALUATIONS {
+        let step = -value / slope;
+        if !step.is_finite() || !(least..=most).contains(&(at + step)) {
+            return Err(CorrectorFailure::NotConverged);
+        }
+        let (next, _) = boundary_point_at_distance(
+            manifold,
+            now,
+            at + step,
+            SEARCH_POINT_ACCURACY,
+            LARGEST_SEARCH_DISTANCE,
+        )?;
+        let after = special.test_function(&next);
+        if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
+            slope = (after - value) / step;
+        }
+        (at, value) = (at + step, after);
+        match after.abs() < special.test_function(&best).abs() {
+            true => best = next,
+            false => worse += 1,
+        }
+        if step.abs() < CODIMENSION_TWO_ACCURACY || worse > 1 {
+            return Ok((best, slope));
+        }
+    }
+    Err(CorrectorFailure::NotConverged)
+}
+
+/// The point of the boundary at a value of one of the parameters, predicted `step` along the
+/// tangent.
+pub fn boundary_point_at_parameter(
+    manifold: &mut TwoParameterEquations,
+    now: &SingularPoint,
+    step: f64,
+    which: usize,
+    value: f64,
+) -> Result<SingularPoint, CorrectorFailure> {
+    let mut solution = manifold.displace_along_direction(&now.solution, &now.tangent, step)?;
+    solution.params[which] = value;
+    let search = now.search(
+        manifold,
+        Some(which),
+        solution,
+        (GIVEN_PARAMETER_ACCURACY, 0.5),
+    );
+    let found = search.secant(manifold)?;
+    let mut point = now.with_own_directions(manifold, found)?;
+    point.solution.params[which] = value;
+    Ok(point)
+}
+
+/// Special points between two points of a boundary, the second `step` along the tangent of the
+/// first; fails if there is more than one. Several modes may become neutral together, as those of
+/// the boundary do.
+pub fn codimension_two_between(
+    manifold: &mut TwoParameterEquations,
+    [now, next]: [&SingularPoint; 2],
+    step: f64,
+) -> Result<Option<(CodimensionTwoKind, SingularPoint)>, CorrectorFailure> {
+    let cusp = now.kind == CriticalKind::Fold && now.fold_speed * next.fold_speed < 0.0;
+    let special = match (cusp, now.index.abs_diff(next.index)) {
+        (false, 0) => return Ok(None),
+        (true, 0) => CodimensionTwoKind::Cusp,
+        (false, _) => CodimensionTwoKind::Crossing,
+        _ => return Err(CorrectorFailure::NotConverged),
+    };
+    let slope = (special.test_function(next) - special.test_function(now)) / step;
+    let (point, slope) =
+        secant_codimension_two(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
+    let vanishing = point
+        .others
+        .iter()
+        .filter(|it| it.abs() < COINCIDENT_EIGENVALUE_TOLERANCE * slope.abs());
+    match special == CodimensionTwoKind::Cusp || vanishing.count() == now.index.abs_diff(next.index)
+    {
+        true => Ok(Some((special, point))),
+        false => Err(CorrectorFailure::NotConverged),
+    }
+}
