@@ -1,6 +1,6 @@
 //! Which leaf is to come to rest, how accurately, on which grids, and what that has cost so far.
 
-use crate::leaf::{Leaf, Loads, System};
+use crate::leaf::{EquationWorkspace, Leaf, Loads};
 use crate::newton::SolverCounts;
 use crate::relax::path::{Path, Route, Stage};
 use crate::relax::request::{Method, Options, Progress, SemiImplicit};
@@ -148,8 +148,8 @@ pub struct WorkLog<'o> {
     pub loading_node_evaluations: usize,
     /// How far the leaf came on its path before it failed.
     pub farthest_stage: Option<(Stage, f64)>,
-    /// The linear system of the last grid, for reuse.
-    pub spare_system: Option<System>,
+    /// The memory of Newton's equations.
+    pub workspace: EquationWorkspace,
 }
 
 impl<'o> WorkLog<'o> {
@@ -161,7 +161,7 @@ impl<'o> WorkLog<'o> {
             node_evaluations: 0,
             loading_node_evaluations: 0,
             farthest_stage: None,
-            spare_system: None,
+            workspace: EquationWorkspace::default(),
         }
     }
 }

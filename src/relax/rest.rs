@@ -95,9 +95,6 @@ fn find_rest<'a>(
             ..problem.reduced_to_half(half)
         };
         let found = solve_from_start(&reduced, grid.clone(), effort);
-        if half.is_some() {
-            effort.spare_system = None;
-        }
         if let Ok(found) = found
             && found.is_stable()
             && (!slowly || is_in_first_valley(&found.history))
@@ -108,16 +105,12 @@ fn find_rest<'a>(
         }
         // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
         // solve the full leaf.
-        effort.spare_system = None;
     }
     if slowly {
         return load_slowly(problem, half, effort);
     }
     match solve_from_start(problem, grid, effort) {
-        Err(_) if problem.may_be_loaded_instead() => {
-            effort.spare_system = None;
-            load_slowly(problem, None, effort)
-        }
+        Err(_) if problem.may_be_loaded_instead() => load_slowly(problem, None, effort),
         found => result_with_path(found, problem.undisturbed_path()),
     }
 }

@@ -76,14 +76,12 @@ pub fn load_slowly<'a>(
         {
             let reduced = problem.reduced_to_half(Some(half));
             let guesses = vec![(on.clone(), half_state(half, &state))];
-            effort.spare_system = None;
             let found = solve_from_guesses(
                 &reduced,
                 NestedEquilibrium::without_grids(&reduced),
                 guesses,
                 effort,
             );
-            effort.spare_system = None;
             if let Ok(found) = found
                 && found.is_stable()
             {
@@ -110,7 +108,7 @@ pub fn load_slowly<'a>(
             Err(failure) if given_up => {
                 return release_instead(problem, failure.with_path(path), effort);
             }
-            Err(_) if !last && !out_of_time => effort.spare_system = None,
+            Err(_) if !last && !out_of_time => {}
             followed => return result_with_path(followed, path),
         }
     }
@@ -147,7 +145,6 @@ fn release_instead(
         return Err(Box::new(failure));
     }
     let grid = grid_of(problem.leaf, problem.segments().unwrap_or(COARSEST));
-    effort.spare_system = None;
     result_with_path(
         solve_from_start(problem, grid, effort),
         Some(Path::Released),
@@ -352,7 +349,6 @@ pub fn solve_from_start(
                     && finer.segments() <= FINEST_COMPARED
                     && effort.node_evaluations <= BUDGET =>
             {
-                effort.spare_system = None;
                 grid = finer;
             }
             found => return found,
@@ -404,7 +400,7 @@ pub fn refine_to_tolerance(
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     loop {
-        found = found.with_error_estimate(problem, &mut effort.spare_system, &mut effort.work);
+        found = found.with_error_estimate(problem, &mut effort.workspace, &mut effort.work);
         let mut known = false;
         if found.is_accurate() {
             (found, known) = check_stability(problem, found, false, effort)?;
