@@ -1,8 +1,5 @@
-//! Continuation of an equilibrium under a small change of its scenario, on the same grids,
-//! without jumps to another equilibrium.
-//!
-//! A leaf at rest that follows its scenario, as numbers of it change by little or much: along its
-//! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
+//! A leaf at rest that follows its scenario as numbers of it change: along its branch of equilibria, on
+//! the same grids, as long as they are stable, and elsewhere only where it is told so.
 
 use crate::homotopy::Homotopy;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
@@ -13,7 +10,7 @@ use crate::relax::accuracy::transfer::{GridLevel, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
 use crate::relax::rest::{equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;

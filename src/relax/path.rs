@@ -6,9 +6,9 @@
 //! coupling of the veins is put on. Tissue is without force between veins in their rest shapes: it
 //! belongs to the natural leaf, and ties the veins from the beginning. As long as this
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
-//! method. Where stability is lost the leaf moves on, down its energy (`loading::snap`).
+//! method. Where stability is lost the leaf moves on, down its energy (`relax::loading::snap`).
 //!
-//! A leaf that is held is moved to its holders instead, under its loads (`settle::grip`): that is its
+//! A leaf that is held is moved to its holders instead, under its loads (`relax::solve_on_grid::grips`): that is its
 //! path.
 //!
 //! The loads come first because straight veins of unequal chords that are compressed before

@@ -1,9 +1,5 @@
-//! From a scenario to rest on nested grids: the problem, the start, rest on one grid, finer ones,
-//! the decision on stability, and the result.
-//!
-//! What is asked of nested grids: which leaf is to come to rest, and how accurately.
-//!
-//! What the way to rest has cost so far, and what it leaves for reuse.
+//! From a scenario to its equilibrium: the attempts of the plan, the decision on stability, and the
+//! result; and a relaxation that begins with a given shape.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::newton::EquilibriumFailure;
@@ -17,8 +13,9 @@ use crate::relax::loading::arrival::{
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
-use crate::relax::plan::{Acceptance, PlannedAttempt, plan};
-use crate::relax::problem::{COARSEST, RelaxationProblem, least_segments, may_solve_half};
+use crate::relax::plan::{
+    Acceptance, COARSEST, PlannedAttempt, RelaxationProblem, least_segments, may_solve_half, plan,
+};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,

@@ -1,13 +1,6 @@
-//! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
-//!
-//! Where the path loses its stability: the leaf moves on, down its energy, to another equilibrium
-//! under the same part of the loading.
-//!
-//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
-//! each solved to convergence, so that segments carry the forces of their strains however stiff
-//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
-//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
-//! is Newton's method.
+//! Saddles of the energy: their Morse index, their refinement by Newton's method, and the side on which
+//! a leaf leaves them: the same on all grids, in all units, and in whichever order its veins are
+//! numbered.
 
 use crate::leaf::{
     DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, NodalField, State, System,

@@ -1,15 +1,7 @@
 //! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
 //! scenario, from the linearised equations on each grid, extrapolated like the results
-//! themselves.
-//!
-//! Derivatives of eigenvalues, and of the moments on clamps, by finite differences between
+//! themselves. Derivatives of eigenvalues, and of the moments on clamps, are finite differences between
 //! neighbouring equilibria, which are known to first order from the response.
-//!
-//! A parameter of a scenario, and finite differences of the scenario with respect to it.
-//!
-//! The linear response of a settled leaf to forces, and to changes of its parameters.
-//!
-//! Derivatives on successively refined grids.
 
 use crate::leaf::{
     DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative, LinearResponse, LinearSolveOutcome,

@@ -12,10 +12,6 @@
 //! correction (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes
 //! from which it is integrated, to the solution of the equations themselves, in each round by
 //! the relative error of the linear equations: about a hundredth on 8 segments.
-//!
-//! The first-order response of a leaf to jumps of its fields, and its subtraction.
-//!
-//! The steps of the integration along the veins in defect correction, and their error.
 
 use crate::leaf::{
     DefiniteFactors, DiscreteLeaf, EquationWorkspace, FieldJump, Grid, LinearSolveOutcome,

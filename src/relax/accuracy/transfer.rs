@@ -1,10 +1,6 @@
-//! Prediction of the leaf at rest on a finer grid from those on nested coarser grids.
-//!
-//! Prolongation to the grid with all segments halved or to any other, and restriction.
-//!
-//! Polynomials through the nodes of a grid that are nearest to a point.
-//!
-//! Strains and stress resultants at the nodes of a state.
+//! A leaf at rest on one grid, and its transfer to others: prolongation to the grid with all segments
+//! halved or to any other, restriction, and prediction on a finer grid from several coarser ones by
+//! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
 use crate::rotation;

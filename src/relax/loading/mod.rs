@@ -1,9 +1,6 @@
-//! The path of equilibria on which a leaf is slowly loaded.
-//!
-//! The walk along the path of equilibria: a predictor through the last states, Newton's method
-//! as corrector, and the Morse index watched.
-//!
-//! The leaf under a part of its loading, from the natural leaf to the leaf as it is.
+//! The path of equilibria on which a leaf is loaded slowly, from the natural leaf to the leaf as it is:
+//! a predictor through the last states, Newton's method as corrector, and the Morse index watched; and
+//! a bound on the second variation by which veins cannot buckle on it.
 
 pub(super) mod arrival;
 pub(super) mod snap;

@@ -1,6 +1,5 @@
-//! What a leaf exerts on what holds it, and how accurate that is.
-//!
-//! The largest stresses along the veins.
+//! The forces and moments that a leaf exerts on what holds it and the largest stresses along its veins,
+//! with their errors.
 
 use crate::leaf::{DiscreteLeaf, Scale};
 use crate::numbers::{larger, largest};

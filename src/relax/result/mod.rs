@@ -1,10 +1,5 @@
-//! What was found, in the units of the scenario.
-//!
-//! The result of a relaxation: the shape, its accuracy and its stability.
-//!
-//! The stability margin of a stable leaf.
-//!
-//! What follows from the outline and the material of a blade, as a part of a result.
+//! The result of a relaxation in the units of the scenario: the shape, its accuracy, its stability with
+//! the margin, and what follows from the outline and the material of a blade.
 
 pub(super) mod forces;
 pub(super) mod report;

@@ -1,6 +1,5 @@
-//! From the settled grids to the result in the units of the scenario.
-//!
-//! Plausibility checks of a leaf at rest: remarks on results that indicate wrong input.
+//! From the leaf on nested grids to the result in the units of the scenario, at its own stations and at
+//! others; with doubts about results that indicate wrong input.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator};
 use crate::newton::EquilibriumFailure;
@@ -11,7 +10,7 @@ use crate::relax::accuracy::fields::{
 use crate::relax::accuracy::transfer::{GridLevel, is_planar_level};
 use crate::relax::accuracy::{NestedEquilibrium, transfer};
 use crate::relax::path::{Event, Path, StabilityLoss, Stage};
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::Method;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};

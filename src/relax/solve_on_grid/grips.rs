@@ -11,7 +11,7 @@ use crate::leaf::{DiscreteLeaf, GrippedNode, State, System};
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::saddle;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation};
 use crate::rotation;

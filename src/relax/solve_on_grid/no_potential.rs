@@ -1,23 +1,16 @@
-//! A single rod under dead moments, at its tip or along it.
+//! Loads without a potential: neither energy nor signs of pivots can guide a relaxation.
 //!
-//! A moment fixed in space has no potential in three dimensions, so that
-//! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
-//! quasi-statically instead: all loads grow together from zero, in steps of
-//! about one radian of tip rotation, each followed by Newton's method with the
-//! exact, unsymmetric tangent.
+//! Dead moments on a single rod (at its tip or along it): all loads grow together from zero, in
+//! steps of about one radian of tip rotation, each followed by Newton's method with the exact,
+//! unsymmetric tangent. Where that would take too many steps, the other loads grow from the shape under
+//! the moments alone, which is computed segment by segment from the clamp: a free rod carries at every
+//! place the sum of the moments beyond it. Where the path ends at a fold, the moments are applied before
+//! the other loads, or after them. A rod that is held elsewhere than at its base is brought there under
+//! the other loads, by their energy, before the moments are applied.
 //!
-//! Where that would take too many steps, the other loads grow from the shape under the moments
-//! alone. A free rod carries at every place the sum of those beyond it, so that this shape can be
-//! computed segment by segment from the clamp.
-//!
-//! Where the path ends at a fold, the moments are applied before the other loads, or after them. A
-//! rod that is held elsewhere than at its base is brought there under the other loads, by their
-//! energy, before the moments are applied.
-//!
-//! A leaf in steady wind, which has no potential: neither energy nor signs of pivots guide it. It
-//! moves, damped as in a relaxation, until it hardly moves any more; then Newton's method with the
-//! exact, unsymmetric matrix finds the balance of all forces with the drag. Where it rests is thus
-//! stable as that motion is.
+//! Steady wind: the leaf moves, damped as in a relaxation, until it hardly moves any more; then
+//! Newton's method with the exact, unsymmetric matrix finds the balance of all forces with the drag.
+//! Where it rests is thus stable as that motion is.
 
 use crate::homotopy::Homotopy;
 use crate::leaf::{

@@ -10,15 +10,13 @@
 //! positive definite the leaf is in the valley (basin of attraction) of its equilibrium, and
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
-//!
-//! The damped motion of the semi-implicit method: its velocities, and the choice of the next
-//! time step by the energy.
 
-use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, Leaf, NodalField, State, System};
+use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
 };
+use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
 
@@ -35,14 +33,6 @@ const NEGLIGIBLE_NEWTON_STEP: f64 = 1e-3;
 /// Largest number of steps on one grid.
 const MAX_STEPS: usize = 2000;
 
-/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
-/// one is first settled with this compliance, which also gives its segment forces, and then
-/// with its own.
-const MOVING_COMPLIANCE: f64 = 2e-3;
-
-/// Approximate largest stretch of a softened leaf by its load.
-const MOVING_STRETCH: f64 = 0.05;
-
 /// Accuracy to which a softened leaf is settled.
 const SOFT_ACCURACY: f64 = 1e-1;
 
@@ -54,18 +44,6 @@ const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
 /// Newton iterations of a stiff leaf before it is stiffened in steps.
 const STIFF_ITERATIONS: usize = 12;
-
-/// The least compliance of a leaf that moves after so many pushes off saddles.
-fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
-    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
-    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
-}
-
-/// Whether a leaf is so stiff that it is softened while it moves.
-pub fn softens(leaf: &Leaf) -> bool {
-    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
-    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
-}
 
 impl GridRelaxation<'_> {
     /// Lets the leaf come to rest.
