@@ -309,11 +309,14 @@ fn the_log_tells_what_was_tried() {
     };
     let found = relax(&leaf, &released, &mut |_| {}).unwrap();
     assert_eq!(attempts(&found), accepted(Strategy::Release));
-    // A column beyond its critical load leaves the valley of the straight one.
+    // A stiff column is softened on its way from arcs: it is loaded slowly at once.
     let column = rod(&format!(
         "{RIGID}; stiffness.bending_3=2; load.gravity=[-12, 0, 0]"
     ));
-    let found = column.relax().unwrap();
+    let loaded = (Strategy::SlowLoading, Extent::Whole, AttemptEnd::Accepted);
+    assert_eq!(attempts(&column.relax().unwrap()), [loaded]);
+    // What rests far from arcs may not be where slow loading leads.
+    let found = scenario("paper/fig10", "leaf.rods=5").relax().unwrap();
     let [
         (Strategy::FirstValley, _, first),
         (Strategy::SlowLoading, _, second),
