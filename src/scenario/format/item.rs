@@ -1,14 +1,12 @@
 //! The value of a key, or a part of it, with its place for messages: converted to numbers, for
 //! every form that a key can have.
-//!
-//! Vectors, and places along a rod, as values of keys.
 
-use crate::scenario::format::entries::{Entries, EntryPath};
-use crate::scenario::format::source::{
-    ScenarioError, ScenarioResult, intended_number, number, shorten,
-};
-use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema};
-use crate::scenario::{Profile, Schedule};
+use crate::scenario::format::entries::{Entries, WrittenEntry};
+use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten};
+use crate::scenario::format::path::EntryPath;
+use crate::scenario::format::source::{intended_number, number};
+use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
+use crate::scenario::profile::{Profile, Schedule};
 use std::fmt::Display;
 use std::str::FromStr;
 use toml::Value;
@@ -17,20 +15,21 @@ use toml::Value;
 /// stiffnesses must not overflow.
 pub(in crate::scenario) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
+// Sentences and phrases of messages that several forms of values share.
+
 const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
      shear_2 and shear_3 only, not in a profile";
-
 const LIST_OF_NUMBERS: &str = "a list of numbers";
-
-pub(in crate::scenario) const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
-
-pub(in crate::scenario) const ONE_PER_KNOT: &str = "one per entry of at";
-
+const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+const ONE_PER_KNOT: &str = "one per entry of at";
 const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
-
 const PROFILE_FORM: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
-
 const FACTOR_SCHEDULE_FORM: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
+const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
+     { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const LOAD_SCHEDULE_FORM: &str =
+    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
 /// The value of a key, or a part of it.
 #[derive(Clone, Copy)]
@@ -38,6 +37,12 @@ pub(in crate::scenario) struct EntryValue<'e> {
     entries: &'e Entries,
     part: EntryPath,
     pub value: &'e Value,
+}
+
+/// The knots of a profile: fractions of the length from 0 to 1, and the numbers there.
+pub(in crate::scenario) struct Knots {
+    pub at: Vec<f64>,
+    pub value: Vec<f64>,
 }
 
 impl Entries {
@@ -55,7 +60,7 @@ impl Entries {
         self.value_in_row(key, 0)
     }
 
-    /// The same in one of its tables, if there may be several.
+    /// The value of a key as given in one of its tables, if there may be several, or its default.
     pub(in crate::scenario) fn value_in_row(
         &self,
         key: Key,
@@ -72,7 +77,7 @@ impl Entries {
     }
 
     /// An error about a key that has no place.
-    pub(in crate::scenario) fn key_error(&self, key: Key, problem: String) -> ScenarioError {
+    fn key_error(&self, key: Key, problem: String) -> ScenarioError {
         ScenarioError {
             key: Some(key),
             ..ScenarioError::in_file(&self.source.file, None, problem)
@@ -82,7 +87,7 @@ impl Entries {
     /// The error about a key that is required and left out.
     fn missing_key_error(&self, key: Key, row: usize) -> ScenarioError {
         let has = |table: &str| self.source.tables.contains(&table);
-        let (table, name) = key.table_and_name();
+        let TablePath { table, name } = key.table_path();
         let example = match key.missing_key_rule() {
             MissingKeyRule::Required(example) => example,
             _ => "...",
@@ -95,7 +100,7 @@ impl Entries {
             _ => format!("add the table [{table}], and below it {entry}"),
         };
         // Stiffnesses are required unless sections are given.
-        let needed = |other: &Key| match other.table_and_name().0 {
+        let needed = |other: &Key| match other.table() {
             _ if has("blade") && other.follows_from_blade() => false,
             "" | "leaf" => true,
             "stiffness" => !has("section") && !has("blade"),
@@ -118,6 +123,7 @@ impl Entries {
 }
 
 impl<'e> EntryValue<'e> {
+    /// The key that the value belongs to.
     pub(in crate::scenario) fn key(&self) -> Key {
         self.part.key
     }
@@ -152,11 +158,7 @@ impl<'e> EntryValue<'e> {
 
     /// The two lists, `at` and `other`, of a table that may have no others. `form`
     /// describes such a table.
-    pub(in crate::scenario) fn pair(
-        &self,
-        other: &'static str,
-        form: &str,
-    ) -> ScenarioResult<[EntryValue<'e>; 2]> {
+    fn pair(&self, other: &'static str, form: &str) -> ScenarioResult<[EntryValue<'e>; 2]> {
         let Some(table) = self.value.as_table() else {
             return Err(self.value_error(format_args!("must be a table: {form}")));
         };
@@ -172,8 +174,8 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The value as it is written, shortened.
-    pub(in crate::scenario) fn displayed_value(&self) -> String {
-        self.entries.entry_location(self.part, self.value).1
+    fn displayed_value(&self) -> String {
+        self.entries.written_entry(self.part, self.value).text
     }
 
     /// Refuses this value unless a condition `holds`.
@@ -188,6 +190,7 @@ impl<'e> EntryValue<'e> {
         }
     }
 
+    /// The error about this value.
     pub(in crate::scenario) fn value_error(&self, problem: impl Display) -> ScenarioError {
         let list = self.part.list.map(|list| format!(", {list}"));
         let components = matches!(
@@ -206,15 +209,16 @@ impl<'e> EntryValue<'e> {
         };
         let path = EntryPath::whole_entry(self.key(), self.part.row);
         let part = list.unwrap_or_default() + &entry;
-        let (place, found) = self.entries.entry_location(self.part, self.value);
+        let WrittenEntry { place, text } = self.entries.written_entry(self.part, self.value);
         ScenarioError {
             place,
             key: Some(self.key()),
-            problem: format!("{path}{part} = {found}: {problem}"),
+            problem: format!("{path}{part} = {text}: {problem}"),
             others: Vec::new(),
         }
     }
 
+    /// A text.
     pub(in crate::scenario) fn text(&self) -> ScenarioResult<&'e str> {
         (self.value.as_str()).ok_or_else(|| self.value_error("must be text in quotes"))
     }
@@ -225,6 +229,7 @@ impl<'e> EntryValue<'e> {
         word.ok_or_else(|| self.value_error(allowed))
     }
 
+    /// `true` or `false`.
     pub(in crate::scenario) fn switch(&self) -> ScenarioResult<bool> {
         (self.value.as_bool()).ok_or_else(|| self.value_error("must be true or false"))
     }
@@ -251,6 +256,7 @@ impl<'e> EntryValue<'e> {
         self.number_in(self.key().form().range())
     }
 
+    /// A number in a range.
     pub(in crate::scenario) fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
         let value = number(self.value);
         let value = value.ok_or_else(|| match self.intended_number() {
@@ -300,7 +306,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A profile for each of `rods` rods.
-    pub(in crate::scenario) fn quantity(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
+    pub(in crate::scenario) fn profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
         if !self.value.is_table() {
             let numbers = self.number_for_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
@@ -316,15 +322,15 @@ impl<'e> EntryValue<'e> {
         lists.map(|list| list.linear_profile(&at)).collect()
     }
 
-    /// Knots and the numbers there, of a profile that is not one per rod.
-    pub(in crate::scenario) fn knots(&self) -> ScenarioResult<(Vec<f64>, Vec<f64>)> {
+    /// The knots of a profile along the leaf.
+    pub(in crate::scenario) fn knots(&self) -> ScenarioResult<Knots> {
         let [at, value] = self.pair("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = list
             .map(|item| item.number())
             .collect::<ScenarioResult<_>>()?;
-        Ok((at, value))
+        Ok(Knots { at, value })
     }
 
     /// A profile that has these values at the knots `at`.
@@ -354,10 +360,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    pub(in crate::scenario) fn increasing_numbers(
-        &self,
-        fractions: bool,
-    ) -> ScenarioResult<Vec<f64>> {
+    fn increasing_numbers(&self, fractions: bool) -> ScenarioResult<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -391,7 +394,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The entries of a list; `needed` describes it in the error if it is not one.
-    pub(in crate::scenario) fn array(
+    fn array(
         &self,
         needed: &str,
     ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
@@ -418,17 +421,7 @@ impl<'e> EntryValue<'e> {
         )?;
         Ok(list)
     }
-}
 
-const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
-     { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
-
-const LOAD_SCHEDULE_FORM: &str =
-    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
-
-const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
-
-impl EntryValue<'_> {
     /// Three numbers.
     pub(in crate::scenario) fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
@@ -441,7 +434,7 @@ impl EntryValue<'_> {
     }
 
     /// A vector for each of `rods` rods: one for all, or a list.
-    pub(in crate::scenario) fn vectors(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
+    pub(in crate::scenario) fn vector_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {
             let each = self.list_of_length(rods, ONE_PER_ROD, VECTORS)?;
             return each.map(|item| item.vector()).collect();
@@ -456,12 +449,12 @@ impl EntryValue<'_> {
     }
 
     /// A vector along each of `rods` rods, one profile for each component.
-    pub(in crate::scenario) fn vector_profiles(
+    pub(in crate::scenario) fn vector_profile_per_rod(
         &self,
         rods: usize,
     ) -> ScenarioResult<Vec<[Profile; 3]>> {
         if !self.value.is_table() {
-            let each = self.vectors(rods)?.into_iter();
+            let each = self.vector_per_rod(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
         let [at, value] = self.pair("value", VECTOR_PROFILE_FORM)?;

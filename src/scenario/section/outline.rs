@@ -38,8 +38,7 @@
 //! to them for the equivalent one of a circle that is bent, pulled and twisted. Corners within a hollow
 //! rectangle concentrate stress, which is left out.
 
-use crate::scenario::Scenario;
-use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
+use crate::numbers::GAUSS_LEGENDRE_RULE;
 use crate::words;
 use glam::DVec3;
 use serde::Serialize;
@@ -117,7 +116,9 @@ impl SectionDimensions {
         let panel = |from: f64| -> f64 {
             let layers = GAUSS_LEGENDRE_RULE.iter();
             layers
-                .map(|(x, weight)| weight * self.layer_torsion((from + x / WALL_PANELS) * wall))
+                .map(|point| {
+                    point.weight * self.layer_torsion((from + point.at / WALL_PANELS) * wall)
+                })
                 .sum()
         };
         let panels = (0..WALL_PANELS as usize).map(|k| panel(k as f64 / WALL_PANELS));
@@ -295,7 +296,7 @@ impl Moduli {
     }
 
     /// Those of a strip of a plate, which twists with it: J = w t^3/3.
-    fn for_strip(width: f64, thickness: f64) -> Moduli {
+    pub(in crate::scenario) fn for_strip(width: f64, thickness: f64) -> Moduli {
         let sides = SectionDimensions {
             outline: SectionOutline::Rectangle,
             width,
@@ -390,24 +391,6 @@ impl SectionOutline {
                 short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
             }
         }
-    }
-}
-
-impl Scenario {
-    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
-    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
-    /// sections.
-    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        if self.blade.is_none() {
-            return self.radii.moduli(rod, sigma);
-        }
-        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
-        let rod = self.rods.get(rod)?;
-        let side = |axis: usize| {
-            let bending = rod.couple_stiffness[axis].at(sigma);
-            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
-        };
-        Some(Moduli::for_strip(side(2), side(1)))
     }
 }
 
@@ -569,7 +552,7 @@ mod moduli_tests {
     /// differences for the stress function on two grids, over J.
     #[test]
     fn torsion_of_hollow_sections() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for wall in [0.01, 0.2, 0.5] {
             let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
             close(
@@ -601,7 +584,7 @@ mod moduli_tests {
     /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
     #[test]
     fn shear_by_forces() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for (outline, width, thickness, wall, factor) in [
             (Rectangle, 3.0, 0.7, None, 1.5),
             (Rectangle, 3.0, 0.7, Some(0.35), 1.5),
