@@ -25,7 +25,7 @@ pub struct Scenario {
     pub rods: Vec<Rod>,
     /// Radii of the veins where sections are given: for pictures.
     pub radii: Radii,
-    /// The blade that the veins and the tissue follow from, if it is given in place of them.
+    /// The blade that the veins and the tissue follow from, if a blade is given in place of them.
     pub blade: Option<Arc<Blade>>,
     /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
     pub base_held: SupportKind,

@@ -395,13 +395,13 @@ fn spline_value(spline: &Spline) -> Value {
     }
 }
 
-/// A quantity of all rods; `None` if it is left out.
+/// A quantity of all rods; `None` if the quantity is left out.
 fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
     let profiles: Option<Vec<&Profile>> = profiles.collect();
     Some(quantity(profiles?.into_iter()))
 }
 
-/// A quantity in time; `None` if it is always the one at rest.
+/// A quantity in time; `None` if the quantity always has its value at rest.
 fn schedule_unless_constant<T: Copy + PartialEq>(
     schedule: &Schedule<T>,
     at_rest: T,

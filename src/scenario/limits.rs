@@ -28,52 +28,39 @@ struct LeafLimits {
     force_stiffness: DimensionlessLimit,
     /// Two coupled rods join within (A/kappa)^(1/4), at the limit 1e-3 of the length.
     coupling: DimensionlessLimit,
-    /// Densities along the rods to their mean.
     density: DimensionlessLimit,
-    /// Rotary inertia to that of the mean density at the radius of gyration L.
     rotary_inertia: DimensionlessLimit,
-    /// A radius enters by its square and, with a small density, gives a small moment of inertia: so it is
-    /// limited by itself.
+    /// A radius is limited by itself, as it enters by its square and, with a small density, gives a
+    /// small moment of inertia.
     section_radius: DimensionlessLimit,
-    /// External damping in its natural unit.
     external_damping: DimensionlessLimit,
-    /// Retardation time in the natural unit of time.
     internal_damping: DimensionlessLimit,
-    /// Duration in the natural unit of time.
     duration: DimensionlessLimit,
-    /// Outputs after the first.
     outputs: DimensionlessLimit,
     /// Times of loads and factors.
     times: DimensionlessLimit,
-    /// Factor of the rest curvatures.
     rest_factor: DimensionlessLimit,
-    /// Largest angle at rest, times the factor.
     rest_factor_angle: DimensionlessLimit,
     /// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
     /// its ends: at the limit, within 1e-4 of its length.
     gravity: DimensionlessLimit,
     /// A force on a tip or a point: as for gravity.
     tip_force: DimensionlessLimit,
-    /// A moment on a tip or a point.
     tip_moment: DimensionlessLimit,
     /// Weight of a rod that follows from its mass: as for gravity.
     rod_weight: DimensionlessLimit,
     /// Weight of the mass of a point: as for forces.
     point_weight: DimensionlessLimit,
-    /// Mass of a point to that of the longest rod.
     point_mass: DimensionlessLimit,
     /// At the limit a thousandth of the digits of positions is lost.
     base_distance: DimensionlessLimit,
-    /// Tissue, wider than for couplings, as blades need: a strip of width h, thickness t and length L gives
-    /// k L^4/A = 12 L^4/(h^2 t^2) and c L^2/A = L^2/h^2.
+    /// Wider for tissue than for couplings, as blades need: a strip of width h, thickness t and length L
+    /// gives k L^4/A = 12 L^4/(h^2 t^2) and c L^2/A = L^2/h^2.
     tissue: DimensionlessLimit,
-    /// Stiffness of tissue against a fold.
     fold: DimensionlessLimit,
     /// Drag on a rod normal to the wind: as for gravity.
     drag: DimensionlessLimit,
-    /// Velocity of the air in its natural unit.
     wind_velocity: DimensionlessLimit,
-    /// Width that a rod turns to the wind, to the longest rod.
     wind_width: DimensionlessLimit,
 }
 
@@ -84,44 +71,44 @@ const LIMITS: LeafLimits = LeafLimits {
         "L_max/L",
         1e3,
         "the ratio of the longest rod to this shortest one: \
-     one grid of equal fractions of the length does not serve both",
+         one grid of equal fractions of the length does not serve both",
     ),
     stiffnesses: upper_limit(
         "A_max/A",
         1e12,
         "the ratio of the largest to this smallest torsion or bending stiffness; \
-     double precision does not resolve more: raise this one or lower the largest",
+         double precision does not resolve more: raise this one or lower the largest",
     ),
     rest_angle: upper_limit("|u0| L", 1e3, REST_ANGLE_REASON),
     stretch: ratio_limit(
         "v0",
         1e3,
         "the factor of the rest length; beyond it or its inverse one grid \
-     of equal fractions of the length does not serve the leaf",
+         of equal fractions of the length does not serve the leaf",
     ),
     force_stiffness: lower_limit(
         "H L^2/A",
         1e-6,
         "A is the smallest bending stiffness of the rod and L its length; \
-     below the limit the rod is softer in stretch or shear than any beam: raise this stiffness",
+         below the limit the rod is softer in stretch or shear than any beam: raise this stiffness",
     ),
     coupling: upper_limit(
         "kappa L^4/A",
         1e12,
         "A is the smallest bending stiffness of the two rods and L the longer length; \
-     beyond the limit neighbours act as glued together: lower the coupling",
+         beyond the limit neighbours act as glued together: lower the coupling",
     ),
     density: ratio_limit(
         "rho/rho_mean",
         1e12,
         "rho_mean is the mean of the densities mid-rod; \
-     beyond the limit one part weighs nothing beside another: choose densities closer to each other",
+         beyond the limit one part weighs nothing beside another: choose densities closer to each other",
     ),
     rotary_inertia: ratio_limit(
         "rho I/(rho_mean L^2)",
         1e12,
         "rho_mean is the mean of the densities mid-rod and L the longest rod; \
-     it is r^2/(4 L^2) for a round section of radius r: choose one closer to that of a rod",
+         it is r^2/(4 L^2) for a round section of radius r: choose one closer to that of a rod",
     ),
     section_radius: ratio_limit(
         "r/L",
@@ -149,7 +136,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "|M| L/A",
         1e8,
         "A is the smallest bending stiffness of the rod and L its length; \
-     the rod would roll up by this many radians: lower the moment or stiffen the rod",
+         the rod would roll up by this many radians: lower the moment or stiffen the rod",
     ),
     rod_weight: upper_limit("|g| rho L^3/A", 1e8, WEIGHT_REASON),
     point_weight: upper_limit("|g| m L^2/A", 1e8, WEIGHT_REASON),
@@ -158,7 +145,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "|base|/L",
         1e3,
         "L is the longest rod; \
-     beyond the limit positions lose digits: choose an origin closer to the leaf",
+         beyond the limit positions lose digits: choose an origin closer to the leaf",
     ),
     tissue: upper_limit("k L^4/A", 1e16, TISSUE_STIFFNESS_REASON),
     fold: upper_limit("c L^2/A", 1e12, TISSUE_STIFFNESS_REASON),
@@ -166,7 +153,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "rho C_D w |U|^2 L^3/(2 A)",
         1e8,
         "A is the smallest bending stiffness of a rod and L its length; \
-     beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity",
+         beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity",
     ),
     wind_velocity: upper_limit("|U| T/L", 1e12, NATURAL_UNITS_REASON),
     wind_width: ratio_limit(

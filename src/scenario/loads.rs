@@ -89,7 +89,7 @@ pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<[f6
     Ok(g)
 }
 
-/// Reads `load.distributed`; `None` if it is left out or zero.
+/// Reads `load.distributed`; `None` if the entry is left out or zero.
 pub(super) fn read_distributed_loads(
     entries: &Entries,
     rods: usize,
@@ -157,8 +157,7 @@ pub struct Wind {
 
 /// Reads `[wind]`; `None` if there is no such table.
 pub(super) fn read_wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
-    let mut table = Key::all().filter(|key| key.table() == "wind");
-    if !table.any(|key| entries.is_given(key)) {
+    if !entries.has_key_of_table("wind") {
         return Ok(None);
     }
     Ok(Some(Wind {
@@ -180,7 +179,7 @@ struct DefaultMotion {
     radius: f64,
     /// Duration, in units of sqrt(rho L^4/A).
     duration: f64,
-    /// Outputs in that time.
+    /// Outputs during the motion, after the first.
     outputs: f64,
 }
 

@@ -5,7 +5,7 @@
 
 mod blade;
 mod checked;
-pub(crate) mod format;
+mod format;
 mod json;
 mod limits;
 mod loads;

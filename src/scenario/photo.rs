@@ -83,8 +83,7 @@ impl PhotoParameterDerivative {
 
 /// Reads `[photo]`; `None` if there is no such table.
 pub(super) fn read_photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
-    let mut table = Key::all().filter(|key| key.table() == "photo");
-    if !table.any(|key| entries.is_given(key)) {
+    if !entries.has_key_of_table("photo") {
         return Ok(None);
     }
     let [right, up] = [Key::PhotoRight, Key::PhotoUp].map(|key| entries.value_or_default(key));

@@ -383,11 +383,6 @@ mod tests {
         // A small value at a knot is not lost next to large ones.
         assert_eq!(linear([0.0, 0.5, 1.0], [1e9, 1e-9, 1e9]).at(0.5), 1e-9);
     }
-}
-
-#[cfg(test)]
-mod schedule_tests {
-    use super::*;
 
     fn schedule<T: Copy>(at: &[f64], value: &[T]) -> Schedule<T> {
         let (at, value) = (at.to_vec(), value.to_vec());

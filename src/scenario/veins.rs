@@ -77,7 +77,7 @@ impl Rod {
 /// A/L.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// L: the largest rod length.
+    /// L, the length of the longest rod.
     pub length: f64,
     /// A, the mean bending stiffness: geometric mean of the 2 N values of A2
     /// and A3 of the N rods at half their lengths, however long the rods are.
@@ -114,7 +114,7 @@ impl Scale {
     }
 }
 
-/// L: the longest rod.
+/// L, the length of the longest rod.
 pub fn longest(rods: &[Rod]) -> f64 {
     rods.iter()
         .fold(0.0, |longest, rod| longest.max(rod.length))
@@ -142,7 +142,7 @@ impl Default for Tissue {
 }
 
 impl Tissue {
-    /// k1, k2, k3 and c1.
+    /// k1, k2, k3 and c1 along the gap.
     pub(crate) fn profiles(&self) -> [&Profile; 4] {
         let [along, across, normal] = &self.stiffness;
         [along, across, normal, &self.fold]
@@ -151,7 +151,7 @@ impl Tissue {
 
 /// What the stiffnesses of the veins follow from.
 pub(super) enum StiffnessSource {
-    /// Numbers.
+    /// Stiffnesses as numbers.
     Stiffnesses,
     Sections(Vec<Arc<Section>>),
     Blade {
@@ -199,7 +199,7 @@ impl StiffnessSource {
     }
 }
 
-/// Reads `leaf.joined`: whether the tips are joined. Those of a blade are if it ends in a point.
+/// Reads `leaf.joined`: whether the tips are joined. The tips of a blade are if it ends in a point.
 pub(super) fn read_joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> ScenarioResult<bool> {
     let item = entries.value_or_default(Key::Joined)?;
     let Some(blade) = blade else {

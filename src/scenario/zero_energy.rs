@@ -189,8 +189,8 @@ impl Scenario {
         rotations
     }
 
-    /// Whether every section of a vein on a hinge can turn about its own tangent, if it is round or
-    /// straight.
+    /// Whether every section of a vein on a hinge can turn about its own tangent, provided that the
+    /// vein is round or straight.
     fn spins(&self, vein: usize) -> bool {
         let gaps = [vein.checked_sub(1), Some(vein)].into_iter().flatten();
         let tissue = |gap| (self.tissue.iter()).any(|all| all.get(gap).is_some_and(has_some));

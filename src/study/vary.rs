@@ -34,7 +34,7 @@ mod tests;
 use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
-use crate::scenario::format::units::{DIMENSIONLESS, Dimension, TIME};
+use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
 use crate::scenario::{
     Entries, EntryPath, Key, Scenario, ScenarioError, ValueSchema, intended_number,
 };

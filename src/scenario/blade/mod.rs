@@ -193,26 +193,26 @@ pub(super) struct BladeParts {
 
 impl BladeParts {
     /// A property along every vein.
-    pub(super) fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
+    pub fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
         let each = self.etas.iter().zip(&self.vein_parts);
         each.map(|(eta, part)| part.profile(property, *eta < 0.0))
             .collect()
     }
 
     /// The lengths of the veins.
-    pub(super) fn lengths(&self) -> Vec<f64> {
+    pub fn lengths(&self) -> Vec<f64> {
         self.veins.iter().map(|vein| vein.length).collect()
     }
 
     /// Where the veins begin.
-    pub(super) fn bases(&self) -> Vec<[f64; 3]> {
+    pub fn bases(&self) -> Vec<[f64; 3]> {
         let y = self.etas.iter().map(|eta| eta * self.half_width);
         y.map(|y| [0.0, y, 0.0]).collect()
     }
 
     /// The angle of each vein at its base in the x-y plane, its elevation above that, and the turn
     /// of its section about d1, if the whole blade is turned by `elevation` about -e2.
-    pub(super) fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
+    pub fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
         let each = self.etas.iter().zip(&self.veins);
         each.map(|(eta, vein)| {
             let angle = if *eta < 0.0 {
@@ -226,7 +226,7 @@ impl BladeParts {
     }
 
     /// k1, k2, k3 and c1 of the tissue in every gap.
-    pub(super) fn tissue_profiles(&self) -> Vec<[Profile; 4]> {
+    pub fn tissue_profiles(&self) -> Vec<[Profile; 4]> {
         let gap = |part: &Arc<BladePart>| {
             [0, 1, 2, 3].map(|which| part.profile(BladeProperty::Tissue(which), false))
         };
@@ -250,8 +250,7 @@ fn tilt_direction(angle: f64, elevation: f64) -> [f64; 3] {
 
 /// Reads `[blade]` of a leaf with so many veins; `None` if there is no such table.
 pub(super) fn read_blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
-    let mut table = Key::all().filter(|key| key.table() == "blade");
-    if !table.any(|key| entries.is_given(key)) {
+    if !entries.has_key_of_table("blade") {
         return Ok(None);
     }
     if let Some(item) = Key::all()

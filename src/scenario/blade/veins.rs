@@ -362,17 +362,13 @@ pub struct BladePart {
 }
 
 impl BladePart {
-    pub(super) fn from_vein(vein: Arc<BladeVein>) -> Arc<BladePart> {
+    pub fn from_vein(vein: Arc<BladeVein>) -> Arc<BladePart> {
         BladePart::new(BladePartSource::Vein(vein))
     }
 
     /// The tissue between two veins, `apart` being the difference of their fractions of the half
     /// width.
-    pub(super) fn from_gap(
-        one: &Arc<BladeVein>,
-        other: &Arc<BladeVein>,
-        apart: f64,
-    ) -> Arc<BladePart> {
+    pub fn from_gap(one: &Arc<BladeVein>, other: &Arc<BladeVein>, apart: f64) -> Arc<BladePart> {
         // The gap on the other side of the midrib is then the same part.
         let (near, far) = if one.eta <= other.eta {
             (one, other)

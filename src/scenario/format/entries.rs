@@ -148,13 +148,9 @@ impl Entries {
     pub fn replaced(&self, overrides: &[String]) -> ScenarioResult<Self> {
         let mut entries = self.clone();
         for given in overrides {
-            let refuse = |problem: String| ScenarioError {
-                place: SourceLocation::Set {
-                    given: shorten(given),
-                },
-                key: None,
-                problem,
-                others: Vec::new(),
+            let refuse = |problem: String| {
+                let given = shorten(given);
+                ScenarioError::at_place(SourceLocation::Set { given }, problem)
             };
             let Some((path, text)) = given.split_once('=') else {
                 let problem = "must be KEY=VALUE, as in load.gravity=[0,0,-0.5]";
@@ -264,6 +260,12 @@ impl Entries {
     /// Whether a value of the key is written.
     pub(in crate::scenario) fn is_given(&self, key: Key) -> bool {
         self.entry(key, 0).is_some()
+    }
+
+    /// Whether a value of some key of this table is written.
+    pub(in crate::scenario) fn has_key_of_table(&self, table: &str) -> bool {
+        let mut keys = Key::all().filter(|key| key.table() == table);
+        keys.any(|key| self.is_given(key))
     }
 
     fn entry(&self, key: Key, row: usize) -> Option<&Entry> {

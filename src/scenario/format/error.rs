@@ -9,7 +9,7 @@ use std::ops::Range;
 /// What reading a scenario, or a part of it, gives.
 pub(in crate::scenario) type ScenarioResult<T> = std::result::Result<T, ScenarioError>;
 
-/// Why a scenario was refused. Its text is the whole message: the place, the key, the
+/// Why a scenario was refused. The error's text is the whole message: the place, the key, the
 /// value found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.message_with_option("set"))]
@@ -26,15 +26,20 @@ pub struct ScenarioError {
 }
 
 impl ScenarioError {
-    /// An error about a file, or a line of it, rather than the value of a key.
-    pub(in crate::scenario) fn in_file(file: &str, line: Option<usize>, problem: String) -> Self {
-        let file = file.to_string();
+    /// An error at a place, alone and of no key.
+    pub(super) fn at_place(place: SourceLocation, problem: String) -> Self {
         ScenarioError {
-            place: SourceLocation::File { file, line },
+            place,
             key: None,
             problem,
             others: Vec::new(),
         }
+    }
+
+    /// An error about a file, or a line of it, rather than the value of a key.
+    pub(in crate::scenario) fn in_file(file: &str, line: Option<usize>, problem: String) -> Self {
+        let file = file.to_string();
+        ScenarioError::at_place(SourceLocation::File { file, line }, problem)
     }
 
     /// The whole message, where overrides are given by this option.

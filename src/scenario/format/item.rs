@@ -124,12 +124,12 @@ impl Entries {
 
 impl<'e> EntryValue<'e> {
     /// The key that the value belongs to.
-    pub(in crate::scenario) fn key(&self) -> Key {
+    pub fn key(&self) -> Key {
         self.part.key
     }
 
     /// One of the lists of a table, if this is a table that has it.
-    pub(in crate::scenario) fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
+    pub fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
         let value = self.value.get(list)?;
         let list = Some(list);
         let part = EntryPath { list, ..self.part };
@@ -140,8 +140,8 @@ impl<'e> EntryValue<'e> {
         })
     }
 
-    /// An entry of a list; the value itself if it is not a list or too short.
-    pub(in crate::scenario) fn entry(&self, index: usize) -> EntryValue<'e> {
+    /// An entry of a list; the value itself if the value is no list, or a shorter one.
+    pub fn entry(&self, index: usize) -> EntryValue<'e> {
         let Some(value) = self.value.get(index) else {
             return *self;
         };
@@ -179,11 +179,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// Refuses this value unless a condition `holds`.
-    pub(in crate::scenario) fn refuse_unless(
-        &self,
-        holds: bool,
-        problem: impl Display,
-    ) -> ScenarioResult<()> {
+    pub fn refuse_unless(&self, holds: bool, problem: impl Display) -> ScenarioResult<()> {
         match holds {
             true => Ok(()),
             false => Err(self.value_error(problem)),
@@ -191,7 +187,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The error about this value.
-    pub(in crate::scenario) fn value_error(&self, problem: impl Display) -> ScenarioError {
+    pub fn value_error(&self, problem: impl Display) -> ScenarioError {
         let list = self.part.list.map(|list| format!(", {list}"));
         let components = matches!(
             self.key().form(),
@@ -211,31 +207,29 @@ impl<'e> EntryValue<'e> {
         let part = list.unwrap_or_default() + &entry;
         let WrittenEntry { place, text } = self.entries.written_entry(self.part, self.value);
         ScenarioError {
-            place,
             key: Some(self.key()),
-            problem: format!("{path}{part} = {text}: {problem}"),
-            others: Vec::new(),
+            ..ScenarioError::at_place(place, format!("{path}{part} = {text}: {problem}"))
         }
     }
 
     /// A text.
-    pub(in crate::scenario) fn text(&self) -> ScenarioResult<&'e str> {
+    pub fn text(&self) -> ScenarioResult<&'e str> {
         (self.value.as_str()).ok_or_else(|| self.value_error("must be text in quotes"))
     }
 
     /// One of the words that `allowed` names.
-    pub(in crate::scenario) fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
+    pub fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
         let word = self.value.as_str().and_then(|word| word.parse().ok());
         word.ok_or_else(|| self.value_error(allowed))
     }
 
     /// `true` or `false`.
-    pub(in crate::scenario) fn switch(&self) -> ScenarioResult<bool> {
+    pub fn switch(&self) -> ScenarioResult<bool> {
         (self.value.as_bool()).ok_or_else(|| self.value_error("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
-    pub(in crate::scenario) fn whole_number(&self, most: usize) -> ScenarioResult<usize> {
+    pub fn whole_number(&self, most: usize) -> ScenarioResult<usize> {
         let whole = self.value.as_integer();
         let whole = whole.and_then(|whole| usize::try_from(whole).ok());
         let whole = whole.filter(|whole| (1..=most).contains(whole));
@@ -252,12 +246,12 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A number in the range of its key.
-    pub(in crate::scenario) fn number(&self) -> ScenarioResult<f64> {
+    pub fn number(&self) -> ScenarioResult<f64> {
         self.number_in(self.key().form().range())
     }
 
     /// A number in a range.
-    pub(in crate::scenario) fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
+    pub fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
         let value = number(self.value);
         let value = value.ok_or_else(|| match self.intended_number() {
             Some(meant) => self.value_error(format_args!("must be a number: {meant}")),
@@ -286,7 +280,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
-    pub(in crate::scenario) fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
+    pub fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
         if number(self.value).is_some() || self.intended_number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
@@ -306,7 +300,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A profile for each of `rods` rods.
-    pub(in crate::scenario) fn profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
+    pub fn profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
         if !self.value.is_table() {
             let numbers = self.number_for_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
@@ -323,7 +317,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The knots of a profile along the leaf.
-    pub(in crate::scenario) fn knots(&self) -> ScenarioResult<Knots> {
+    pub fn knots(&self) -> ScenarioResult<Knots> {
         let [at, value] = self.pair("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
@@ -348,8 +342,8 @@ impl<'e> EntryValue<'e> {
         Ok(Profile::Linear { at, value })
     }
 
-    /// A factor in time.
-    pub(in crate::scenario) fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
+    /// A factor at given times.
+    pub fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
         let [at, factor] = self.pair("factor", FACTOR_SCHEDULE_FORM)?;
         let at = at.increasing_numbers(false)?;
         let value = factor.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
@@ -393,7 +387,7 @@ impl<'e> EntryValue<'e> {
         Ok(at)
     }
 
-    /// The entries of a list; `needed` describes it in the error if it is not one.
+    /// The entries of a list; `needed` describes the list in the error about a value that is none.
     fn array(
         &self,
         needed: &str,
@@ -405,9 +399,9 @@ impl<'e> EntryValue<'e> {
         Ok((0..list.len()).map(move |index| whole.entry(index)))
     }
 
-    /// The entries of a list that must have `count` of them, `because` of what; `needed`
-    /// describes the list in the error if it is not one.
-    pub(in crate::scenario) fn list_of_length(
+    /// The entries of a list of length `count`, `because` of what; `needed` describes the list in the
+    /// error about a value that is none.
+    pub fn list_of_length(
         &self,
         count: usize,
         because: &str,
@@ -422,8 +416,8 @@ impl<'e> EntryValue<'e> {
         Ok(list)
     }
 
-    /// Three numbers.
-    pub(in crate::scenario) fn vector(&self) -> ScenarioResult<[f64; 3]> {
+    /// A vector x, y, z.
+    pub fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
         let mut vector = [0.0; 3];
         let components = self.list_of_length(3, "one per axis x, y, z", needed)?;
@@ -434,7 +428,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A vector for each of `rods` rods: one for all, or a list.
-    pub(in crate::scenario) fn vector_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
+    pub fn vector_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {
             let each = self.list_of_length(rods, ONE_PER_ROD, VECTORS)?;
             return each.map(|item| item.vector()).collect();
@@ -449,10 +443,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A vector along each of `rods` rods, one profile for each component.
-    pub(in crate::scenario) fn vector_profile_per_rod(
-        &self,
-        rods: usize,
-    ) -> ScenarioResult<Vec<[Profile; 3]>> {
+    pub fn vector_profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[Profile; 3]>> {
         if !self.value.is_table() {
             let each = self.vector_per_rod(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
@@ -480,7 +471,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A load in time; of some keys, or one that is always the same.
-    pub(in crate::scenario) fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
+    pub fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
@@ -494,7 +485,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A fraction of the length behind the base.
-    pub(in crate::scenario) fn fraction(&self) -> ScenarioResult<f64> {
+    pub fn fraction(&self) -> ScenarioResult<f64> {
         let at = self.number_in(NumberRange::Finite)?;
         self.refuse_unless(
             at > 0.0 && at <= 1.0,
@@ -504,7 +495,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A stretch of a rod, `[from, to]`, or one point of it.
-    pub(in crate::scenario) fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
+    pub fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
         if number(self.value).is_some() {
             return Ok([self.fraction()?; 2]);
         }

@@ -281,7 +281,7 @@ impl Key {
     }
 
     /// What applies if the key is left out.
-    pub(crate) fn missing_key_rule(self) -> MissingKeyRule {
+    pub(super) fn missing_key_rule(self) -> MissingKeyRule {
         self.row().left_out
     }
 
@@ -374,7 +374,7 @@ pub(super) struct TablePath<'p> {
 
 impl TablePath<'_> {
     /// Splits a path such as `load.gravity` or `load.point.vein` before its last name.
-    pub(super) fn split(path: &str) -> TablePath<'_> {
+    pub fn split(path: &str) -> TablePath<'_> {
         let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
         TablePath { table, name }
     }
@@ -441,7 +441,7 @@ pub(crate) enum NumberRange {
 
 /// What applies if a key is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MissingKeyRule {
+pub(super) enum MissingKeyRule {
     /// The key is required; the message gives this example of a value.
     Required(&'static str),
     /// This default value.
@@ -452,7 +452,7 @@ pub(crate) enum MissingKeyRule {
 
 impl ValueSchema {
     /// The range of the numbers in a value.
-    pub(super) fn range(self) -> NumberRange {
+    pub fn range(self) -> NumberRange {
         match self {
             ValueSchema::Number(range)
             | ValueSchema::PerRod(range)

@@ -7,7 +7,7 @@ use crate::scenario::format::{Key, TablePath, ValueSchema, table_header};
 use std::fmt;
 use toml::Value;
 
-/// Lists that a table can have.
+/// Lists that the table of a profile or a schedule can have.
 const LIST_NAMES: [&str; 3] = ["at", "value", "factor"];
 
 const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
@@ -16,7 +16,7 @@ const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
 /// that, or all numbers of one of these, which are then multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EntryPath {
-    /// The key.
+    /// The key of the entry.
     pub key: Key,
     /// Which of its tables, counted from 0, if there may be several; else 0.
     pub(crate) row: usize,

@@ -25,20 +25,20 @@ pub(in crate::scenario) struct ScenarioSource {
 }
 
 /// A text that was parsed.
-pub(super) struct ParsedText {
+pub(in crate::scenario) struct ParsedText {
     pub source: ScenarioSource,
     pub table: Table,
 }
 
 /// The places of a key and of its value in the text.
-pub(super) struct EntrySpans {
+pub(in crate::scenario) struct EntrySpans {
     pub key: Range<usize>,
     pub value: Range<usize>,
 }
 
 impl ScenarioSource {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
-    pub(super) fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
+    pub fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
         // A mark that some editors write.
         let text = text.trim_start_matches('\u{feff}');
         let mut source = ScenarioSource {
@@ -66,7 +66,7 @@ impl ScenarioSource {
 
     /// The places of a key, and of its value or a part of that; in one of its tables if there are
     /// several.
-    pub(super) fn find_entry_spans(
+    pub fn find_entry_spans(
         &self,
         path: TablePath,
         row: usize,
@@ -90,13 +90,13 @@ impl ScenarioSource {
     }
 
     /// A value as it is written, shortened.
-    pub(super) fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
+    pub fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
         let written = spans.and_then(|spans| self.text.get(spans.value.clone()));
         written.map_or_else(|| shorten(&value.to_string()), shorten)
     }
 
     /// The line with byte `at` of the text.
-    pub(super) fn location(&self, at: Option<usize>) -> SourceLocation {
+    pub fn location(&self, at: Option<usize>) -> SourceLocation {
         SourceLocation::File {
             file: self.file.clone(),
             line: at.map(|at| line_of(self.text.as_bytes(), at)),
@@ -105,21 +105,11 @@ impl ScenarioSource {
 
     /// An error that is not about the value of a key.
     fn error_at_span(&self, span: Option<Range<usize>>, problem: String) -> ScenarioError {
-        ScenarioError {
-            place: self.location(span.map(|span| span.start)),
-            key: None,
-            problem,
-            others: Vec::new(),
-        }
+        ScenarioError::at_place(self.location(span.map(|span| span.start)), problem)
     }
 
     /// The error about a key that is none of the format, with its line.
-    pub(super) fn unknown_key_error(
-        &self,
-        path: TablePath,
-        row: usize,
-        problem: String,
-    ) -> ScenarioError {
+    pub fn unknown_key_error(&self, path: TablePath, row: usize, problem: String) -> ScenarioError {
         let span = self
             .find_entry_spans(path, row, None)
             .map(|spans| spans.key);
@@ -128,7 +118,7 @@ impl ScenarioSource {
     }
 
     /// The error about a value in place of a table, or of several.
-    pub(super) fn misplaced_value_error(&self, table: &str, value: &Value) -> ScenarioError {
+    pub fn misplaced_value_error(&self, table: &str, value: &Value) -> ScenarioError {
         let spans = self.find_entry_spans(TablePath::split(table), 0, None);
         let found = self.displayed_value(spans.as_ref(), value);
         let allowed = Key::allowed_in(table).join(", ");

@@ -305,8 +305,7 @@ pub(super) fn read_sections(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<Arc<Section>>>> {
-    let mut table = Key::all().filter(|key| key.table() == "section");
-    if !table.any(|key| entries.is_given(key)) {
+    if !entries.has_key_of_table("section") {
         return Ok(None);
     }
     for key in Key::COUPLE.into_iter().chain(Key::FORCE) {
