@@ -263,7 +263,7 @@ impl<'a> GroupRods<'a> {
         let [a, b, c, d] = self.q;
         let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
         let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
-        let v = Vectors::gather(simd, [vector(a), vector(b), vector(c), vector(d)], part);
+        let v = Vectors::from_group(simd, [vector(a), vector(b), vector(c), vector(d)], part);
         (
             v,
             Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
@@ -296,7 +296,7 @@ impl<'a> GroupRods<'a> {
 #[inline(always)]
 fn gather<S: Simd>(simd: S, of: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
     let [a, b, c, d] = of;
-    Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
+    Vectors::from_group(simd, [a[i], b[i], c[i], d[i]], part)
 }
 
 /// Right-hand side and energy, and the matrix if requested.

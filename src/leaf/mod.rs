@@ -51,12 +51,11 @@ pub use crate::leaf::state::{
 };
 pub use crate::leaf::system::{AssemblyTotals, EquationWorkspace, System};
 pub use crate::leaf::tissue::HalfTurn;
+use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation;
 pub use crate::scenario::Scale;
-use crate::scenario::{
-    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation, sorted_distinct,
-};
+use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 

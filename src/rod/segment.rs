@@ -318,8 +318,9 @@ impl<S: Simd> LaneSections<S> {
     pub fn gather(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
         let ds = NumberGroup([a.ds, b.ds, c.ds, d.ds]);
         let ds = Lanes::load_group(simd, &ds, part);
-        let vectors =
-            |of: fn(&Section) -> DVec3| Vectors::gather(simd, [of(a), of(b), of(c), of(d)], part);
+        let vectors = |of: fn(&Section) -> DVec3| {
+            Vectors::from_group(simd, [of(a), of(b), of(c), of(d)], part)
+        };
         LaneSections {
             ds,
             per_ds: ds.recip(),

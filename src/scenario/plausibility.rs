@@ -1,41 +1,76 @@
-//! What in a scenario is probably not what was intended.
+//! Numbers of a scenario that are allowed, but probably not what was intended: degrees in place of
+//! radians, accelerations in place of weights, lengths in other units.
 
-use crate::scenario::{Clamp, Dynamics, Rod, Scenario};
+use crate::scenario::checked::Scenario;
+use crate::scenario::loads::Dynamics;
+use crate::scenario::supports::Clamp;
+use crate::scenario::veins::Rod;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Largest plausible stretch of a vein relative to its rest stretch.
 pub(crate) const LARGEST_PLAUSIBLE_STRETCH: f64 = 0.2;
 
-/// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under
-/// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
-const HANGING_LENGTH_FACTOR: f64 = 30.0;
+/// What numbers of a leaf plausibly are. Accelerations are in units of length per second squared.
+struct PlausibleRanges {
+    /// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under its
+    /// own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+    hanging_length: f64,
+    /// The acceleration of gravity in metres, and the relative tolerance with which this number is
+    /// recognized.
+    gravity: f64,
+    gravity_tolerance: f64,
+    /// Multiple of (A/q)^(1/3) from which on a weight of 9.81 is taken for an acceleration.
+    suspicious_length: f64,
+    /// Multiple of the acceleration of gravity, and fraction of it, by which a weight contradicts a
+    /// mass.
+    weight_contradiction: f64,
+    /// Fraction by which two statements of a weight differ in rounding, and their angle in radians.
+    weight_tolerance: f64,
+    /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
+    /// a turn that are multiples of this.
+    degree_multiple: f64,
+}
 
-/// Gravity if entered by mistake as an acceleration in metres and seconds, and the relative
-/// tolerance with which that number is recognised.
-const GRAVITY_ACCELERATION: f64 = 9.81;
+const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
+    hanging_length: 30.0,
+    gravity: 9.81,
+    gravity_tolerance: 2e-3,
+    suspicious_length: 5.0,
+    weight_contradiction: 10.0,
+    weight_tolerance: 0.01,
+    degree_multiple: 15.0,
+};
 
-const GRAVITY_TOLERANCE: f64 = 2e-3;
+/// A unit of length, and the acceleration of gravity in it per second squared.
+struct GravityInUnit {
+    length: &'static str,
+    acceleration: f64,
+}
 
-/// Multiple of that length from which on such a number is taken for this mistake.
-const SUSPICIOUS_LENGTH_FACTOR: f64 = 5.0;
+const GRAVITY_IN_UNITS: [GravityInUnit; 4] = {
+    const fn unit(length: &'static str, acceleration: f64) -> GravityInUnit {
+        GravityInUnit {
+            length,
+            acceleration,
+        }
+    }
+    [
+        unit("m", 9.81),
+        unit("cm", 981.0),
+        unit("mm", 9810.0),
+        unit("in", 386.1),
+    ]
+};
 
-/// Multiple of the acceleration of gravity, and part of it, by which a weight contradicts a mass.
-const WEIGHT_CONTRADICTION_FACTOR: f64 = 10.0;
-
-/// Part by which two statements of a weight differ in rounding, and their angle in radians.
-const WEIGHT_TOLERANCE: f64 = 0.01;
-
-/// The acceleration of gravity in units of length of these names per second squared, and its range
-/// in any of them.
-const GRAVITY_BY_LENGTH_UNIT: [(&str, f64); 4] =
-    [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
-
+/// The range of the acceleration of gravity in all of these units.
 const GRAVITY_RANGE: [f64; 2] = [9.81, 9810.0];
 
-/// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
-/// a turn that are multiples of this.
-const DEGREE_MULTIPLE: f64 = 15.0;
+impl GravityInUnit {
+    fn of(length: &str) -> Option<&'static GravityInUnit> {
+        GRAVITY_IN_UNITS.iter().find(|unit| unit.length == length)
+    }
+}
 
 /// What is probably not what was intended, one short sentence each.
 pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
@@ -51,7 +86,7 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
     angles.into_iter().chain(lengths).flatten().collect()
 }
 
-/// The one of them that most probably keeps a leaf from coming to rest.
+/// The implausible number that most probably keeps a leaf from coming to rest.
 pub fn obstacle(scenario: &Scenario) -> Option<String> {
     let slips = [
         out_of_reach,
@@ -64,16 +99,37 @@ pub fn obstacle(scenario: &Scenario) -> Option<String> {
     slips.into_iter().find_map(|slip| slip(scenario))
 }
 
+/// How far a held tip is from the base of a vein.
+struct TipReach {
+    /// By which part the vein would have to stretch.
+    stretch: f64,
+    away: f64,
+    /// Length of the vein at rest.
+    length: f64,
+}
+
 /// A tip that is held farther from the base than a vein plausibly stretches.
 pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
     let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
-    let of = |rod: &Rod| {
+    let reach = |rod: &Rod| {
         let length = rod.length * rod.rest_stretch.integral(1.0);
         let away = tip.distance(rod.base_position());
-        (away / length - 1.0, away, length)
+        TipReach {
+            stretch: away / length - 1.0,
+            away,
+            length,
+        }
     };
-    let all = scenario.rods.iter().map(of).enumerate();
-    let (j, (stretch, away, length)) = all.min_by(|(_, a), (_, b)| b.0.total_cmp(&a.0))?;
+    let all = scenario.rods.iter().map(reach).enumerate();
+    let least = all.min_by(|(_, a), (_, b)| b.stretch.total_cmp(&a.stretch));
+    let (
+        j,
+        TipReach {
+            stretch,
+            away,
+            length,
+        },
+    ) = least?;
     (stretch > LARGEST_PLAUSIBLE_STRETCH).then(|| {
         format!(
             "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
@@ -91,13 +147,8 @@ fn four_digits(number: f64) -> f64 {
 
 /// Base angles of more than a right angle: a vein that grows backwards.
 fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
-    type Angle = fn(&Rod) -> f64;
-    let kinds: [(&str, Angle); 2] = [
-        ("leaf.fan", |rod| rod.angle),
-        ("leaf.elevation", |rod| rod.elevation),
-    ];
     let doubt = |key: &str, angle: f64| {
-        let turned = angle.abs() > FRAC_PI_2 * (1.0 + GRAVITY_TOLERANCE);
+        let turned = angle.abs() > FRAC_PI_2 * (1.0 + PLAUSIBLE.gravity_tolerance);
         turned.then(|| {
             format!(
                 "{key} is in radians, and {angle} is {}",
@@ -109,10 +160,11 @@ fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
         // The directions of its veins follow from this angle and its outline.
         return doubt("leaf.elevation", blade.elevation);
     }
-    kinds.into_iter().find_map(|(key, of)| {
-        let angles = scenario.rods.iter().map(of);
+    let largest = |key: &str, angle: fn(&Rod) -> f64| {
+        let angles = scenario.rods.iter().map(angle);
         doubt(key, angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?)
-    })
+    };
+    largest("leaf.fan", |rod| rod.angle).or_else(|| largest("leaf.elevation", |rod| rod.elevation))
 }
 
 /// An angle by which a clamped tip is turned that looks like one in degrees.
@@ -123,7 +175,7 @@ fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<String> {
         whole.then_some(("angles", clamp.angle))
     };
     let twist = |clamp: &Clamp| {
-        let whole = clamp.twist % DEGREE_MULTIPLE == 0.0 && clamp.twist.abs() > TAU;
+        let whole = clamp.twist % PLAUSIBLE.degree_multiple == 0.0 && clamp.twist.abs() > TAU;
         whole.then_some(("twist", clamp.twist))
     };
     let (key, angle) = clamps
@@ -166,12 +218,12 @@ fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
     let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
     let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
     let angle = given.angle_between(pulled);
-    let states = match given.distance(pulled) <= WEIGHT_TOLERANCE * pulled.length() {
+    let states = match given.distance(pulled) <= PLAUSIBLE.weight_tolerance * pulled.length() {
         true => format!(
             "state the same weight, {other} per length of vein {}, which then counts twice",
             vein + 1
         ),
-        false if angle > WEIGHT_TOLERANCE => format!(
+        false if angle > PLAUSIBLE.weight_tolerance => format!(
             "contradict each other: as weights per length of vein {}, {one} and {other}, they are {:.0} degrees apart",
             vein + 1,
             angle.to_degrees()
@@ -196,18 +248,15 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     if scenario.units.time.is_some() && !scenario.units.is_in_seconds() {
         return None;
     }
-    let known = GRAVITY_BY_LENGTH_UNIT
-        .iter()
-        .find(|(name, _)| Some(*name) == unit);
-    let [least, most] = match known {
-        Some((_, acceleration)) if given => [*acceleration; 2],
+    let [least, most] = match unit.and_then(GravityInUnit::of) {
+        Some(known) if given => [known.acceleration; 2],
         // In units without names densities alone may be dimensionless, those of a material not.
         None if unit.is_none() && scenario.radii.have_mass() => GRAVITY_RANGE,
         _ => return None,
     };
     let mass = scenario.dynamics.mean_density();
     let found = weight / mass;
-    let allowed = least / WEIGHT_CONTRADICTION_FACTOR..=most * WEIGHT_CONTRADICTION_FACTOR;
+    let allowed = least / PLAUSIBLE.weight_contradiction..=most * PLAUSIBLE.weight_contradiction;
     (weight > 0.0 && !allowed.contains(&found)).then(|| {
         format!(
             "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
@@ -225,13 +274,11 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
         return None;
     }
     let own = units.length.as_deref()?;
-    let (_, known) = GRAVITY_BY_LENGTH_UNIT
-        .iter()
-        .find(|(name, _)| *name == own)?;
+    let known = GravityInUnit::of(own)?.acceleration;
     let given = DVec3::from_array(scenario.g).length();
-    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < GRAVITY_TOLERANCE;
-    let of_other = |(name, acceleration): &&(&str, f64)| *name != own && is(*acceleration);
-    let (other, _) = GRAVITY_BY_LENGTH_UNIT.iter().find(of_other)?;
+    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
+    let of_other = |unit: &&GravityInUnit| unit.length != own && is(unit.acceleration);
+    let other = GRAVITY_IN_UNITS.iter().find(of_other)?.length;
     Some(format!(
         "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
         four_digits(given)
@@ -247,9 +294,9 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     let weights = weights.map(|weight| DVec3::from_array(weight).length());
     let weight = weights.fold(0.0, f64::max);
     // 9.81 times a power of ten, for other units of length.
-    let digits = weight / 10_f64.powf((weight / GRAVITY_ACCELERATION).log10().round());
+    let digits = weight / 10_f64.powf((weight / PLAUSIBLE.gravity).log10().round());
     let of_mass = scenario.g != [0.0; 3];
-    let slip = !of_mass && (digits / GRAVITY_ACCELERATION - 1.0).abs() < GRAVITY_TOLERANCE;
+    let slip = !of_mass && (digits / PLAUSIBLE.gravity - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
     // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
     let stiffness = |rod: &Rod| {
         let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));
@@ -268,9 +315,9 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     if weight == 0.0
         || shortest
             < if slip {
-                SUSPICIOUS_LENGTH_FACTOR
+                PLAUSIBLE.suspicious_length
             } else {
-                HANGING_LENGTH_FACTOR
+                PLAUSIBLE.hanging_length
             }
     {
         return None;

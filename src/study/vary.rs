@@ -34,7 +34,7 @@ mod tests;
 use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
-use crate::scenario::format::units::{DIMENSIONLESS, Dimension, TIME};
+use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
 use crate::scenario::{
     Entries, EntryPath, Key, Scenario, ScenarioError, ValueSchema, intended_number,
 };
@@ -171,7 +171,7 @@ impl FromStr for VariableTarget {
             return Err(refuse(format!("unknown key: methods have {all}")));
         }
         let part = EntryPath::parse(text).map_err(refuse)?;
-        part.is_number().map_err(refuse)?;
+        part.check_is_number().map_err(refuse)?;
         Ok(VariableTarget::Entry(part))
     }
 }
@@ -623,7 +623,7 @@ impl BaseScenario {
             return vec![keys.clone()];
         };
         match self.entries.value_at(*part) {
-            Some(value) => (part.numbers(value).into_iter())
+            Some(value) => (part.number_paths(value).into_iter())
                 .map(|part| ParameterKeys(vec![VariableTarget::Entry(part)]))
                 .collect(),
             None => vec![keys.clone()],
@@ -697,7 +697,7 @@ impl BaseScenario {
             };
             let each = match self.entries.number_at(part) {
                 Some(_) => vec![part],
-                None => part.numbers(value),
+                None => part.number_paths(value),
             };
             let factor = EntryPath {
                 scale: true,
@@ -721,7 +721,7 @@ impl BaseScenario {
         let value = self.entries.number_at(part)?;
         // Some defaults are those of tables that would stand beside what is given in their place.
         let allowed = || self.scenario_with_values(&[(&keys, value)]).is_ok();
-        let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance && allowed();
+        let can_vary = part.check_is_number().is_ok() && part.key != Key::Tolerance && allowed();
         let is_length = part.key.dimension() == [1, 0, 0];
         can_vary.then(|| ScenarioNumber {
             value,

@@ -1,6 +1,8 @@
 //! The JSON schema of scenarios, generated from the table of keys.
 
-use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema, split};
+use crate::scenario::format::{
+    Key, MissingKeyRule, NumberRange, TablePath, ValueSchema, is_repeated_table,
+};
 use serde_json::{Map, Value, json};
 
 /// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
@@ -15,8 +17,8 @@ pub fn schema() -> Value {
 /// The schema of a table, which has no name at the top, with those in it.
 fn table(name: &str) -> Value {
     let (mut properties, mut required) = (Map::new(), Vec::new());
-    for key in Key::all().filter(|key| key.table_and_name().0 == name) {
-        let (_, within) = key.table_and_name();
+    for key in Key::all().filter(|key| key.table() == name) {
+        let within = key.table_path().name;
         properties.insert(within.into(), entry(key));
         // Alternatives, such as stiffnesses, sections and blades, are not required here.
         let alone = matches!(name, "" | "leaf") && !key.follows_from_blade() || key.is_repeated();
@@ -25,12 +27,15 @@ fn table(name: &str) -> Value {
         }
     }
     for inner in Key::tables() {
-        let (outer, within) = split(inner);
+        let TablePath {
+            table: outer,
+            name: within,
+        } = TablePath::split(inner);
         if outer != name {
             continue;
         }
         let one = table(inner);
-        let repeated = Key::REPEATED_TABLES.contains(&inner);
+        let repeated = is_repeated_table(inner);
         if !repeated && !one["required"].is_null() {
             required.push(within);
         }

@@ -23,7 +23,7 @@ mod table;
 use crate::newton::SolverCounts;
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use crate::run::{Instant, Limit};
-use crate::scenario::format::units::LENGTH;
+use crate::scenario::units::LENGTH;
 
 pub use crate::study::fit::data::{
     ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, MeasuredColumn,

@@ -1,48 +1,63 @@
 //! Serializes a checked scenario as JSON of the same form as the TOML, which can be read
-//! in place of it.
+//! in place of the TOML.
 
 #[cfg(test)]
 mod tests;
 
-use crate::scenario::format::split;
-use crate::scenario::outline::SectionOutline;
+use crate::numbers::sorted_distinct;
+use crate::scenario::blade::Spline;
+use crate::scenario::checked::Scenario;
+use crate::scenario::format::{Key, TablePath};
+use crate::scenario::loads::PointLoad;
 use crate::scenario::photo::axis_name;
-use crate::scenario::section::{HollowSection, Property, Section};
-use crate::scenario::{
-    Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, sorted_distinct,
-};
+use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
+use crate::scenario::supports::Grip;
+use crate::scenario::veins::{Rod, Tissue};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// The sections of a scenario, and what else is theirs.
+/// The sections of a scenario where they give the stiffnesses.
 struct SerializedSections<'a> {
     sections: &'a [Arc<Section>],
+    /// Whether they give the densities, too.
     density: bool,
+    /// Whether they give the rotary inertia, too.
     rotary_inertia: bool,
 }
 
-/// All entries with their values, including defaults, but not those that `[section]` or `[blade]` gives: a JSON object from which
-/// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
-/// `"inf"`.
+/// An entry of the format with its value.
+struct SerializedEntry {
+    path: TablePath<'static>,
+    value: Value,
+}
+
+/// A JSON object from which [`Scenario::from_toml`] makes an equal scenario: all entries with their
+/// values, including defaults, but not those that `[section]` or `[blade]` gives. An infinite
+/// stiffness is `"inf"`.
 impl Serialize for Scenario {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let sections = self.sections();
         let entry = |key: Key| match key {
             // All tables of a name stand where the first of its keys does.
-            Key::PointVein | Key::GripVein => {
-                let (table, _) = key.table_and_name();
-                Some((split(table), self.table_rows(key)?))
-            }
+            Key::PointVein | Key::GripVein => Some(SerializedEntry {
+                path: TablePath::split(key.table()),
+                value: self.table_rows(key)?,
+            }),
             _ if key.is_repeated() => None,
-            _ => Some((key.table_and_name(), self.written(key, sections.as_ref())?)),
+            _ => Some(SerializedEntry {
+                path: key.table_path(),
+                value: self.serialized_value(key, sections.as_ref())?,
+            }),
         };
         let entries: Vec<_> = Key::all().filter_map(entry).collect();
         let mut top = serializer.serialize_map(None)?;
-        for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
-            match &entries[0] {
-                (("", name), value) => top.serialize_entry(name, value)?,
-                ((table, _), _) => top.serialize_entry(table, &SerializedTable(entries))?,
+        for entries in entries.chunk_by(|one, other| one.path.table == other.path.table) {
+            let SerializedEntry { path, value } = &entries[0];
+            match path.table {
+                "" => top.serialize_entry(path.name, value)?,
+                table => top.serialize_entry(table, &SerializedTable(entries))?,
             }
         }
         top.end()
@@ -50,11 +65,12 @@ impl Serialize for Scenario {
 }
 
 /// The entries of a table, in the order of the format.
-struct SerializedTable<'e>(&'e [((&'static str, &'static str), Value)]);
+struct SerializedTable<'e>(&'e [SerializedEntry]);
 
 impl Serialize for SerializedTable<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|((_, name), value)| (name, value)))
+        let entries = self.0.iter();
+        serializer.collect_map(entries.map(|entry| (entry.path.name, &entry.value)))
     }
 }
 
@@ -82,39 +98,38 @@ impl Scenario {
     }
 
     /// The value of a key; `None` if other keys determine it.
-    fn written(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
+    fn serialized_value(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         if let Some(blade) = &self.blade {
             match (key, blade.curvature()) {
                 _ if key.follows_from_blade() => return None,
                 (Key::RestTwist, Some(_)) => return None,
-                (Key::RestBend2, Some((at, value))) => return Some(along(at, value)),
+                (Key::RestBend2, Some(curvature)) => return Some(spline_value(curvature)),
                 _ => {}
             }
         }
-        match key.table_and_name().0 {
-            "blade" => return self.of_blade(key),
-            "section" => return sections?.written(key),
+        match key.table() {
+            "blade" => return self.blade_value(key),
+            "section" => return sections?.serialized_value(key),
             "stiffness" if sections.is_some() => return None,
-            "tip" => return self.of_tip(key),
-            "photo" => return self.of_photo(key),
-            "tissue" => return self.of_tissue(key),
-            "wind" => return self.of_wind(key),
-            "dynamics" => return self.of_dynamics(key, sections),
+            "tip" => return self.tip_value(key),
+            "photo" => return self.photo_value(key),
+            "tissue" => return self.tissue_value(key),
+            "wind" => return self.wind_value(key),
+            "dynamics" => return self.dynamics_value(key, sections),
             _ if key == Key::Elevation && self.blade.is_some() => {
                 return Some(number(self.blade.as_ref()?.elevation));
             }
             _ => {}
         }
-        type Triple = fn(&Rod) -> &[Profile; 3];
-        let triples: [([Key; 3], Triple); 3] = [
-            (Key::COUPLE, |rod| &rod.couple_stiffness),
-            (Key::FORCE, |rod| &rod.force_stiffness),
-            (Key::REST_CURVATURE, |rod| &rod.rest_curvature),
-        ];
-        for (keys, of) in triples {
-            if let Some(which) = keys.iter().position(|one| *one == key) {
-                return Some(quantity(self.rods.iter().map(|rod| &of(rod)[which])));
-            }
+        let triple = |keys: [Key; 3], of: fn(&Rod) -> &[Profile; 3]| {
+            let axis = keys.iter().position(|one| *one == key)?;
+            Some(quantity(self.rods.iter().map(|rod| &of(rod)[axis])))
+        };
+        let of_veins = triple(Key::COUPLE, |rod| &rod.couple_stiffness)
+            .or_else(|| triple(Key::FORCE, |rod| &rod.force_stiffness))
+            .or_else(|| triple(Key::REST_CURVATURE, |rod| &rod.rest_curvature));
+        if of_veins.is_some() {
+            return of_veins;
         }
         Some(match key {
             Key::Name => json!(self.name),
@@ -147,7 +162,7 @@ impl Scenario {
         })
     }
 
-    fn of_tissue(&self, key: Key) -> Option<Value> {
+    fn tissue_value(&self, key: Key) -> Option<Value> {
         let tissue = self.tissue.as_ref()?;
         if key == Key::TissueGrown {
             return Some(json!(self.tissue_grown));
@@ -157,13 +172,12 @@ impl Scenario {
         Some(number_or_list(tissue.iter().map(of)))
     }
 
-    fn of_blade(&self, key: Key) -> Option<Value> {
+    fn blade_value(&self, key: Key) -> Option<Value> {
         let blade = self.blade.as_ref()?;
         let materials = blade.materials.iter();
-        let (at, value) = blade.points();
         Some(match key {
             Key::BladeLength => number(blade.length()),
-            Key::BladeWidth => along(at, value),
+            Key::BladeWidth => spline_value(blade.width_profile()),
             Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
             Key::BladeYoung => quantity(materials.map(|of| &of.young)),
             Key::YoungAcross => optional_quantity(materials.map(|of| of.young_across.as_ref()))?,
@@ -182,7 +196,7 @@ impl Scenario {
         self.blade.as_ref().is_some_and(|blade| blade.has_mass())
     }
 
-    fn of_wind(&self, key: Key) -> Option<Value> {
+    fn wind_value(&self, key: Key) -> Option<Value> {
         let wind = self.wind.as_ref()?;
         Some(match key {
             Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
@@ -194,7 +208,7 @@ impl Scenario {
     }
 
     /// A ruler is told as the scale that follows from it.
-    fn of_photo(&self, key: Key) -> Option<Value> {
+    fn photo_value(&self, key: Key) -> Option<Value> {
         let photo = self.photo.as_ref()?;
         match key {
             Key::PhotoScale => Some(number(photo.scale)),
@@ -207,7 +221,7 @@ impl Scenario {
         }
     }
 
-    fn of_tip(&self, key: Key) -> Option<Value> {
+    fn tip_value(&self, key: Key) -> Option<Value> {
         let held = self.held_tip.as_ref()?;
         let clamps = held.clamps.as_deref();
         Some(match key {
@@ -219,7 +233,7 @@ impl Scenario {
         })
     }
 
-    fn of_dynamics(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
+    fn dynamics_value(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
             Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
@@ -276,7 +290,7 @@ impl Scenario {
 }
 
 impl SerializedSections<'_> {
-    fn written(&self, key: Key) -> Option<Value> {
+    fn serialized_value(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {
             quantity(self.sections.iter().map(|section| of(section)))
@@ -372,21 +386,22 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     json!({ "at": at, "value": value })
 }
 
-/// A quantity along a leaf.
-fn along(at: &[f64], value: &[f64]) -> Value {
+/// A quantity along a blade.
+fn spline_value(spline: &Spline) -> Value {
+    let (at, value) = (spline.knots(), spline.values());
     match value.iter().all(|one| *one == value[0]) {
         true => number(value[0]),
         false => json!({ "at": at, "value": value }),
     }
 }
 
-/// A quantity of all rods; `None` if it is left out.
+/// A quantity of all rods; `None` if the quantity is left out.
 fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
     let profiles: Option<Vec<&Profile>> = profiles.collect();
     Some(quantity(profiles?.into_iter()))
 }
 
-/// A quantity in time; `None` if it is always the one at rest.
+/// A quantity in time; `None` if the quantity always has its value at rest.
 fn schedule_unless_constant<T: Copy + PartialEq>(
     schedule: &Schedule<T>,
     at_rest: T,

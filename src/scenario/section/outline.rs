@@ -1,6 +1,10 @@
-//! Areas, moments and factors of full and hollow sections.
+//! A section at one place along a rod: area, moments, torsion constant and shear factors, full or
+//! hollow, and the largest stresses in it.
 //!
 //! Second moments and areas of hollow sections are those of the outline less those of the hole.
+//!
+//! # Torsion of hollow sections
+//!
 //! The torsion constant J of a hollow section lies between two bounds (L. Prandtl's stress function
 //! gives most of all that are constant on both edges of the wall). From below it is that of tubes
 //! within each other (R. Bredt 1896, layer upon layer): with the area A(x) within the line at depth
@@ -14,7 +18,7 @@
 //! y + (b/a)^2 y (1 - y), with its sides a > b and the wall y b/2: it is exact for thin walls and for
 //! full sections, and else within 1 % of finite differences.
 //!
-//! The largest stresses in a section: its moduli, and what a force and a moment make of them.
+//! # Stresses
 //!
 //! With the area S, the second moments I2 and I3 about d2 and d3, and the width w and thickness t:
 //!
@@ -29,8 +33,8 @@
 //! semi-axes a > b at the ends of the short one 2 a^2 b/(a^2 + b^2), of a rectangle in the middle of
 //! the long sides. That of a thin wall is 2 A/s (art. 115, R. Bredt), with the area A within it and its
 //! length s; a thick one lies between both as its torsion constant does: exact for circles, and of
-//! rectangles within 4 % of finite differences. Q/(I b) is D. I. Zhuravskii's (art. 120, note): the first moment of half of the section over
-//! its second moment and the material across, 3/2 of the mean in a rectangle, 4/3 in a round section
+//! rectangles within 4 % of finite differences. Q/(I b) is D. I. Zhuravskii's (art. 120, note): the first moment of half
+//! of the section over its second moment and the material across, 3/2 of the mean in a rectangle, 4/3 in a round section
 //! and 2 in a thin round tube.
 //!
 //! The largest normal and shear stresses, and those of torsion and shear forces, lie at different
@@ -38,8 +42,7 @@
 //! to them for the equivalent one of a circle that is bent, pulled and twisted. Corners within a hollow
 //! rectangle concentrate stress, which is left out.
 
-use crate::scenario::Scenario;
-use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
+use crate::numbers::GAUSS_LEGENDRE_RULE;
 use crate::words;
 use glam::DVec3;
 use serde::Serialize;
@@ -67,7 +70,7 @@ pub(super) struct SectionDimensions {
 }
 
 impl SectionDimensions {
-    /// Those of the hole.
+    /// The dimensions of the hole.
     pub fn hole(self) -> Option<SectionDimensions> {
         let inside = |side: f64, wall: f64| (side - 2.0 * wall).max(0.0);
         self.wall.map(|wall| SectionDimensions {
@@ -88,6 +91,7 @@ impl SectionDimensions {
         }
     }
 
+    /// The area of the material.
     pub fn area(self) -> f64 {
         self.enclosed() - self.hole().map_or(0.0, SectionDimensions::enclosed)
     }
@@ -117,7 +121,9 @@ impl SectionDimensions {
         let panel = |from: f64| -> f64 {
             let layers = GAUSS_LEGENDRE_RULE.iter();
             layers
-                .map(|(x, weight)| weight * self.layer_torsion((from + x / WALL_PANELS) * wall))
+                .map(|point| {
+                    point.weight * self.layer_torsion((from + point.at / WALL_PANELS) * wall)
+                })
                 .sum()
         };
         let panels = (0..WALL_PANELS as usize).map(|k| panel(k as f64 / WALL_PANELS));
@@ -149,7 +155,7 @@ impl SectionDimensions {
         part + (short / long).powi(2) * part * (1.0 - part)
     }
 
-    /// A^2/g of the line at this depth in the wall.
+    /// A^2/g (see the torsion of hollow sections above) of the line at this depth in the wall.
     fn layer_torsion(self, depth: f64) -> f64 {
         let (w, t) = (self.width - 2.0 * depth, self.thickness - 2.0 * depth);
         let (area, gradient) = match self.outline {
@@ -183,12 +189,13 @@ impl SectionDimensions {
     }
 }
 
-/// So many panels of five points resolve the layers of every wall to 1e-9.
+/// Panels of a wall's depth, each with the rule of five points: they resolve the layers of every wall
+/// to 1e-9.
 const WALL_PANELS: f64 = 4.0;
 
 /// Cowper's factor of a hollow circle, the square of whose inner diameter is the part `hole` of
-/// that of the outer one. That of a hollow ellipse is that of the full one, reduced as for circles:
-/// an estimate.
+/// the square of the outer one. The factor of a hollow ellipse is estimated from that of the full
+/// ellipse, reduced as for circles.
 fn hollow_circle_shear_factor(hole: f64, nu: f64) -> f64 {
     let both = (1.0 + hole) * (1.0 + hole);
     6.0 * (1.0 + nu) * both / ((7.0 + 6.0 * nu) * both + (20.0 + 12.0 * nu) * hole)
@@ -243,7 +250,7 @@ impl SectionOutline {
 /// What the largest stresses in a section follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moduli {
-    /// S.
+    /// S, the area of the material.
     area: f64,
     /// t/(2 I2) and w/(2 I3).
     bending: [f64; 2],
@@ -258,19 +265,19 @@ pub struct Moduli {
 /// The largest stresses in a section, force per area.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Stress {
-    /// Along the rod, by tension and bending: its size, in tension or compression.
+    /// Size of the stress along the rod, in tension or compression, by tension and bending.
     pub normal: f64,
-    /// By torsion and shear forces.
+    /// Shear stress by torsion and shear forces.
     pub shear: f64,
-    /// As if both were largest in the same point.
+    /// Von Mises' equivalent stress, as if normal and shear stress were largest in the same point.
     pub equivalent: f64,
 }
 
 impl Stress {
-    /// The names of its components.
+    /// The names of the three stresses in results.
     pub const NAMES: [&str; 3] = ["normal_stress", "shear_stress", "equivalent_stress"];
 
-    /// All three.
+    /// The three stresses in the order of [`Stress::NAMES`].
     pub fn to_array(self) -> [f64; 3] {
         [self.normal, self.shear, self.equivalent]
     }
@@ -294,8 +301,8 @@ impl Moduli {
         }
     }
 
-    /// Those of a strip of a plate, which twists with it: J = w t^3/3.
-    fn for_strip(width: f64, thickness: f64) -> Moduli {
+    /// The moduli of a strip of a plate, which twists with the plate: J = w t^3/3.
+    pub(in crate::scenario) fn for_strip(width: f64, thickness: f64) -> Moduli {
         let sides = SectionDimensions {
             outline: SectionOutline::Rectangle,
             width,
@@ -310,7 +317,7 @@ impl Moduli {
 }
 
 impl SectionDimensions {
-    /// Its moduli.
+    /// What the largest stresses in the section follow from.
     pub fn moduli(self) -> Moduli {
         let (w, t) = (self.width, self.thickness);
         let [second, third] = self.second_moments();
@@ -336,7 +343,7 @@ impl SectionDimensions {
         self.hole().filter(|hole| hole.enclosed() > 0.0)
     }
 
-    /// The first moment of its upper half about d2.
+    /// The first moment of the upper half of the section about d2.
     fn first_moment(self) -> f64 {
         let factor = match self.outline {
             SectionOutline::Circle | SectionOutline::Ellipse => 1.0 / 12.0,
@@ -371,7 +378,7 @@ impl SectionDimensions {
     }
 }
 
-/// Terms of the series of a rectangle, which falls off as exp(-n pi/2).
+/// Terms of the series for the stress function of a rectangle, which falls off as exp(-n pi/2).
 const RECTANGLE_SERIES_TERMS: i32 = 12;
 
 impl SectionOutline {
@@ -390,24 +397,6 @@ impl SectionOutline {
                 short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
             }
         }
-    }
-}
-
-impl Scenario {
-    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
-    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
-    /// sections.
-    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        if self.blade.is_none() {
-            return self.radii.moduli(rod, sigma);
-        }
-        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
-        let rod = self.rods.get(rod)?;
-        let side = |axis: usize| {
-            let bending = rod.couple_stiffness[axis].at(sigma);
-            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
-        };
-        Some(Moduli::for_strip(side(2), side(1)))
     }
 }
 
@@ -501,7 +490,7 @@ mod tests {
     /// Torsion constants from finite differences (rectangles) and bilinear elements (ellipses) for
     /// the stress function on three grids, extrapolated.
     #[test]
-    fn torsion_of_hollow_sections() {
+    fn torsion_constants_of_hollow_sections() {
         use SectionOutline::{Ellipse, Rectangle};
         for (outline, width, thickness, wall, torsion, within) in [
             (Rectangle, 1.0, 1.0, 0.02, 0.018_998, 2e-3),
@@ -522,16 +511,6 @@ mod tests {
         // A wall of half the thickness leaves no hole.
         let full = hollow(Rectangle, 1.7, 1.0, 0.5);
         close(full.torsion(), Rectangle.torsion(1.7, 1.0), 1e-14);
-    }
-}
-
-#[cfg(test)]
-mod moduli_tests {
-    use super::*;
-
-    #[track_caller]
-    fn close(found: f64, wanted: f64, relative: f64) {
-        assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
     }
 
     fn moduli(outline: SectionOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
@@ -569,7 +548,7 @@ mod moduli_tests {
     /// differences for the stress function on two grids, over J.
     #[test]
     fn torsion_of_hollow_sections() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for wall in [0.01, 0.2, 0.5] {
             let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
             close(
@@ -601,7 +580,7 @@ mod moduli_tests {
     /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
     #[test]
     fn shear_by_forces() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for (outline, width, thickness, wall, factor) in [
             (Rectangle, 3.0, 0.7, None, 1.5),
             (Rectangle, 3.0, 0.7, Some(0.35), 1.5),
