@@ -166,7 +166,8 @@ pub fn trace<'py>(
             points.map(|point| curves(py, &point.curves)).collect()
         })
         .collect();
-    let (complete, remark) = (trace.complete, trace.remark.clone());
+    let remark = trace.remark.as_ref().map(ToString::to_string);
+    let complete = trace.complete;
     let files = Files::of(trace, scenario.checked.clone());
     Ok((files, complete, remark, lines?))
 }
@@ -202,7 +203,8 @@ pub fn boundary<'py>(
             points.map(|point| curves(py, &point.curves)).collect()
         })
         .collect();
-    let (complete, remark) = (boundary.complete, boundary.remark.clone());
+    let remark = boundary.remark.as_ref().map(ToString::to_string);
+    let complete = boundary.complete;
     let files = Files::of(boundary, scenario.checked.clone());
     Ok((files, complete, remark, lines?))
 }

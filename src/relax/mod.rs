@@ -10,6 +10,7 @@ pub(crate) mod eigenvalues;
 mod follow;
 mod loading;
 mod path;
+mod remark;
 mod request;
 pub(crate) mod rest;
 mod result;
@@ -26,6 +27,11 @@ pub(crate) use crate::relax::accuracy::{GridLevel, NestedEquilibrium};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
 pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
+pub(crate) use crate::relax::remark::serialize_remark;
+pub use crate::relax::remark::{
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
+    SpanHolder,
+};
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,

@@ -14,6 +14,7 @@ use crate::relax::loading::arrival::{
     follow_load_path, guess, load_slowly, solve_from_guesses, solve_from_start, takes_loads_stably,
 };
 use crate::relax::path::{Path, Route, Stage};
+use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, SemiImplicit, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
@@ -181,7 +182,7 @@ pub(super) fn equilibrium_with_stability(
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
     leaf.doubts.extend(doubt);
     leaf.doubts
-        .extend(unconfirmed.then(|| UNCONFIRMED_EQUILIBRIUM_REMARK.to_owned()));
+        .extend(unconfirmed.then_some(EquilibriumDoubt::UnconfirmedEquilibrium));
     leaf.apply_stability_verdict(decision.verdict);
     let modes = decision.modes.or_else(|| {
         let list = EigenvalueRequest::requested(problem);
@@ -200,15 +201,15 @@ impl Equilibrium {
             Verdict::Undecided(certain)
                 if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
             {
-                self.doubts.push(MINIMUM_INDEX_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedIndex);
                 certain
             }
             Verdict::Undecided(_) => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 return;
             }
             Verdict::Unknown => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 self.stability.negative_eigenvalues = None;
                 return;
             }
@@ -220,29 +221,13 @@ impl Equilibrium {
         }
         if index > 0 {
             self.outcome = Outcome::Saddle;
-            self.remark = Some(BESIDE_BIFURCATION_REMARK.to_owned());
+            self.remark = Some(EquilibriumRemark::BeyondBifurcation);
         } else if unknown {
             // It said so.
             self.remark = None;
         }
     }
 }
-
-/// Remark on a leaf that two grids never bring to the same equilibrium.
-const UNCONFIRMED_EQUILIBRIUM_REMARK: &str = "from its start the leaf moves to different equilibria on different grids: \
-     this is one in which it can rest; relax with --all looks for the others";
-
-/// Remark on a leaf with an eigenvalue that may have either sign.
-const UNDECIDED_SIGN_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     whether the leaf is stable is not certain";
-
-/// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
-const MINIMUM_INDEX_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     the index is the number of those that are certainly negative, or larger";
-
-/// Remark on a leaf at rest on all grids that is at a saddle.
-const BESIDE_BIFURCATION_REMARK: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
-     still stable; a load that is a little larger, or a small disturbance, shows where it goes";
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;

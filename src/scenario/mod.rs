@@ -45,6 +45,7 @@ pub use crate::scenario::format::units::Units;
 pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, Weight, Wind};
 pub use crate::scenario::outline::{Moduli, Stress};
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
+pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{
     LARGEST_PLAUSIBLE_STRETCH, obstacle, out_of_reach, plausibility_warnings,
 };

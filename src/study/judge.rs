@@ -48,7 +48,7 @@ impl From<Equilibrium> for MethodSolution {
     fn from(leaf: Equilibrium) -> Self {
         MethodSolution {
             outcome: leaf.outcome,
-            remark: leaf.remark,
+            remark: leaf.remark.map(|remark| remark.to_string()),
             stations: leaf.shape.stations,
             rods: leaf.shape.rods,
             energy: leaf.energy.unwrap_or(f64::NAN),

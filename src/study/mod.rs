@@ -8,6 +8,7 @@ mod fit;
 mod judge;
 mod map;
 mod margin;
+mod remark;
 mod sensitivity;
 mod trace;
 mod vary;
@@ -42,6 +43,7 @@ pub use crate::study::map::{
     MapShow, ReferenceConfidence, map,
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
+pub use crate::study::remark::{BoundaryRemark, BranchRemark, EquilibriaRemark, TraceRemark};
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
 };

@@ -9,6 +9,7 @@ use crate::numbers::larger;
 use crate::relax::accuracy::richardson::{Richardson, distance};
 use crate::relax::accuracy::transfer::Stencil;
 use crate::relax::accuracy::{GridLevel, positions, transfer};
+use crate::relax::remark::EquilibriumRemark;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Equilibrium, Outcome, Shape};
 use crate::scenario::Scenario;
@@ -288,10 +289,6 @@ fn integrate_from_section(
 /// Smallest number of parts into which the stations of a result divide a vein.
 const MIN_STATION_PARTS: usize = 16;
 
-/// Advice if interpolated stations are less accurate than the tolerance.
-const INTERPOLATION_ADVICE: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
-    stations between: ask for a smaller tolerance, or for other stations";
-
 impl Equilibrium {
     /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
     /// nodes of the finest grid, with its segments halved until there are at least 17
@@ -319,7 +316,7 @@ impl Equilibrium {
         }
         if there.outcome.is_success() {
             there.outcome = Outcome::ToleranceNotReached;
-            there.remark = Some(INTERPOLATION_ADVICE.into());
+            there.remark = Some(EquilibriumRemark::InaccurateBetweenStations);
         }
         there
     }

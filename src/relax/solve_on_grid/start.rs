@@ -8,6 +8,7 @@
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, NodalField, State};
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::loading::arrival;
+use crate::relax::remark::EquilibriumDoubt;
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
@@ -149,10 +150,6 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     }
 }
 
-/// Remark on a leaf that did not come to rest from the given shape.
-const RELAXED_ANEW_REMARK: &str =
-    "from the given start the leaf does not come to rest: it was relaxed as without one";
-
 /// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
 /// in the valley in which that lies, where a relaxation may find another. Where that leads nowhere it
 /// relaxes as without, and one of the doubts says so.
@@ -207,7 +204,7 @@ pub fn relax_from(
     }
     drop(effort);
     let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
-    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
+    leaf.doubts.push(EquilibriumDoubt::RelaxedAnew);
     Ok(leaf)
 }
 
