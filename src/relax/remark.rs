@@ -316,6 +316,18 @@ remarks! {
     }
 }
 
+impl EquilibriumRemark {
+    /// What may have kept the leaf from coming to rest.
+    pub fn obstacle(&self) -> Option<&RestObstacle> {
+        match self {
+            EquilibriumRemark::NoDescent { obstacle, .. }
+            | EquilibriumRemark::UnresolvedBend { obstacle, .. }
+            | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_ref(),
+            _ => None,
+        }
+    }
+}
+
 /// What holds a vein at one end of a span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpanHolder {
