@@ -261,7 +261,7 @@ impl Key {
         &FORMAT[self as usize]
     }
 
-    /// As in `--set`: `table.key`, or `name`.
+    /// Its path in the scenario: `table.key`, or `name`.
     pub fn path(self) -> &'static str {
         self.row().path
     }
