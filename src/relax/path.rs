@@ -14,7 +14,6 @@
 //! The loads come first because straight veins of unequal chords that are compressed before
 //! they are bent buckle at once, to either side; after their loads they are bent already.
 
-use crate::relax::remark::EquilibriumDoubt;
 use crate::words;
 use serde::Serialize;
 use std::fmt;
@@ -100,17 +99,6 @@ impl Path {
         match self {
             Path::Loaded { events, .. } | Path::Held { events } => events,
             Path::Released => &[],
-        }
-    }
-
-    /// What is not certain about it, where this route was meant.
-    pub(super) fn doubt(&self, meant: Route) -> Option<EquilibriumDoubt> {
-        match self {
-            Path::Loaded {
-                confirmed: false, ..
-            } => Some(EquilibriumDoubt::UnconfirmedPath),
-            Path::Released if meant == Route::LoadedLeaf => Some(EquilibriumDoubt::ReleasedInstead),
-            _ => None,
         }
     }
 

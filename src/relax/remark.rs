@@ -3,7 +3,7 @@
 
 use crate::leaf::HalfTurn;
 use crate::numbers::{format_error_bound, format_two_digits};
-use crate::relax::path::Stage;
+use crate::relax::path::{Path, Route, Stage};
 use crate::run::remarks;
 use crate::scenario::PlausibilityWarning;
 use crate::shooting::{NeutralDirection, ShootingFailureReason};
@@ -323,6 +323,19 @@ impl EquilibriumRemark {
             EquilibriumRemark::NoDescent { obstacle, .. }
             | EquilibriumRemark::UnresolvedBend { obstacle, .. }
             | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_ref(),
+            _ => None,
+        }
+    }
+}
+
+impl EquilibriumDoubt {
+    /// What is not certain about a path, where this route was meant.
+    pub(super) fn about_path(path: &Path, meant: Route) -> Option<Self> {
+        match path {
+            Path::Loaded {
+                confirmed: false, ..
+            } => Some(EquilibriumDoubt::UnconfirmedPath),
+            Path::Released if meant == Route::LoadedLeaf => Some(EquilibriumDoubt::ReleasedInstead),
             _ => None,
         }
     }

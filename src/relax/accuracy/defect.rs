@@ -23,8 +23,8 @@ use crate::leaf::{
 };
 use crate::newton::SolverCounts;
 use crate::numbers::larger;
-use crate::relax::accuracy::GridLevel;
 use crate::relax::accuracy::fields::extrapolated_node_fields;
+use crate::relax::accuracy::transfer::GridLevel;
 use crate::rotation;
 use glam::DVec3;
 

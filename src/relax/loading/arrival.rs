@@ -6,15 +6,16 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_state, whole_sta
 use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::numbers::largest;
 use crate::relax::accuracy::richardson::distance;
-use crate::relax::accuracy::transfer::{predict_on_finer_grid, prolong, restrict, transfer};
+use crate::relax::accuracy::transfer::{
+    GridLevel, positions, predict_on_finer_grid, prolong, restrict, transfer,
+};
 use crate::relax::accuracy::{
-    GridLevel, History, NestedEquilibrium, RelaxationFailure, RelaxationResult, positions,
-    result_with_path,
+    History, NestedEquilibrium, RelaxationFailure, RelaxationResult, result_with_path,
 };
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::path::{Event, Path, Stage};
+use crate::relax::problem::{BUDGET, RelaxationProblem, WorkLog};
 use crate::relax::request::Progress;
-use crate::relax::rest::{BUDGET, RelaxationProblem, WorkLog};
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::solve_on_grid::{
