@@ -311,7 +311,8 @@ pub fn chart(
         Ok::<_, ChartError>(chart)
     })?;
     let chart = found.map_err(value_error)?;
-    let (confirmed, remarks) = (chart.is_reference_confirmed(), chart.remarks.clone());
+    let confirmed = chart.is_reference_confirmed();
+    let remarks = chart.remarks.iter().map(ToString::to_string).collect();
     let scaling = chart.scaling.clone();
     let scaling = scaling.map(|scaling| Files::of(scaling, input.clone()));
     Ok((Files::of(chart, input), scaling, confirmed, remarks))

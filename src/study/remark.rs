@@ -1,10 +1,12 @@
 //! What is said of traces, their branches, boundaries of stability and sets of equilibria: why they
-//! are not known as far as requested, and what would help.
+//! are not known as far as requested, and what would help. And what a method says of its answer,
+//! where methods are compared.
 
 use crate::branch::{CorrectorFailure, VerificationFailure};
 use crate::numbers::format_error_bound;
 use crate::relax::EquilibriumRemark;
 use crate::run::remarks;
+use crate::shooting::{NeutralDirection, ShootingFailureReason};
 use crate::study::vary::ParameterKeys;
 
 remarks! {
@@ -109,6 +111,49 @@ remarks! {
         /// A run that was stopped.
         #[error("{}", CorrectorFailure::Stopped)]
         Stopped = "stopped",
+    }
+
+    /// What a method says of its answer.
+    pub enum SolutionRemark {
+        /// What is said of an equilibrium.
+        #[error("{0}")]
+        Equilibrium(EquilibriumRemark) = inner.code(),
+        /// The saddle that a relaxation left.
+        #[error("left a saddle of index {index}")]
+        LeftSaddle {
+            /// Its Morse index.
+            index: usize,
+        } = "left-saddle",
+        /// How shooting found the solution.
+        #[error(
+            "over {}, growth 10^{growth:.1}{}",
+            match .intervals {
+                1 => "1 interval".into(),
+                count => format!("{count} intervals"),
+            },
+            .neutral.as_ref().map_or(String::new(), |neutral| format!("; {neutral}"))
+        )]
+        Shot {
+            /// Its number of intervals.
+            intervals: usize,
+            /// Decimal logarithm of the growth of perturbations from base to tip.
+            growth: f64,
+            /// A direction in which the leaf can move without resistance.
+            neutral: Option<NeutralDirection>,
+        } = "shot",
+        /// Why shooting found no solution.
+        #[error("{0}")]
+        ShootingFailed(ShootingFailureReason) = "shooting-failed",
+        /// The time step of explicit motion.
+        #[error("step {step:.3e}, stable up to {stable:.3e} because of {limit}")]
+        Stepped {
+            /// The step, in the scenario's unit of time.
+            step: f64,
+            /// The longest stable one.
+            stable: f64,
+            /// The fastest motion, which limits it.
+            limit: &'static str,
+        } = "stepped",
     }
 
     /// What is to be said of the equilibria that were found. They are counted from 0.

@@ -167,7 +167,8 @@ fn an_acceleration_of_a_flat_strip_is_named() {
         );
         codes(&settle(base(&strip, "").scenario(), 1e-6).doubts)
     };
-    assert_eq!(strip(-9.81), "acceleration-as-weight");
+    // So heavy a strip snaps on its way, to other places on other grids.
+    assert!(strip(-9.81).starts_with("acceleration-as-weight"));
     assert_eq!(strip(-800.0 * 0.008 * 4e-4 * 9.81), "");
 }
 
