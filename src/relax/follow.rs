@@ -133,8 +133,8 @@ fn relax_with_progress(
 ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
     let (leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
-        let remark = leaf.remark.clone();
-        let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
+        let remark = leaf.remark.as_ref();
+        let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
         return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
     Ok(Ok(found))

@@ -14,6 +14,7 @@ mod loading;
 mod log;
 mod path;
 pub(crate) mod plan;
+mod remark;
 mod request;
 pub(crate) mod rest;
 mod result;
@@ -31,6 +32,11 @@ pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
 pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
+pub(crate) use crate::relax::remark::serialize_remark;
+pub use crate::relax::remark::{
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
+    SpanHolder,
+};
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,

@@ -41,6 +41,7 @@ pub(crate) use crate::scenario::format::source::intended_number;
 pub use crate::scenario::format::units::{self, Units};
 pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, Weight, Wind};
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
+pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{
     LARGEST_PLAUSIBLE_STRETCH, obstacle, out_of_reach, plausibility_warnings,
 };

@@ -1,6 +1,7 @@
 //! Numbers of a scenario that are allowed, but probably not what was intended: degrees in place of
 //! radians, accelerations in place of weights, lengths in other units.
 
+use crate::run::remarks;
 use crate::scenario::checked::Scenario;
 use crate::scenario::loads::Dynamics;
 use crate::scenario::supports::Clamp;
@@ -72,8 +73,158 @@ impl GravityInUnit {
     }
 }
 
-/// What is probably not what was intended, one short sentence each.
-pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
+remarks! {
+    /// What in a scenario is probably not what was intended. Veins are counted from 0, and numbers
+    /// are in the units of the scenario.
+    pub enum PlausibilityWarning {
+        /// An angle that is in degrees, or of a vein that grows backwards.
+        #[error("{key} is in radians, and {angle} is {}", turn_in_words(*.angle))]
+        AngleInDegrees {
+            /// The key of the scenario.
+            key: &'static str,
+            /// Its value.
+            angle: f64,
+        } = "angle-in-degrees",
+        /// A section with a side longer than its vein.
+        #[error(
+            "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
+            .vein + 1, four_digits(*.side), four_digits(*.length)
+        )]
+        ThickerThanLong {
+            /// The vein.
+            vein: usize,
+            /// The longest side of its section.
+            side: f64,
+            /// Its length.
+            length: f64,
+        } = "thicker-than-long",
+        /// A tip that is held farther from the base than a vein plausibly stretches.
+        #[error(
+            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
+            four_digits(*.distance), .vein + 1, four_digits(*.length), 100.0 * .stretch
+        )]
+        OutOfReach {
+            /// Of the tip from the base.
+            distance: f64,
+            /// The vein that would stretch most.
+            vein: usize,
+            /// Its length at rest.
+            length: f64,
+            /// By which part of its length it would stretch.
+            stretch: f64,
+        } = "out-of-reach",
+        /// A weight per length besides an acceleration that gives the mass the same weight.
+        #[error(
+            "load.gravity and load.g state the same weight, {} per length of vein {}, which then counts twice; {}",
+            four_digits(*.weight), .vein + 1, BOTH_WEIGHTS
+        )]
+        WeightGivenTwice {
+            /// A vein that has both.
+            vein: usize,
+            /// The weight per length.
+            weight: f64,
+        } = "weight-given-twice",
+        /// A weight per length besides an acceleration that gives the mass another weight.
+        #[error(
+            "load.gravity and load.g contradict each other: {}; {}",
+            both_weights(*.vein, [*.given, *.of_mass], *.apart), BOTH_WEIGHTS
+        )]
+        WeightsContradict {
+            /// A vein that has both.
+            vein: usize,
+            /// Its weight per length, as given.
+            given: f64,
+            /// The weight per length of its mass.
+            of_mass: f64,
+            /// The angle between both, in radians, if their directions differ.
+            apart: Option<f64>,
+        } = "weights-contradict",
+        /// A leaf that is too long for its weight, which is the acceleration of gravity by its number.
+        #[error(
+            "{}: load.gravity is a force per length, mass per length times 9.81, not the acceleration",
+            too_long_in_words(*.times)
+        )]
+        AccelerationAsWeight {
+            /// The length of every vein, at least, in lengths over which it carries its weight.
+            times: f64,
+        } = "acceleration-as-weight",
+        /// A leaf that is too long for its weight and stiffness.
+        #[error(
+            "{}: {}", too_long_in_words(*.times),
+            match .of_mass {
+                true => "load.g is an acceleration: check it, the mass, the stiffnesses and the units",
+                false => "load.gravity is a force per length: check it, the stiffnesses and the units",
+            }
+        )]
+        TooLong {
+            /// The length of every vein, at least, in lengths over which it carries its weight.
+            times: f64,
+            /// Whether the weight is that of its mass, by an acceleration.
+            of_mass: bool,
+        } = "too-long",
+        /// A weight that is not that of the mass.
+        #[error(
+            "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
+            four_digits(*.weight), four_digits(*.mass), four_digits(.weight / .mass)
+        )]
+        WeightOfAnotherMass {
+            /// Per length.
+            weight: f64,
+            /// Per length.
+            mass: f64,
+        } = "weight-of-another-mass",
+        /// The acceleration of gravity as it is in another unit of length.
+        #[error(
+            "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {unit}: there it is {expected}",
+            four_digits(*.given)
+        )]
+        GravityOfAnotherUnit {
+            /// The acceleration.
+            given: f64,
+            /// The unit of length in which it is that of gravity.
+            other: &'static str,
+            /// The unit of length of the scenario.
+            unit: String,
+            /// That of gravity in it.
+            expected: f64,
+        } = "gravity-of-another-unit",
+    }
+}
+
+/// What to do about two weights.
+const BOTH_WEIGHTS: &str =
+    "they add up: give one of them, and other loads along veins as load.distributed";
+
+fn turn_in_words(angle: f64) -> &'static str {
+    match angle.abs() > TAU {
+        true => "more than a turn",
+        false => "more than a right angle",
+    }
+}
+
+fn both_weights(vein: usize, weights: [f64; 2], apart: Option<f64>) -> String {
+    let ([one, other], vein) = (weights.map(four_digits), vein + 1);
+    match apart {
+        Some(angle) => format!(
+            "as weights per length of vein {vein}, {one} and {other}, they are {:.0} degrees apart",
+            angle.to_degrees()
+        ),
+        None => format!("they state the weights {one} and {other} per length of vein {vein}"),
+    }
+}
+
+fn too_long_in_words(times: f64) -> String {
+    format!(
+        "every vein is {times:.0} times longer than (A/q)^(1/3), over which it carries its weight"
+    )
+}
+
+fn four_digits(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+/// What is probably not what was intended.
+pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
     let heavy = weight_stated_twice(scenario).or_else(|| too_long(scenario));
     let heavy = heavy
         .or_else(|| weight_of_another_mass(scenario))
@@ -86,8 +237,8 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
     angles.into_iter().chain(lengths).flatten().collect()
 }
 
-/// The implausible number that most probably keeps a leaf from coming to rest.
-pub fn obstacle(scenario: &Scenario) -> Option<String> {
+/// The one of them that most probably keeps a leaf from coming to rest.
+pub fn obstacle(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let slips = [
         out_of_reach,
         clamp_angle_in_degrees,
@@ -101,6 +252,7 @@ pub fn obstacle(scenario: &Scenario) -> Option<String> {
 
 /// How far a held tip is from the base of a vein.
 struct TipReach {
+    vein: usize,
     /// By which part the vein would have to stretch.
     stretch: f64,
     away: f64,
@@ -109,105 +261,81 @@ struct TipReach {
 }
 
 /// A tip that is held farther from the base than a vein plausibly stretches.
-pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
+pub fn out_of_reach(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
-    let reach = |rod: &Rod| {
+    let reach = |(vein, rod): (usize, &Rod)| {
         let length = rod.length * rod.rest_stretch.integral(1.0);
         let away = tip.distance(rod.base_position());
         TipReach {
+            vein,
             stretch: away / length - 1.0,
             away,
             length,
         }
     };
-    let all = scenario.rods.iter().map(reach).enumerate();
-    let least = all.min_by(|(_, a), (_, b)| b.stretch.total_cmp(&a.stretch));
-    let (
-        j,
-        TipReach {
-            stretch,
-            away,
-            length,
-        },
-    ) = least?;
-    (stretch > LARGEST_PLAUSIBLE_STRETCH).then(|| {
-        format!(
-            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
-            four_digits(away),
-            j + 1,
-            four_digits(length),
-            100.0 * stretch
-        )
+    let all = scenario.rods.iter().enumerate().map(reach);
+    let least = all.min_by(|a, b| b.stretch.total_cmp(&a.stretch))?;
+    (least.stretch > LARGEST_PLAUSIBLE_STRETCH).then_some(PlausibilityWarning::OutOfReach {
+        distance: least.away,
+        vein: least.vein,
+        length: least.length,
+        stretch: least.stretch,
     })
 }
 
-fn four_digits(number: f64) -> f64 {
-    format!("{number:.3e}").parse().unwrap_or(number)
-}
-
 /// Base angles of more than a right angle: a vein that grows backwards.
-fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
-    let doubt = |key: &str, angle: f64| {
+fn fan_angles_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    type Angle = fn(&Rod) -> f64;
+    let kinds: [(&'static str, Angle); 2] = [
+        ("leaf.fan", |rod| rod.angle),
+        ("leaf.elevation", |rod| rod.elevation),
+    ];
+    let doubt = |key: &'static str, angle: f64| {
         let turned = angle.abs() > FRAC_PI_2 * (1.0 + PLAUSIBLE.gravity_tolerance);
-        turned.then(|| {
-            format!(
-                "{key} is in radians, and {angle} is {}",
-                clamp_turn_meaning(angle)
-            )
-        })
+        turned.then_some(PlausibilityWarning::AngleInDegrees { key, angle })
     };
     if let Some(blade) = &scenario.blade {
         // The directions of its veins follow from this angle and its outline.
         return doubt("leaf.elevation", blade.elevation);
     }
-    let largest = |key: &str, angle: fn(&Rod) -> f64| {
-        let angles = scenario.rods.iter().map(angle);
+    kinds.into_iter().find_map(|(key, of)| {
+        let angles = scenario.rods.iter().map(of);
         doubt(key, angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?)
-    };
-    largest("leaf.fan", |rod| rod.angle).or_else(|| largest("leaf.elevation", |rod| rod.elevation))
+    })
 }
 
 /// An angle by which a clamped tip is turned that looks like one in degrees.
-fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<String> {
+fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let clamps = scenario.held_tip.as_ref()?.clamps.as_ref()?;
     let angle = |clamp: &Clamp| {
         let whole = clamp.angle.fract() == 0.0 && clamp.angle.abs() > FRAC_PI_2;
-        whole.then_some(("angles", clamp.angle))
+        whole.then_some(("tip.angles", clamp.angle))
     };
     let twist = |clamp: &Clamp| {
         let whole = clamp.twist % PLAUSIBLE.degree_multiple == 0.0 && clamp.twist.abs() > TAU;
-        whole.then_some(("twist", clamp.twist))
+        whole.then_some(("tip.twist", clamp.twist))
     };
     let (key, angle) = clamps
         .iter()
         .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
-    let turned = clamp_turn_meaning(angle);
-    Some(format!("tip.{key} is in radians, and {angle} is {turned}"))
-}
-
-fn clamp_turn_meaning(angle: f64) -> &'static str {
-    match angle.abs() > TAU {
-        true => "more than a turn",
-        false => "more than a right angle",
-    }
+    Some(PlausibilityWarning::AngleInDegrees { key, angle })
 }
 
 /// A section with a side longer than its vein.
-fn thicker_than_long(scenario: &Scenario) -> Option<String> {
+fn thicker_than_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
     let mut rods = scenario.rods.iter().enumerate();
-    let (j, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
-    Some(format!(
-        "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
-        j + 1,
-        four_digits(side(j)),
-        four_digits(rod.length)
-    ))
+    let (vein, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
+    Some(PlausibilityWarning::ThickerThanLong {
+        vein,
+        side: side(vein),
+        length: rod.length,
+    })
 }
 
 /// A weight per length besides an acceleration that pulls the mass: they add up, and state either the
 /// same weight twice or two weights.
-fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
+fn weight_stated_twice(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let weights = |vein: usize| {
         let weight = scenario.weight(vein);
         let given = DVec3::from_array(weight.even);
@@ -216,30 +344,26 @@ fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
         (given != DVec3::ZERO).then_some((vein, given, pulled))
     };
     let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
-    let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
+    let of_mass = pulled.length();
     let angle = given.angle_between(pulled);
-    let states = match given.distance(pulled) <= PLAUSIBLE.weight_tolerance * pulled.length() {
-        true => format!(
-            "state the same weight, {other} per length of vein {}, which then counts twice",
-            vein + 1
-        ),
-        false if angle > PLAUSIBLE.weight_tolerance => format!(
-            "contradict each other: as weights per length of vein {}, {one} and {other}, they are {:.0} degrees apart",
-            vein + 1,
-            angle.to_degrees()
-        ),
-        false => format!(
-            "contradict each other: they state the weights {one} and {other} per length of vein {}",
-            vein + 1
-        ),
-    };
-    Some(format!(
-        "load.gravity and load.g {states}; they add up: give one of them, and other loads along veins as load.distributed"
-    ))
+    Some(
+        match given.distance(pulled) <= PLAUSIBLE.weight_tolerance * of_mass {
+            true => PlausibilityWarning::WeightGivenTwice {
+                vein,
+                weight: of_mass,
+            },
+            false => PlausibilityWarning::WeightsContradict {
+                vein,
+                given: given.length(),
+                of_mass,
+                apart: (angle > PLAUSIBLE.weight_tolerance).then_some(angle),
+            },
+        },
+    )
 }
 
 /// A weight that is not that of the mass, if both are given, in seconds.
-fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
+fn weight_of_another_mass(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let even = (0..scenario.rods.len()).map(|vein| scenario.weight(vein).even);
     let weight = even.map(|even| DVec3::from_array(even).length());
     let weight = weight.fold(0.0, f64::max);
@@ -257,18 +381,12 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     let mass = scenario.dynamics.mean_density();
     let found = weight / mass;
     let allowed = least / PLAUSIBLE.weight_contradiction..=most * PLAUSIBLE.weight_contradiction;
-    (weight > 0.0 && !allowed.contains(&found)).then(|| {
-        format!(
-            "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
-            four_digits(weight),
-            four_digits(mass),
-            four_digits(found)
-        )
-    })
+    (weight > 0.0 && !allowed.contains(&found))
+        .then_some(PlausibilityWarning::WeightOfAnotherMass { weight, mass })
 }
 
 /// The acceleration of gravity as it is in another unit of length.
-fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
+fn gravity_of_another_unit(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let units = &scenario.units;
     if units.time.is_some() && !units.is_in_seconds() {
         return None;
@@ -279,14 +397,16 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
     let is = |acceleration: f64| (given / acceleration - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
     let of_other = |unit: &&GravityInUnit| unit.length != own && is(unit.acceleration);
     let other = GRAVITY_IN_UNITS.iter().find(of_other)?.length;
-    Some(format!(
-        "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
-        four_digits(given)
-    ))
+    Some(PlausibilityWarning::GravityOfAnotherUnit {
+        given,
+        other,
+        unit: own.to_owned(),
+        expected: known,
+    })
 }
 
 /// A leaf that is too long for its weight and stiffness, if only its base is held.
-fn too_long(scenario: &Scenario) -> Option<String> {
+fn too_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
     if scenario.held_tip.is_some() {
         return None;
     }
@@ -322,18 +442,11 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     {
         return None;
     }
-    let advice = match slip {
-        true => {
-            "load.gravity is a force per length, mass per length times 9.81, not the acceleration"
-        }
-        false if of_mass => {
-            "load.g is an acceleration: check it, the mass, the stiffnesses and the units"
-        }
-        false => "load.gravity is a force per length: check it, the stiffnesses and the units",
-    };
-    Some(format!(
-        "every vein is {shortest:.0} times longer than (A/q)^(1/3), over which it carries its weight: {advice}"
-    ))
+    let times = shortest;
+    Some(match slip {
+        true => PlausibilityWarning::AccelerationAsWeight { times },
+        false => PlausibilityWarning::TooLong { times, of_mass },
+    })
 }
 
 #[cfg(test)]
@@ -353,11 +466,18 @@ mod tests {
             );
             plausibility_warnings(&Scenario::from_toml(&text).unwrap())
         };
-        assert!(doubts("cm", 9.81)[0].contains("there it is 981"));
-        assert!(doubts("cm", 9.8)[0].contains("in m/s²"));
-        assert!(doubts("m", 981.0)[0].contains("there it is 9.81"));
+        let said = "load.g is 9.81, the acceleration of gravity in m/s², and lengths are in cm: there it is 981";
+        assert_eq!(doubts("cm", 9.81)[0].to_string(), said);
+        for (length, g, meant) in [("cm", 9.8, ("m", 981.0)), ("m", 981.0, ("cm", 9.81))] {
+            let said = &doubts(length, g)[0];
+            assert!(
+                matches!(said, PlausibilityWarning::GravityOfAnotherUnit { other, expected, .. }
+                    if (*other, *expected) == meant),
+                "{said}"
+            );
+        }
         for (length, g) in [("cm", 981.0), ("m", 9.81), ("cm", 160.0), ("ell", 9.81)] {
-            assert_eq!(doubts(length, g), Vec::<String>::new());
+            assert_eq!(doubts(length, g), []);
         }
     }
 
@@ -375,12 +495,14 @@ mod tests {
         };
         for elevation in [45.0, 2.0] {
             let said = doubts(elevation);
-            assert!(
-                said.len() == 1 && said[0].starts_with("leaf.elevation "),
-                "{said:?}"
-            );
+            let key = "leaf.elevation";
+            let wanted = PlausibilityWarning::AngleInDegrees {
+                key,
+                angle: elevation,
+            };
+            assert_eq!(said, [wanted]);
         }
-        assert_eq!(doubts(1.2), Vec::<String>::new());
+        assert_eq!(doubts(1.2), []);
     }
 
     /// A weight of another mass may keep a leaf from coming to rest.

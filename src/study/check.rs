@@ -4,7 +4,8 @@
 
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, serialize_index,
+    Equilibrium, EquilibriumRemark, Options, Outcome, Progress, RelaxError, SemiImplicit,
+    serialize_index, serialize_remark,
 };
 use crate::run::Limit;
 use crate::scenario::Scenario;
@@ -359,8 +360,8 @@ pub fn serialize_relaxation<S: Serializer>(
     #[derive(Serialize)]
     struct Keys<'a> {
         outcome: &'static str,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        remark: Option<&'a str>,
+        #[serde(flatten, serialize_with = "serialize_remark")]
+        remark: &'a Option<EquilibriumRemark>,
         segments: &'a [usize],
         error_estimate: Option<f64>,
         residual: Option<f64>,
@@ -373,7 +374,7 @@ pub fn serialize_relaxation<S: Serializer>(
     }
     Keys {
         outcome: leaf.outcome.word(),
-        remark: leaf.remark.as_deref(),
+        remark: &leaf.remark,
         segments: &leaf.accuracy.segments,
         error_estimate: leaf.accuracy.error_estimate,
         residual: leaf.accuracy.residual,

@@ -8,6 +8,7 @@ mod fit;
 mod judge;
 mod map;
 mod margin;
+mod remark;
 mod sensitivity;
 mod trace;
 mod vary;
@@ -20,9 +21,9 @@ pub use crate::study::boundary::{
     StabilityBoundary, trace_stability_boundary,
 };
 pub use crate::study::chart::{
-    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRow,
-    FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution, ScalingRow, ScalingStudy,
-    SolverConfig, TimingSpread, chart, scaling,
+    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRemark,
+    ChartRow, ChartRowRemark, FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution,
+    ScalingRow, ScalingStudy, SolverConfig, TimingSpread, chart, scaling,
 };
 pub use crate::study::check::{
     Check, CheckOptions, CheckVerdict, ComparedQuantity, DifferenceLocation, ShootingResult, check,
@@ -38,10 +39,13 @@ pub use crate::study::fit::{
     SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
-    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
-    MapShow, ReferenceConfidence, map,
+    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapMotionFailure, MapOutcome, MapRefused,
+    MapRemark, MapRequest, MapRow, MapShow, ReferenceConfidence, map,
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
+pub use crate::study::remark::{
+    BoundaryRemark, BranchRemark, EquilibriaRemark, SolutionRemark, TraceRemark,
+};
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
 };

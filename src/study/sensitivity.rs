@@ -5,8 +5,8 @@
 
 use crate::numbers::largest;
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, FewerVeins, Method, Options, Parameter, Progress, RelaxError,
-    Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
+    Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Method, Options, Parameter,
+    Progress, RelaxError, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
@@ -50,7 +50,7 @@ pub fn relax_with_sensitivities(
         at_rest && turns && decides_zero_energy_rotation(number, turnings)
     });
     leaf.doubts
-        .extend(none.iter().map(|(key, _)| no_derivative_remark(key)));
+        .extend((none.into_iter()).map(|(key, _)| EquilibriumDoubt::NoDerivative { key }));
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(
             &found.levels,
@@ -116,13 +116,6 @@ fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
         .iter()
         .filter(|it| it.includes_bent_veins)
         .count()
-}
-
-fn no_derivative_remark(key: &str) -> String {
-    format!(
-        "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
-         change of this number decides where it turns to"
-    )
 }
 
 /// Tolerance of the blades that a blade is compared with.

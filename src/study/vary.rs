@@ -1,10 +1,10 @@
 //! Numbers of a scenario that vary: `KEY=FROM..TO[:COUNT][log]`.
 //!
-//! A key is any number of the scenario by its path as in `--set`, one entry of
+//! A key is any number of the scenario by its path (`table.key`), one entry of
 //! a list by an index that counts from 0 (`load.gravity[2]`), a common factor of all numbers
 //! of a key (`scale:stiffness.bending_2`), or a setting of a method
 //! (`method.step`). Several keys joined by `+` take the same value. The
-//! values are substituted as by `--set`, so that every limit of the
+//! values are substituted in the text of the scenario, so that every limit of the
 //! format applies to them ([`BaseScenario::scenario_with_values`]); the text is parsed only once.
 //!
 //! ```
@@ -428,7 +428,7 @@ pub struct VariedScenario {
 
 impl BaseScenario {
     /// Reads the file at `path`, with the entries `overrides` replaced
-    /// (`KEY=VALUE`, as in `--set`, or `method.segments=16`).
+    /// (`KEY=VALUE`, by paths of the scenario, or `method.segments=16`).
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, VaryError> {
         BaseScenario::from_text(scenario::text(path)?, path.display().to_string(), overrides)
     }

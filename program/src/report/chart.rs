@@ -33,7 +33,7 @@ impl ReportedResult for Chart {
         lines.extend(
             (self.scaling.iter()).flat_map(|it| label_first_line("veins", scaling_lines(it))),
         );
-        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.clone())));
+        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.to_string())));
         lines
     }
 }

@@ -17,8 +17,8 @@ use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, st
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
-    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event,
-    InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
+    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
+    Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
     COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
@@ -102,8 +102,19 @@ impl ReportedResult for Equilibrium {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
+        let doubts = self.doubts.iter().map(doubt_with_option);
+        [remark, label_first_line("doubtful", doubts)].concat()
+    }
+}
+
+/// A doubt on an equilibrium, with the option that helps.
+pub fn doubt_with_option(doubt: &EquilibriumDoubt) -> String {
+    match doubt {
+        EquilibriumDoubt::UnconfirmedPath | EquilibriumDoubt::UnconfirmedEquilibrium => {
+            format!("{doubt}; relax with --all looks for the others")
+        }
+        _ => doubt.to_string(),
     }
 }
 
@@ -454,7 +465,7 @@ impl ReportedResult for Equilibria {
 
     fn remarks(&self) -> LabelledLines {
         let more = "there may be more: no number of starts proves that these are all";
-        let remark = label_first_line("remark", self.remark.clone());
+        let remark = label_first_line("remark", self.remark());
         [remark, label_first_line("remark", Some(more.into()))].concat()
     }
 }
@@ -499,7 +510,8 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
     let unknown = margin.pushes.iter();
     let unknown = unknown.filter(|push| push.kind == InstabilityKind::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
-        let why = push.remark.as_deref().unwrap_or_default();
+        let why = push.remark.as_ref().map(ToString::to_string);
+        let why = why.unwrap_or_default();
         let which = direction_text(margin, push);
         match push.more_than.filter(|least| *least > 0.0) {
             Some(least) => {
@@ -519,7 +531,7 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
         }
         None => {}
     }
-    lines.extend(margin.remark.clone());
+    lines.extend(margin.remark.as_ref().map(ToString::to_string));
     lines
 }
 

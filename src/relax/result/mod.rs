@@ -7,6 +7,9 @@ pub(super) mod report;
 use crate::newton::SolverCounts;
 use crate::relax::log::Attempt;
 use crate::relax::path::Path;
+use crate::relax::remark::{
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, serialize_remark,
+};
 use crate::relax::request::Method;
 use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 use crate::relax::saddle::Saddle;
@@ -279,13 +282,13 @@ pub struct Equilibrium {
     pub method: Method,
     /// How the run ended.
     pub outcome: Outcome,
-    /// Advice if the run did not succeed: one sentence for the user.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    /// Why the run did not succeed and what would help, or what else is to be said of its end.
+    #[serde(flatten, serialize_with = "serialize_remark")]
+    pub remark: Option<EquilibriumRemark>,
     /// Implausible properties: a leaf that is stretched far, inverted, or too long for its
     /// weight and stiffness; and an uncertain stability.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<EquilibriumDoubt>,
     /// Number of rods.
     #[serde(rename = "rods")]
     pub rod_count: usize,
@@ -404,16 +407,16 @@ pub struct Margin {
     pub climbs: usize,
     /// Why a part of it is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<MarginRemark>,
     /// Time of all that is not the solve itself, in seconds.
     pub wall_seconds: f64,
 }
 
 impl Margin {
     /// No margin, with the reason.
-    pub fn none(remark: &str) -> Self {
+    pub fn none(remark: MarginRemark) -> Self {
         Margin {
-            remark: Some(remark.into()),
+            remark: Some(remark),
             ..Margin::default()
         }
     }
@@ -488,7 +491,7 @@ pub struct CriticalTipForce {
     pub mirrored: bool,
     /// Why it is not known, if that is so.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<CriticalTipForceRemark>,
 }
 
 /// How stability is lost.

@@ -260,7 +260,7 @@ impl Key {
         &FORMAT[self as usize]
     }
 
-    /// The path of the key, as overrides name it: `table.key`, or `name`.
+    /// Its path in the scenario: `table.key`, or `name`.
     pub fn path(self) -> &'static str {
         self.row().path
     }
