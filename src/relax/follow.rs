@@ -1,7 +1,7 @@
 //! A leaf at rest that follows its scenario as numbers of it change: along its branch of equilibria, on
 //! the same grids, as long as they are stable, and elsewhere only where it is told so.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
@@ -160,11 +160,22 @@ fn displaced_state(level: &GridLevel, leaf: &Leaf, response: &LinearResponse) ->
     rescale_state(level, state, leaf)
 }
 
-/// The shortest step of the way, as a part of it.
-const SHORTEST: f64 = 1.0 / 4096.0;
+/// Steps from one scenario to another.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1.0 / 4096.0,
+    longest: 1.0,
+    growth: 2.0,
+    failure: 0.25,
+};
 
-/// How much shorter a step is made that fails.
-const FAILED_STEP_FACTOR: f64 = 0.25;
+/// Why a leaf does not follow its scenario to the end.
+enum FollowEnd<E> {
+    /// Its branch cannot be followed beyond this part of the way.
+    Lost(f64),
+    /// A scenario on the way cannot be met.
+    Refused(E),
+}
 
 /// Grids on which the next equilibrium is predicted.
 const MAX_PREDICTED_GRIDS: usize = 2;
@@ -326,25 +337,34 @@ impl EquilibriumTracker {
         along: &dyn Fn(f64) -> Result<Scenario, E>,
     ) -> Result<TrackOutcome, E> {
         let clock = Instant::now();
-        let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
-        loop {
-            let scenario = Arc::new(along(way.next_lambda())?);
-            check_wind_options(&scenario, &self.options)?;
-            let last = way.next_lambda() == 1.0;
-            match self.step(Arc::clone(&scenario), last) {
+        let end = STEPS.follow(|step| {
+            let scenario = match along(step.to) {
+                Ok(scenario) => Arc::new(scenario),
+                Err(refused) => return StepEnd::Ended(FollowEnd::Refused(refused)),
+            };
+            if let Err(refused) = check_wind_options(&scenario, &self.options) {
+                return StepEnd::Ended(FollowEnd::Refused(E::from(refused)));
+            }
+            match self.step(Arc::clone(&scenario), step.to == 1.0) {
                 Ok(found) => {
                     (self.at, self.scenario) = (found, scenario);
-                    if last {
-                        self.coarsen();
-                        self.choose_cheaper_grid();
-                        return Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))));
+                    StepEnd::Made {
+                        growth: STEPS.growth,
                     }
-                    way.advance(2.0 * way.next_step_length());
                 }
-                Err(_) if way.shorten(FAILED_STEP_FACTOR) => {}
-                Err(_) if self.refine() => {}
-                Err(_) => return Ok(TrackOutcome::BranchEnded { part: way.lambda }),
+                Err(_) if !step.is_shortest => StepEnd::TooLong(FollowEnd::Lost(step.from)),
+                Err(_) if self.refine() => StepEnd::Again,
+                Err(_) => StepEnd::Ended(FollowEnd::Lost(step.from)),
             }
+        });
+        match end {
+            Ok(()) => {
+                self.coarsen();
+                self.choose_cheaper_grid();
+                Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))))
+            }
+            Err(FollowEnd::Lost(part)) => Ok(TrackOutcome::BranchEnded { part }),
+            Err(FollowEnd::Refused(refused)) => Err(refused),
         }
     }
 

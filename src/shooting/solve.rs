@@ -3,7 +3,7 @@
 //! A boundary-value solution without a given start: by continuation from the leaf
 //! that rests in arcs, whose solution is known, to the scenario's.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::run::UnmodelledFeature;
 use crate::scenario::{Scenario, SupportKind, longest};
 use crate::shape::{Difference, equally_spaced};
@@ -217,8 +217,14 @@ fn solve_near(
 /// Accuracy of intermediate solutions.
 const INTERMEDIATE_TOLERANCE: f64 = 1e-6;
 
-/// Smallest step, as a part of the whole change.
-const LEAST_STEP: f64 = 1.0 / 16384.0;
+/// Steps of a stage, of which the first is the whole change.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1.0 / 16384.0,
+    longest: 1.0,
+    growth: 2.0,
+    failure: 0.5,
+};
 
 /// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
 const MAX_SLOPE_EVALUATIONS: usize = 4_000_000;
@@ -319,42 +325,46 @@ impl HomotopyAttempt<'_, '_, '_> {
         stage: HomotopyParameter,
         mut near: LeafTrajectory,
     ) -> Result<LeafTrajectory, InterruptedHomotopy> {
-        let mut path = Homotopy::new(1.0, [LEAST_STEP, 1.0]);
         let mut before: Option<(LeafTrajectory, f64)> = None;
         let (begun, rods) = (self.log.work.slopes, self.equations.rods());
-        while path.lambda < 1.0 {
-            let part = path.lambda;
-            self.log.lambda = part;
-            *stage(self.equations) = path.next_lambda();
+        let end = STEPS.follow(|step| {
+            self.log.lambda = step.from;
+            *stage(self.equations) = step.to;
             let predicted = match &before {
-                Some((earlier, at)) => near.extrapolate(
-                    self.equations,
-                    earlier,
-                    path.next_step_length() / (part - at),
-                ),
+                Some((earlier, at)) => {
+                    near.extrapolate(self.equations, earlier, step.length() / (step.from - at))
+                }
                 None => near.clone(),
             };
             match self.solve_near(&predicted) {
                 Ok(trajectory) => {
-                    before = Some((std::mem::replace(&mut near, trajectory), part));
-                    path.advance(2.0 * path.next_step_length());
+                    before = Some((std::mem::replace(&mut near, trajectory), step.from));
+                    StepEnd::Made {
+                        growth: STEPS.growth,
+                    }
                 }
                 Err(reason) => {
                     let spent = (self.log.work.slopes - begun) * rods;
                     let ends = reason == ShootingFailureReason::OutOfTime
                         || spent >= MAX_SLOPE_EVALUATIONS;
-                    if ends || !path.shorten(0.5) {
-                        return Err(InterruptedHomotopy {
-                            reason,
-                            lambda: part,
-                            last_trajectory: near,
-                        });
+                    match ends {
+                        true => StepEnd::Ended((reason, step.from)),
+                        false => StepEnd::TooLong((reason, step.from)),
                     }
                 }
             }
+        });
+        match end {
+            Ok(()) => {
+                self.log.lambda = 1.0;
+                Ok(near)
+            }
+            Err((reason, lambda)) => Err(InterruptedHomotopy {
+                reason,
+                lambda,
+                last_trajectory: near,
+            }),
         }
-        self.log.lambda = 1.0;
-        Ok(near)
     }
 
     fn solve_near(
