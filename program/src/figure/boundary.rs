@@ -8,16 +8,15 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
-    HEADER, LabelPlacement, Legend, MOST_CURVES_NAMED, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, SmallPanels, TICK_FONT_SIZE, clearest_label,
-    draw_panel_title, label_size, new_page,
+    LabelPlacement, Legend, MOST_CURVES_NAMED, clearest_label, label_size, new_page,
 };
 use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::space::SmallPanels;
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve, vein_tips};
 use crate::figure::drawing::{
-    BLUE, Color, DashPattern, Drawing, GREEN, NOTE_COLOR, PURPLE, SKY, SLATE, Stroke, TEXT_COLOR,
-    TextAnchor, VERMILION, polygon_path,
+    BLUE, Color, DashPattern, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, PAGE, PURPLE, PageRectangle,
+    SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, draw_panel_title, polygon_path,
 };
-use crate::figure::leaf::{DrawnVeins, longest_curve, vein_tips};
 use crate::figure::map::{DARKEST_MORSE_INDEX, PALE, fill_cell_by_index};
 use crate::figure::scenario::{FigureSetting, QuantityLabel};
 use crate::report::numbers::{
@@ -56,11 +55,11 @@ pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
         .map(|it| DrawnVeins::from_curves(&it.curves, &it.tips, longest).with_supports(scenario))
         .collect();
     let diagram =
-        PageRectangle::left_of_legend(HEADER + PANEL_TITLE_HEIGHT, DIAGRAM_HEIGHT, LEGEND_WIDTH);
-    let below = diagram.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        PageRectangle::left_of_legend(PAGE.header + PAGE.panel_title, DIAGRAM_HEIGHT, LEGEND_WIDTH);
+    let below = diagram.opposite_corner().y + PAGE.panel_axis;
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(boundary), None);
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(boundary), None);
     drawing.height = panels.bottom();
     drawing.draw_group("curves", |page| {
         draw_curves(page, boundary, &scenario.units, &shown, diagram)
@@ -259,7 +258,7 @@ fn draw_index_cells(
     }
     for [c, r] in &map.disagreeing {
         if let Some(at) = axes.page_position((map.first[c - 1], map.second[r - 1])) {
-            page.draw_label(at, "×", TICK_FONT_SIZE, TextAnchor::Middle, TEXT_COLOR);
+            page.draw_label(at, "×", FONT_SIZE.tick, TextAnchor::Middle, TEXT_COLOR);
         }
     }
 }

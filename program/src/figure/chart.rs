@@ -5,13 +5,12 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PageRectangle, TICK_FONT_SIZE, new_page,
-};
+use crate::figure::drawing::labels::{Legend, new_page};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, Drawing, GREEN, NOTE_COLOR, ORANGE, PURPLE, SHADOW_COLOR, SKY, SLATE, Stroke,
-    TEXT_COLOR, TextAnchor, VERMILION, circle_path, rectangle_path,
+    BLUE, Color, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, ORANGE, PAGE, PURPLE, PageRectangle,
+    SHADOW_COLOR, SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, circle_path,
+    rectangle_path,
 };
 use crate::report::contender_name;
 use crate::report::numbers::format_error_bound;
@@ -109,9 +108,9 @@ fn time_axis(values: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, title, notes, None);
-    drawing.height = (HEADER + panel.total_height()).ceil();
-    drawing.draw_group("chart", |page| panel.draw(page, HEADER));
+    let mut drawing = new_page(PAGE.left_margin, title, notes, None);
+    drawing.height = (PAGE.header + panel.total_height()).ceil();
+    drawing.draw_group("chart", |page| panel.draw(page, PAGE.header));
     drawing
 }
 
@@ -310,7 +309,7 @@ impl ChartPanel {
 
     /// Height of the panel with lanes and axis.
     pub fn total_height(&self) -> f64 {
-        self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS_HEIGHT
+        self.lanes_height() + FRAME_HEIGHT + PAGE.panel_axis
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
@@ -379,9 +378,9 @@ impl ChartPanel {
         let area = DVec2::new(cell.size.x, LANE_HEIGHT - 2.0);
         let start = DVec2::new(left, top + 1.0);
         page.draw_shape(rectangle_path(start, area), FAILURE_LANES_COLOR, None);
-        let name = Font::embedded().shorten_text(word, TICK_FONT_SIZE, KEY - 14.0);
+        let name = Font::embedded().shorten_text(word, FONT_SIZE.tick, KEY - 14.0);
         let at = DVec2::new(right + 10.0, middle);
-        page.draw_centered_label(at, &name, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
+        page.draw_centered_label(at, &name, FONT_SIZE.tick, TextAnchor::Start, NOTE_COLOR);
         let mut from_right = right;
         for series in &self.series {
             let failures = || series.failures.iter().filter(|it| it.word == word);

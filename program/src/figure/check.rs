@@ -3,16 +3,14 @@
 
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN,
-    PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, WIDTH, draw_header,
-    draw_panel_title,
-};
+use crate::figure::drawing::labels::{Legend, LegendRows, draw_header};
 use crate::figure::drawing::markers::{Marker, draw_second_solution_dot};
+use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, draw_panel_title, vein_color,
 };
-use crate::figure::leaf::{DrawnVeins, LeafPanels};
+use crate::figure::leaf::LeafPanels;
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_error_bound;
 use crate::report::{check_verdict_phrase, equilibrium_kind, relaxation_verdict};
@@ -38,28 +36,28 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
         CheckVerdict::NotCompared(why) | CheckVerdict::NotIndependent(why) => Font::embedded()
             .wrap_text(
                 why,
-                TEXT_FONT_SIZE,
-                WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN,
+                FONT_SIZE.text,
+                PAGE.width - PAGE.left_margin - PAGE.right_margin,
             ),
         _ => Vec::new(),
     };
-    let key_line = NOTES_BASE_LINE + LINE_HEIGHT * (reason.len() + 1) as f64;
-    let panels = LeafPanels::placed_below(HEADER - NOTES_BASE_LINE + key_line, &veins);
+    let key_line = PAGE.notes_base_line + LINE_HEIGHT * (reason.len() + 1) as f64;
+    let panels = LeafPanels::placed_below(PAGE.header - PAGE.notes_base_line + key_line, &veins);
     let compared = !check.along.is_empty();
     let below = if compared { PANEL_HEIGHT } else { 0.0 };
-    let mut drawing = Drawing::new(WIDTH, &title);
+    let mut drawing = Drawing::new(PAGE.width, &title);
     drawing.height = (panels.bottom() + below).ceil();
     drawing.draw_group("header", |page| {
         let notes = header_notes(check, &veins, &setting);
-        draw_header(page, PAGE_LEFT_MARGIN, &title, &notes, Some(&veins));
+        draw_header(page, PAGE.left_margin, &title, &notes, Some(&veins));
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(
-                PAGE_LEFT_MARGIN,
-                NOTES_BASE_LINE + LINE_HEIGHT * (line + 1) as f64,
+                PAGE.left_margin,
+                PAGE.notes_base_line + LINE_HEIGHT * (line + 1) as f64,
             );
-            page.draw_label(base, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+            page.draw_label(base, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         }
-        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, key_line, 26.0);
+        let mut key = LegendRows::starting_at(PAGE.left_margin, key_line, 26.0);
         let stroke = Stroke::new(vein_color(0.3), veins.line_width());
         key.add_entry(page, "relaxed", |page, cell| {
             cell.draw_midline(page, stroke)
@@ -103,7 +101,7 @@ const FRAME_HEIGHT: f64 = 216.0;
 /// Right of the frame, for the key.
 const KEY: f64 = 212.0;
 
-const PANEL_HEIGHT: f64 = PANEL_TITLE_HEIGHT + FRAME_HEIGHT + PANEL_AXIS_HEIGHT;
+const PANEL_HEIGHT: f64 = PAGE.panel_title + FRAME_HEIGHT + PAGE.panel_axis;
 
 const FEWEST_DECADES: f64 = 3.0;
 
@@ -147,7 +145,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
         .unzip();
-    let mut cell = PageRectangle::left_of_legend(start + PANEL_TITLE_HEIGHT, FRAME_HEIGHT, KEY);
+    let mut cell = PageRectangle::left_of_legend(start + PAGE.panel_title, FRAME_HEIGHT, KEY);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {

@@ -9,14 +9,12 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page, panel_letters,
-};
+use crate::figure::drawing::labels::{Legend, new_page};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
-    circle_path, color_of_vein, polygon_path, rectangle_path,
+    BLUE, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, SECOND_SOLUTION_COLOR,
+    Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path, color_of_vein, panel_letters, polygon_path,
+    rectangle_path,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::numbers::{
@@ -48,10 +46,10 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
             fit.degrees_of_freedom
         )),
     }
-    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
+    let mut page = new_page(PAGE.left_margin, &name, &notes, None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
-    let mut top = HEADER;
+    let mut top = PAGE.header;
     page.draw_group("numbers", |page| {
         top = draw_fit_parameters(page, top, &letter(), &fit.parameters, units);
     });
@@ -93,9 +91,9 @@ pub fn draw_fit_parameters(
     units: &Units,
 ) -> f64 {
     let shown = &all[..all.len().min(MOST_NUMBERS_DRAWN)];
-    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS_WIDTH, top + PANEL_TITLE_HEIGHT);
+    let corner = DVec2::new(PAGE.left_margin + WORDS_WIDTH, top + PAGE.panel_title);
     let size = DVec2::new(
-        WIDTH - PAGE_RIGHT_MARGIN - VALUES_WIDTH - corner.x,
+        PAGE.width - PAGE.right_margin - VALUES_WIDTH - corner.x,
         ROW_HEIGHT * shown.len().max(1) as f64,
     );
     let cell = PageRectangle::new(corner, size);
@@ -130,11 +128,11 @@ pub fn draw_fit_parameters(
     for (k, it) in shown.iter().enumerate() {
         let middle = corner.y + ROW_HEIGHT * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
-            let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
+            let text = Font::embedded().shorten_text(text, FONT_SIZE.tick, room);
             page.draw_centered_label(
                 DVec2::new(x, middle),
                 &text,
-                TICK_FONT_SIZE,
+                FONT_SIZE.tick,
                 anchor,
                 TEXT_COLOR,
             );
@@ -144,7 +142,7 @@ pub fn draw_fit_parameters(
             page,
             corner.x - 10.0,
             &number.words,
-            WORDS_WIDTH + PAGE_LEFT_MARGIN - 16.0,
+            WORDS_WIDTH + PAGE.left_margin - 16.0,
             TextAnchor::End,
         );
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
@@ -153,7 +151,7 @@ pub fn draw_fit_parameters(
             page,
             cell.opposite_corner().x + 12.0,
             &text,
-            WIDTH - cell.opposite_corner().x - 16.0,
+            PAGE.width - cell.opposite_corner().x - 16.0,
             TextAnchor::Start,
         );
         // An open interval leaves the frame, dashed.
@@ -185,7 +183,7 @@ pub fn draw_fit_parameters(
             Marker::Circle.draw(page, value, BLUE);
         }
     }
-    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
+    cell.opposite_corner().y + PAGE.panel_axis
 }
 
 /// A fitted number with its interval, without digits below it.
@@ -270,7 +268,7 @@ pub fn draw_results(
     units: &Units,
     results: &ResultSeries,
 ) -> f64 {
-    let cell = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, RESULT_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(top + PAGE.panel_title, RESULT_HEIGHT, KEY);
     let quantity = result_label(results.kind, units);
     let values = results.all_residuals().flat_map(|(_, r)| {
         let (band, sd) = (r.band, 2.0 * r.sd);
@@ -415,7 +413,7 @@ fn draw_residuals(
     let mut key = Legend::right_of(cell);
     let note = "in standard deviations";
     key.add_marker(page, "data less model", note, Marker::Dot, TEXT_COLOR);
-    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
+    cell.opposite_corner().y + PAGE.panel_axis
 }
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
@@ -438,10 +436,10 @@ pub fn draw_measured_veins(
         views = LEAF_VIEWS.into();
     }
     views.truncate(2);
-    let whole = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - KEY;
+    let whole = PAGE.width - PAGE.left_margin - PAGE.right_margin - KEY;
     let width = match views.len() {
         1 => whole,
-        _ => 0.5 * (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - VIEWS_GAP),
+        _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - VIEWS_GAP),
     };
     let count = leaf.curves.len();
     let panels: Vec<_> = (views.iter())
@@ -473,11 +471,11 @@ pub fn draw_measured_veins(
         "as it is" => "traced veins".to_string(),
         name => format!("traced veins, experiment {name}"),
     };
-    let mut below = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, height, KEY);
+    let mut below = PageRectangle::left_of_legend(top + PAGE.panel_title, height, KEY);
     for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
         let corner = DVec2::new(
-            PAGE_LEFT_MARGIN + k as f64 * (width + VIEWS_GAP),
-            top + PANEL_TITLE_HEIGHT,
+            PAGE.left_margin + k as f64 * (width + VIEWS_GAP),
+            top + PAGE.panel_title,
         );
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
@@ -504,7 +502,7 @@ pub fn draw_measured_veins(
             });
         }
     }
-    below.corner.y += PANEL_AXIS_HEIGHT - RESIDUALS_GAP;
+    below.corner.y += PAGE.panel_axis - RESIDUALS_GAP;
     let along = Axis::linear("fraction of the length", 0.0, 1.0);
     let points = residuals.iter().filter_map(|it| {
         let color = color_of_vein(it.rod?.checked_sub(1)?, count);

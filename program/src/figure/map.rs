@@ -6,14 +6,11 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, WIDTH, draw_header,
-};
+use crate::figure::drawing::labels::{Legend, LegendRows, draw_header};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path,
-    rectangle_path, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, WHITE, circle_path, rectangle_path, vein_color,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::map_title;
@@ -66,13 +63,13 @@ pub fn draw(map: &Map) -> Drawing {
     let title = format!("{name}: {}", map_title(map.show));
     let width = match (map.request.axes.len(), map.request.methods.len()) {
         (2, 1) => SINGLE_PANEL_PAGE_WIDTH,
-        _ => WIDTH,
+        _ => PAGE.width,
     };
     let mut drawing = Drawing::new(width, &title);
     let mut end = 0.0;
     drawing.draw_group("header", |page| {
-        draw_header(page, PAGE_LEFT_MARGIN, &title, &header_notes(map), None);
-        end = draw_legend(page, map, NOTES_BASE_LINE + 20.0);
+        draw_header(page, PAGE.left_margin, &title, &header_notes(map), None);
+        end = draw_legend(page, map, PAGE.notes_base_line + 20.0);
         if map.show == MapShow::Waves {
             end = draw_waves_explanation(page, end);
         }
@@ -108,7 +105,7 @@ fn header_notes(map: &Map) -> Vec<String> {
 
 /// Draws the key of the outcomes and marks that occur; returns where it ends.
 fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
-    let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, base, SWATCH_SIZE);
+    let mut key = LegendRows::starting_at(PAGE.left_margin, base, SWATCH_SIZE);
     for outcome in MapOutcome::ALL {
         let shown =
             |row: &MapRow| row.outcome == outcome && stable_waves_shown(map.show, row).is_none();
@@ -155,11 +152,11 @@ fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
 
 /// Draws the explanation of a map of waves; returns where it ends.
 fn draw_waves_explanation(page: &mut Drawing, mut top: f64) -> f64 {
-    let room = page.width - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
-    for line in Font::embedded().wrap_text(WAVES_EXPLANATION, TICK_FONT_SIZE, room) {
-        let base = DVec2::new(PAGE_LEFT_MARGIN, top + TICK_FONT_SIZE);
-        page.draw_label(base, &line, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
-        top += 1.4 * TICK_FONT_SIZE;
+    let room = page.width - PAGE.left_margin - PAGE.right_margin;
+    for line in Font::embedded().wrap_text(WAVES_EXPLANATION, FONT_SIZE.tick, room) {
+        let base = DVec2::new(PAGE.left_margin, top + FONT_SIZE.tick);
+        page.draw_label(base, &line, FONT_SIZE.tick, TextAnchor::Start, NOTE_COLOR);
+        top += 1.4 * FONT_SIZE.tick;
     }
     top + 6.0
 }
@@ -193,16 +190,19 @@ fn draw_panels(
     let columns = y.map_or(1, |_| methods.len().clamp(1, MOST_PANEL_COLUMNS));
     let (corner, size, pitch) = match y {
         Some(_) => {
-            let left = PAGE_LEFT_MARGIN + 18.0;
-            let room = WIDTH - PAGE_RIGHT_MARGIN - left - (columns - 1) as f64 * GAP;
+            let left = PAGE.left_margin + 18.0;
+            let room = PAGE.width - PAGE.right_margin - left - (columns - 1) as f64 * GAP;
             let width = (room / columns as f64).min(WIDEST);
             let size = DVec2::new(width, PANEL_ASPECT_RATIO * width);
-            let pitch = size + DVec2::new(GAP, PANEL_TITLE_HEIGHT + TICKS_HEIGHT + 6.0);
-            (DVec2::new(left, start + PANEL_TITLE_HEIGHT), size, pitch)
+            let pitch = size + DVec2::new(GAP, PAGE.panel_title + TICKS_HEIGHT + 6.0);
+            (DVec2::new(left, start + PAGE.panel_title), size, pitch)
         }
         None => {
-            let left = PAGE_LEFT_MARGIN + METHOD_NAME_WIDTH;
-            let size = DVec2::new(WIDTH - PAGE_RIGHT_MARGIN - COUNT_WIDTH - left, STRIP_HEIGHT);
+            let left = PAGE.left_margin + METHOD_NAME_WIDTH;
+            let size = DVec2::new(
+                PAGE.width - PAGE.right_margin - COUNT_WIDTH - left,
+                STRIP_HEIGHT,
+            );
             let pitch = DVec2::new(0.0, STRIP_HEIGHT + STRIP_GAP);
             (DVec2::new(left, start + 10.0), size, pitch)
         }
@@ -233,13 +233,13 @@ fn draw_panels(
     drawing.draw_label(
         below,
         &x.axis.title(),
-        TEXT_FONT_SIZE,
+        FONT_SIZE.text,
         TextAnchor::Middle,
         TEXT_COLOR,
     );
     if let Some(y) = y {
         let middle = DVec2::new(24.0, 0.5 * (corner.y + last.opposite_corner().y));
-        drawing.draw_rotated_label(middle, &y.axis.title(), TEXT_FONT_SIZE, TEXT_COLOR);
+        drawing.draw_rotated_label(middle, &y.axis.title(), FONT_SIZE.text, TEXT_COLOR);
     }
     end + AXIS_NAME_HEIGHT
 }
@@ -255,23 +255,23 @@ fn draw_method_name(
     let (name, count) = (method.word(), outcome_count_text(map, method));
     if above {
         let base = cell.corner - DVec2::new(0.0, 8.0);
-        page.draw_label(base, name, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+        page.draw_label(base, name, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         let base = base.with_x(cell.opposite_corner().x);
-        return page.draw_label(base, &count, TICK_FONT_SIZE, TextAnchor::End, NOTE_COLOR);
+        return page.draw_label(base, &count, FONT_SIZE.tick, TextAnchor::End, NOTE_COLOR);
     }
     let [left, right] = cell.midline();
     let gap = DVec2::new(10.0, 0.0);
     page.draw_centered_label(
         left - gap,
         name,
-        TEXT_FONT_SIZE,
+        FONT_SIZE.text,
         TextAnchor::End,
         TEXT_COLOR,
     );
     page.draw_centered_label(
         right + gap,
         &count,
-        TICK_FONT_SIZE,
+        FONT_SIZE.tick,
         TextAnchor::Start,
         NOTE_COLOR,
     );
@@ -347,7 +347,7 @@ fn draw_curves(
             LOW_CURVE_PANEL
         };
         let cell = PageRectangle::new(
-            DVec2::new(strip.corner.x, top + PANEL_TITLE_HEIGHT),
+            DVec2::new(strip.corner.x, top + PAGE.panel_title),
             DVec2::new(strip.size.x, height),
         );
         let lines = curves.iter().map(|(_, _, of)| {
@@ -370,7 +370,7 @@ fn draw_curves(
                 key.add_marked_line(page, name, "", *color);
             }
         });
-        top = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        top = cell.opposite_corner().y + PAGE.panel_axis;
     }
     top
 }

@@ -1,13 +1,13 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
-use crate::figure::drawing::labels::{
-    HEADER, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels, new_page,
+use crate::figure::drawing::labels::new_page;
+use crate::figure::drawing::space::{
+    FRONT, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, ViewAngles,
 };
-use crate::figure::drawing::space::{FRONT, OBLIQUE_VIEW, ViewAngles};
+use crate::figure::drawing::veins::{DrawnVeins, vein_tips};
 use crate::figure::drawing::{
-    Color, Drawing, FRAME_COLOR, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke,
+    Color, Drawing, FRAME_COLOR, NOTE_COLOR, PAGE, SECOND_SOLUTION_COLOR, Stroke,
 };
-use crate::figure::leaf::{DrawnVeins, vein_tips};
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_four_digits;
 use crate::report::relaxation_verdict;
@@ -36,7 +36,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
     let panels =
-        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, HEADER);
+        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, PAGE.header);
     let mut notes = vec![
         format!("N = {}", rest.count),
         relaxation_verdict(equilibrium),
@@ -47,7 +47,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     });
     notes.push("grey: at rest".into());
     notes.extend(rest.leaf_notes(&setting));
-    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, Some(&rest));
+    let mut drawing = new_page(PAGE.side_margin, &name, &notes, Some(&rest));
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {

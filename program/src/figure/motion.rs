@@ -6,17 +6,16 @@
 
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels,
-    TEXT_FONT_SIZE, new_page, panel_letters,
+use crate::figure::drawing::labels::{Legend, LegendRows, new_page};
+use crate::figure::drawing::space::{
+    BoxMargins, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, common_bounding_box,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, common_bounding_box};
+use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR,
-    TextAnchor, WHITE, is_drawable, polyline_path, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle,
+    SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, is_drawable, panel_letters,
+    polyline_path, vein_color,
 };
-use crate::figure::leaf::DrawnVeins;
 use crate::figure::scenario::{FigureSetting, name_with_unit};
 use crate::report::numbers::{format_four_digits, number_in_unit};
 use glam::{DVec2, DVec3};
@@ -57,11 +56,11 @@ pub fn header_notes(record: &Record) -> Vec<String> {
 
 pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
-    let upper = HEADER + PANEL_TITLE_HEIGHT;
-    let lower = upper + ENERGIES_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(record), None);
-    let lowest = lower + BALANCE_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
-    drawing.height = lowest + TIP_HEIGHT + PANEL_AXIS_HEIGHT + BOTTOM_MARGIN;
+    let upper = PAGE.header + PAGE.panel_title;
+    let lower = upper + ENERGIES_HEIGHT + BETWEEN + PAGE.panel_title;
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(record), None);
+    let lowest = lower + BALANCE_HEIGHT + BETWEEN + PAGE.panel_title;
+    drawing.height = lowest + TIP_HEIGHT + PAGE.panel_axis + BOTTOM_MARGIN;
     let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
@@ -287,7 +286,7 @@ fn draw_picture(
         SMALL_LINE_WIDTH_FACTOR * veins.line_width(),
     );
     let corner = DVec2::new(10.0, 17.0);
-    page.draw_label(corner, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+    page.draw_label(corner, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
     page
 }
 
@@ -409,9 +408,9 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
         .collect();
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
     let top = if has_path {
-        HEADER + LEGEND_BASE_LINE
+        PAGE.header + LEGEND_BASE_LINE
     } else {
-        HEADER
+        PAGE.header
     };
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shapes.len(), &setting, top);
     let mut notes = header_notes(record);
@@ -419,14 +418,17 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
     notes.extend(first.map_or(Vec::new(), |veins| veins.leaf_notes(&setting)));
     let width = panels.grid_width();
     notes.push(format!("a square of the grid is {width} wide"));
-    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, first);
+    let mut drawing = new_page(PAGE.side_margin, &name, &notes, first);
     drawing.height = panels.bottom();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     let strokes = [SECOND_SOLUTION_COLOR, EARLIER_PATH_COLOR].map(|color| Stroke::new(color, 1.0));
     if has_path {
         drawing.draw_group("key", |page| {
-            let mut key =
-                LegendRows::starting_at(SIDE_MARGIN, NOTES_BASE_LINE + LEGEND_BASE_LINE, 22.0);
+            let mut key = LegendRows::starting_at(
+                PAGE.side_margin,
+                PAGE.notes_base_line + LEGEND_BASE_LINE,
+                22.0,
+            );
             for (name, stroke) in ["the tip's way since the picture before", "and before that"]
                 .into_iter()
                 .zip(strokes)

@@ -1,19 +1,18 @@
 //! A single rod at rest in one large view: of the plane in which it lies, or in space; with its loads,
 //! its supports and its unloaded shape.
 
-use crate::figure::drawing::labels::{
-    LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, WIDTH, draw_panel_title, new_page,
-};
+use crate::figure::drawing::labels::{LegendRows, new_page};
 use crate::figure::drawing::markers::{
-    ForceArrow, draw_support_marker, draw_tip_marker, draw_vein_markers, force_arrows,
+    ForceArrow, draw_support_marker, draw_tip_marker, force_arrows,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, padded_box};
+use crate::figure::drawing::space::{
+    BoxMargins, OBLIQUE_VIEW, SpacePanel, draw_plane_panel, padded_box,
+};
+use crate::figure::drawing::veins::{DrawnVeins, draw_vein_markers};
 use crate::figure::drawing::{
-    Drawing, DrawingPath, FRAME_COLOR, PathStep, Stroke, TEXT_COLOR, curve_between_fractions,
-    is_drawable, polyline_path,
+    Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
+    curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::leaf::{DrawnVeins, draw_plane_panel};
 use crate::figure::scenario::FigureSetting;
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
@@ -85,13 +84,13 @@ pub fn draw(
     notes: &[String],
 ) -> Drawing {
     let rod = DrawnRod::from_equilibrium(leaf, scenario, veins);
-    let mut page = new_page(PAGE_LEFT_MARGIN, &leaf.scenario, notes, None);
+    let mut page = new_page(PAGE.left_margin, &leaf.scenario, notes, None);
     let mut top = 0.0;
     page.draw_group("key", |page| top = rod.draw_legend(page));
     let (low, high) = rod.bounding_corners();
     let extent = high - low;
-    let corner = DVec2::new(PAGE_LEFT_MARGIN, top + PANEL_TITLE_HEIGHT);
-    let width = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
+    let corner = DVec2::new(PAGE.left_margin, top + PAGE.panel_title);
+    let width = PAGE.width - PAGE.left_margin - PAGE.right_margin;
     let height = match rod.viewing_plane() {
         Some((what, axes)) => {
             let [across, up] = axes.map(|axis| extent[axis]);
@@ -107,7 +106,7 @@ pub fn draw(
                     .map(|point| camera.project_point(point));
                 camera.draw_arrows(page, &setting.direction_arrows(true, 0.0), cell, taken);
             });
-            height + PANEL_AXIS_HEIGHT
+            height + PAGE.panel_axis
         }
         None => {
             let cell = PageRectangle::new(corner, DVec2::new(width, HIGHEST));
@@ -218,7 +217,7 @@ impl<'a> DrawnRod<'a> {
 
     /// Draws the key; returns where it ends.
     fn draw_legend(&self, page: &mut Drawing) -> f64 {
-        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, NOTES_BASE_LINE + 22.0, 26.0);
+        let mut key = LegendRows::starting_at(PAGE.left_margin, PAGE.notes_base_line + 22.0, 26.0);
         let own = self
             .veins
             .veins

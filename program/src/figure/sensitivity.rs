@@ -3,13 +3,10 @@
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page,
-};
+use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::{
-    BLUE, Drawing, FRAME_COLOR, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, VERMILION,
-    rectangle_path,
+    BLUE, Drawing, FONT_SIZE, FRAME_COLOR, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, VERMILION, rectangle_path,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, round_to_error};
@@ -125,22 +122,22 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
             format_error_bound(error)
         ));
     }
-    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
+    let mut page = new_page(PAGE.left_margin, &name, &notes, None);
     let height = ROW * rows.len().max(1) as f64;
-    page.height = HEADER + PANEL_TITLE_HEIGHT + height + PANEL_AXIS_HEIGHT + BOTTOM;
-    let width = (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - WORDS - 2.0 * GAP) / 3.0;
-    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS, HEADER + PANEL_TITLE_HEIGHT);
+    page.height = PAGE.header + PAGE.panel_title + height + PAGE.panel_axis + BOTTOM;
+    let width = (PAGE.width - PAGE.left_margin - PAGE.right_margin - WORDS - 2.0 * GAP) / 3.0;
+    let corner = DVec2::new(PAGE.left_margin + WORDS, PAGE.header + PAGE.panel_title);
     page.draw_group("words", |page| {
         for (k, row) in rows.iter().enumerate() {
             let middle = corner + DVec2::new(-10.0, ROW * (k as f64 + 0.5));
-            let room = WORDS + PAGE_LEFT_MARGIN - 16.0;
+            let room = WORDS + PAGE.left_margin - 16.0;
             for (text, up, color) in [
                 (&row.words, -6.5, TEXT_COLOR),
                 (&row.change_text, 7.0, NOTE_COLOR),
             ] {
-                let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
+                let text = Font::embedded().shorten_text(text, FONT_SIZE.tick, room);
                 let at = middle + DVec2::new(0.0, up);
-                page.draw_centered_label(at, &text, TICK_FONT_SIZE, TextAnchor::End, color);
+                page.draw_centered_label(at, &text, FONT_SIZE.tick, TextAnchor::End, color);
             }
         }
     });
@@ -213,7 +210,7 @@ fn draw_bars(
         page.draw_centered_label(
             at,
             &format_four_digits(shown),
-            TICK_FONT_SIZE,
+            FONT_SIZE.tick,
             anchor,
             NOTE_COLOR,
         );

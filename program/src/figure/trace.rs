@@ -2,13 +2,13 @@
 //! varies, and the leaf at some of the points.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes};
-use crate::figure::drawing::labels::{
-    HEADER, LabelPlacement, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, SmallPanels, new_page, panel_letters,
-};
+use crate::figure::drawing::labels::{LabelPlacement, Legend, new_page};
 use crate::figure::drawing::markers::Marker;
-use crate::figure::drawing::{CURVE_COLORS, Drawing, Stroke, TEXT_COLOR};
-use crate::figure::leaf::{DrawnVeins, longest_curve};
+use crate::figure::drawing::space::SmallPanels;
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve};
+use crate::figure::drawing::{
+    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, panel_letters,
+};
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
 use crate::report::{
@@ -58,17 +58,17 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(trace), None);
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(trace), None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
-    let mut below = HEADER;
+    let mut below = PAGE.header;
     for (place, &quantity) in quantities.iter().enumerate() {
         let height = if place == 0 {
             DIAGRAM
         } else {
             FURTHER_PANEL_HEIGHT
         };
-        let cell = PageRectangle::left_of_legend(below + PANEL_TITLE_HEIGHT, height, KEY);
+        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, KEY);
         drawing.draw_group("branches", |page| {
             let axis = varied_number_axis(trace, &varied);
             draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
@@ -76,18 +76,18 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
                 draw_legend(page, trace, cell);
             }
         });
-        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        below = cell.opposite_corner().y + PAGE.panel_axis;
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = PageRectangle::left_of_legend(
-            below + BETWEEN + PANEL_TITLE_HEIGHT,
+            below + BETWEEN + PAGE.panel_title,
             FORCE_LINE_HEIGHT,
             KEY,
         );
         drawing.draw_group("law", |page| {
             draw_force_displacement_line(page, trace, law, branch, cell, &letter())
         });
-        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        below = cell.opposite_corner().y + PAGE.panel_axis;
     }
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     drawing.height = panels.bottom();

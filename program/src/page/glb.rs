@@ -3,8 +3,8 @@
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
 
+use crate::figure::drawing::veins::{node_stride, replace_undrawable_points};
 use crate::figure::drawing::{Color, color_of_vein};
-use crate::figure::leaf::{node_stride, replace_undrawable_points};
 use glam::{DVec3, Vec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;

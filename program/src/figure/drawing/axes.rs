@@ -6,13 +6,10 @@
 //! Round numbers, for ticks and scales.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, draw_panel_title,
-};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Color, Drawing, DrawingPath, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, Stroke, TEXT_COLOR,
-    TextAnchor, rectangle_path, smooth_curve,
+    Color, Drawing, DrawingPath, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PageRectangle, PathStep,
+    Stroke, TEXT_COLOR, TextAnchor, draw_panel_title, rectangle_path, smooth_curve,
 };
 use crate::report::numbers::{
     digit_times_power_text, format_decimals, power_of_ten_text, superscript, time_power_text,
@@ -120,11 +117,11 @@ impl PanelAxes {
                 match direction {
                     _ if !axis.labelled => (),
                     AxisOrientation::Horizontal => {
-                        let base = foot + DVec2::new(0.0, TICK_LENGTH + 1.2 * TICK_FONT_SIZE);
+                        let base = foot + DVec2::new(0.0, TICK_LENGTH + 1.2 * FONT_SIZE.tick);
                         page.draw_label(
                             base,
                             &text,
-                            TICK_FONT_SIZE,
+                            FONT_SIZE.tick,
                             TextAnchor::Middle,
                             NOTE_COLOR,
                         );
@@ -134,11 +131,11 @@ impl PanelAxes {
                         page.draw_centered_label(
                             end,
                             &text,
-                            TICK_FONT_SIZE,
+                            FONT_SIZE.tick,
                             TextAnchor::End,
                             NOTE_COLOR,
                         );
-                        widest = widest.max(font.text_width(&text, TICK_FONT_SIZE));
+                        widest = widest.max(font.text_width(&text, FONT_SIZE.tick));
                     }
                 }
             }
@@ -148,7 +145,7 @@ impl PanelAxes {
             page.draw_label(
                 base,
                 &self.across.title(),
-                TEXT_FONT_SIZE,
+                FONT_SIZE.text,
                 TextAnchor::Middle,
                 TEXT_COLOR,
             );
@@ -157,7 +154,7 @@ impl PanelAxes {
             let distance =
                 (widest + NAME_LABEL_GAP).clamp(LEAST_NAME_DISTANCE, LARGEST_NAME_DISTANCE);
             let base = DVec2::new(corner.x - distance, middle.y);
-            page.draw_rotated_label(base, &self.up.title(), TEXT_FONT_SIZE, TEXT_COLOR);
+            page.draw_rotated_label(base, &self.up.title(), FONT_SIZE.text, TEXT_COLOR);
         }
     }
 
@@ -466,8 +463,8 @@ impl Axis {
         };
         let font = Font::embedded();
         let size = |tick: &Tick| match direction {
-            AxisOrientation::Horizontal => font.text_width(&tick.text, TICK_FONT_SIZE),
-            AxisOrientation::Vertical => TICK_FONT_SIZE,
+            AxisOrientation::Horizontal => font.text_width(&tick.text, FONT_SIZE.tick),
+            AxisOrientation::Vertical => FONT_SIZE.tick,
         };
         let separate = |pair: &[Tick]| {
             let distance = length * (pair[1].fraction - pair[0].fraction).abs();

@@ -1,17 +1,12 @@
-//! Markers of points in a panel, of the clamp and the tips of a leaf, of points of a second
-//! solution, of grips, and of the directions of gravity and wind.
-//!
-//! Dead forces on a rod as arrows, on its tip, on points and along it.
-//!
-//! Dead moments on a rod as curved arrows about their axes, by the right-hand rule.
+//! Markers of points, supports and tips, and arrows: directions of gravity and wind in a corner of a
+//! panel, dead forces on a rod, and dead moments as curved arrows about their axes by the right-hand
+//! rule.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TICK_FONT_SIZE};
 use crate::figure::drawing::{
-    Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
-    circle_path, polygon_path, polyline_path, rectangle_path,
+    Color, Drawing, FONT_SIZE, NOTE_COLOR, PageRectangle, SECOND_SOLUTION_COLOR, Stroke,
+    TEXT_COLOR, TextAnchor, WHITE, circle_path, polygon_path, polyline_path, rectangle_path,
 };
-use crate::figure::leaf::{DrawnVeins, GrippedStretch};
 use crate::figure::scenario::{LoadKind, LoadMark, load_marks};
 use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
@@ -60,7 +55,7 @@ fn draw_cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
 }
 
 /// Marks where the rods are clamped; larger than the tip's marker, which may cover it.
-pub fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
+fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
     let rim = Some(Stroke::new(WHITE, 1.0));
     page.draw_shape(rectangle_path(at - half, 2.0 * half), TEXT_COLOR, rim);
@@ -76,68 +71,6 @@ pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
     match held {
         SupportKind::Clamped => draw_clamp_marker(page, at),
         SupportKind::Pinned => Marker::Triangle.draw(page, at, TEXT_COLOR),
-    }
-}
-
-/// Draws the markers of a leaf: those along its veins, and of its bases and tips.
-pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
-    draw_vein_markers(page, veins, &place);
-    let mut bases: Vec<DVec3> = Vec::new();
-    for base in veins.bases() {
-        if !bases.contains(&base) {
-            draw_support_marker(page, place(base), veins.base_support);
-            bases.push(base);
-        }
-    }
-    if let [(tip, _)] = veins.tips.as_slice() {
-        return match veins.tip_support {
-            Some(held) => draw_support_marker(page, place(*tip), held),
-            None => draw_tip_marker(page, place(*tip)),
-        };
-    }
-    // Many are small.
-    let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
-    for (tip, color) in &veins.tips {
-        let rim = Stroke::new(*color, 0.5 * radius);
-        page.draw_shape(circle_path(place(*tip), radius), WHITE, Some(rim));
-    }
-}
-
-/// Draws the markers along veins: points of a second solution, moments and grips.
-pub fn draw_vein_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
-    let radius = 0.7 + 0.6 * veins.line_width();
-    for &point in &veins.dots {
-        draw_second_solution_dot(page, place(point), radius);
-    }
-    for moment in &veins.moments {
-        moment.draw(page, veins.largest_extent(), &place);
-    }
-    for grip in &veins.grips {
-        draw_grip_markers(page, grip, veins.line_width(), &place);
-    }
-}
-
-/// Marks where a grip holds a vein: a stretch with both of its ends, or a point; pinned or clamped.
-fn draw_grip_markers(
-    page: &mut Drawing,
-    grip: &GrippedStretch,
-    line_width: f64,
-    place: impl Fn(DVec3) -> DVec2,
-) {
-    let points: Vec<DVec2> = grip.points.iter().map(|&point| place(point)).collect();
-    let marker = match grip.support {
-        SupportKind::Clamped => Marker::Square,
-        SupportKind::Pinned => Marker::Triangle,
-    };
-    if let [first, .., last] = points.as_slice() {
-        page.draw_stroke(
-            polyline_path(&points),
-            Stroke::new(TEXT_COLOR, 1.6 + line_width),
-        );
-        marker.draw(page, *first, TEXT_COLOR);
-        marker.draw(page, *last, TEXT_COLOR);
-    } else if let [point] = points.as_slice() {
-        marker.draw(page, *point, TEXT_COLOR);
     }
 }
 
@@ -186,7 +119,7 @@ pub fn draw_direction_arrow(
     }
     let below = 0.5 * ARROW_LENGTH * direction.y.abs().max(0.4) + 11.0;
     let foot = at + DVec2::new(0.0, below);
-    page.draw_label(foot, name, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
+    page.draw_label(foot, name, FONT_SIZE.tick, TextAnchor::Middle, NOTE_COLOR);
     at
 }
 
@@ -261,8 +194,8 @@ impl ForceArrow {
         }
         // Beside the middle of the arrow, or below it where it lies flat.
         let size = DVec2::new(
-            Font::embedded().text_width(&self.label, TICK_FONT_SIZE),
-            TICK_FONT_SIZE,
+            Font::embedded().text_width(&self.label, FONT_SIZE.tick),
+            FONT_SIZE.tick,
         );
         let side = if along.x.abs() < 0.7 {
             DVec2::X
@@ -279,7 +212,7 @@ impl ForceArrow {
         page.draw_centered_label(
             middle,
             &self.label,
-            TICK_FONT_SIZE,
+            FONT_SIZE.tick,
             TextAnchor::Middle,
             NOTE_COLOR,
         );

@@ -1,16 +1,16 @@
-//! The panel in space: a parallel projection of the leaf in a box, with its shadow
-//! on the floor.
+//! Parallel projections of leaves: flat panels of two axes, and panels in space, alone or many of
+//! one scale on a page, with the box around the leaf and its shadow on the floor.
 
-use crate::figure::drawing::axes::{multiples_with_text, round_step};
+use crate::figure::drawing::axes::{Axis, PanelAxes, multiples_with_text, round_step};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE};
-use crate::figure::drawing::markers::{draw_direction_arrow, draw_leaf_markers};
+use crate::figure::drawing::markers::draw_direction_arrow;
+use crate::figure::drawing::veins::{BezierPiece, DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{
-    Drawing, FLOOR, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR,
-    TextAnchor, polygon_path, polyline_path,
+    Color, Drawing, FLOOR, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PAGE, PageRectangle, PathStep,
+    SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, draw_colored_title, polygon_path, polyline_path,
 };
-use crate::figure::leaf::{BezierPiece, DrawnVein, DrawnVeins};
 use crate::figure::scenario::{DirectionArrow, FigureSetting};
+use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
 
 /// Directions from which the box is seen: azimuth from the xi axis and elevation above the
@@ -284,7 +284,7 @@ impl<'s> SpacePanel<'s> {
                 let foot = self.project_point(*point);
                 page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME_COLOR, 0.8));
                 let at = foot + label_offset(*out, 17.0);
-                page.draw_centered_label(at, text, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
+                page.draw_centered_label(at, text, FONT_SIZE.tick, TextAnchor::Middle, NOTE_COLOR);
             }
         }
         self.draw_axis_names(page, distance, true);
@@ -301,7 +301,7 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
-            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, TICK_FONT_SIZE));
+            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, FONT_SIZE.tick));
             let beyond = NAME_LABEL_DISTANCE + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
@@ -311,7 +311,7 @@ impl<'s> SpacePanel<'s> {
             let at = middle + label_offset(edge.outward, distance);
             let name = self.setting.brief_axis_name(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
-            let size = TEXT_FONT_SIZE + 1.0;
+            let size = FONT_SIZE.text + 1.0;
             let most =
                 page.width - Font::embedded().text_width(&name, size) - NAME_PAGE_EDGE_DISTANCE;
             let (at, anchor) = match edge.axis {
@@ -370,4 +370,158 @@ impl<'s> SpacePanel<'s> {
 /// to the side.
 fn label_offset(out: DVec2, distance: f64) -> DVec2 {
     distance * out + DVec2::new(5.0 * out.x, 0.0)
+}
+
+/// Least distance between grid lines.
+const PLANE_TICK_DISTANCE: f64 = 36.0;
+
+/// Draws a panel of two axes with `scale` pixels per length and this point in its middle; returns how
+/// it shows points.
+pub fn draw_plane_panel(
+    page: &mut Drawing,
+    middle: DVec3,
+    setting: &FigureSetting,
+    cell: PageRectangle,
+    scale: f64,
+    [across, up]: [usize; 2],
+) -> ParallelProjection {
+    let camera = ParallelProjection::new(DVec3::AXES[across], DVec3::AXES[up]);
+    let camera = camera.with_point_at(scale, middle, cell.middle());
+    let shown = setting.value_per_length();
+    let axis = |which: usize, pixels: f64| {
+        let half = 0.5 * pixels / scale;
+        let (low, high) = (middle[which] - half, middle[which] + half);
+        Axis {
+            tick_spacing: Some(PLANE_TICK_DISTANCE),
+            ..Axis::linear(&setting.axis_name(which), shown * low, shown * high)
+        }
+    };
+    let axes = PanelAxes {
+        cell,
+        across: axis(across, cell.size.x),
+        up: axis(up, cell.size.y),
+    };
+    axes.draw(page);
+    camera
+}
+
+const COLUMNS: usize = 4;
+
+const PANEL_GAP: f64 = 12.0;
+
+const LOWEST: f64 = 110.0;
+
+const HIGHEST: f64 = 330.0;
+
+const BOTTOM: f64 = 10.0;
+
+/// Least pixels between grid lines.
+const LEAST_GRID_SPACING: f64 = 17.0;
+
+/// Factor of the line width of veins in small panels.
+pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
+
+const SPACE_PANEL_MARGINS: BoxMargins = BoxMargins {
+    left: 14.0,
+    right: 14.0,
+    below: 14.0,
+};
+
+/// Where the panels are, and the box that all of them show.
+pub struct SmallPanels<'s> {
+    bounds: [DVec3; 2],
+    setting: &'s FigureSetting,
+    /// Displayed width of a square of the grid.
+    grid_step: f64,
+    size: DVec2,
+    top: f64,
+    count: usize,
+}
+
+impl<'s> SmallPanels<'s> {
+    /// `count` panels from `top` on that can hold any of these shapes.
+    pub fn fitted_to_shapes<'a>(
+        shapes: impl Iterator<Item = &'a DrawnVeins>,
+        count: usize,
+        setting: &'s FigureSetting,
+        top: f64,
+    ) -> Self {
+        let bounds = common_bounding_box(shapes);
+        let width = (PAGE.width - 2.0 * PAGE.side_margin - (COLUMNS - 1) as f64 * PANEL_GAP)
+            / COLUMNS as f64;
+        let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
+        let height = (width - SPACE_PANEL_MARGINS.left - SPACE_PANEL_MARGINS.right) * extent.y
+            / extent.x
+            + SPACE_PANEL_MARGINS.below;
+        let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
+        let scale = (SPACE_PANEL_MARGINS.inner_size(size) / extent).min_element();
+        SmallPanels {
+            bounds,
+            grid_step: round_step(setting.value_per_length() * LEAST_GRID_SPACING / scale),
+            setting,
+            size,
+            top,
+            count,
+        }
+    }
+
+    /// Formats the width of a square of the grid.
+    pub fn grid_width(&self) -> String {
+        format!(
+            "{} {}",
+            format_four_digits(self.grid_step),
+            self.setting.length_unit()
+        )
+    }
+
+    fn panel_rectangle(&self, index: usize) -> PageRectangle {
+        let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
+        let pitch = self.size + DVec2::new(PANEL_GAP, PAGE.panel_title + PANEL_GAP);
+        PageRectangle::new(
+            DVec2::new(PAGE.side_margin, self.top + PAGE.panel_title) + place * pitch,
+            self.size,
+        )
+    }
+
+    pub fn bottom(&self) -> f64 {
+        let rows = self.count.div_ceil(COLUMNS).max(1);
+        let row = PAGE.panel_title + self.size.y + PANEL_GAP;
+        (self.top + rows as f64 * row + BOTTOM).ceil()
+    }
+
+    /// Draws a leaf with its letter and title in its panel.
+    pub fn draw_leaf(
+        &self,
+        page: &mut Drawing,
+        index: usize,
+        veins: &DrawnVeins,
+        caption: [&str; 2],
+    ) {
+        let [letter, text] = caption;
+        let scene =
+            self.draw_empty_panel(page, (index, 0.0), OBLIQUE_VIEW, (letter, text, NOTE_COLOR));
+        scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
+    }
+
+    /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
+    /// title in a colour. The first also shows the names of the axes and gravity, and each the wind
+    /// if that changes.
+    pub fn draw_empty_panel(
+        &self,
+        page: &mut Drawing,
+        (index, time): (usize, f64),
+        view: ViewAngles,
+        (letter, text, color): (&str, &str, Color),
+    ) -> SpacePanel<'s> {
+        let cell = self.panel_rectangle(index);
+        draw_colored_title(page, cell.corner, letter, text, color);
+        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
+        let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_PANEL_MARGINS, step);
+        scene.draw_box(page);
+        if index == 0 {
+            scene.draw_axis_names(page, 9.0, false);
+        }
+        scene.draw_direction_arrows(page, index == 0, time);
+        scene
+    }
 }
