@@ -44,7 +44,7 @@ pub use crate::study::map::{
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
 pub use crate::study::remark::{
-    BoundaryRemark, BranchRemark, EquilibriaRemark, SolutionRemark, TraceRemark,
+    BoundaryRemark, BranchRemark, CheckReason, EquilibriaRemark, SolutionRemark, TraceRemark,
 };
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,

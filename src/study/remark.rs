@@ -1,6 +1,6 @@
 //! What is said of traces, their branches, boundaries of stability and sets of equilibria: why they
 //! are not known as far as requested, and what would help. And what a method says of its answer,
-//! where methods are compared.
+//! where methods are compared, or why they are not.
 
 use crate::branch::{CorrectorFailure, VerificationFailure};
 use crate::numbers::format_error_bound;
@@ -111,6 +111,30 @@ remarks! {
         /// A run that was stopped.
         #[error("{}", CorrectorFailure::Stopped)]
         Stopped = "stopped",
+    }
+
+    /// Why a check has nothing to compare.
+    pub enum CheckReason {
+        /// A leaf that is not at rest.
+        #[error(
+            "the relaxation did not come to rest{}",
+            .remark.as_ref().map_or(String::new(), |remark| format!(": {remark}"))
+        )]
+        NotAtRest {
+            /// What is said of it.
+            remark: Option<EquilibriumRemark>,
+        } = "not-at-rest",
+        /// No solution by shooting.
+        #[error("{0}")]
+        ShootingFailed(ShootingFailureReason) = "shooting-failed",
+        /// A solution by shooting that is less accurate than the tolerance.
+        #[error(
+            "the boundary-value solution is only known within {error:.1e}: ask for a larger tolerance"
+        )]
+        Inaccurate {
+            /// The bound on its error, in units of length.
+            error: f64,
+        } = "inaccurate",
     }
 
     /// What a method says of its answer.
