@@ -49,7 +49,7 @@ pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::state::{
     Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
 };
-pub use crate::leaf::system::{AssemblyTotals, System};
+pub use crate::leaf::system::{AssemblyTotals, EquationWorkspace, System};
 pub use crate::leaf::tissue::HalfTurn;
 use crate::rod::Section;
 use crate::rotation;
@@ -223,6 +223,16 @@ impl Leaf {
     /// its rest is no minimum of an energy, and no eigenvalue tells whether it is stable.
     pub fn has_potential(&self) -> bool {
         !self.loads.has_moments() && !self.in_wind()
+    }
+
+    /// Its scenario, shared.
+    pub(super) fn shared_scenario(&self) -> Arc<Scenario> {
+        Arc::clone(&self.scenario)
+    }
+
+    /// Whether it was made from this very scenario.
+    pub(super) fn is_of(&self, scenario: &Arc<Scenario>) -> bool {
+        Arc::ptr_eq(&self.scenario, scenario)
     }
 
     /// Whether wind acts on it.

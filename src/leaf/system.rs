@@ -19,11 +19,13 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
 use crate::rod::NodeBlock;
+use crate::scenario::Scenario;
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// From this many nodes on, groups of rods are distributed over threads. Measured: below it
 /// waking the threads costs more than it saves.
@@ -67,6 +69,8 @@ pub(crate) struct RodGroup {
 /// The linear system of a leaf, with workspace for its solution.
 #[derive(Clone, Debug)]
 pub struct System {
+    /// The scenario of the leaf to which these equations belong.
+    scenario: Arc<Scenario>,
     pub(crate) groups: Vec<RodGroup>,
     pub(super) rods: usize,
     pub(super) p: Vec<Vec<GroupIncrements>>,
@@ -93,6 +97,32 @@ pub struct System {
     pub(super) law_forces: Vec<DVec3>,
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
+}
+
+/// The memory of Newton's equations, passed on from one solution to the next: equations of the same
+/// leaf on the same grid are set up in the memory of the last ones, others in new memory.
+#[derive(Debug, Default)]
+pub struct EquationWorkspace {
+    last: Option<System>,
+}
+
+impl EquationWorkspace {
+    /// Whether the last equations were those of `leaf`.
+    pub fn fits(&self, leaf: &DiscreteLeaf) -> bool {
+        self.last.as_ref().is_some_and(|last| last.belongs_to(leaf))
+    }
+
+    /// Equations of `leaf` that are to be assembled, in the memory of the last ones if that fits; it
+    /// is released otherwise.
+    pub fn equations(&mut self, leaf: &DiscreteLeaf) -> System {
+        let last = self.last.take().filter(|last| last.belongs_to(leaf));
+        last.unwrap_or_else(|| System::new(leaf))
+    }
+
+    /// Takes back the memory of equations that are not needed any more.
+    pub fn take_back(&mut self, system: System) {
+        self.last = Some(system);
+    }
 }
 
 /// Runs `f` over the groups, on all threads if `parallel`. Each group works on its
@@ -130,6 +160,7 @@ impl System {
         };
         let count = rods.div_ceil(GROUP);
         System {
+            scenario: leaf.leaf.shared_scenario(),
             groups: (0..count).map(|g| RodGroup::new(leaf, g, &gaps)).collect(),
             rods,
             p: vec![vec![GroupIncrements::default(); n]; count],
@@ -172,14 +203,19 @@ impl System {
         }
     }
 
-    /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
-    /// on a grid of as many segments.
-    pub fn new_in_memory(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
-        let fits = |spare: &System| {
-            let same = (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
-            same && spare.first == leaf.first_node()
-        };
-        spare.filter(fits).unwrap_or_else(|| System::new(leaf))
+    /// Whether these are equations of `leaf`: of the same veins, supports and coupling, on the same grid.
+    fn belongs_to(&self, leaf: &DiscreteLeaf) -> bool {
+        let nodes = leaf.moving_nodes();
+        leaf.leaf.is_of(&self.scenario)
+            && (self.rods, self.segments) == (leaf.rods(), leaf.segments())
+            && (self.first, self.joined) == (nodes.start, leaf.tips_move_together())
+            && nodes
+                .map(|i| leaf.mass_weight(i))
+                .eq(self.weights.iter().copied())
+            && match leaf.coupled() {
+                true => gap_couplings(leaf).eq(self.gaps.iter().copied()),
+                false => self.gaps.is_empty(),
+            }
     }
 
     /// Number of rods.

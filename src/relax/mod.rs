@@ -9,7 +9,9 @@ pub(crate) mod accuracy;
 pub(crate) mod eigenvalues;
 mod follow;
 mod loading;
+mod log;
 mod path;
+mod plan;
 pub(crate) mod problem;
 mod remark;
 mod request;
@@ -22,11 +24,12 @@ pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
 use crate::memory;
-pub use crate::newton::SolverCounts;
+pub use crate::newton::{EquilibriumFailure, SolverCounts};
 pub(crate) use crate::relax::accuracy::NestedEquilibrium;
 pub(crate) use crate::relax::accuracy::transfer::{GridLevel, Stencil, rod_shapes};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
+pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{

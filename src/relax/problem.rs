@@ -1,9 +1,8 @@
 //! Which leaf is to come to rest, how accurately, on which grids, and what that has cost so far.
 
-use crate::leaf::{Leaf, Loads, System};
-use crate::newton::SolverCounts;
-use crate::relax::path::{Path, Route, Stage};
-use crate::relax::request::{Method, Options, Progress, SemiImplicit};
+use crate::leaf::{Leaf, Loads};
+use crate::relax::path::{Path, Route};
+use crate::relax::request::{Method, Options, SemiImplicit};
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
@@ -137,34 +136,6 @@ impl<'a> RelaxationProblem<'a> {
 
 /// Limit on nodes times force evaluations for a leaf to come to rest: some seconds.
 pub const BUDGET: usize = 10_000_000;
-
-/// Counts of the work on all grids, whatever becomes of them, and its progress.
-pub struct WorkLog<'o> {
-    pub progress: &'o mut dyn FnMut(&Progress),
-    pub work: SolverCounts,
-    /// Nodes times force evaluations so far.
-    pub node_evaluations: usize,
-    /// Nodes times force evaluations of all walks.
-    pub loading_node_evaluations: usize,
-    /// How far the leaf came on its path before it failed.
-    pub farthest_stage: Option<(Stage, f64)>,
-    /// The linear system of the last grid, for reuse.
-    pub spare_system: Option<System>,
-}
-
-impl<'o> WorkLog<'o> {
-    /// None so far.
-    pub fn new(progress: &'o mut dyn FnMut(&Progress)) -> Self {
-        WorkLog {
-            progress,
-            work: SolverCounts::default(),
-            node_evaluations: 0,
-            loading_node_evaluations: 0,
-            farthest_stage: None,
-            spare_system: None,
-        }
-    }
-}
 
 /// Segments of the finest grid.
 pub const FINEST: usize = 16_384;

@@ -6,22 +6,26 @@
 //! What the way to rest has cost so far, and what it leaves for reuse.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
+use crate::newton::EquilibriumFailure;
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
 use crate::relax::eigenvalues;
 use crate::relax::eigenvalues::EigenvalueRequest;
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{
-    follow_load_path, guess, load_slowly, solve_from_guesses, solve_from_start, takes_loads_stably,
+    LoadingEnd, follow_load_path, grid_of, guess, load_slowly, solve_from_guesses,
+    solve_from_start, takes_loads_stably,
 };
+use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
-use crate::relax::problem::{COARSEST, RelaxationProblem, WorkLog, least_segments, may_solve_half};
+use crate::relax::plan::{Acceptance, PlannedAttempt, plan};
+use crate::relax::problem::{COARSEST, RelaxationProblem, least_segments, may_solve_half};
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
-use crate::relax::solve_on_grid::{check_segments, explicit, softens};
+use crate::relax::solve_on_grid::{check_segments, explicit};
 use crate::relax::stability::{Decision, Verdict, decide, state_from_rod_shapes};
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::Scenario;
@@ -67,8 +71,7 @@ pub(crate) fn relax_on_grids(
         ..RelaxationProblem::new(&leaf, options, tolerance)
     };
     let mut effort = WorkLog::new(progress);
-    let grid = Grid::new(first, leaf.kinks());
-    let found = find_rest(&problem, half.as_ref(), grid, &mut effort);
+    let found = find_rest(&problem, half.as_ref(), first, &mut effort);
     Ok(equilibrium_with_stability(
         &problem,
         found,
@@ -77,49 +80,86 @@ pub(crate) fn relax_on_grids(
     ))
 }
 
-/// Brings the leaf to rest, its `half` where that is enough.
+/// Brings the leaf to rest, its `half` where that is enough, by the first attempt of its plan that is
+/// accepted.
 fn find_rest<'a>(
     problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
-    grid: Grid,
+    segments: usize,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    let slowly = problem.loads_slowly();
-    // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
-    // the path need not be walked.
-    let in_valley = slowly
-        && matches!(problem.options.method, Method::SemiImplicit(_))
-        && !softens(problem.leaf);
-    if in_valley || !slowly && half.is_some() {
-        let reduced = RelaxationProblem {
-            stays_in_valley: in_valley,
-            ..problem.reduced_to_half(half)
+    let mut failed = None;
+    for attempt in plan(problem, half.is_some(), segments) {
+        if attempt.needs_time && problem.out_of_time() {
+            break;
+        }
+        let half = half.filter(|_| attempt.extent == Extent::Half);
+        let found = match attempt.strategy {
+            Strategy::SlowLoading => match load_slowly(problem, half, effort) {
+                LoadingEnd::Final(found) => return found,
+                LoadingEnd::GivenUp(failure) => Err(failure),
+            },
+            _ => {
+                let (found, end) = solve_planned(problem, half, &attempt, effort);
+                effort.log(attempt.strategy, attempt.extent, attempt.segments, end);
+                if found.is_ok() && end == AttemptEnd::Accepted {
+                    return found;
+                }
+                found
+            }
         };
-        let found = solve_from_start(&reduced, grid.clone(), effort);
-        if half.is_some() {
-            effort.spare_system = None;
-        }
-        if let Ok(found) = found
-            && found.is_stable()
-            && (!slowly || is_in_first_valley(&found.history))
-            && (!slowly || takes_loads_stably(problem, &found, effort))
-        {
-            let path = problem.undisturbed_path();
-            return Ok(found.mirrored_to_whole(&reduced).with_path(path));
-        }
-        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
-        // solve the full leaf.
-        effort.spare_system = None;
+        failed = found.err().or(failed);
     }
-    if slowly {
-        return load_slowly(problem, half, effort);
-    }
-    match solve_from_start(problem, grid, effort) {
-        Err(_) if problem.may_be_loaded_instead() => {
-            effort.spare_system = None;
-            load_slowly(problem, None, effort)
+    match failed {
+        Some(failure) => Err(failure),
+        None => {
+            NestedEquilibrium::without_grids(problem).into_failure(EquilibriumFailure::StepLimit)
         }
-        found => result_with_path(found, problem.undisturbed_path()),
+    }
+}
+
+/// Makes an attempt from arcs, or from the start of the request, of the `half` or of the whole.
+fn solve_planned<'a>(
+    problem: &RelaxationProblem<'a>,
+    half: Option<&'a Leaf>,
+    attempt: &PlannedAttempt,
+    effort: &mut WorkLog,
+) -> (RelaxationResult, AttemptEnd) {
+    let part = RelaxationProblem {
+        stays_in_valley: attempt.strategy == Strategy::FirstValley,
+        ..problem.reduced_to_half(half)
+    };
+    let grid = grid_of(problem.leaf, attempt.segments);
+    let found = solve_from_start(&part, grid, effort);
+    let end = match &found {
+        Ok(found) => acceptance_of(problem, attempt.acceptance, found, effort),
+        Err(failure) => AttemptEnd::Failed(failure.stop),
+    };
+    let path = match attempt.needs_time {
+        // It takes the place of slow loading.
+        true => Some(Path::Released),
+        false => problem.undisturbed_path(),
+    };
+    let whole = found.map(|found| found.mirrored_to_whole(&part));
+    (result_with_path(whole, path), end)
+}
+
+/// Whether an equilibrium is accepted by this rule, or why not.
+fn acceptance_of(
+    problem: &RelaxationProblem,
+    rule: Acceptance,
+    found: &NestedEquilibrium,
+    effort: &mut WorkLog,
+) -> AttemptEnd {
+    match rule {
+        Acceptance::AtRest => AttemptEnd::Accepted,
+        _ if !found.is_stable() => AttemptEnd::Unstable,
+        Acceptance::Stable => AttemptEnd::Accepted,
+        Acceptance::EndOfLoading if !is_in_first_valley(&found.history) => AttemptEnd::FarFromArcs,
+        Acceptance::EndOfLoading if !takes_loads_stably(problem, found, effort) => {
+            AttemptEnd::VeinsMayBuckle
+        }
+        Acceptance::EndOfLoading => AttemptEnd::Accepted,
     }
 }
 
@@ -191,6 +231,7 @@ pub(super) fn equilibrium_with_stability(
         (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
     leaf.stability.modes = modes.map(|it| it.modes);
+    leaf.attempts = std::mem::take(&mut effort.attempts);
     (leaf, found)
 }
 
@@ -276,15 +317,18 @@ pub fn relax_from(
     let mut effort = WorkLog::new(progress);
     let begun = NestedEquilibrium::without_grids(&problem);
     let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
-    let settled = match &found {
-        Ok(found) => found.is_stable() || how.keep_unstable,
-        Err(_) => problem.out_of_time(),
+    let (settled, end) = match &found {
+        Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
+        Ok(_) => (false, AttemptEnd::Unstable),
+        Err(failure) => (problem.out_of_time(), AttemptEnd::Failed(failure.stop)),
     };
+    effort.log(Strategy::GivenShape, Extent::Whole, segments, end);
     if settled {
         return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
     }
-    drop(effort);
+    let given = effort.attempts;
     let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
+    leaf.attempts.splice(0..0, given);
     leaf.doubts.push(EquilibriumDoubt::RelaxedAnew);
     Ok(leaf)
 }

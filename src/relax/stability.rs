@@ -14,7 +14,8 @@ use crate::relax::eigenvalues::{
     EigenvalueRequest, LowestModes, affordable_next_grid, deciding_grid,
 };
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
-use crate::relax::problem::{RelaxationProblem, WorkLog};
+use crate::relax::log::WorkLog;
+use crate::relax::problem::RelaxationProblem;
 use crate::relax::request::{MOST_MODES, Method, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;
 use crate::relax::{eigenvalues, saddle};

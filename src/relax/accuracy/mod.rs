@@ -18,7 +18,7 @@ pub(crate) mod richardson;
 pub(crate) mod transfer;
 
 use crate::leaf::{
-    DiscreteLeaf, Grid, Leaf, RodFields, System, whole_leaf_changes, whole_leaf_fields,
+    DiscreteLeaf, EquationWorkspace, Grid, Leaf, RodFields, whole_leaf_changes, whole_leaf_fields,
 };
 use crate::memory;
 use crate::newton::{Contraction, EquilibriumFailure, SolverCounts};
@@ -522,11 +522,11 @@ impl NestedEquilibrium {
 
     /// The same with the error of the values on its only grid or of the extrapolated values
     /// estimated from their defect, and corrected if that makes them accurate enough. The
-    /// equations take the place of the `spare` ones.
+    /// equations are set up in the memory of the `workspace`.
     pub fn with_error_estimate(
         mut self,
         problem: &RelaxationProblem,
-        spare: &mut Option<System>,
+        workspace: &mut EquationWorkspace,
         work: &mut SolverCounts,
     ) -> Self {
         let most = problem.corrections();
@@ -546,7 +546,7 @@ impl NestedEquilibrium {
             }
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let (levels, systems) = (&self.levels, (&mut self.factorized_level, spare));
+        let (levels, systems) = (&self.levels, (&mut self.factorized_level, workspace));
         self.estimate =
             columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {

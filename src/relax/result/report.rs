@@ -101,6 +101,7 @@ pub fn equilibrium(
             energy_error: (energy_error.filter(|_| !problem.leaf.in_wind()))
                 .map(|error| error * scale.moment()),
         },
+        attempts: Vec::new(),
         work: found.work,
         wall_seconds,
         shape: Shape {

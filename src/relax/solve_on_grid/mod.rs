@@ -22,8 +22,9 @@ use crate::memory;
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::relax::accuracy::transfer::{GridLevel, mirror_level};
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationFailure, is_large};
+use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
-use crate::relax::problem::{BUDGET, FINEST, RelaxationProblem, WorkLog};
+use crate::relax::problem::{BUDGET, FINEST, RelaxationProblem};
 use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
@@ -145,8 +146,7 @@ fn find_unleaned_equilibrium(
     moved |= windy && from_start;
     if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
         let how = (near_rest, cg_tolerance);
-        effort.spare_system = None;
-        let mut system = System::new(&leaf);
+        let mut system = effort.workspace.equations(&leaf);
         let begun = from_start.then(|| (state.clone(), effort.work.steps));
         let settled =
             solve_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
@@ -154,7 +154,9 @@ fn find_unleaned_equilibrium(
             let distance = begun.distance(&settled.level.state);
             history.from_start = Some((distance, effort.work.steps - steps));
         }
-        effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
+        if !is_large(&settled.level.leaf) {
+            effort.workspace.take_back(system);
+        }
         return GridSolution {
             left_convex_valley: moved || settled.left_convex_valley,
             events,
@@ -415,12 +417,14 @@ pub fn check_stability(
     }
     let before = found.index;
     let (mut found, mut level) = found.split();
-    let mut spare = effort.spare_system.take();
-    if spare.is_none() && found.levels.is_empty() {
+    if found.levels.is_empty() && !effort.workspace.fits(&level.leaf) {
         // Further grids have equations of their own.
-        spare = found.factorized_level.take().map(|linear| linear.system);
+        let linear = found.factorized_level.take();
+        if let Some(linear) = linear {
+            effort.workspace.take_back(linear.system);
+        }
     }
-    let mut system = System::new_in_memory(spare, &level.leaf);
+    let mut system = effort.workspace.equations(&level.leaf);
     let work = &mut effort.work;
     let mut count = count_negative(problem, &level, &mut system, compared, work);
     if matches!(count.index, Some(Some(1..))) && !problem.keeps_unstable() {
