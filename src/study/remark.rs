@@ -203,3 +203,36 @@ remarks! {
         } = "stopped",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::join_remarks;
+
+    #[test]
+    fn remarks_are_sentences_with_codes() {
+        let all = [
+            EquilibriaRemark::LowerEnergy {
+                plain: 1,
+                lowest: 0,
+                difference: 0.25,
+            },
+            EquilibriaRemark::Stopped { starts: 16 },
+        ];
+        let joined = "a relaxation ends in equilibrium 2, but number 1 is stable, too, and has less energy, by 2.5×10⁻¹; \
+                      the search was stopped after 16 starts";
+        assert_eq!(join_remarks(&all).as_deref(), Some(joined));
+        assert_eq!(join_remarks::<EquilibriaRemark>(&[]), None);
+        let [vary, across] = ["load.gravity[2]", "leaf.rods"].map(|key| key.parse().unwrap());
+        let start = 5.0;
+        let remark = BoundaryRemark::NoIndexChange {
+            vary,
+            across,
+            start,
+        };
+        let sentence = "along load.gravity[2] the index changes nowhere at leaf.rods = 5";
+        assert_eq!(remark.to_string(), sentence);
+        let passed_on = BoundaryRemark::Trace(TraceRemark::TooManyBranches { most: 24 });
+        assert_eq!(passed_on.code(), "too-many-branches");
+    }
+}
