@@ -177,6 +177,10 @@ macro_rules! remarks {
         }
 
         impl $type {
+            /// All of its own codes.
+            #[cfg(test)]
+            pub const CODES: &'static [&'static str] = &[$($($code,)?)*];
+
             /// The word for it, in kebab case, which stays when its sentence changes.
             pub fn code(&self) -> &'static str {
                 match self {

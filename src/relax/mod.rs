@@ -65,7 +65,7 @@ use crate::run::Instant;
 pub use crate::run::{Limit, RefusedOption, UnknownWord as UnknownMethod, UnmodelledFeature};
 use crate::scenario::Scenario;
 pub use crate::shape::{NodeState, RodShape};
-pub use crate::shooting::CorrectionProgress;
+pub use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

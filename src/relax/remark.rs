@@ -413,3 +413,47 @@ pub(crate) fn serialize_remark<S: Serializer>(
     }
     .serialize(serializer)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words that stay, and that the documents explain.
+    #[test]
+    fn codes_are_documented() {
+        let formats = include_str!("../../docs/formats.md");
+        let codes = EquilibriumRemark::CODES;
+        for (k, code) in codes.iter().enumerate() {
+            assert!(formats.contains(&format!("`{code}`")), "{code}");
+            assert!(!codes[..k].contains(code), "{code}");
+        }
+    }
+
+    #[test]
+    fn a_remark_ends_with_what_may_keep_the_leaf_from_rest() {
+        let mut remark = EquilibriumRemark::StepLimit {
+            segments: 8,
+            obstacle: Some(RestObstacle::Loads {
+                reached: Some((Stage::Joining, 0.5)),
+                loads: vec!["load.gravity", "load.tip_force"],
+                stiffness: "torsion",
+                vein: 2,
+                may_shoot: true,
+            }),
+        };
+        let sentence = "the step limit came before rest on 8 segments: the load may admit no stable equilibrium \
+                        (it came to rest up to 50.00 % of joining): lower load.gravity or load.tip_force, or raise \
+                        stiffness.torsion of vein 3, or try the method shooting";
+        assert_eq!(remark.to_string(), sentence);
+        if let EquilibriumRemark::StepLimit { obstacle, .. } = &mut remark {
+            *obstacle = None;
+        }
+        assert!(remark.to_string().ends_with("no stable equilibrium"));
+        let key = "leaf.fan";
+        let slip = PlausibilityWarning::AngleInDegrees { key, angle: -60.0 };
+        let doubt = EquilibriumDoubt::Implausible(slip);
+        assert_eq!(doubt.code(), "angle-in-degrees");
+        let sentence = "leaf.fan is in radians, and -60 is more than a turn";
+        assert_eq!(doubt.to_string(), sentence);
+    }
+}

@@ -33,10 +33,10 @@ pub use crate::study::equilibria::{
 };
 pub use crate::study::fit::{
     ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, Fit,
-    FitAlternative, FitBudget, FitCandidate, FitError, FitExperiment, FitLeaf, FitOutcome,
-    FitParameter, FitRequest, FitResidual, FitStep, FitWork, FreeParameter, FreeParameterTarget,
-    MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn, RowCondition, RowFilter,
-    SystematicResiduals, TracedVeinPoint, fit,
+    FitAlternative, FitBudget, FitCandidate, FitCandidateRemark, FitError, FitExperiment, FitLeaf,
+    FitOutcome, FitParameter, FitRemark, FitRequest, FitResidual, FitStep, FitWork, FreeParameter,
+    FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn,
+    RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
     DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapMotionFailure, MapOutcome, MapRefused,
@@ -44,7 +44,7 @@ pub use crate::study::map::{
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
 pub use crate::study::remark::{
-    BoundaryRemark, BranchRemark, EquilibriaRemark, SolutionRemark, TraceRemark,
+    BoundaryRemark, BranchRemark, CheckReason, EquilibriaRemark, SolutionRemark, TraceRemark,
 };
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,

@@ -1,6 +1,6 @@
 //! What is said of traces, their branches, boundaries of stability and sets of equilibria: why they
 //! are not known as far as requested, and what would help. And what a method says of its answer,
-//! where methods are compared.
+//! where methods are compared, or why they are not.
 
 use crate::branch::{CorrectorFailure, VerificationFailure};
 use crate::numbers::format_error_bound;
@@ -113,6 +113,30 @@ remarks! {
         Stopped = "stopped",
     }
 
+    /// Why a check has nothing to compare.
+    pub enum CheckReason {
+        /// A leaf that is not at rest.
+        #[error(
+            "the relaxation did not come to rest{}",
+            .remark.as_ref().map_or(String::new(), |remark| format!(": {remark}"))
+        )]
+        NotAtRest {
+            /// What is said of it.
+            remark: Option<EquilibriumRemark>,
+        } = "not-at-rest",
+        /// No solution by shooting.
+        #[error("{0}")]
+        ShootingFailed(ShootingFailureReason) = "shooting-failed",
+        /// A solution by shooting that is less accurate than the tolerance.
+        #[error(
+            "the boundary-value solution is only known within {error:.1e}: ask for a larger tolerance"
+        )]
+        Inaccurate {
+            /// The bound on its error, in units of length.
+            error: f64,
+        } = "inaccurate",
+    }
+
     /// What a method says of its answer.
     pub enum SolutionRemark {
         /// What is said of an equilibrium.
@@ -177,5 +201,38 @@ remarks! {
             /// The number of starts.
             starts: usize,
         } = "stopped",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::join_remarks;
+
+    #[test]
+    fn remarks_are_sentences_with_codes() {
+        let all = [
+            EquilibriaRemark::LowerEnergy {
+                plain: 1,
+                lowest: 0,
+                difference: 0.25,
+            },
+            EquilibriaRemark::Stopped { starts: 16 },
+        ];
+        let joined = "a relaxation ends in equilibrium 2, but number 1 is stable, too, and has less energy, by 2.5×10⁻¹; \
+                      the search was stopped after 16 starts";
+        assert_eq!(join_remarks(&all).as_deref(), Some(joined));
+        assert_eq!(join_remarks::<EquilibriaRemark>(&[]), None);
+        let [vary, across] = ["load.gravity[2]", "leaf.rods"].map(|key| key.parse().unwrap());
+        let start = 5.0;
+        let remark = BoundaryRemark::NoIndexChange {
+            vary,
+            across,
+            start,
+        };
+        let sentence = "along load.gravity[2] the index changes nowhere at leaf.rods = 5";
+        assert_eq!(remark.to_string(), sentence);
+        let passed_on = BoundaryRemark::Trace(TraceRemark::TooManyBranches { most: 24 });
+        assert_eq!(passed_on.code(), "too-many-branches");
     }
 }

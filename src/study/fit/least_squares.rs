@@ -12,6 +12,7 @@ use crate::study::fit::data::Experiment;
 use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
 use crate::study::fit::minima::{relative_misfit, sum_of_squares};
 use crate::study::fit::model::{FitModel, FitPoint};
+use crate::study::fit::remark::FitRemark;
 use crate::study::fit::statistics::{
     FitStatistics, NULL_SINGULAR_VALUE, singular_value_decomposition,
 };
@@ -450,10 +451,6 @@ const MOST_EQUILIBRIUM_JUMPS: usize = 3;
 /// that of the search to it: a larger one is due to coarse grids.
 const CONSISTENT_DEVIATION_RATIO: f64 = 1.05;
 
-/// Remark if a leaf did not stay on its branch.
-const EQUILIBRIUM_JUMP_REMARK: &str = "on the way a leaf jumped to another equilibrium, that to which it \
-    relaxes from the start: compare with a fit that starts from the values found";
-
 /// A minimum, or where the search for it ended.
 pub(super) struct FitMinimum {
     pub fit: Fit,
@@ -591,7 +588,7 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             };
         };
         if jumps > 0 {
-            found.fit.remarks.push(EQUILIBRIUM_JUMP_REMARK.into());
+            found.fit.remarks.push(FitRemark::JumpedOnTheWay);
         }
         Ok(found)
     }
