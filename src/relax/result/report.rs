@@ -12,7 +12,6 @@ use crate::relax::accuracy::transfer::{GridLevel, is_planar_level};
 use crate::relax::accuracy::{NestedEquilibrium, transfer};
 use crate::relax::path::{Event, Path, StabilityLoss, Stage};
 use crate::relax::problem::RelaxationProblem;
-use crate::relax::request::Method;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::scenario::{
@@ -234,7 +233,7 @@ pub fn outcome(
 ) -> (Outcome, Option<String>) {
     let advice = || advice(problem, found, reached);
     let finest = found.levels.last().map_or(0, |level| level.leaf.segments());
-    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let explicit = problem.options.method.is_explicit();
     match stopped {
         None if found.keeps_tolerance => (
             match (found.index, found.history.saddle) {
