@@ -39,7 +39,8 @@ pub use crate::relax::remark::{
 };
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
-    SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,
+    SMALLEST_TOLERANCE, SemiImplicit, Settings, ShootingVariant, UnsupportedSetting,
+    check_tolerance, without_wind,
 };
 pub use crate::relax::rest::relax_from;
 pub(crate) use crate::relax::rest::relax_on_grids;

@@ -3,7 +3,9 @@
 use crate::leaf::{Grid, Leaf};
 use crate::newton::SolverCounts;
 use crate::relax::remark::EquilibriumRemark;
-use crate::relax::request::{MAX_INTERVALS, Method, Options, Progress, RelaxError};
+use crate::relax::request::{
+    MAX_INTERVALS, Options, Progress, RelaxError, SemiImplicit, ShootingVariant,
+};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::forces::{Reaction, Stresses};
 use crate::relax::result::report::neutral_directions;
@@ -83,11 +85,13 @@ pub fn relax(
     tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
-    let (intervals, from_rest) = match options.method {
-        Method::Shooting { intervals } => (intervals, false),
-        Method::ShootingFromRest { intervals } => (intervals, true),
-        _ => (Some(1), false),
-    };
+    let ShootingVariant {
+        intervals,
+        from_relaxed_leaf: from_rest,
+    } = options.method.shooting().unwrap_or(ShootingVariant {
+        intervals: Some(1),
+        from_relaxed_leaf: false,
+    });
     check_intervals(scenario.rods.len(), intervals)?;
     if !from_rest && scenario.held_tip.is_some() {
         // Shooting from arcs has no continuation to a held tip.
@@ -119,7 +123,7 @@ fn relax_from_rest(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let relaxation = Options {
-        method: Method::default(),
+        method: SemiImplicit::default().into(),
         tolerance: Some(START_TOLERANCE),
         modes: 0,
         stations: None,

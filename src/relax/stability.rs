@@ -13,7 +13,7 @@ use crate::relax::eigenvalues::{
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::log::WorkLog;
 use crate::relax::plan::RelaxationProblem;
-use crate::relax::request::{MOST_MODES, Method, Options, Progress, SemiImplicit};
+use crate::relax::request::{MOST_MODES, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;
 use crate::relax::{eigenvalues, saddle};
 use crate::scenario::Scenario;
@@ -303,10 +303,11 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
         return None;
     }
     let options = Options {
-        method: Method::SemiImplicit(SemiImplicit {
+        method: SemiImplicit {
             keep_unstable: true,
             ..SemiImplicit::default()
-        }),
+        }
+        .into(),
         modes: 0,
         ..Options::default()
     };

@@ -546,7 +546,7 @@ fn at_rest(
 ) -> Result<State, SimulationError> {
     let scenario = scenario_at_start(leaf.scenario());
     let options = relax::Options {
-        method: relax::Method::default().on_grid(Some(grid.segments())),
+        method: relax::SemiImplicit::on_grid(Some(grid.segments())).into(),
         tolerance: Some(tolerance),
         limit,
         route: match scenario.wind {

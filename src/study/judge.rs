@@ -7,7 +7,9 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::relax;
-use crate::relax::{Equilibrium, Method, Options, Outcome, RelaxError, SolverCounts, index_near};
+use crate::relax::{
+    Equilibrium, Options, Outcome, RelaxError, SemiImplicit, SolverCounts, index_near,
+};
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape, Undulation};
@@ -177,7 +179,7 @@ pub fn single_grid_error(
     const SAFETY: f64 = 2.0;
     let on = |segments: usize| {
         let options = Options {
-            method: Method::default().on_grid(Some(segments)),
+            method: SemiImplicit::on_grid(Some(segments)).into(),
             tolerance: Some(tolerance),
             limit: limit.clone(),
             ..Options::default()

@@ -5,8 +5,8 @@
 
 use crate::numbers::largest;
 use crate::relax::{
-    Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Method, Options, Parameter,
-    Progress, RelaxError, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
+    Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Options, Parameter, Progress,
+    RelaxError, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
@@ -136,7 +136,7 @@ pub fn relax_blade(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let mut leaf = relax(base.scenario(), options, progress)?;
-    let refines = matches!(&options.method, Method::SemiImplicit(how) if how.segments.is_none());
+    let refines = (options.method.semi_implicit()).is_some_and(|how| how.segments.is_none());
     let (Some(blade), Some(true), true) = (leaf.blade.as_ref(), leaf.stable(), refines) else {
         return Ok(leaf);
     };

@@ -15,7 +15,6 @@ use crate::figure::drawing::{
 use crate::report::contender_name;
 use crate::report::numbers::format_error_bound;
 use glam::DVec2;
-use leafdyn::relax::Method;
 use leafdyn::study::{Chart, ChartRow, PeerProgram, ScalingStudy, SolverConfig};
 
 /// Fixed colours of the peers that come with this crate, the same in every chart;
@@ -120,24 +119,22 @@ fn point_coordinates(series: &[ChartSeries]) -> (Vec<f64>, Vec<f64>) {
     points.map(|point| point.coordinates).unzip()
 }
 
-/// Colour and marker of a contender.
-fn contender_style(who: SolverConfig) -> (Color, Marker) {
-    match (who.method, who.one_grid) {
-        (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
-        (Method::SemiImplicit(_), true) => (SKY, Marker::Square),
-        (Method::Explicit { .. }, false) => (VERMILION, Marker::Circle),
-        (Method::Explicit { .. }, true) => (ORANGE, Marker::Square),
-        (Method::SingleShooting, _) => (GREEN, Marker::Triangle),
-        (Method::Shooting { .. }, _) => (PURPLE, Marker::Wedge),
-        (Method::ShootingFromRest { .. }, _) => (SLATE, Marker::Diamond),
-    }
-}
+/// Color and marker of each contender, in the order of [`SolverConfig::ALL`].
+const CONTENDER_STYLES: [(Color, Marker); SolverConfig::ALL.len()] = [
+    (BLUE, Marker::Circle),
+    (SKY, Marker::Square),
+    (VERMILION, Marker::Circle),
+    (ORANGE, Marker::Square),
+    (GREEN, Marker::Triangle),
+    (PURPLE, Marker::Wedge),
+    (SLATE, Marker::Diamond),
+];
 
 /// A series for each contender with results: seconds over veins, or errors over
 /// seconds. Each row comes with its number of veins.
 fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartSeries> {
     let of = |who: SolverConfig| {
-        let (color, marker) = contender_style(who);
+        let (color, marker) = CONTENDER_STYLES[who.number().unwrap_or(0)];
         let default = if who.is_default() { " (default)" } else { "" };
         let name = format!("{}{default}", contender_name(who));
         let mut series = ChartSeries::new(name, color, marker, false);

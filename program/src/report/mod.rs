@@ -26,7 +26,7 @@ pub use crate::report::trace::{
     error_location_words, index_change_text, is_codimension_two, passes_crossings, slope_unit,
     write_boundary_table, write_trace_table,
 };
-use leafdyn::relax::{Equilibrium, Method, Outcome};
+use leafdyn::relax::{Equilibrium, Outcome};
 use leafdyn::scenario::{Scenario, Units, printable};
 use leafdyn::study::{BranchEnd, CheckVerdict, CorrectorFailure, MapShow, SolverConfig};
 use serde::Serialize;
@@ -271,15 +271,17 @@ pub fn check_verdict_phrase(verdict: &CheckVerdict) -> &'static str {
 
 /// The name of a contender in a chart.
 pub fn contender_name(contender: SolverConfig) -> &'static str {
-    match (contender.method, contender.one_grid) {
-        (Method::SemiImplicit(_), false) => "semi-implicit, extrapolated",
-        (Method::SemiImplicit(_), true) => "semi-implicit, single grids",
-        (Method::Explicit { .. }, false) => "explicit, extrapolated",
-        (Method::Explicit { .. }, true) => "explicit, single grids",
-        (Method::SingleShooting, _) => "single shooting",
-        (Method::Shooting { .. }, _) => "multiple shooting",
-        (Method::ShootingFromRest { .. }, _) => "shooting from the relaxed leaf",
-    }
+    /// In the order of [`SolverConfig::ALL`].
+    const NAMES: [&str; SolverConfig::ALL.len()] = [
+        "semi-implicit, extrapolated",
+        "semi-implicit, single grids",
+        "explicit, extrapolated",
+        "explicit, single grids",
+        "single shooting",
+        "multiple shooting",
+        "shooting from the relaxed leaf",
+    ];
+    NAMES[contender.number().unwrap_or(0)]
 }
 
 /// How a branch ended, in a phrase.

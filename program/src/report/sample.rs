@@ -2,7 +2,7 @@
 //! motion, and made-up studies of it.
 
 use glam::{DQuat, DVec3};
-use leafdyn::relax::{Equilibrium, Method, Outcome};
+use leafdyn::relax::{Equilibrium, Outcome};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
 use leafdyn::simulate::{Frame, OutputSample, Record, ShapeSnapshot, Simulation, snapshot_indices};
@@ -36,7 +36,7 @@ pub fn sample_scenario(name: &str, rods: usize) -> Scenario {
 /// A leaf at rest on one grid, with an error estimate as if from several.
 pub fn sample_equilibrium(rods: usize, segments: usize) -> Equilibrium {
     let options = relax::Options {
-        method: Method::default().on_grid(Some(segments)),
+        method: relax::SemiImplicit::on_grid(Some(segments)).into(),
         ..relax::Options::default()
     };
     let mut leaf = relax::relax(&sample_scenario("fan", rods), &options, &mut |_| {}).unwrap();
@@ -112,7 +112,9 @@ pub fn sample_map() -> Map {
     .unwrap();
     let row = |cell: usize, method: MapMethod| {
         let outcome = match method {
-            MapMethod::ToRest(Method::SemiImplicit(_)) if cell < 5 => MapOutcome::Right,
+            MapMethod::ToRest(method) if method.semi_implicit().is_some() && cell < 5 => {
+                MapOutcome::Right
+            }
             _ => MapOutcome::ALL[cell],
         };
         let rests = !matches!(

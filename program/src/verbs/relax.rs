@@ -190,7 +190,7 @@ impl RelaxArguments {
     }
 
     fn find_all_equilibria(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
-        let Method::SemiImplicit(how) = self.method_with_options()? else {
+        let Some(how) = self.method_with_options()?.semi_implicit() else {
             return Err("--all: only with the method semi-implicit".into());
         };
         let mut line = job.progress_line();

@@ -12,7 +12,6 @@ use crate::relax::accuracy::{NestedEquilibrium, transfer};
 use crate::relax::path::{Event, Path, StabilityLoss, Stage};
 use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
-use crate::relax::request::Method;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::scenario::{
@@ -234,7 +233,7 @@ pub fn outcome(
 ) -> (Outcome, Option<EquilibriumRemark>) {
     let obstacle = || obstacle_to_rest(problem, found, reached);
     let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
-    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let explicit = problem.options.method.is_explicit();
     match stopped {
         None if found.keeps_tolerance => (
             match (found.index, found.history.saddle) {

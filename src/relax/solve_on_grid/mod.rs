@@ -15,7 +15,7 @@ use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationFailure, is_l
 use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
 use crate::relax::plan::{BUDGET, FINEST, RelaxationProblem};
-use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
+use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
@@ -128,7 +128,7 @@ fn find_unleaned_equilibrium(
     } else {
         leaf.place_held_nodes(&mut state);
     }
-    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let explicit = problem.options.method.is_explicit();
     let windy = leaf.leaf.in_wind();
     // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);
@@ -205,11 +205,8 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
         return half_state(problem.leaf, &initial_state(&whole));
     }
     let mut state = initial_state(leaf);
-    if let Method::SemiImplicit(SemiImplicit {
-        disturbance: Some(number),
-        ..
-    }) = problem.options.method
-    {
+    let how = problem.options.method.semi_implicit();
+    if let Some(number) = how.and_then(|how| how.disturbance) {
         disturb(leaf, number, &mut state);
     }
     state

@@ -174,11 +174,17 @@ impl SolverConfig {
 
     /// The word used on the command line and in files.
     pub fn word(self) -> &'static str {
-        match (self.method, self.one_grid) {
-            (Method::SemiImplicit(_), true) => "semi-implicit-grid",
-            (Method::Explicit { .. }, true) => "explicit-grid",
-            (method, _) => method.word(),
+        match self.one_grid && !self.method.is_shooting() {
+            true if self.method.is_explicit() => "explicit-grid",
+            true => "semi-implicit-grid",
+            false => self.method.word(),
         }
+    }
+
+    /// Its place among [`SolverConfig::ALL`], whatever the options of its method.
+    pub fn number(self) -> Option<usize> {
+        let word = self.word();
+        SolverConfig::ALL.iter().position(|it| it.word() == word)
     }
 
     /// Whether it is the default of [`crate::relax::relax`].
@@ -259,7 +265,8 @@ impl<'s> RepeatedRuns<'s> {
             AccuracySetting::Tolerance(tolerance) => (Some(tolerance), None),
             AccuracySetting::Segments(segments) => (None, Some(segments)),
         };
-        if let Method::ShootingFromRest { .. } = self.contender.method {
+        let shooting = self.contender.method.shooting();
+        if shooting.is_some_and(|how| how.from_relaxed_leaf) {
             let accuracy = tolerance.unwrap_or(self.scenario.tolerance);
             return shoot_from_relaxed_leaf(self.scenario, accuracy);
         }
@@ -625,12 +632,7 @@ fn measure_scaling(
         let row = result::chart_rows(&[runs], leaf.reference.as_ref());
         rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
-    let order = |contender| {
-        SolverConfig::ALL
-            .iter()
-            .position(|other| *other == contender)
-    };
-    rows.sort_by_key(|found| (order(found.row.contender), found.rods));
+    rows.sort_by_key(|found| (found.row.contender.number(), found.rods));
     Ok((rows, unconfirmed))
 }
 
@@ -642,8 +644,8 @@ fn coarsest_accurate_grid(
 ) -> Option<usize> {
     let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
     let grids = SolverConfig {
-        method: Method::default(),
         one_grid: true,
+        ..SolverConfig::ALL[0]
     };
     let accurate = |&segments: &usize| {
         let mut run = RepeatedRuns::new(scenario, grids, AccuracySetting::Segments(segments));

@@ -7,7 +7,7 @@
 //!
 //! Measurements of other programs, next to ours.
 
-use crate::relax::{Method, Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
+use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
 use crate::shooting;
 use crate::shooting::ShootingStart;
@@ -364,8 +364,7 @@ pub fn chart_remarks(
     let floor = reference.map_or(0.0, |found| found.known_within);
     let neutral = reference.and_then(|found| found.neutral.as_ref());
     let mut remarks = Vec::new();
-    let mut methods = contenders.iter().map(|contender| contender.method);
-    if methods.any(|method| matches!(method, Method::Explicit { .. })) {
+    if contenders.iter().any(|it| it.method.is_explicit()) {
         remarks.push(ChartRemark::ExplicitStep);
     }
     if let Some(neutral) = neutral {

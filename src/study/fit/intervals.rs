@@ -12,9 +12,11 @@
 
 use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::least_squares::{GaussNewtonIteration, GaussNewtonOutcome};
-use crate::study::fit::minima::MOST_RELAXATION_STEPS;
-use crate::study::fit::model::{CaseSolution, FitPoint};
-use crate::study::fit::statistics::{FitStatistics, UNDETERMINED_UNCERTAINTY};
+use crate::study::fit::model::{FitPoint, MOST_RELAXATION_STEPS};
+use crate::study::fit::prediction::CaseSolution;
+use crate::study::fit::statistics::{
+    BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY,
+};
 use crate::study::fit::{FitParameter, FitStep};
 use nalgebra::{DMatrix, DVector};
 
@@ -186,9 +188,6 @@ const MOST_LOST_LEAVES: usize = 3;
 
 /// A sum with a smaller relative error than this needs no further evaluation.
 const CLEAR_SUM_ERROR: f64 = 0.3;
-
-/// Excess below the minimum, in variances, that indicates a better minimum.
-pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
 
 /// Where a profile ends on one side of the minimum.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,8 @@
 //! Whether the data contradict the model at a minimum.
 
 use crate::scenario::longest;
-use crate::study::fit::data::{DatumDimension, MeasuredQuantity};
-use crate::study::fit::model::{DatumQuantity, ScalarDatum};
+use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
+use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
 use crate::study::fit::statistics::FitStatistics;
 use crate::study::fit::{FitParameter, FreeParameterTarget, SystematicResiduals};
 use nalgebra::DVector;

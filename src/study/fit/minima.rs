@@ -5,16 +5,12 @@
 //! that exchange or mirror what the data may not distinguish.
 
 use crate::run::Instant;
-use crate::scenario::longest;
-use crate::study::fit::data::{DatumDimension, Experiment, MeasuredQuantity};
-use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
-use crate::study::fit::least_squares::{
-    ExcludedMinimum, FitMinimum, GaussNewtonIteration, GaussNewtonOutcome, LocalFitSearch,
-    Weighting,
-};
-use crate::study::fit::model::{DatumQuantity, FitModel, FitPoint};
+use crate::study::fit::data::Experiment;
+use crate::study::fit::least_squares::{ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
+use crate::study::fit::model::{FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
 use crate::study::fit::remark::FitRemark;
-use crate::study::fit::statistics::UNDETERMINED_UNCERTAINTY;
+use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
 use crate::study::fit::{
     Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
 };
@@ -66,7 +62,7 @@ impl FitStart {
         let found = loose.relax_leaves(&start);
         told(clock.elapsed().as_secs_f64());
         let (initial, refused) = match found {
-            Ok(point) if relative_misfit(model, &point) <= POOR_INITIAL_MISFIT => {
+            Ok(point) if model.relative_misfit(&point) <= POOR_INITIAL_MISFIT => {
                 return Ok(FitStart {
                     point,
                     initial: None,
@@ -90,7 +86,7 @@ impl FitStart {
             taken = evaluations;
             let there = found.and_then(|found| loose.relax_leaves(&found.theta).ok());
             if let Some(there) =
-                there.filter(|there| relative_misfit(model, there) <= POOR_MINIMUM_MISFIT)
+                there.filter(|there| model.relative_misfit(there) <= POOR_MINIMUM_MISFIT)
             {
                 return Ok(FitStart {
                     point: there,
@@ -102,7 +98,7 @@ impl FitStart {
         }
         let scout = Multistart::new(model, weighting);
         let least = match &initial {
-            Some(point) => sum_of_squares(weighting, point),
+            Some(point) => weighting.sum_of_squares(point),
             None => f64::INFINITY,
         };
         let mut starts = match initial {
@@ -161,7 +157,7 @@ fn find_coarse_minimum(
     iteration.excluded_minimum = besides;
     let (point, end, more) = iteration.run(point);
     let found = (end == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
-        sum: sum_of_squares(weighting, &point),
+        sum: weighting.sum_of_squares(&point),
         theta: point.theta,
     });
     (found, 1 + more)
@@ -480,8 +476,6 @@ const NEARBY_VALUE_OFFSETS: [f64; 4] = [-0.2, 0.2, -1.0, 1.0];
 /// steps in which they come to rest: soft leaves far from the data may take thousands.
 const COMPARISON_TOLERANCE: f64 = 1e-3;
 
-pub(super) const MOST_RELAXATION_STEPS: usize = 400;
-
 /// Values of the coordinates and the sum of squares there.
 #[derive(Clone, Debug)]
 pub(super) struct EvaluatedStart {
@@ -523,7 +517,7 @@ impl<'a> Multistart<'a> {
             .model
             .relax_leaves_within_steps(&theta, MOST_RELAXATION_STEPS)
             .ok()?;
-        let sum = sum_of_squares(self.weighting, &point);
+        let sum = self.weighting.sum_of_squares(&point);
         sum.is_finite().then_some(EvaluatedStart { theta, sum })
     }
 
@@ -707,46 +701,4 @@ fn is_within_given_bounds(model: &FitModel, theta: &[f64]) -> bool {
         let [low, high] = free.bounds;
         !free.has_given_bounds || (low..=high).contains(theta)
     })
-}
-
-/// The sum of squares at a point.
-pub(super) fn sum_of_squares(weighting: Weighting, point: &FitPoint) -> f64 {
-    let residuals = weighting.residuals(point);
-    weighting.huber_sum(&residuals, weighting.huber_bound(&residuals))
-}
-
-/// The root mean square of the residuals, of coordinates in lengths of the leaf, of other data
-/// relative to the largest of their kind.
-pub(super) fn relative_misfit(model: &FitModel, point: &FitPoint) -> f64 {
-    let longest = longest(&model.base.scenario().rods);
-    let pixel = model.initial_pixel_length();
-    let largest = |kind: DatumDimension| {
-        let alike = point
-            .components()
-            .filter(move |c| c.quantity.dimension() == kind);
-        alike.fold(0.0_f64, |most, c| most.max(c.observed.abs()))
-    };
-    let (force, frequency) = (
-        largest(DatumDimension::Force),
-        largest(DatumDimension::Frequency),
-    );
-    let (mut squares, mut count) = (0.0, 0.0_f64);
-    for component in point.components() {
-        let size = match component.quantity {
-            DatumQuantity::Vein { .. }
-                if component.quantity.dimension() == DatumDimension::Pixel =>
-            {
-                longest / pixel
-            }
-            DatumQuantity::Vein { .. } | DatumQuantity::Result(MeasuredQuantity::Tip(_)) => longest,
-            DatumQuantity::Result(MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..)) => {
-                force
-            }
-            DatumQuantity::Result(MeasuredQuantity::Frequency(_)) => frequency,
-        };
-        let part = (component.model - component.observed) / size.max(f64::MIN_POSITIVE);
-        squares += part.powi(2);
-        count += 1.0;
-    }
-    (squares / count.max(1.0)).sqrt()
 }

@@ -9,15 +9,17 @@
 //!
 //! The free numbers of a fit.
 
+mod columns;
 mod data;
-mod found;
+mod derivatives;
 mod intervals;
 mod lack_of_fit;
 mod least_squares;
+mod local_fit;
 mod minima;
 mod model;
+mod prediction;
 mod remark;
-mod responses;
 mod statistics;
 mod table;
 
@@ -26,13 +28,17 @@ use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use crate::run::{Instant, Limit};
 use crate::scenario::units::LENGTH;
 
-pub use crate::study::fit::data::{
-    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, MeasuredColumn,
-    MeasuredQuantity, MeasuredValue, RowCondition, RowFilter, TracedVeinPoint,
+pub use crate::study::fit::columns::{
+    ComparisonOperator, DataReadingOptions, MeasuredColumn, MeasuredQuantity, RowCondition,
+    RowFilter,
 };
-use crate::study::fit::least_squares::{ASSUMED_DEVIATION_PER_LENGTH, Weighting};
+pub use crate::study::fit::data::{
+    Data, DataFile, DataOrigin, Experiment, MeasuredValue, TracedVeinPoint,
+};
 use crate::study::fit::minima::{FitStart, GlobalFitSearch};
-use crate::study::fit::model::{EvaluationBudget, FitModel};
+use crate::study::fit::model::{
+    ASSUMED_DEVIATION_PER_LENGTH, EvaluationBudget, FitModel, Weighting,
+};
 pub use crate::study::fit::remark::{FitCandidateRemark, FitRemark};
 use crate::study::{BaseScenario, ParameterKeys, VariableTarget, VaryError};
 use crate::words;

@@ -4,9 +4,10 @@
 //!
 //! Which candidate experiment would be most informative.
 
-use crate::study::fit::data::{Data, DatumDimension, Experiment};
-use crate::study::fit::least_squares::Weighting;
-use crate::study::fit::model::{DatumQuantity, EvaluationBudget, FitModel, FitPoint, ScalarDatum};
+use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::data::{Data, Experiment};
+use crate::study::fit::model::{EvaluationBudget, FitModel, FitPoint, Weighting};
+use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
 use crate::study::fit::remark::FitCandidateRemark;
 use crate::study::fit::{FitCandidate, FitError};
 use nalgebra::{DMatrix, DVector};
@@ -14,6 +15,9 @@ use nalgebra::{DMatrix, DVector};
 /// A number with an uncertainty of more than this, in logarithms or units, is not determined: a
 /// factor of ten.
 pub(super) const UNDETERMINED_UNCERTAINTY: f64 = std::f64::consts::LN_10;
+
+/// Excess below the minimum, in variances, that indicates a better minimum.
+pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
 
 /// A number with a larger component than this in combinations to which the data are insensitive
 /// is not determined.

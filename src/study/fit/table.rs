@@ -10,7 +10,7 @@
 
 use crate::scenario::MOST_BYTES;
 use crate::study::fit::FitError;
-use crate::study::fit::data::{
+use crate::study::fit::columns::{
     DataReadingOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
 };
 

@@ -14,7 +14,8 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::motion::{Explicit, Physics, Stopped, TimeIntegrator};
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Method, Options, Outcome, RelaxError, SolverCounts, index_near, initial_state, rod_shapes,
+    Method, Options, Outcome, RelaxError, SemiImplicit, SolverCounts, index_near, initial_state,
+    rod_shapes,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
@@ -78,7 +79,12 @@ impl<'a> MapCell<'a> {
         let rods = scenario.rods.len();
         let relaxed = refuse_slow_grid(LEAST_SEGMENTS_PER_ROD, rods, limit).unwrap_or_else(|| {
             run_within_limit(limit, all, |limit| {
-                relax_with_error_estimate(scenario, Method::default(), tolerance, limit)
+                relax_with_error_estimate(
+                    scenario,
+                    SemiImplicit::default().into(),
+                    tolerance,
+                    limit,
+                )
             })
         });
         let mut cell = MapCell {
@@ -148,7 +154,8 @@ impl<'a> MapCell<'a> {
     fn timed_solution(&self, method: MapMethod) -> (CellSolution, f64) {
         let segments = self.solver_settings.segments;
         let (scenario, tolerance) = (self.scenario, self.tolerance);
-        if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
+        let is_relaxed = |method: Method| method.semi_implicit().is_some() && segments.is_none();
+        if matches!(method, MapMethod::ToRest(method) if is_relaxed(method)) {
             return self.relaxed_answer.clone();
         }
         let on_grid = match method {
@@ -165,16 +172,15 @@ impl<'a> MapCell<'a> {
             MapMethod::ExplicitMotion => {
                 solve_by_explicit_motion(scenario, self.solver_settings, tolerance, limit)
             }
-            MapMethod::ToRest(method) => match method {
-                Method::SingleShooting => {
-                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, Some(1), limit)
-                }
-                Method::Shooting { intervals } => {
-                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, intervals, limit)
-                }
-                Method::ShootingFromRest { .. } => self.shoot_from_relaxed_leaf(tolerance, limit),
-                Method::SemiImplicit(_) | Method::Explicit { .. } => {
+            MapMethod::ToRest(method) => match method.shooting() {
+                None => {
                     relax_with_error_estimate(scenario, method.on_grid(segments), tolerance, limit)
+                }
+                Some(how) if how.from_relaxed_leaf => {
+                    self.shoot_from_relaxed_leaf(tolerance, limit)
+                }
+                Some(how) => {
+                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, how.intervals, limit)
                 }
             },
         })
@@ -709,7 +715,7 @@ fn relax_between_cells(
         deadline: Some(Instant::now() + Duration::from_secs_f64(request.cell_seconds)),
         ..request.limit.clone()
     };
-    let method = Method::default().on_grid(varied.solver_settings.segments);
+    let method = SemiImplicit::on_grid(varied.solver_settings.segments).into();
     let tolerance = request.tolerance.unwrap_or(varied.scenario.tolerance);
     relax_with_error_estimate(&varied.scenario, method, tolerance, &limit).ok()
 }

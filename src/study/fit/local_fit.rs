@@ -1,22 +1,230 @@
-//! The result of a fit: the minimum and its neighbourhood.
+//! The fit from one start: the search for the minimum near it, and what is told of the minimum.
 //!
-//! The results in words.
+//! The search runs on coarse grids and ends on all of them. If the profile of a number leads to a
+//! better minimum, it goes on from there.
 
 use crate::numbers::format_two_digits;
 use crate::relax::ContinuationFailure;
 use crate::scenario::longest;
 use crate::study::ParameterKeys;
-use crate::study::fit::data::{DatumDimension, Experiment, ObservedExperiment};
+use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::data::{Experiment, ObservedExperiment};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
-use crate::study::fit::least_squares::GaussNewtonOutcome;
-use crate::study::fit::model::{DatumQuantity, FitModel};
+use crate::study::fit::least_squares::{ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::model::{FitModel, FitPoint, Weighting, round_to_three_digits};
+use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::remark::FitRemark;
-use crate::study::fit::statistics::{FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis};
+use crate::study::fit::statistics::{
+    BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
+};
 use crate::study::fit::{
-    Fit, FitCoordinate, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork,
-    lack_of_fit, statistics,
+    Fit, FitCoordinate, FitError, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual,
+    FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
 };
 use std::collections::BTreeMap;
+
+/// Largest number of minima abandoned for better ones.
+const MOST_MINIMA_ABANDONED: usize = 4;
+
+/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
+const MOST_EQUILIBRIUM_JUMPS: usize = 3;
+
+/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
+/// that of the search to it: a larger one is due to coarse grids.
+const CONSISTENT_DEVIATION_RATIO: f64 = 1.05;
+
+/// A minimum, or where the search for it ended.
+pub(super) struct FitMinimum {
+    pub fit: Fit,
+    pub theta: Vec<f64>,
+    /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
+    pub sum: f64,
+    pub variance: f64,
+    pub significant_excess: f64,
+    pub converged: bool,
+    /// Root mean square of the residuals, relative to the size of the data.
+    pub misfit: f64,
+    /// Whether the sum still falls where a number without given bounds is as far from its initial
+    /// value as it may be.
+    pub beyond_window: bool,
+}
+
+impl FitMinimum {
+    /// Whether this is the better answer. A minimum is not left for values that are none.
+    pub fn is_preferred_to(&self, other: &FitMinimum) -> bool {
+        match self.converged == other.converged {
+            true => self.sum < other.sum,
+            false => self.converged,
+        }
+    }
+
+    /// This minimum as one besides which another is searched from these values.
+    pub fn exclude_from(&self, theta: &[f64]) -> ExcludedMinimum<'_> {
+        let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
+        ExcludedMinimum {
+            theta: &self.theta,
+            largest_sum: self.sum + self.significant_excess,
+            distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
+        }
+    }
+}
+
+/// The search for a minimum near a start.
+pub(super) struct LocalFitSearch<'m, 'a> {
+    pub model: &'m FitModel<'a>,
+    pub weighting: Weighting,
+    /// Whether the standard deviations of the data are known.
+    pub has_known_deviations: bool,
+    pub candidates: &'m [Experiment],
+    /// Largest number of steps to a minimum.
+    pub most_steps: usize,
+}
+
+impl<'m, 'a> LocalFitSearch<'m, 'a> {
+    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
+    /// there.
+    pub fn run(
+        &self,
+        first: &FitPoint,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<FitMinimum, FitError> {
+        let (model, weighting) = (self.model, self.weighting);
+        let (mut coarse, mut point) = model.coarse_model(first, weighting)?;
+        let mut work = FitWork::default();
+        let mut attempts = 0;
+        let mut jumps = 0;
+        let mut found = loop {
+            // The search on coarse grids; the last steps use all.
+            let mut searching = |step, sum| {
+                let known = None;
+                progress(&FitStep {
+                    step,
+                    sum,
+                    known,
+                    budget: None,
+                });
+            };
+            let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
+            search.most_steps = search.most_steps.min(self.most_steps);
+            let (near, searched, more) = search.run(point);
+            work.evaluations += more;
+            attempts += 1;
+            let there = model.continue_leaves(&near, &near.theta);
+            let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
+            let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
+            last.reuses_derivatives = true;
+            last.most_steps = last.most_steps.min(self.most_steps);
+            let (mut least, end, more) = last.run(there);
+            work.evaluations += 1 + more;
+            work.accurate += 1 + more;
+            let is_lost =
+                end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
+            if is_lost
+                && jumps < MOST_EQUILIBRIUM_JUMPS
+                && let Some(there) = model.relax_beyond_jump(&last.jumps, &least, weighting)
+            {
+                jumps += 1;
+                attempts -= 1;
+                (coarse, point) = model.coarse_model(&there, weighting)?;
+                continue;
+            }
+            let of_search =
+                FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
+            let spread = self.statistics(&least).residual_deviation;
+            let same = searched == GaussNewtonOutcome::Converged
+                && of_search.residual_deviation < CONSISTENT_DEVIATION_RATIO * spread;
+            if !same && end == GaussNewtonOutcome::Converged {
+                // Its neighbourhood is computed with its own leaves.
+                let differentiated = model.differentiate_data(&mut least);
+                differentiated.map_err(|lost| model.no_equilibrium_error(&near.theta, 0, &lost))?;
+            }
+            let stats = self.statistics(&least);
+            let shape = if same { &of_search } else { &stats };
+            let contradicted = lack_of_fit::data_contradict_model(&stats);
+            let parameters = match end {
+                GaussNewtonOutcome::Converged if !contradicted => {
+                    intervals::parameters_with_intervals(&stats, shape, progress)
+                }
+                _ => Ok(intervals::parameters_without_intervals(&stats)),
+            };
+            let (end, parameters) = match parameters {
+                Ok(parameters) => (end, parameters),
+                Err(better) if attempts < MOST_MINIMA_ABANDONED => {
+                    point = better;
+                    continue;
+                }
+                Err(_) => (
+                    GaussNewtonOutcome::StepLimit,
+                    intervals::parameters_without_intervals(&stats),
+                ),
+            };
+            break FitMinimum {
+                fit: assemble_fit(&stats, &end, parameters, work, self.candidates),
+                sum: weighting.sum_of_squares(stats.point),
+                variance: stats.residual_deviation.powi(2),
+                significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
+                converged: end == GaussNewtonOutcome::Converged,
+                misfit: model.relative_misfit(stats.point),
+                beyond_window: falls_beyond_window(&stats),
+                theta: stats.point.theta.clone(),
+            };
+        };
+        if jumps > 0 {
+            found.fit.remarks.push(FitRemark::JumpedOnTheWay);
+        }
+        Ok(found)
+    }
+
+    fn statistics<'p>(&'p self, point: &'p FitPoint) -> FitStatistics<'p, 'a> {
+        FitStatistics::new(self.model, self.weighting, self.has_known_deviations, point)
+    }
+}
+
+/// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
+/// than chance.
+fn falls_beyond_window(stats: &FitStatistics) -> bool {
+    let weighed = stats.weighting.weight_roots(&stats.residuals);
+    let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
+    let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+    coordinates.enumerate().any(|(k, (free, theta))| {
+        let [low, high] = free.bounds;
+        let slope = slopes[k];
+        let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
+        let bend = stats.jacobian.column(k).norm_squared();
+        let step = (slope.abs() / bend).min(LONGEST_COORDINATE_STEP);
+        let gain = step * (2.0 * slope.abs() - bend * step);
+        !free.has_given_bounds
+            && outwards
+            && gain > BETTER_MINIMUM_EXCESS * stats.residual_deviation.powi(2)
+    })
+}
+
+/// Values, of those at which a leaf would have to jump, at which it is relaxed again.
+const MOST_JUMPS_RELAXED: usize = 3;
+
+impl FitModel<'_> {
+    /// The leaves relaxed from their usual starts, beyond the values at which one of
+    /// `before` would have to jump; or there, if another equilibrium exists. `None`
+    /// if that does not reduce the residuals.
+    pub fn relax_beyond_jump(
+        &self,
+        jumps: &[Vec<f64>],
+        before: &FitPoint,
+        weighting: Weighting,
+    ) -> Option<FitPoint> {
+        let residuals = weighting.residuals(before);
+        let bound = weighting.huber_bound(&residuals);
+        let sum = weighting.huber_sum(&residuals, bound);
+        // The farthest are the steps that the data ask for; close to where a leaf buckles none is followed.
+        let far = jumps.iter().take(MOST_JUMPS_RELAXED);
+        let near = jumps.iter().skip(MOST_JUMPS_RELAXED).next_back();
+        far.chain(near).chain([&before.theta]).find_map(|theta| {
+            let there = self.relax_leaves(theta).ok()?;
+            let nearer = weighting.huber_sum(&weighting.residuals(&there), bound) < sum;
+            nearer.then_some(there)
+        })
+    }
+}
 
 /// Components of a weakly determined combination smaller than this part of its
 /// largest are left out.
@@ -495,11 +703,6 @@ fn unknown_endpoint_sentences(parameter: &FitParameter) -> Vec<String> {
 fn is_at_bound(parameter: &FitParameter, free: &FitCoordinate) -> bool {
     let bounds = free.bounds.map(|bound| free.inverse_transform(bound));
     free.has_given_bounds && bounds.contains(&parameter.value)
-}
-
-/// Three significant digits.
-pub(super) fn round_to_three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 fn format_two_decimals(value: f64) -> String {
