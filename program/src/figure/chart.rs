@@ -38,18 +38,19 @@ const SMALLEST_ERROR_DRAWN: f64 = 1e-17;
 const FEWEST_DECADES: f64 = 1.0;
 
 pub fn draw_chart(chart: &Chart) -> Drawing {
-    let rows: Vec<(usize, &ChartRow)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
-    let mut series = contender_series(&rows, false);
+    let rods = chart.rods;
+    let rows = chart.rows.iter().map(|row| RowOfLeaf { rods, row });
+    let mut series = contender_series(&rows.collect::<Vec<_>>(), false);
     series.extend(peer_series(&chart.peers));
     let floor = chart.reference.as_ref().map(|found| found.known_within);
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
-    let (across, up) = point_coordinates(&series);
     let failed = series.iter().flat_map(|series| &series.failures);
-    let across = across.into_iter();
-    let up = up.into_iter().chain(floor);
+    let seconds = series_points(&series).map(|point| point.0);
+    let errors = series_points(&series).map(|point| point.1).chain(floor);
+    let name = "largest true error of positions / L";
     let panel = ChartPanel {
-        across: time_axis(across.chain(failed.filter_map(|failure| failure.x))),
-        up: Axis::logarithmic("largest true error of positions / L", up, FEWEST_DECADES),
+        across: time_axis(seconds.chain(failed.filter_map(|failure| failure.x))),
+        up: Axis::logarithmic(name, errors, FEWEST_DECADES),
         series,
         floor,
     };
@@ -73,7 +74,10 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
 }
 
 pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
-    let rows = scaling.rows.iter().map(|found| (found.rods, &found.row));
+    let rows = scaling.rows.iter().map(|found| RowOfLeaf {
+        rods: found.rods,
+        row: &found.row,
+    });
     let series = contender_series(&rows.collect::<Vec<_>>(), true);
     let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
     rods.sort_unstable();
@@ -85,7 +89,7 @@ pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
             ticks: TickPlacement::WholeNumbers(rods),
             ..axis
         },
-        up: time_axis(point_coordinates(&series).1.into_iter()),
+        up: time_axis(series_points(&series).map(|point| point.1)),
         series,
         floor: None,
     };
@@ -114,15 +118,27 @@ fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
     drawing
 }
 
-/// Coordinates of the points of all series, across and up.
-fn point_coordinates(series: &[ChartSeries]) -> (Vec<f64>, Vec<f64>) {
-    let points = series.iter().flat_map(|series| &series.points);
-    points.map(|point| point.coordinates).unzip()
+/// The points of all series.
+fn series_points(series: &[ChartSeries]) -> impl Iterator<Item = (f64, f64)> {
+    series.iter().flat_map(ChartSeries::point_coordinates)
 }
 
-/// Colour and marker of a contender.
-fn contender_style(who: SolverConfig) -> (Color, Marker) {
-    match (who.method, who.one_grid) {
+/// A row of a chart, and the number of veins of its leaf.
+struct RowOfLeaf<'c> {
+    rods: usize,
+    row: &'c ChartRow,
+}
+
+/// How the points of a series look, and the line through them.
+#[derive(Clone, Copy)]
+pub struct SeriesStyle {
+    color: Color,
+    marker: Marker,
+    dashed: bool,
+}
+
+fn contender_style(who: SolverConfig) -> SeriesStyle {
+    let (color, marker) = match (who.method, who.one_grid) {
         (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
         (Method::SemiImplicit(_), true) => (SKY, Marker::Square),
         (Method::Explicit { .. }, false) => (VERMILION, Marker::Circle),
@@ -130,18 +146,23 @@ fn contender_style(who: SolverConfig) -> (Color, Marker) {
         (Method::SingleShooting, _) => (GREEN, Marker::Triangle),
         (Method::Shooting { .. }, _) => (PURPLE, Marker::Wedge),
         (Method::ShootingFromRest { .. }, _) => (SLATE, Marker::Diamond),
+    };
+    let dashed = false;
+    SeriesStyle {
+        color,
+        marker,
+        dashed,
     }
 }
 
 /// A series for each contender with results: seconds over veins, or errors over
-/// seconds. Each row comes with its number of veins.
-fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartSeries> {
+/// seconds.
+fn contender_series(rows: &[RowOfLeaf], over_veins: bool) -> Vec<ChartSeries> {
     let of = |who: SolverConfig| {
-        let (color, marker) = contender_style(who);
         let default = if who.is_default() { " (default)" } else { "" };
         let name = format!("{}{default}", contender_name(who));
-        let mut series = ChartSeries::new(name, color, marker, false);
-        for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
+        let mut series = ChartSeries::new(name, contender_style(who));
+        for RowOfLeaf { rods, row } in rows.iter().filter(|it| it.row.contender == who) {
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
                 true => (rods, seconds),
@@ -184,13 +205,12 @@ fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
     for peer in peers {
         let place = all.iter().position(|series| series.name == peer.name);
         let place = place.unwrap_or_else(|| {
-            let color = peer_color(&peer.name, all.len());
-            all.push(ChartSeries::new(
-                peer.name.clone(),
-                color,
-                Marker::Ring,
-                true,
-            ));
+            let style = SeriesStyle {
+                color: peer_color(&peer.name, all.len()),
+                marker: Marker::Ring,
+                dashed: true,
+            };
+            all.push(ChartSeries::new(peer.name.clone(), style));
             all.len() - 1
         });
         match peer
@@ -252,28 +272,24 @@ pub struct FailedRun {
 
 pub struct ChartSeries {
     pub name: String,
-    pub color: Color,
-    pub dashed: bool,
-    pub marker: Marker,
+    pub style: SeriesStyle,
     pub points: Vec<ChartPoint>,
     pub failures: Vec<FailedRun>,
 }
 
 impl ChartSeries {
     /// Without points so far.
-    pub fn new(name: String, color: Color, marker: Marker, dashed: bool) -> Self {
+    pub fn new(name: String, style: SeriesStyle) -> Self {
         ChartSeries {
             name,
-            color,
-            dashed,
-            marker,
+            style,
             points: Vec::new(),
             failures: Vec::new(),
         }
     }
 
     fn stroke(&self) -> Stroke {
-        Stroke::new(self.color, 1.5).with_dashes(self.dashed)
+        Stroke::new(self.style.color, 1.5).with_dashes(self.style.dashed)
     }
 
     fn point_coordinates(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -327,13 +343,13 @@ impl ChartPanel {
         }
         for series in &self.series {
             for point in &series.points {
-                axes.draw_curve(page, &point.spread, Stroke::new(series.color, 1.1));
+                axes.draw_curve(page, &point.spread, Stroke::new(series.style.color, 1.1));
             }
             axes.draw_markers(
                 page,
                 series.point_coordinates(),
-                series.marker,
-                series.color,
+                series.style.marker,
+                series.style.color,
             );
         }
         for (lane, word) in self.failure_lanes().into_iter().enumerate() {
@@ -387,11 +403,11 @@ impl ChartPanel {
             let places = failures().filter_map(|it| Some(self.across.fraction(it.x?)));
             for fraction in places.filter(|fraction| fraction.is_finite()) {
                 let x = left + fraction.clamp(0.0, 1.0) * cell.size.x;
-                Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
+                Marker::Cross.draw(page, DVec2::new(x, middle), series.style.color);
             }
             if failures().any(|failure| failure.x.is_none()) {
                 from_right -= CROSS_SPACING;
-                Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
+                Marker::Cross.draw(page, DVec2::new(from_right, middle), series.style.color);
             }
         }
     }
@@ -401,7 +417,7 @@ impl ChartPanel {
         for series in &self.series {
             key.add_entry(page, &series.name, "", |page, cell| {
                 cell.draw_midline(page, series.stroke());
-                series.marker.draw(page, cell.middle(), series.color);
+                (series.style.marker).draw(page, cell.middle(), series.style.color);
             });
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
@@ -486,7 +502,10 @@ mod tests {
     #[test]
     fn times_are_spread_along_their_axis() {
         let chart = sample::sample_chart();
-        let rows = [(5, &chart.rows[0])];
+        let rows = [RowOfLeaf {
+            rods: 5,
+            row: &chart.rows[0],
+        }];
         let spread = |over_veins| contender_series(&rows, over_veins)[0].points[0].spread;
         assert_eq!(spread(false), [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
         assert_eq!(spread(true), [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
@@ -497,7 +516,7 @@ mod tests {
         let mut chart = sample::sample_chart();
         let of = |chart: &Chart| -> Vec<(String, Color)> {
             let all = peer_series(&chart.peers).into_iter();
-            all.map(|peer| (peer.name, peer.color)).collect()
+            all.map(|peer| (peer.name, peer.style.color)).collect()
         };
         let alone = of(&chart)[0].clone();
         chart.peers.insert(0, chart.peers[0].clone());

@@ -110,14 +110,21 @@ const ZERO_STRIP_HEIGHT: f64 = 30.0;
 
 const MOST_STATIONS_MARKED: usize = 70;
 
-/// Differences of a quantity along the veins, and the largest one at which the
-/// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
+/// How much both solutions differ in a quantity.
+struct DifferenceCurve {
+    along: NamedCurve,
+    /// The largest difference at which the solutions agree.
+    allowed: Option<f64>,
+}
+
+/// Differences of a quantity along the veins: of positions in units of `unit`, of other quantities in
+/// those of the scenario.
 fn difference_curve(
     quantity: ComparedQuantity,
     check: &Check,
     unit: f64,
     color: Color,
-) -> (NamedCurve, Option<f64>) {
+) -> DifferenceCurve {
     let (name, unit, allowed) = match quantity {
         ComparedQuantity::Position => {
             ("position, in lengths L", unit, Some(check.allowed() / unit))
@@ -132,19 +139,20 @@ fn difference_curve(
         .map(|found| quantity.component(found) / unit);
     let stations = check.relaxed.shape.stations.iter().copied();
     let points = stations.zip(values).collect();
-    let curve = NamedCurve {
+    let along = NamedCurve {
         name,
         color,
         points,
     };
-    (curve, allowed)
+    DifferenceCurve { along, allowed }
 }
 
 fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let quantities = ComparedQuantity::ALL.into_iter().zip(CURVE_COLORS);
-    let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
+    let curves: Vec<DifferenceCurve> = quantities
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
-        .unzip();
+        .collect();
+    let values = || curves.iter().flat_map(|curve| curve.along.ordinates());
     let mut cell = PageRectangle::left_of_legend(start + PAGE.panel_title, FRAME_HEIGHT, KEY);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
@@ -153,27 +161,25 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
-    let mut values = curves.iter().flat_map(NamedCurve::ordinates);
-    if values.any(|value| value == 0.0) {
+    if values().any(|value| value == 0.0) {
         cell.size.y -= ZERO_STRIP_HEIGHT;
         across.labelled = false;
         draw_zero_strip(page, &curves, cell, stations);
     }
-    let values = curves.iter().flat_map(NamedCurve::ordinates);
-    let values = values.chain(allowed.iter().flatten().copied());
+    let allowed = curves.iter().filter_map(|curve| curve.allowed);
     let axes = PanelAxes {
         cell,
         across,
-        up: Axis::logarithmic("", values, FEWEST_DECADES),
+        up: Axis::logarithmic("", values().chain(allowed), FEWEST_DECADES),
     };
     axes.draw(page);
-    for (curve, allowed) in curves.iter().zip(allowed) {
-        if let Some(allowed) = allowed {
-            let stroke = Stroke::new(curve.color, 1.0).with_dashes(true);
+    for curve in &curves {
+        if let Some(allowed) = curve.allowed {
+            let stroke = Stroke::new(curve.along.color, 1.0).with_dashes(true);
             axes.draw_curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
         }
     }
-    for curve in &curves {
+    for DifferenceCurve { along: curve, .. } in &curves {
         axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
         if curve.points.len() <= MOST_STATIONS_MARKED {
             axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
@@ -186,7 +192,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
 /// below it.
 fn draw_zero_strip(
     page: &mut Drawing,
-    curves: &[NamedCurve],
+    curves: &[DifferenceCurve],
     above: PageRectangle,
     stations: Axis,
 ) {
@@ -203,15 +209,15 @@ fn draw_zero_strip(
     };
     strip.draw(page);
     for (lane, curve) in curves.iter().enumerate() {
-        let zeros = curve.points.iter().filter(|point| point.1 == 0.0);
+        let zeros = (curve.along.points.iter()).filter(|point| point.1 == 0.0);
         let places = zeros.map(|point| (point.0, lane as f64 - 1.5));
-        strip.draw_markers(page, places, Marker::Dot, curve.color);
+        strip.draw_markers(page, places, Marker::Dot, curve.along.color);
     }
 }
 
-fn draw_legend(page: &mut Drawing, curves: &[NamedCurve], cell: PageRectangle) {
+fn draw_legend(page: &mut Drawing, curves: &[DifferenceCurve], cell: PageRectangle) {
     let mut key = Legend::right_of(cell);
-    for curve in curves {
+    for DifferenceCurve { along: curve, .. } in curves {
         let largest = match curve.ordinates().fold(0.0, f64::max) {
             0.0 => "no difference".into(),
             largest => format!("≤ {}", format_error_bound(largest)),

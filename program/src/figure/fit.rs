@@ -11,6 +11,7 @@ use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::{Legend, new_page};
 use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::space::{PlaneView, VIEW_FROM_ABOVE, VIEW_FROM_SIDE};
 use crate::figure::drawing::{
     BLUE, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, SECOND_SOLUTION_COLOR,
     Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path, color_of_vein, panel_letters, polygon_path,
@@ -63,7 +64,7 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
         page.draw_group("veins", |page| {
             let of = fit.residuals.iter();
             let of = of.filter(|it| it.rod.is_some() && it.number == leaf.number);
-            top = draw_measured_veins(page, top, &letter(), (name, units), leaf, of.collect());
+            top = draw_measured_veins(page, top, &letter(), name, units, leaf, of.collect());
         });
     }
     page.height = (top + BOTTOM).ceil();
@@ -234,11 +235,13 @@ const SINGLE_EXPERIMENT_HALF_WIDTH: f64 = 5.0;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Views, and their axes.
-const LEAF_VIEWS: [(&str, [usize; 2]); 3] = [
-    ("from above", [0, 1]),
-    ("from the side", [0, 2]),
-    ("along x", [1, 2]),
+const LEAF_VIEWS: [PlaneView; 3] = [
+    VIEW_FROM_ABOVE,
+    VIEW_FROM_SIDE,
+    PlaneView {
+        title: "along x",
+        axes: [1, 2],
+    },
 ];
 
 /// A result in words, with its unit.
@@ -270,15 +273,17 @@ pub fn draw_results(
 ) -> f64 {
     let cell = PageRectangle::left_of_legend(top + PAGE.panel_title, RESULT_HEIGHT, KEY);
     let quantity = result_label(results.kind, units);
-    let values = results.all_residuals().flat_map(|(_, r)| {
-        let (band, sd) = (r.band, 2.0 * r.sd);
-        [r.data - sd, r.data + sd, r.model - band, r.model + band]
-    });
+    let values = results
+        .all_residuals()
+        .flat_map(|PlacedResidual { residual: r, .. }| {
+            let (band, sd) = (r.band, 2.0 * r.sd);
+            [r.data - sd, r.data + sd, r.model - band, r.model + band]
+        });
     let up = Axis {
         emphasizes_zero: false,
         ..Axis::linear_covering(&quantity.axis_name(), values)
     };
-    let places = || results.all_residuals().map(|(x, _)| x);
+    let places = || results.all_residuals().map(|it| it.abscissa);
     let across = match results.abscissa_keys {
         Some(keys) => Axis::linear_covering(
             &QuantityLabel::from_keys(&keys.to_string(), units).axis_name(),
@@ -305,13 +310,19 @@ pub fn draw_results(
             None => draw_single_experiments(page, &axes, series),
         }
     }
-    for (x, r) in results.all_residuals() {
+    for PlacedResidual {
+        abscissa: x,
+        residual: r,
+    } in results.all_residuals()
+    {
         let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
         axes.draw_curve(page, &bar, Stroke::new(SECOND_SOLUTION_COLOR, 1.0));
     }
     axes.draw_markers(
         page,
-        results.all_residuals().map(|(x, r)| (x, r.data)),
+        results
+            .all_residuals()
+            .map(|it| (it.abscissa, it.residual.data)),
         Marker::Dot,
         SECOND_SOLUTION_COLOR,
     );
@@ -338,17 +349,23 @@ pub fn draw_results(
     );
     let points = results
         .all_residuals()
-        .map(|(x, r)| (x, r.residual, TEXT_COLOR))
+        .map(|it| ResidualMark {
+            abscissa: it.abscissa,
+            residual: it.residual.residual,
+            color: TEXT_COLOR,
+        })
         .collect();
     draw_residuals(page, cell, across, points)
 }
 
 /// Draws the model through a series of experiments, with its band.
-fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitResidual)]) {
+fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[PlacedResidual]) {
     let mut once = series.to_vec();
-    once.dedup_by_key(|(x, _)| *x);
+    once.dedup_by_key(|it| it.abscissa);
     let line = |of: &dyn Fn(&FitResidual) -> f64| -> Vec<DVec2> {
-        let points: Vec<(f64, f64)> = once.iter().map(|(x, r)| (*x, of(r))).collect();
+        let points: Vec<(f64, f64)> = (once.iter())
+            .map(|it| (it.abscissa, of(it.residual)))
+            .collect();
         axes.smooth_curve(&points).into_iter().flatten().collect()
     };
     let mut band = line(&|r| r.model + r.band);
@@ -358,18 +375,18 @@ fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitRe
     }
     let model: Vec<Option<DVec2>> = line(&|r| r.model).into_iter().map(Some).collect();
     axes.draw_clipped_line(page, &model, MODEL_STROKE);
-    if let [(x, r)] = once[..] {
-        draw_single_experiments(page, axes, &[(x, r)]);
+    if once.len() == 1 {
+        draw_single_experiments(page, axes, &once);
     }
 }
 
 /// Draws the model of single experiments, each with its band.
-fn draw_single_experiments(
-    page: &mut Drawing,
-    axes: &PanelAxes,
-    experiments: &[(f64, &FitResidual)],
-) {
-    for (x, r) in experiments {
+fn draw_single_experiments(page: &mut Drawing, axes: &PanelAxes, experiments: &[PlacedResidual]) {
+    for PlacedResidual {
+        abscissa: x,
+        residual: r,
+    } in experiments
+    {
         let ends = [r.model + r.band, r.model - r.band].map(|y| axes.page_position((*x, y)));
         if let ([Some(top), Some(end)], Some(at)) = (ends, axes.page_position((*x, r.model))) {
             let half = DVec2::new(SINGLE_EXPERIMENT_HALF_WIDTH, 0.0);
@@ -383,16 +400,23 @@ fn draw_single_experiments(
     }
 }
 
+/// A residual in standard deviations, as a point of a panel.
+struct ResidualMark {
+    abscissa: f64,
+    residual: f64,
+    color: Color,
+}
+
 /// Draws residuals below a panel along the same axis; returns where they end.
 fn draw_residuals(
     page: &mut Drawing,
     above: PageRectangle,
     across: Axis,
-    points: Vec<(f64, f64, Color)>,
+    points: Vec<ResidualMark>,
 ) -> f64 {
     let corner = DVec2::new(above.corner.x, above.opposite_corner().y + RESIDUALS_GAP);
     let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS_HEIGHT));
-    let sizes = points.iter().map(|(_, residual, _)| residual.abs());
+    let sizes = points.iter().map(|mark| mark.residual.abs());
     let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
         emphasizes_zero: true,
@@ -407,8 +431,9 @@ fn draw_residuals(
         let from = corner + DVec2::new(0.0, fraction * cell.size.y);
         page.draw_line(from, from.with_x(cell.opposite_corner().x), two);
     }
-    for (x, residual, color) in points {
-        axes.draw_markers(page, [(x, residual)], Marker::Dot, color);
+    for mark in points {
+        let at = (mark.abscissa, mark.residual);
+        axes.draw_markers(page, [at], Marker::Dot, mark.color);
     }
     let mut key = Legend::right_of(cell);
     let note = "in standard deviations";
@@ -422,13 +447,15 @@ pub fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
-    (experiment, units): (&str, &Units),
+    experiment: &str,
+    units: &Units,
     leaf: &FitLeaf,
     residuals: Vec<&FitResidual>,
 ) -> f64 {
-    let measured = |(_, [a, b]): &(&str, [usize; 2])| {
+    let measured = |view: &PlaneView| {
+        let [a, b] = view.axes;
         let mut points = leaf.traced.iter();
-        points.any(|(_, at)| at[*a].is_some() && at[*b].is_some())
+        points.any(|(_, at)| at[a].is_some() && at[b].is_some())
     };
     let mut views: Vec<_> = LEAF_VIEWS.into_iter().filter(measured).collect();
     if views.is_empty() {
@@ -443,7 +470,7 @@ pub fn draw_measured_veins(
     };
     let count = leaf.curves.len();
     let panels: Vec<_> = (views.iter())
-        .map(|(_, axes)| {
+        .map(|PlaneView { axes, .. }| {
             let seen = |at: [Option<f64>; 3]| Some((at[axes[0]]?, at[axes[1]]?));
             let traced = leaf.traced.iter();
             let points = traced.filter_map(|(rod, at)| Some((*rod, seen(*at)?)));
@@ -472,14 +499,14 @@ pub fn draw_measured_veins(
         name => format!("traced veins, experiment {name}"),
     };
     let mut below = PageRectangle::left_of_legend(top + PAGE.panel_title, height, KEY);
-    for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
+    for (k, (view, (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
         let corner = DVec2::new(
             PAGE.left_margin + k as f64 * (width + VIEWS_GAP),
             top + PAGE.panel_title,
         );
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
-        let what = format!("{experiment}, {view}");
+        let what = format!("{experiment}, {}", view.title);
         let (across, up) = equalize_axis_scales(across, up, cell.size);
         let panel = PanelAxes::draw_titled(page, cell, [letter, &what], across, up);
         for (rod, line) in curves.iter().enumerate() {
@@ -506,7 +533,11 @@ pub fn draw_measured_veins(
     let along = Axis::linear("fraction of the length", 0.0, 1.0);
     let points = residuals.iter().filter_map(|it| {
         let color = color_of_vein(it.rod?.checked_sub(1)?, count);
-        Some((it.sigma?, it.residual, color))
+        Some(ResidualMark {
+            abscissa: it.sigma?,
+            residual: it.residual,
+            color,
+        })
     });
     draw_residuals(page, below, along, points.collect())
 }
@@ -529,6 +560,14 @@ const FEWEST_EXPERIMENTS: usize = 4;
 /// Experiments are in line up to this part of their distance.
 const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 
+/// A result of an experiment, and where a panel has it: the value that varied, or the number of the
+/// experiment.
+#[derive(Clone, Copy)]
+pub struct PlacedResidual<'f> {
+    pub abscissa: f64,
+    pub residual: &'f FitResidual,
+}
+
 /// Results of one kind, drawn in one panel.
 pub struct ResultSeries<'f> {
     /// As in the data: `tip_x`.
@@ -537,11 +576,11 @@ pub struct ResultSeries<'f> {
     /// experiments.
     pub abscissa_keys: Option<&'f ParameterKeys>,
     /// Series along it, each with its values in ascending order.
-    pub series: Vec<Vec<(f64, &'f FitResidual)>>,
+    pub series: Vec<Vec<PlacedResidual<'f>>>,
 }
 
 impl<'f> ResultSeries<'f> {
-    pub fn all_residuals(&self) -> impl Iterator<Item = (f64, &'f FitResidual)> {
+    pub fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
         self.series.iter().flatten().copied()
     }
 }
@@ -579,13 +618,21 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
                     .last(),
             };
             let Some((to, key)) = found else {
-                numbered.push((of[from].number as f64, of[from]));
+                numbered.push(PlacedResidual {
+                    abscissa: of[from].number as f64,
+                    residual: of[from],
+                });
                 from += 1;
                 continue;
             };
             let keys = &own[from][key].0;
-            let mut series: Vec<_> = (from..to).map(|k| (own[k][key].1, of[k])).collect();
-            series.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut series: Vec<_> = (from..to)
+                .map(|k| PlacedResidual {
+                    abscissa: own[k][key].1,
+                    residual: of[k],
+                })
+                .collect();
+            series.sort_by(|a, b| a.abscissa.total_cmp(&b.abscissa));
             let along = Some(keys);
             let mut of_kind = all[first..].iter_mut();
             match of_kind.find(|it: &&mut ResultSeries| it.abscissa_keys == along) {

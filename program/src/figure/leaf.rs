@@ -7,7 +7,8 @@
 
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, SmallPanels, SpacePanel, draw_plane_panel, padded_box,
+    BoxMargins, OBLIQUE_VIEW, PlaneView, SmallPanels, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT,
+    VIEW_FROM_SIDE, draw_plane_panel, padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{Drawing, FONT_SIZE, PAGE, PageRectangle, Stroke, draw_panel_title};
@@ -116,11 +117,29 @@ const LARGEST_ROWS_HEIGHT: f64 = 800.0;
 /// Padding around the leaf, as a fraction of its largest extent.
 const PADDING: f64 = 0.06;
 
-/// The flat panels: names of their groups, letters, titles, and the two axes.
-const PLANE_PANELS: [(&str, &str, &str, [usize; 2]); 3] = [
-    ("top", "(a)", "from above", [0, 1]),
-    ("side", "(b)", "from the side", [0, 2]),
-    ("front", "(c)", "from the front", [1, 2]),
+/// A flat panel: the name of its group, its letter, and what it shows.
+struct PlanePanel {
+    group: &'static str,
+    letter: &'static str,
+    view: PlaneView,
+}
+
+const PLANE_PANELS: [PlanePanel; 3] = [
+    PlanePanel {
+        group: "top",
+        letter: "(a)",
+        view: VIEW_FROM_ABOVE,
+    },
+    PlanePanel {
+        group: "side",
+        letter: "(b)",
+        view: VIEW_FROM_SIDE,
+    },
+    PlanePanel {
+        group: "front",
+        letter: "(c)",
+        view: VIEW_FROM_FRONT,
+    },
 ];
 
 /// Of the panel in space.
@@ -158,11 +177,17 @@ fn draw_plane_projection(
     camera.draw_arrows(page, &arrows, cell, veins.piece_ends().map(place));
 }
 
-/// Starts and lengths of columns and rows, and the pixels per length of the
-/// flat panels.
+/// A column or a row of panels.
+#[derive(Clone, Copy)]
+struct PanelSpan {
+    start: f64,
+    length: f64,
+}
+
+/// Columns and rows, and the pixels per length of the flat panels.
 pub struct LeafPanels {
-    columns: [(f64, f64); 2],
-    rows: [(f64, f64); 2],
+    columns: [PanelSpan; 2],
+    rows: [PanelSpan; 2],
     scale: f64,
 }
 
@@ -191,39 +216,52 @@ impl LeafPanels {
         ];
         let top = start + PAGE.panel_title;
         let bottom = top + heights[0] + PAGE.panel_axis + PAGE.panel_title;
+        let spans = |starts: [f64; 2], lengths: [f64; 2]| {
+            [0, 1].map(|k| PanelSpan {
+                start: starts[k],
+                length: lengths[k],
+            })
+        };
+        let right = PAGE.left_margin + widths[0] + COLUMN_GAP;
         LeafPanels {
-            columns: [
-                (PAGE.left_margin, widths[0]),
-                (PAGE.left_margin + widths[0] + COLUMN_GAP, widths[1]),
-            ],
-            rows: [(top, heights[0]), (bottom, heights[1])],
+            columns: spans([PAGE.left_margin, right], widths),
+            rows: spans([top, bottom], heights),
             scale,
         }
     }
 
     pub fn bottom(&self) -> f64 {
-        self.rows[1].0 + self.rows[1].1 + PAGE.panel_axis + BOTTOM
+        self.rows[1].start + self.rows[1].length + PAGE.panel_axis + BOTTOM
     }
 
     pub fn draw(&self, drawing: &mut Drawing, veins: &DrawnVeins, setting: &FigureSetting) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;
-        let cell = |column: (f64, f64), row: (f64, f64)| {
-            PageRectangle::new(DVec2::new(column.0, row.0), DVec2::new(column.1, row.1))
+        let cell = |column: PanelSpan, row: PanelSpan| {
+            PageRectangle::new(
+                DVec2::new(column.start, row.start),
+                DVec2::new(column.length, row.length),
+            )
         };
         let cells = [(left, top), (left, bottom), (right, bottom)];
-        for ((name, letter, text, axes), (column, row)) in PLANE_PANELS.into_iter().zip(cells) {
+        for (panel, (column, row)) in PLANE_PANELS.into_iter().zip(cells) {
             let cell = cell(column, row);
-            drawing.draw_group(name, |page| {
-                draw_panel_title(page, cell.corner, letter, text);
-                draw_plane_projection(page, veins, setting, cell, self.scale, axes);
+            drawing.draw_group(panel.group, |page| {
+                draw_panel_title(page, cell.corner, panel.letter, panel.view.title);
+                draw_plane_projection(page, veins, setting, cell, self.scale, panel.view.axes);
             });
         }
         // The panel in space has no axis on its left: it takes half of the gap.
         let shift = 0.5 * COLUMN_GAP;
         let cell = cell(
-            (right.0 - shift, right.1 + shift),
-            (top.0, top.1 + PAGE.panel_axis - FONT_SIZE.tick),
+            PanelSpan {
+                start: right.start - shift,
+                length: right.length + shift,
+            },
+            PanelSpan {
+                length: top.length + PAGE.panel_axis - FONT_SIZE.tick,
+                ..top
+            },
         );
         drawing.draw_group("space", |page| {
             let bounds = padded_box(veins.low, veins.high);
@@ -258,8 +296,8 @@ mod tests {
             veins.low = DVec3::ZERO;
             veins.high = DVec3::from_array(size);
             let found = LeafPanels::placed_below(0.0, &veins);
-            let [left, right] = found.columns.map(|column| column.1 + 1e-9);
-            let [top, bottom] = found.rows.map(|row| row.1 + 1e-9);
+            let [left, right] = found.columns.map(|column| column.length + 1e-9);
+            let [top, bottom] = found.rows.map(|row| row.length + 1e-9);
             let [x, y, z] = size.map(|extent| found.scale * extent);
             let fits = left >= x && right >= y && top >= y && bottom >= z;
             assert!(fits, "{size:?}");

@@ -284,48 +284,63 @@ const TALL_CURVE_PANEL: f64 = 260.0;
 
 const LOW_CURVE_PANEL: f64 = 150.0;
 
-/// A curve: its name, its colour, and its value in a row.
-type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
+/// A curve over the number that varies.
+struct MapCurve {
+    name: &'static str,
+    color: Color,
+    value: fn(&MapRow) -> Option<f64>,
+}
 
-/// The titles of the panels, the names of their axes, and their curves.
-fn curve_panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
+/// A panel with curves over the number that varies.
+struct CurvePanel {
+    title: &'static str,
+    axis_name: String,
+    curves: Vec<MapCurve>,
+}
+
+fn curve_panels(map: &Map) -> Vec<CurvePanel> {
+    let curve = |name, color: usize, value| MapCurve {
+        name,
+        color: CURVE_COLORS[color],
+        value,
+    };
     let units = &map.request.base.scenario().units;
     let length = units.length.as_deref();
     match map.show {
         MapShow::Outcomes => vec![
-            (
-                "where the tip is",
-                name_with_unit("tip", length),
-                vec![
-                    ("x", CURVE_COLORS[0], |row| row.tip_x),
-                    ("y", CURVE_COLORS[1], |row| row.tip_y),
-                    ("z", CURVE_COLORS[2], |row| row.tip_z),
+            CurvePanel {
+                title: "where the tip is",
+                axis_name: name_with_unit("tip", length),
+                curves: vec![
+                    curve("x", 0, |row| row.tip_x),
+                    curve("y", 1, |row| row.tip_y),
+                    curve("z", 2, |row| row.tip_z),
                 ],
-            ),
-            (
-                "energy",
-                name_with_unit("energy", units.energy().as_deref()),
-                vec![("energy", CURVE_COLORS[3], |row| row.energy)],
-            ),
+            },
+            CurvePanel {
+                title: "energy",
+                axis_name: name_with_unit("energy", units.energy().as_deref()),
+                curves: vec![curve("energy", 3, |row| row.energy)],
+            },
         ],
         MapShow::Waves => vec![
-            (
-                "waves along the margins, of stable leaves",
-                "waves".into(),
-                vec![("waves", CURVE_COLORS[0], MapRow::stable_waves)],
-            ),
-            (
-                "their amplitude",
-                name_with_unit("amplitude", Some("L")),
-                vec![("amplitude", CURVE_COLORS[1], |row| {
+            CurvePanel {
+                title: "waves along the margins, of stable leaves",
+                axis_name: "waves".into(),
+                curves: vec![curve("waves", 0, MapRow::stable_waves)],
+            },
+            CurvePanel {
+                title: "their amplitude",
+                axis_name: name_with_unit("amplitude", Some("L")),
+                curves: vec![curve("amplitude", 1, |row| {
                     row.stable_waves().and(row.margin_amplitude)
                 })],
-            ),
-            (
-                "mean twist of the veins",
-                name_with_unit("twist", Some("rad")),
-                vec![("twist", CURVE_COLORS[3], |row| row.twist)],
-            ),
+            },
+            CurvePanel {
+                title: "mean twist of the veins",
+                axis_name: name_with_unit("twist", Some("rad")),
+                curves: vec![curve("twist", 3, |row| row.twist)],
+            },
         ],
     }
 }
@@ -340,7 +355,8 @@ fn draw_curves(
 ) -> f64 {
     let values = &map.request.axes[0].values;
     let mut top = start;
-    for (what, name, curves) in curve_panels(map) {
+    for panel in curve_panels(map) {
+        let curves = &panel.curves;
         let height = if curves.len() > 1 {
             TALL_CURVE_PANEL
         } else {
@@ -350,24 +366,24 @@ fn draw_curves(
             DVec2::new(strip.corner.x, top + PAGE.panel_title),
             DVec2::new(strip.size.x, height),
         );
-        let lines = curves.iter().map(|(_, _, of)| {
+        let lines = curves.iter().map(|curve| {
             let mut line: Vec<(f64, f64)> = values.iter().map(|&x| (x, f64::NAN)).collect();
             for row in &map.rows {
-                line[row.cell].1 = of(row).unwrap_or(f64::NAN);
+                line[row.cell].1 = (curve.value)(row).unwrap_or(f64::NAN);
             }
             line
         });
         let lines: Vec<_> = lines.collect();
         let known = lines.iter().flatten().map(|point| point.1);
-        let up = Axis::linear_covering(&name, known.filter(|value| value.is_finite()))
+        let up = Axis::linear_covering(&panel.axis_name, known.filter(|value| value.is_finite()))
             .with_least_extent(ROUNDING_VARIATION);
         page.draw_group("curves", |page| {
-            let axes = PanelAxes::draw_titled(page, cell, ["", what], x.axis.clone(), up);
+            let axes = PanelAxes::draw_titled(page, cell, ["", panel.title], x.axis.clone(), up);
             let mut key = Legend::right_of(cell);
-            for ((name, color, _), line) in curves.iter().zip(lines) {
-                axes.draw_curve(page, &line, Stroke::new(*color, 1.6));
-                axes.draw_markers(page, line, Marker::Dot, *color);
-                key.add_marked_line(page, name, "", *color);
+            for (curve, line) in curves.iter().zip(lines) {
+                axes.draw_curve(page, &line, Stroke::new(curve.color, 1.6));
+                axes.draw_markers(page, line, Marker::Dot, curve.color);
+                key.add_marked_line(page, curve.name, "", curve.color);
             }
         });
         top = cell.opposite_corner().y + PAGE.panel_axis;

@@ -12,7 +12,7 @@ use crate::figure::drawing::space::{
 };
 use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, PanelCaption,
     SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, is_drawable, panel_letters,
     polyline_path, vein_color,
 };
@@ -26,6 +26,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
 use std::io::Write;
+use std::ops::Range;
 use tiny_skia::Pixmap;
 
 const ENERGIES_HEIGHT: f64 = 300.0;
@@ -218,17 +219,14 @@ pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> 
         .map_init(ColorPalette::new, |palette, (veins, time)| {
             let text = format!("{}, t = {}", record.scenario, format_four_digits(*time));
             palette.nearest_color_indices(&rasterize(&draw_picture(
-                veins,
-                bounds,
-                setting,
-                (&text, *time),
+                veins, bounds, setting, &text, *time,
             )))
         })
         .collect();
     encode_gif(&pictures, &picture_delays(&times), out).map_err(io::Error::other)
 }
 
-/// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
+/// At most [`MOST_FILM_PICTURES`] of the shapes, including the first and the last.
 fn sampled_shapes(film: &[ShapeSnapshot]) -> Vec<&ShapeSnapshot> {
     let count = film.len().min(MOST_FILM_PICTURES);
     let last = film.len().saturating_sub(1);
@@ -268,7 +266,8 @@ fn draw_picture(
     veins: &DrawnVeins,
     bounds: [DVec3; 2],
     setting: &FigureSetting,
-    (text, time): (&str, f64),
+    text: &str,
+    time: f64,
 ) -> Drawing {
     let mut page = Drawing::new(FILM_PAGE_SIZE.x, text);
     page.height = FILM_PAGE_SIZE.y;
@@ -353,7 +352,7 @@ fn encode_gif(
     encoder.set_repeat(gif::Repeat::Infinite)?;
     let mut before: Option<&Vec<u8>> = None;
     for (picture, &delay) in pictures.iter().zip(delays) {
-        let (rows, pixels) = changed_rows(before, picture, usize::from(width));
+        let ChangedRows { rows, pixels } = changed_rows(before, picture, usize::from(width));
         encoder.write_frame(&gif::Frame {
             delay,
             top: rows.start as u16,
@@ -369,15 +368,18 @@ fn encode_gif(
     Ok(())
 }
 
-/// The rows in which a picture differs from the one before, at least one, and their
-/// pixels.
-fn changed_rows(
-    before: Option<&Vec<u8>>,
-    picture: &[u8],
-    width: usize,
-) -> (std::ops::Range<usize>, Vec<u8>) {
+/// Rows of a picture that differ from the one before, at least one, and the indices of their pixels.
+struct ChangedRows {
+    rows: Range<usize>,
+    pixels: Vec<u8>,
+}
+
+fn changed_rows(before: Option<&Vec<u8>>, picture: &[u8], width: usize) -> ChangedRows {
     let Some(before) = before else {
-        return (0..picture.len() / width, picture.to_vec());
+        return ChangedRows {
+            rows: 0..picture.len() / width,
+            pixels: picture.to_vec(),
+        };
     };
     let pixels = before.iter().zip(picture);
     let pixels = pixels.map(|(a, b)| if a == b { UNCHANGED_PIXEL_INDEX } else { *b });
@@ -387,7 +389,10 @@ fn changed_rows(
     let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
     let rows = first..last + 1;
     let changed = &pixels[rows.start * width..rows.end * width];
-    (rows, changed.to_vec())
+    ChangedRows {
+        pixels: changed.to_vec(),
+        rows,
+    }
 }
 
 /// Below the notes.
@@ -448,8 +453,12 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
                 "t = {}",
                 number_in_unit(format_four_digits(time), &scenario.units, TIME)
             );
-            let caption = (letter.as_str(), when.as_str(), NOTE_COLOR);
-            let scene = panels.draw_empty_panel(page, (index, time), OBLIQUE_VIEW, caption);
+            let caption = PanelCaption {
+                letter: &letter,
+                text: &when,
+                color: NOTE_COLOR,
+            };
+            let scene = panels.draw_empty_panel(page, index, time, OBLIQUE_VIEW, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path
                     .iter()
@@ -560,7 +569,7 @@ mod film_tests {
         for k in [0, 50, 100] {
             let time = record.moments[k].time;
             let text = format!("{}, t = {}", record.scenario, format_four_digits(time));
-            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, (&text, time)));
+            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, &text, time));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =

@@ -3,10 +3,11 @@
 
 use crate::figure::drawing::labels::{LegendRows, new_page};
 use crate::figure::drawing::markers::{
-    ForceArrow, draw_support_marker, draw_tip_marker, force_arrows,
+    ForceArrow, RodPoint, draw_support_marker, draw_tip_marker, force_arrows,
 };
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, SpacePanel, draw_plane_panel, padded_box,
+    BoxMargins, OBLIQUE_VIEW, PlaneView, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT,
+    VIEW_FROM_SIDE, draw_plane_panel, padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVeins, draw_vein_markers};
 use crate::figure::drawing::{
@@ -52,13 +53,6 @@ const HATCHING_DEPTH: f64 = 8.0;
 
 const HATCHING_STROKES: i32 = 3;
 
-/// Names of planes, and their two axes.
-const VIEW_PLANES: [(&str, [usize; 2]); 3] = [
-    ("from above", [0, 1]),
-    ("from the side", [0, 2]),
-    ("from the front", [1, 2]),
-];
-
 const MARGINS: BoxMargins = BoxMargins {
     left: 90.0,
     right: 60.0,
@@ -92,13 +86,13 @@ pub fn draw(
     let corner = DVec2::new(PAGE.left_margin, top + PAGE.panel_title);
     let width = PAGE.width - PAGE.left_margin - PAGE.right_margin;
     let height = match rod.viewing_plane() {
-        Some((what, axes)) => {
+        Some(PlaneView { title, axes }) => {
             let [across, up] = axes.map(|axis| extent[axis]);
             let height = (width * up / across).clamp(LOWEST, HIGHEST);
             let cell = PageRectangle::new(corner, DVec2::new(width, height));
             let scale = (width / across).min(height / up);
             page.draw_group("rod", |page| {
-                draw_panel_title(page, corner, "", what);
+                draw_panel_title(page, corner, "", title);
                 let camera = draw_plane_panel(page, 0.5 * (low + high), setting, cell, scale, axes);
                 rod.draw(page, cell, |point| camera.project_point(point));
                 let taken = rod
@@ -169,7 +163,10 @@ impl<'a> DrawnRod<'a> {
         }
         let forces = force_arrows(scenario, veins.largest_extent(), |sigma| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
-            Some((point(sigma)?, (there? - before?).normalize_or_zero()))
+            Some(RodPoint {
+                position: point(sigma)?,
+                tangent: (there? - before?).normalize_or_zero(),
+            })
         });
         DrawnRod {
             veins,
@@ -200,18 +197,19 @@ impl<'a> DrawnRod<'a> {
     }
 
     /// The plane of two axes in which it is seen, unless it leaves every such plane.
-    fn viewing_plane(&self) -> Option<(&'static str, [usize; 2])> {
+    fn viewing_plane(&self) -> Option<PlaneView> {
         let (low, high) = self.bounding_corners();
         let extent = high - low - DVec3::splat(2.0 * PADDING * (high - low).max_element());
-        let seen = |(_, [a, b]): &(&str, [usize; 2])| extent[*a].min(extent[*b]);
-        let best = VIEW_PLANES.into_iter().reduce(|one, other| {
+        let seen = |view: &PlaneView| extent[view.axes[0]].min(extent[view.axes[1]]);
+        let views = [VIEW_FROM_ABOVE, VIEW_FROM_SIDE, VIEW_FROM_FRONT].into_iter();
+        let best = views.reduce(|one, other| {
             if seen(&other) > seen(&one) {
                 other
             } else {
                 one
             }
         })?;
-        let across = 3 - best.1[0] - best.1[1];
+        let across = 3 - best.axes[0] - best.axes[1];
         (extent[across] <= FLAT * extent.max_element()).then_some(best)
     }
 

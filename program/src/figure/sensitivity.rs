@@ -164,7 +164,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
             ..Axis::linear(&name, -end, end)
         };
         page.draw_group("changes", |page| {
-            draw_bars(page, cell, (&format!("along {of}"), across), &rows, axis);
+            draw_bars(page, cell, &format!("along {of}"), across, &rows, axis);
         });
     }
     page
@@ -174,7 +174,8 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
 fn draw_bars(
     page: &mut Drawing,
     cell: PageRectangle,
-    (what, across): (&str, Axis),
+    what: &str,
+    across: Axis,
     rows: &[SensitivityRow],
     axis: usize,
 ) {

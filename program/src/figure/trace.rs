@@ -2,7 +2,7 @@
 //! varies, and the leaf at some of the points.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes};
-use crate::figure::drawing::labels::{LabelPlacement, Legend, new_page};
+use crate::figure::drawing::labels::{LabelPlacement, Legend, LegendText, new_page};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::space::SmallPanels;
 use crate::figure::drawing::veins::{DrawnVeins, longest_curve};
@@ -71,7 +71,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, KEY);
         drawing.draw_group("branches", |page| {
             let axis = varied_number_axis(trace, &varied);
-            draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
+            draw_branches(page, trace, axis, quantity, &shown, cell, &letter());
             if place == 0 {
                 draw_legend(page, trace, cell);
             }
@@ -236,7 +236,8 @@ fn tip_coordinate(point: &TracePoint, axis: usize) -> f64 {
 fn draw_branches(
     page: &mut Drawing,
     trace: &Trace,
-    (across, quantity): (Axis, TraceShow),
+    across: Axis,
+    quantity: TraceShow,
     shown: &[[usize; 2]],
     cell: PageRectangle,
     letter: &str,
@@ -264,11 +265,11 @@ fn draw_branches(
         let line: Vec<(f64, f64)> = points.iter().map(|point| at(point)).collect();
         let drawn = axes.smooth_curve(&line);
         let mut begun = 0;
-        for (count, stable) in stability_pieces(&points, origin.is_some()) {
+        for StretchOfBranch { segments, stable } in stretches_of_branch(&points, origin.is_some()) {
             let width = if stable { 2.0 } else { 1.2 };
             let stroke =
                 Stroke::new(CURVE_COLORS[b % CURVE_COLORS.len()], width).with_dashes(!stable);
-            let piece: Vec<Option<DVec2>> = (drawn[begun..begun + count].iter())
+            let piece: Vec<Option<DVec2>> = (drawn[begun..begun + segments].iter())
                 .flat_map(|run| {
                     if run.is_empty() {
                         vec![None]
@@ -278,7 +279,7 @@ fn draw_branches(
                 })
                 .collect();
             axes.draw_clipped_line(page, &piece, stroke);
-            begun += count;
+            begun += segments;
         }
         labels.avoid_curve(&axes, &line);
     }
@@ -308,7 +309,10 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
             None => "first branch".into(),
             Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
         };
-        (name, branch_end_phrase(&branch.end).into())
+        LegendText {
+            name,
+            note: branch_end_phrase(&branch.end).into(),
+        }
     });
     key.add_curves(page, branches);
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
@@ -325,21 +329,29 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
     }
 }
 
-/// How many segments of a branch between these points are equally stable, one after the other, and
-/// whether they are stable. With an `origin` the first of the points is that where it leaves another
-/// branch.
-fn stability_pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
-    let mut pieces: Vec<(usize, bool)> = Vec::new();
+/// Successive segments of a branch that are all stable, or all unstable.
+struct StretchOfBranch {
+    segments: usize,
+    stable: bool,
+}
+
+/// The stretches of a branch through these points, one after the other. With an `origin` the first of
+/// the points is where the branch leaves another.
+fn stretches_of_branch(points: &[&TracePoint], origin: bool) -> Vec<StretchOfBranch> {
+    let mut stretches: Vec<StretchOfBranch> = Vec::new();
     for (k, pair) in points.windows(2).enumerate() {
         // The index of a critical point is the one after it, but that of the other branch.
         let of = if origin && k == 0 { pair[1] } else { pair[0] };
         let stable = of.index == 0;
-        match pieces.last_mut() {
-            Some((count, same)) if *same == stable => *count += 1,
-            _ => pieces.push((1, stable)),
+        match stretches.last_mut() {
+            Some(last) if last.stable == stable => last.segments += 1,
+            _ => stretches.push(StretchOfBranch {
+                segments: 1,
+                stable,
+            }),
         }
     }
-    pieces
+    stretches
 }
 
 /// Draws force against displacement of the tip, and the fitted line.

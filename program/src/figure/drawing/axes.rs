@@ -191,9 +191,8 @@ impl PanelAxes {
         let mut path: DrawingPath = Vec::new();
         let mut pen = None;
         for pair in places.windows(2) {
-            let inside = pair[0].zip(pair[1]);
-            let Some((from, to)) = inside.and_then(|(from, to)| self.clip_to_frame(from, to))
-            else {
+            let ends = pair[0].zip(pair[1]).map(<[DVec2; 2]>::from);
+            let Some([from, to]) = ends.and_then(|ends| self.clip_to_frame(ends)) else {
                 continue;
             };
             if pen != Some(from) {
@@ -208,7 +207,7 @@ impl PanelAxes {
     }
 
     /// The part of a line that is inside the frame (Liang and Barsky).
-    fn clip_to_frame(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+    fn clip_to_frame(&self, [from, to]: [DVec2; 2]) -> Option<[DVec2; 2]> {
         let step = to - from;
         let (low, high) = (self.cell.corner - from, self.cell.opposite_corner() - from);
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -228,7 +227,7 @@ impl PanelAxes {
             1.0 => to,
             part => from + part * step,
         };
-        (first <= last).then(|| (point(first), point(last)))
+        (first <= last).then(|| [first, last].map(point))
     }
 
     /// Draws a marker at each of these points that is inside the frame.
@@ -334,6 +333,13 @@ pub struct Tick {
     pub value: f64,
     /// From 0 at the start of the axis to 1 at its end.
     pub fraction: f64,
+    pub text: String,
+}
+
+/// A value as a tick shows it.
+#[derive(Clone, Debug)]
+pub struct LabelledValue {
+    pub value: f64,
     pub text: String,
 }
 
@@ -487,8 +493,11 @@ impl Axis {
         let ticks = match (&self.ticks, self.sign) {
             (TickPlacement::WholeNumbers(values), _) => {
                 let kept = values.iter().step_by(every(values.len()));
-                kept.map(|&value| (value, format_decimals(value, 0)))
-                    .collect()
+                kept.map(|&value| LabelledValue {
+                    value,
+                    text: format_decimals(value, 0),
+                })
+                .collect()
             }
             (_, Some(sign)) => {
                 let count = (high.floor() - low.ceil() + 1.0).max(0.0) as usize;
@@ -498,10 +507,15 @@ impl Axis {
                 let unit = 10f64.powi(self.label_power_of_ten());
                 let step = round_step((high - low) * spacing / unit);
                 let found = multiples_with_text(low / unit, high / unit, step).into_iter();
-                found.map(|(value, text)| (value * unit, text)).collect()
+                found
+                    .map(|LabelledValue { value, text }| LabelledValue {
+                        value: value * unit,
+                        text,
+                    })
+                    .collect()
             }
         };
-        let tick = |(value, text): (f64, String)| Tick {
+        let tick = |LabelledValue { value, text }: LabelledValue| Tick {
             value,
             fraction: self.fraction(value),
             text,
@@ -519,7 +533,7 @@ impl Axis {
         sign: f64,
         every: i32,
         few: bool,
-    ) -> Vec<(f64, String)> {
+    ) -> Vec<LabelledValue> {
         let (digits, every) = match few {
             true => ([1.0, 2.0, 5.0].as_slice(), 1),
             false => ([1.0].as_slice(), every),
@@ -535,7 +549,10 @@ impl Axis {
                     _ if few => digit_times_power_text(sign * digit, power),
                     _ => power_of_ten_text(sign, power),
                 };
-                (sign * digit * 10f64.powi(power), text)
+                LabelledValue {
+                    value: sign * digit * 10f64.powi(power),
+                    text,
+                }
             })
             .collect()
     }
@@ -574,14 +591,17 @@ pub fn round_step(smallest: f64) -> f64 {
 }
 
 /// Multiples of `step` from `low` to `high`, each with its text.
-pub fn multiples_with_text(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
+pub fn multiples_with_text(low: f64, high: f64, step: f64) -> Vec<LabelledValue> {
     let slack = 1e-9;
     let first = (low / step - slack).ceil() as i64;
     let last = (high / step + slack).floor() as i64;
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     (first..=last)
         .map(|multiple| multiple as f64 * step)
-        .map(|value| (value, format_decimals(value, decimals)))
+        .map(|value| LabelledValue {
+            value,
+            text: format_decimals(value, decimals),
+        })
         .collect()
 }
 
@@ -769,7 +789,7 @@ mod round_tests {
     fn multiples_reach_both_ends_and_have_equal_decimals() {
         let texts = |low, high, step| -> Vec<String> {
             let found = multiples_with_text(low, high, step).into_iter();
-            found.map(|(_, text)| text).collect()
+            found.map(|it| it.text).collect()
         };
         let even = ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"];
         assert_eq!(texts(-0.4, 0.45, 0.2), even);

@@ -29,6 +29,12 @@ const SUFFICIENT_CLEARANCE: f64 = 5.0;
 /// Points closer than this share a label.
 const SHARED_LABEL_DISTANCE: f64 = 10.0;
 
+/// A text that is to stand next to a point.
+struct RequestedLabel {
+    at: DVec2,
+    text: String,
+}
+
 pub struct LabelPlacement {
     cell: PageRectangle,
     /// Points on curves.
@@ -36,7 +42,7 @@ pub struct LabelPlacement {
     /// Labels drawn so far.
     drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
-    requested_labels: Vec<(DVec2, String)>,
+    requested_labels: Vec<RequestedLabel>,
 }
 
 impl LabelPlacement {
@@ -68,17 +74,20 @@ impl LabelPlacement {
     /// Requests a label next to a point; points close to each other share one.
     pub fn request_label(&mut self, at: DVec2, text: &str) {
         let mut wanted = self.requested_labels.iter_mut();
-        match wanted.find(|(place, _)| place.distance(at) < SHARED_LABEL_DISTANCE) {
-            Some((_, texts)) => *texts += &format!(", {text}"),
-            None => self.requested_labels.push((at, text.into())),
+        match wanted.find(|label| label.at.distance(at) < SHARED_LABEL_DISTANCE) {
+            Some(label) => label.text += &format!(", {text}"),
+            None => self.requested_labels.push(RequestedLabel {
+                at,
+                text: text.into(),
+            }),
         }
     }
 
     /// Draws all requested labels.
     pub fn draw_requested(&mut self, page: &mut Drawing) {
         self.curve_points
-            .extend(self.requested_labels.iter().map(|(at, _)| *at));
-        for (at, text) in std::mem::take(&mut self.requested_labels) {
+            .extend(self.requested_labels.iter().map(|label| label.at));
+        for RequestedLabel { at, text } in std::mem::take(&mut self.requested_labels) {
             let size = label_size(&text);
             let places = LABEL_DISTANCES.into_iter().flat_map(|distance| {
                 (0..LABEL_DIRECTIONS).map(move |k| {
@@ -92,8 +101,8 @@ impl LabelPlacement {
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
                 PageRectangle::new(at + offset + side - 0.5 * size, size)
             });
-            if let Some((_, cell)) = clearest_label(cells, |cell| self.clearance(cell)) {
-                self.draw_label_at(page, cell, &text, TEXT_COLOR);
+            if let Some(best) = clearest_label(cells, |cell| self.clearance(cell)) {
+                self.draw_label_at(page, best.label, &text, TEXT_COLOR);
             }
         }
     }
@@ -139,18 +148,24 @@ impl LabelPlacement {
     }
 }
 
+/// A label, or several that are placed together, with the least of their clearances.
+pub struct ClearLabel<T> {
+    pub label: T,
+    pub clearance: f64,
+}
+
 /// The first of these labels that is clear enough, or the clearest of all.
 pub fn clearest_label<T>(
     labels: impl Iterator<Item = T>,
     clearance: impl Fn(&T) -> f64,
-) -> Option<(f64, T)> {
-    let mut best: Option<(f64, T)> = None;
+) -> Option<ClearLabel<T>> {
+    let mut best: Option<ClearLabel<T>> = None;
     for label in labels {
-        let clear = clearance(&label);
-        if best.as_ref().is_none_or(|(most, _)| clear > *most) {
-            best = Some((clear, label));
+        let clearance = clearance(&label);
+        if best.as_ref().is_none_or(|best| clearance > best.clearance) {
+            best = Some(ClearLabel { label, clearance });
         }
-        if clear >= SUFFICIENT_CLEARANCE {
+        if clearance >= SUFFICIENT_CLEARANCE {
             break;
         }
     }
@@ -272,6 +287,12 @@ const SAMPLE_HEIGHT: f64 = 12.0;
 /// Most of many curves that a key names.
 pub const MOST_CURVES_NAMED: usize = 7;
 
+/// What a key says of a curve.
+pub struct LegendText {
+    pub name: String,
+    pub note: String,
+}
+
 /// The key of a panel: a column of samples with their names.
 pub struct Legend {
     /// Left end and middle of the next entry's first line.
@@ -320,10 +341,10 @@ impl Legend {
     pub fn add_curves(
         &mut self,
         page: &mut Drawing,
-        curves: impl ExactSizeIterator<Item = (String, String)>,
+        curves: impl ExactSizeIterator<Item = LegendText>,
     ) {
         let more = curves.len().saturating_sub(MOST_CURVES_NAMED);
-        for ((name, note), color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
+        for (LegendText { name, note }, color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
             self.add_line(page, &name, &note, Stroke::new(color, 1.8));
         }
         if more > 0 {

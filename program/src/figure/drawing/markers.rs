@@ -88,21 +88,32 @@ const END_ON_LENGTH: f64 = 0.2;
 /// From the sides of a panel to the middle of the arrow.
 const ARROW_INSET: DVec2 = DVec2::new(28.0, 32.0);
 
+/// A direction as a panel shows it.
+#[derive(Clone, Copy)]
+pub struct ProjectedDirection {
+    /// Projection of its unit vector onto the page.
+    pub on_page: DVec2,
+    pub is_toward_viewer: bool,
+}
+
 /// Draws a direction with its name in the corner of a panel that is farthest from the points
-/// `taken`; returns where. `direction` is the projection of its unit vector onto the page, `toward`
-/// whether it points towards the viewer.
+/// `taken`; returns where.
 pub fn draw_direction_arrow(
     page: &mut Drawing,
     cell: PageRectangle,
     taken: &[DVec2],
-    (direction, toward): (DVec2, bool),
+    direction: ProjectedDirection,
     name: &str,
 ) -> DVec2 {
     let at = cell.emptiest_corner(ARROW_INSET, taken.iter().copied());
     let stroke = Stroke::new(TEXT_COLOR, 1.3);
+    let ProjectedDirection {
+        on_page: direction,
+        is_toward_viewer,
+    } = direction;
     if direction.length() < END_ON_LENGTH {
         page.draw_stroke(circle_path(at, 6.0), stroke);
-        match toward {
+        match is_toward_viewer {
             true => page.draw_shape(circle_path(at, 1.8), TEXT_COLOR, None),
             false => draw_cross(page, at, 4.2, stroke),
         }
@@ -143,25 +154,31 @@ pub struct ForceArrow {
     label: String,
 }
 
+/// A point of a rod, with the unit tangent there.
+pub struct RodPoint {
+    pub position: DVec3,
+    pub tangent: DVec3,
+}
+
 /// The forces on a single rod whose largest extent is `extent`; `at` gives the point at a fraction of
-/// its length, with the tangent there.
+/// its length.
 pub fn force_arrows(
     scenario: &Scenario,
     extent: f64,
-    at: impl Fn(f64) -> Option<(DVec3, DVec3)>,
+    at: impl Fn(f64) -> Option<RodPoint>,
 ) -> Vec<ForceArrow> {
     let unit = scenario.units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     let marks = load_marks(scenario, None).into_iter();
     let arrow = |mark: LoadMark| {
-        let (place, tangent) = at(mark.at)?;
+        let RodPoint { position, tangent } = at(mark.at)?;
         let along = mark.action == LoadKind::Distributed;
         // One that pushes against the rod ends at the point, any other begins there.
         let pushes = mark.direction.dot(tangent) < -0.5;
         let start = if pushes || along { -1.0 } else { 0.0 };
         let reach = mark.length * extent * mark.direction;
         Some(ForceArrow {
-            ends: [start, start + 1.0].map(|part| place + part * reach),
+            ends: [start, start + 1.0].map(|part| position + part * reach),
             head: if along {
                 SMALL_ARROW_HEAD_SIZE
             } else {

@@ -1,25 +1,38 @@
 //! Parallel projections of leaves: flat panels of two axes, and panels in space, alone or many of
 //! one scale on a page, with the box around the leaf and its shadow on the floor.
 
-use crate::figure::drawing::axes::{Axis, PanelAxes, multiples_with_text, round_step};
+use crate::figure::drawing::axes::{
+    Axis, LabelledValue, PanelAxes, multiples_with_text, round_step,
+};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::markers::draw_direction_arrow;
+use crate::figure::drawing::markers::{ProjectedDirection, draw_direction_arrow};
 use crate::figure::drawing::veins::{BezierPiece, DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{
-    Color, Drawing, FLOOR, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PAGE, PageRectangle, PathStep,
-    SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, draw_colored_title, polygon_path, polyline_path,
+    Drawing, FLOOR, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PAGE, PageRectangle, PanelCaption,
+    PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, polygon_path, polyline_path,
 };
 use crate::figure::scenario::{DirectionArrow, FigureSetting};
 use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
 
-/// Directions from which the box is seen: azimuth from the xi axis and elevation above the
-/// floor, in degrees. From above one of its edges, and along the xi axis from a little above.
-pub type ViewAngles = [f64; 2];
+/// The direction from which a box is seen, in degrees: from the xi axis, and above the floor.
+#[derive(Clone, Copy)]
+pub struct ViewAngles {
+    azimuth: f64,
+    elevation: f64,
+}
 
-pub const OBLIQUE_VIEW: ViewAngles = [-55.0, 28.0];
+/// From above one of the edges of the box.
+pub const OBLIQUE_VIEW: ViewAngles = ViewAngles {
+    azimuth: -55.0,
+    elevation: 28.0,
+};
 
-pub const FRONT: ViewAngles = [-8.0, 12.0];
+/// Along the xi axis, from a little above.
+pub const FRONT_VIEW: ViewAngles = ViewAngles {
+    azimuth: -8.0,
+    elevation: 12.0,
+};
 
 /// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_BOX_SIDE: f64 = 0.4;
@@ -100,7 +113,8 @@ impl ParallelProjection {
     }
 
     pub fn from_view(view: ViewAngles) -> Self {
-        let [(sin_a, cos_a), (sin_e, cos_e)] = view.map(|angle| angle.to_radians().sin_cos());
+        let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
+        let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let right = DVec3::new(-sin_a, cos_a, 0.0);
         ParallelProjection::new(right, DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e))
     }
@@ -137,9 +151,11 @@ impl ParallelProjection {
     ) {
         let mut taken: Vec<DVec2> = taken.collect();
         for DirectionArrow { direction, name } in arrows {
-            let shown = self.project_direction(*direction) / self.scale;
-            let toward = self.toward.dot(*direction) > 0.0;
-            let at = draw_direction_arrow(page, cell, &taken, (shown, toward), name);
+            let direction = ProjectedDirection {
+                on_page: self.project_direction(*direction) / self.scale,
+                is_toward_viewer: self.toward.dot(*direction) > 0.0,
+            };
+            let at = draw_direction_arrow(page, cell, &taken, direction, name);
             taken.push(at);
         }
     }
@@ -160,7 +176,13 @@ struct AxisEdge {
     /// Offsets from a point on the edge along its grid lines: to the corner between the two
     /// walls, and to the end of the second.
     grid_line_offsets: [DVec3; 2],
-    ticks: Vec<(DVec3, String)>,
+    ticks: Vec<EdgeTick>,
+}
+
+/// A tick of an axis in space.
+struct EdgeTick {
+    point: DVec3,
+    text: String,
 }
 
 /// A box in space, and the leaf in it.
@@ -207,7 +229,10 @@ impl<'s> SpacePanel<'s> {
                 outward: camera.project_direction(outward).normalize(),
                 grid_line_offsets: walls,
                 ticks: ticks
-                    .map(|(value, text)| (at(value / unit), text))
+                    .map(|LabelledValue { value, text }| EdgeTick {
+                        point: at(value / unit),
+                        text,
+                    })
                     .collect(),
             }
         };
@@ -242,7 +267,7 @@ impl<'s> SpacePanel<'s> {
         let floor = [low, near, right, far].map(|corner| self.project_point(corner));
         page.draw_shape(polygon_path(&floor), FLOOR, None);
         for edge in &self.edges {
-            for &(start, _) in &edge.ticks {
+            for &EdgeTick { point: start, .. } in &edge.ticks {
                 let line = [
                     start,
                     start + edge.grid_line_offsets[0],
@@ -280,7 +305,7 @@ impl<'s> SpacePanel<'s> {
             ..
         } in &self.edges
         {
-            for (point, text) in ticks {
+            for EdgeTick { point, text } in ticks {
                 let foot = self.project_point(*point);
                 page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME_COLOR, 0.8));
                 let at = foot + label_offset(*out, 17.0);
@@ -301,7 +326,7 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
-            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, FONT_SIZE.tick));
+            let widths = widths.map(|tick| Font::embedded().text_width(&tick.text, FONT_SIZE.tick));
             let beyond = NAME_LABEL_DISTANCE + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
@@ -374,6 +399,28 @@ fn label_offset(out: DVec2, distance: f64) -> DVec2 {
 
 /// Least distance between grid lines.
 const PLANE_TICK_DISTANCE: f64 = 36.0;
+
+/// A view along one of the three axes: its title, and the axes that point to the right and up.
+#[derive(Clone, Copy)]
+pub struct PlaneView {
+    pub title: &'static str,
+    pub axes: [usize; 2],
+}
+
+pub const VIEW_FROM_ABOVE: PlaneView = PlaneView {
+    title: "from above",
+    axes: [0, 1],
+};
+
+pub const VIEW_FROM_SIDE: PlaneView = PlaneView {
+    title: "from the side",
+    axes: [0, 2],
+};
+
+pub const VIEW_FROM_FRONT: PlaneView = PlaneView {
+    title: "from the front",
+    axes: [1, 2],
+};
 
 /// Draws a panel of two axes with `scale` pixels per length and this point in its middle; returns how
 /// it shows points.
@@ -498,8 +545,12 @@ impl<'s> SmallPanels<'s> {
         caption: [&str; 2],
     ) {
         let [letter, text] = caption;
-        let scene =
-            self.draw_empty_panel(page, (index, 0.0), OBLIQUE_VIEW, (letter, text, NOTE_COLOR));
+        let caption = PanelCaption {
+            letter,
+            text,
+            color: NOTE_COLOR,
+        };
+        let scene = self.draw_empty_panel(page, index, 0.0, OBLIQUE_VIEW, caption);
         scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
     }
 
@@ -509,12 +560,13 @@ impl<'s> SmallPanels<'s> {
     pub fn draw_empty_panel(
         &self,
         page: &mut Drawing,
-        (index, time): (usize, f64),
+        index: usize,
+        time: f64,
         view: ViewAngles,
-        (letter, text, color): (&str, &str, Color),
+        caption: PanelCaption,
     ) -> SpacePanel<'s> {
         let cell = self.panel_rectangle(index);
-        draw_colored_title(page, cell.corner, letter, text, color);
+        caption.draw(page, cell.corner);
         let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
         let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_PANEL_MARGINS, step);
         scene.draw_box(page);

@@ -60,11 +60,17 @@ pub struct GrippedStretch {
     pub support: SupportKind,
 }
 
+/// The tip of a vein, or of all where they are joined.
+pub struct DrawnTip {
+    pub position: DVec3,
+    pub color: Color,
+}
+
 pub struct DrawnVeins {
     pub veins: Vec<DrawnVein>,
     pub count: usize,
     pub dots: Vec<DVec3>,
-    pub tips: Vec<(DVec3, Color)>,
+    pub tips: Vec<DrawnTip>,
     /// How the bases are held, and the tips if they are.
     pub base_support: SupportKind,
     pub tip_support: Option<SupportKind>,
@@ -81,10 +87,13 @@ impl DrawnVeins {
     pub fn from_equilibrium(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
         let veins = DrawnVeins::from_curves(&shape.curves, &equilibrium.tips, shape.longest());
-        let nodes = (&shape.curve_stations[..], &shape.curves[..]);
-        veins
-            .with_supports(scenario)
-            .with_loads(scenario, &load_marks(scenario, None), nodes)
+        let loads = load_marks(scenario, None);
+        veins.with_supports(scenario).with_loads(
+            scenario,
+            &loads,
+            &shape.curve_stations,
+            &shape.curves,
+        )
     }
 
     /// Where the veins that are drawn begin.
@@ -99,11 +108,9 @@ impl DrawnVeins {
         let veins = DrawnVeins::from_curves(&still.curves, &tips, record.length);
         let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
         let loads = load_marks(scenario, Some(time));
-        veins.with_supports(scenario).with_loads(
-            scenario,
-            &loads,
-            (&record.stations, &still.curves),
-        )
+        veins
+            .with_supports(scenario)
+            .with_loads(scenario, &loads, &record.stations, &still.curves)
     }
 
     /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
@@ -112,7 +119,8 @@ impl DrawnVeins {
         mut self,
         scenario: &Scenario,
         loads: &[LoadMark],
-        (stations, curves): (&[f64], &[Vec<DVec3>]),
+        stations: &[f64],
+        curves: &[Vec<DVec3>],
     ) -> Self {
         self.moments = moment_arrows(loads, |sigma| {
             let point =
@@ -162,8 +170,11 @@ impl DrawnVeins {
         let joined = tips.len() == 1;
         let tips = (0..tips.len())
             .filter(|&index| joined || is_vein_drawn(index, count))
-            .map(|index| (tips[index] / unit, color_of_vein(index, count)))
-            .filter(|(tip, _)| is_drawable(*tip))
+            .map(|index| DrawnTip {
+                position: tips[index] / unit,
+                color: color_of_vein(index, count),
+            })
+            .filter(|tip| is_drawable(tip.position))
             .collect();
 
         let pieces = veins.iter().flat_map(|vein| &vein.pieces);
@@ -301,17 +312,17 @@ pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(
             bases.push(base);
         }
     }
-    if let [(tip, _)] = veins.tips.as_slice() {
+    if let [tip] = veins.tips.as_slice() {
         return match veins.tip_support {
-            Some(held) => draw_support_marker(page, place(*tip), held),
-            None => draw_tip_marker(page, place(*tip)),
+            Some(held) => draw_support_marker(page, place(tip.position), held),
+            None => draw_tip_marker(page, place(tip.position)),
         };
     }
     // Many are small.
     let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
-    for (tip, color) in &veins.tips {
-        let rim = Stroke::new(*color, 0.5 * radius);
-        page.draw_shape(circle_path(place(*tip), radius), WHITE, Some(rim));
+    for tip in &veins.tips {
+        let rim = Stroke::new(tip.color, 0.5 * radius);
+        page.draw_shape(circle_path(place(tip.position), radius), WHITE, Some(rim));
     }
 }
 
