@@ -30,16 +30,23 @@ use leafdyn::study::{
 };
 use std::collections::{BTreeSet, HashMap};
 
-const DIAGRAM_HEIGHT: f64 = 400.0;
+/// Sizes of the diagram, in pixels.
+struct BoundaryLayout {
+    diagram: f64,
+    /// Width right of the panel, for the key.
+    key: f64,
+    /// Most leaves drawn, each at a named point.
+    most_leaves: usize,
+}
 
-/// Right of the panel, for the key.
-const LEGEND_WIDTH: f64 = 210.0;
+const LAYOUT: BoundaryLayout = BoundaryLayout {
+    diagram: 400.0,
+    key: 210.0,
+    most_leaves: 4,
+};
 
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
-
-/// Most leaves drawn, each at a named point.
-const MOST_LEAVES_DRAWN: usize = 4;
 
 /// Colours of neighbouring curves; they also differ in their dashes.
 const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
@@ -48,14 +55,14 @@ pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
     let shown: Vec<CaptionedLeaf> = (boundary.curves.iter())
         .flat_map(|curve| (curve.beside.iter()).map(|leaf| CaptionedLeaf::new(curve.kind, leaf)))
-        .take(MOST_LEAVES_DRAWN)
+        .take(LAYOUT.most_leaves)
         .collect();
     let longest = longest_curve(shown.iter().flat_map(|it| &it.leaf.curves));
     let shapes: Vec<DrawnVeins> = (shown.iter())
         .map(|it| DrawnVeins::from_curves(&it.curves, &it.tips, longest).with_supports(scenario))
         .collect();
     let diagram =
-        PageRectangle::left_of_legend(PAGE.header + PAGE.panel_title, DIAGRAM_HEIGHT, LEGEND_WIDTH);
+        PageRectangle::left_of_legend(PAGE.header + PAGE.panel_title, LAYOUT.diagram, LAYOUT.key);
     let below = diagram.opposite_corner().y + PAGE.panel_axis;
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
@@ -345,23 +352,28 @@ fn draw_legend(
     }
 }
 
-/// Spacing of the places that are tried along a curve, and their largest number.
-const PLACE_SPACING: f64 = 5.0;
+/// Where the sides of a curve are labelled, in pixels.
+struct SideLabelRules {
+    /// Of the places that are tried along a curve, and their largest number.
+    spacing: f64,
+    most_places: usize,
+    /// Curves closer than this are labelled together, with the indices outside them.
+    neighbour: f64,
+    /// From a curve to its label.
+    gap: f64,
+    least_clearance: f64,
+    /// Least component of the normal of a curve along the first number, which distinguishes the sides.
+    least_normal: f64,
+}
 
-const MOST_PLACES_TRIED: usize = 400;
-
-/// Curves closer than this are labelled together, with the indices outside them.
-const NEIGHBOUR_DISTANCE: f64 = 16.0;
-
-/// From a curve to its label.
-const GAP: f64 = 4.0;
-
-/// Labels need at least this clearance.
-const LEAST_CLEARANCE: f64 = 2.0;
-
-/// The normal of a curve must have at least this component along the first number, which
-/// distinguishes the sides.
-const LEAST_NORMAL_COMPONENT: f64 = 0.15;
+const SIDE_LABEL: SideLabelRules = SideLabelRules {
+    spacing: 5.0,
+    most_places: 400,
+    neighbour: 16.0,
+    gap: 4.0,
+    least_clearance: 2.0,
+    least_normal: 0.15,
+};
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
@@ -379,7 +391,7 @@ pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &m
                 room.fold(f64::INFINITY, f64::min)
             },
         );
-        if let Some(best) = best.filter(|best| best.clearance >= LEAST_CLEARANCE) {
+        if let Some(best) = best.filter(|best| best.clearance >= SIDE_LABEL.least_clearance) {
             for PlacedLabel { cell, text } in best.label.labels {
                 labels.draw_label_at(page, cell, &text, NOTE_COLOR);
             }
@@ -513,7 +525,9 @@ impl BoundaryLine {
     fn label_places(&self) -> Vec<LabelPlace> {
         let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
         let whole: f64 = self.segments.iter().map(|it| length(&it.ends)).sum();
-        let spacing = PLACE_SPACING.max(whole / MOST_PLACES_TRIED as f64);
+        let spacing = SIDE_LABEL
+            .spacing
+            .max(whole / SIDE_LABEL.most_places as f64);
         let (mut places, mut before) = (Vec::new(), 0.0);
         for BoundarySegment { ends, sides } in &self.segments {
             let (own, step) = (length(ends), ends[1] - ends[0]);
@@ -523,7 +537,7 @@ impl BoundaryLine {
             for k in 0..count {
                 let part = (k as f64 + 0.5) / count as f64;
                 let off = (before + part * own - 0.5 * whole).abs();
-                if normal.x > LEAST_NORMAL_COMPONENT {
+                if normal.x > SIDE_LABEL.least_normal {
                     let place = LabelPlace {
                         at: ends[0] + part * step,
                         normal,
@@ -573,7 +587,7 @@ impl SideLabels {
         let LabelPlace { at, normal, sides } = place;
         let label = |along: f64, sign: f64, text: String| {
             let size = label_size(&text);
-            let reach = 0.5 * (size * normal.abs()).element_sum() + GAP;
+            let reach = 0.5 * (size * normal.abs()).element_sum() + SIDE_LABEL.gap;
             let middle = at + (along + sign * reach) * normal;
             let corner = middle - 0.5 * size;
             let cell = PageRectangle { corner, size };
@@ -600,7 +614,7 @@ impl SideLabels {
             others.sort_by(|(_, a), (_, b)| (sign * a.along).total_cmp(&(sign * b.along)));
             let (mut along, mut index) = (0.0, sides[out]);
             for (k, it) in &others {
-                if (0.0..NEIGHBOUR_DISTANCE).contains(&(sign * (it.along - along)))
+                if (0.0..SIDE_LABEL.neighbour).contains(&(sign * (it.along - along)))
                     && it.sides[1 - out] == index
                 {
                     (along, index) = (it.along, it.sides[out]);
@@ -617,13 +631,20 @@ impl SideLabels {
     }
 }
 
-/// Distance in pixels of the rows in which crossings with curves are looked for, and of the columns.
-const ROW: f64 = 2.0;
+/// Rows and columns along which crossings with curves are looked for, in pixels.
+struct ShadingGrid {
+    /// Distance of rows, and of columns.
+    row: f64,
+    column: f64,
+    /// Least distance of a column from the ends of a stretch in which it is.
+    beside: f64,
+}
 
-const COLUMN_SPACING: f64 = 4.0;
-
-/// Least distance of a column from the ends of a stretch in which it is.
-const BESIDE: f64 = 0.5;
+const SHADING: ShadingGrid = ShadingGrid {
+    row: 2.0,
+    column: 4.0,
+    beside: 0.5,
+};
 
 /// A part of a row between two crossings with curves, or a crossing and an end of the row.
 struct RowStretch {
@@ -642,7 +663,7 @@ pub fn shade_stable_region(
     cell: PageRectangle,
     curves: &[BoundaryLine],
 ) -> bool {
-    let rows = (cell.size.y / ROW).floor().max(1.0) as usize;
+    let rows = (cell.size.y / SHADING.row).floor().max(1.0) as usize;
     let height = cell.size.y / rows as f64;
     let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;
     let stretches: Vec<RowStretch> = (0..rows)
@@ -735,7 +756,7 @@ fn connected_regions(
     curves: &[BoundaryLine],
     y: impl Fn(usize) -> f64,
 ) -> Vec<usize> {
-    let columns = (cell.size.x / COLUMN_SPACING).ceil().max(1.0) as usize;
+    let columns = (cell.size.x / SHADING.column).ceil().max(1.0) as usize;
     let x = |k: usize| cell.corner.x + (k as f64 + 0.5) * cell.size.x / columns as f64;
     let crossed: Vec<Vec<f64>> = (0..columns)
         .map(|k| {
@@ -772,7 +793,7 @@ fn connected_regions(
             ];
             // A column along a curve leads nowhere.
             let open = (0..columns).any(|k| {
-                let inside = low + BESIDE < x(k) && x(k) < high - BESIDE;
+                let inside = low + SHADING.beside < x(k) && x(k) < high - SHADING.beside;
                 inside && !crossed[k].iter().any(|y| (here..=below).contains(y))
             });
             if open {

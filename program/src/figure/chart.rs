@@ -236,14 +236,22 @@ fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
     all
 }
 
-const FRAME_HEIGHT: f64 = 430.0;
+/// Sizes of a chart, in pixels.
+struct ChartLayout {
+    frame: f64,
+    /// Width right of the frame, for the key and the names of lanes.
+    key: f64,
+    /// Height of a lane of failures, and the gap below all.
+    lane: f64,
+    lane_gap: f64,
+}
 
-/// Right of the frame, for the key and the names of lanes.
-const KEY: f64 = 252.0;
-
-const LANE_HEIGHT: f64 = 16.0;
-
-const LANE_GAP: f64 = 7.0;
+const LAYOUT: ChartLayout = ChartLayout {
+    frame: 430.0,
+    key: 252.0,
+    lane: 16.0,
+    lane_gap: 7.0,
+};
 
 /// Colour of the points on the Pareto front and of the band that joins them.
 const PARETO_FRONT_COLOR: Color = Color(247, 205, 92);
@@ -319,18 +327,22 @@ impl ChartPanel {
     fn lanes_height(&self) -> f64 {
         match self.failure_lanes().len() {
             0 => 0.0,
-            lanes => lanes as f64 * LANE_HEIGHT + LANE_GAP,
+            lanes => lanes as f64 * LAYOUT.lane + LAYOUT.lane_gap,
         }
     }
 
     /// Height of the panel with lanes and axis.
     pub fn total_height(&self) -> f64 {
-        self.lanes_height() + FRAME_HEIGHT + PAGE.panel_axis
+        self.lanes_height() + LAYOUT.frame + PAGE.panel_axis
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
         let axes = PanelAxes {
-            cell: PageRectangle::left_of_legend(start + self.lanes_height(), FRAME_HEIGHT, KEY),
+            cell: PageRectangle::left_of_legend(
+                start + self.lanes_height(),
+                LAYOUT.frame,
+                LAYOUT.key,
+            ),
             across: self.across.clone(),
             up: self.up.clone(),
         };
@@ -353,7 +365,7 @@ impl ChartPanel {
             );
         }
         for (lane, word) in self.failure_lanes().into_iter().enumerate() {
-            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LANE_HEIGHT, word);
+            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LAYOUT.lane, word);
         }
         self.draw_legend(page, axes.cell);
     }
@@ -390,11 +402,11 @@ impl ChartPanel {
     fn draw_failure_lane(&self, page: &mut Drawing, cell: PageRectangle, top: f64, word: &str) {
         const CROSS_SPACING: f64 = 11.0;
         let (left, right) = (cell.corner.x, cell.opposite_corner().x);
-        let middle = top + 0.5 * LANE_HEIGHT;
-        let area = DVec2::new(cell.size.x, LANE_HEIGHT - 2.0);
+        let middle = top + 0.5 * LAYOUT.lane;
+        let area = DVec2::new(cell.size.x, LAYOUT.lane - 2.0);
         let start = DVec2::new(left, top + 1.0);
         page.draw_shape(rectangle_path(start, area), FAILURE_LANES_COLOR, None);
-        let name = Font::embedded().shorten_text(word, FONT_SIZE.tick, KEY - 14.0);
+        let name = Font::embedded().shorten_text(word, FONT_SIZE.tick, LAYOUT.key - 14.0);
         let at = DVec2::new(right + 10.0, middle);
         page.draw_centered_label(at, &name, FONT_SIZE.tick, TextAnchor::Start, NOTE_COLOR);
         let mut from_right = right;

@@ -18,7 +18,26 @@ use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, CheckVerdict, ComparedQuantity};
 
-const LINE_HEIGHT: f64 = 19.0;
+/// Sizes of the panel of differences, in pixels.
+struct DifferenceLayout {
+    /// Height of a line of the reason for a verdict.
+    reason_line: f64,
+    frame: f64,
+    /// Width right of the frame, for the key.
+    key: f64,
+    /// Height of the strip below for differences of exactly zero: one lane per quantity.
+    zero_strip: f64,
+    /// Most stations that are marked.
+    most_marked: usize,
+}
+
+const LAYOUT: DifferenceLayout = DifferenceLayout {
+    reason_line: 19.0,
+    frame: 216.0,
+    key: 212.0,
+    zero_strip: 30.0,
+    most_marked: 70,
+};
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -41,7 +60,7 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
             ),
         _ => Vec::new(),
     };
-    let key_line = PAGE.notes_base_line + LINE_HEIGHT * (reason.len() + 1) as f64;
+    let key_line = PAGE.notes_base_line + LAYOUT.reason_line * (reason.len() + 1) as f64;
     let panels = LeafPanels::placed_below(PAGE.header - PAGE.notes_base_line + key_line, &veins);
     let compared = !check.along.is_empty();
     let below = if compared { PANEL_HEIGHT } else { 0.0 };
@@ -53,7 +72,7 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(
                 PAGE.left_margin,
-                PAGE.notes_base_line + LINE_HEIGHT * (line + 1) as f64,
+                PAGE.notes_base_line + LAYOUT.reason_line * (line + 1) as f64,
             );
             page.draw_label(base, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         }
@@ -96,19 +115,9 @@ fn header_notes(check: &Check, veins: &DrawnVeins, setting: &FigureSetting) -> V
     notes
 }
 
-const FRAME_HEIGHT: f64 = 216.0;
-
-/// Right of the frame, for the key.
-const KEY: f64 = 212.0;
-
-const PANEL_HEIGHT: f64 = PAGE.panel_title + FRAME_HEIGHT + PAGE.panel_axis;
+const PANEL_HEIGHT: f64 = PAGE.panel_title + LAYOUT.frame + PAGE.panel_axis;
 
 const FEWEST_DECADES: f64 = 3.0;
-
-/// Height of the strip below for differences of exactly zero: one lane per quantity.
-const ZERO_STRIP_HEIGHT: f64 = 30.0;
-
-const MOST_STATIONS_MARKED: usize = 70;
 
 /// How much both solutions differ in a quantity.
 struct DifferenceCurve {
@@ -153,7 +162,8 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
         .collect();
     let values = || curves.iter().flat_map(|curve| curve.along.ordinates());
-    let mut cell = PageRectangle::left_of_legend(start + PAGE.panel_title, FRAME_HEIGHT, KEY);
+    let mut cell =
+        PageRectangle::left_of_legend(start + PAGE.panel_title, LAYOUT.frame, LAYOUT.key);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {
@@ -162,7 +172,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     };
     let mut across = stations.clone();
     if values().any(|value| value == 0.0) {
-        cell.size.y -= ZERO_STRIP_HEIGHT;
+        cell.size.y -= LAYOUT.zero_strip;
         across.labelled = false;
         draw_zero_strip(page, &curves, cell, stations);
     }
@@ -181,7 +191,7 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     }
     for DifferenceCurve { along: curve, .. } in &curves {
         axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        if curve.points.len() <= MOST_STATIONS_MARKED {
+        if curve.points.len() <= LAYOUT.most_marked {
             axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
         }
     }
@@ -199,7 +209,7 @@ fn draw_zero_strip(
     let strip = PanelAxes {
         cell: PageRectangle::new(
             DVec2::new(above.corner.x, above.opposite_corner().y),
-            DVec2::new(above.size.x, ZERO_STRIP_HEIGHT),
+            DVec2::new(above.size.x, LAYOUT.zero_strip),
         ),
         across: stations,
         up: Axis {

@@ -17,7 +17,7 @@ use crate::figure::drawing::{
     Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path, color_of_vein, panel_letters, polygon_path,
     rectangle_path,
 };
-use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::figure::scenario::{COORDINATE_NAMES, QuantityLabel, name_with_unit};
 use crate::report::numbers::{
     count_in_words, format_five_digits, format_four_digits, round_to_error,
 };
@@ -26,12 +26,40 @@ use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::{Fit, FitLeaf, FitParameter, FitResidual, MeasuredQuantity, ParameterKeys};
 use std::collections::HashMap;
 
-const BOTTOM: f64 = 4.0;
+/// Sizes of the panels of results and of measured leaves, in pixels.
+struct ResultLayout {
+    height: f64,
+    /// Height of the residuals below a panel, and the gap between.
+    residuals: f64,
+    residuals_gap: f64,
+    /// Least distance between ticks of residuals.
+    residual_ticks: f64,
+    /// Heights of a leaf, and between its two views.
+    least_leaf: f64,
+    largest_leaf: f64,
+    views_gap: f64,
+    /// Width right of the panels, for the key.
+    key: f64,
+    /// Half the width of the band of a single experiment.
+    half_band: f64,
+    /// Most panels of results, and most leaves, that are drawn.
+    most_panels: usize,
+    most_leaves: usize,
+}
 
-/// Most panels of results, and most leaves, that are drawn.
-const MOST_RESULT_PANELS: usize = 8;
-
-const MOST_LEAVES: usize = 3;
+const RESULT_LAYOUT: ResultLayout = ResultLayout {
+    height: 190.0,
+    residuals: 70.0,
+    residuals_gap: 12.0,
+    residual_ticks: 16.0,
+    least_leaf: 110.0,
+    largest_leaf: 300.0,
+    views_gap: 70.0,
+    key: 200.0,
+    half_band: 5.0,
+    most_panels: 8,
+    most_leaves: 3,
+};
 
 pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
     let units = &scenario.units;
@@ -54,34 +82,44 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
     page.draw_group("numbers", |page| {
         top = draw_fit_parameters(page, top, &letter(), &fit.parameters, units);
     });
-    for results in result_series_by_kind(fit).iter().take(MOST_RESULT_PANELS) {
+    for results in result_series_by_kind(fit)
+        .iter()
+        .take(RESULT_LAYOUT.most_panels)
+    {
         page.draw_group("result", |page| {
             top = draw_results(page, top, &letter(), units, results);
         });
     }
     let traced = fit.leaves.iter().filter(|(_, it)| !it.traced.is_empty());
-    for (name, leaf) in traced.take(MOST_LEAVES) {
+    for (name, leaf) in traced.take(RESULT_LAYOUT.most_leaves) {
         page.draw_group("veins", |page| {
             let of = fit.residuals.iter();
             let of = of.filter(|it| it.rod.is_some() && it.number == leaf.number);
             top = draw_measured_veins(page, top, &letter(), name, units, leaf, of.collect());
         });
     }
-    page.height = (top + BOTTOM).ceil();
+    page.height = (top + PAGE.bottom_margin).ceil();
     page
 }
 
-/// Left of the intervals, for the numbers in words; right of them, for the values; and a row.
-const WORDS_WIDTH: f64 = 216.0;
+/// Sizes of the panel of intervals, in pixels.
+struct IntervalLayout {
+    /// Left of the intervals, for the numbers in words; right of them, for the values.
+    words: f64,
+    values: f64,
+    row: f64,
+    most_rows: usize,
+    /// Intervals are drawn up to this part of the value.
+    widest: f64,
+}
 
-const VALUES_WIDTH: f64 = 200.0;
-
-const ROW_HEIGHT: f64 = 24.0;
-
-const MOST_NUMBERS_DRAWN: usize = 30;
-
-/// Intervals are drawn up to this part of the value.
-const WIDEST_RELATIVE_INTERVAL: f64 = 1.0;
+const INTERVALS: IntervalLayout = IntervalLayout {
+    words: 216.0,
+    values: 200.0,
+    row: 24.0,
+    most_rows: 30,
+    widest: 1.0,
+};
 
 /// Draws the free numbers with their intervals; returns where that ends.
 pub fn draw_fit_parameters(
@@ -91,11 +129,11 @@ pub fn draw_fit_parameters(
     all: &[FitParameter],
     units: &Units,
 ) -> f64 {
-    let shown = &all[..all.len().min(MOST_NUMBERS_DRAWN)];
-    let corner = DVec2::new(PAGE.left_margin + WORDS_WIDTH, top + PAGE.panel_title);
+    let shown = &all[..all.len().min(INTERVALS.most_rows)];
+    let corner = DVec2::new(PAGE.left_margin + INTERVALS.words, top + PAGE.panel_title);
     let size = DVec2::new(
-        PAGE.width - PAGE.right_margin - VALUES_WIDTH - corner.x,
-        ROW_HEIGHT * shown.len().max(1) as f64,
+        PAGE.width - PAGE.right_margin - INTERVALS.values - corner.x,
+        INTERVALS.row * shown.len().max(1) as f64,
     );
     let cell = PageRectangle::new(corner, size);
     // The ends of the intervals as parts of the values.
@@ -105,14 +143,14 @@ pub fn draw_fit_parameters(
     };
     let known = shown.iter().flat_map(parts).flatten();
     let widest = known.map(f64::abs).filter(|it| it.is_finite());
-    let widest = widest.fold(0.0, f64::max).min(WIDEST_RELATIVE_INTERVAL);
+    let widest = widest.fold(0.0, f64::max).min(INTERVALS.widest);
     let open = shown
         .iter()
         .flat_map(parts)
-        .any(|end| end.is_none_or(|it| it.abs() > WIDEST_RELATIVE_INTERVAL));
+        .any(|end| end.is_none_or(|it| it.abs() > INTERVALS.widest));
     let end = 110.0
         * if open || widest == 0.0 {
-            WIDEST_RELATIVE_INTERVAL
+            INTERVALS.widest
         } else {
             widest
         };
@@ -127,7 +165,7 @@ pub fn draw_fit_parameters(
     };
     let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
     for (k, it) in shown.iter().enumerate() {
-        let middle = corner.y + ROW_HEIGHT * (k as f64 + 0.5);
+        let middle = corner.y + INTERVALS.row * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
             let text = Font::embedded().shorten_text(text, FONT_SIZE.tick, room);
             page.draw_centered_label(
@@ -143,7 +181,7 @@ pub fn draw_fit_parameters(
             page,
             corner.x - 10.0,
             &number.words,
-            WORDS_WIDTH + PAGE.left_margin - 16.0,
+            INTERVALS.words + PAGE.left_margin - 16.0,
             TextAnchor::End,
         );
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
@@ -162,7 +200,7 @@ pub fn draw_fit_parameters(
                 .map(|at| at.with_y(middle))
         };
         let ends = [(low, -1.0), (high, 1.0)].map(|(part, sign)| {
-            let inside = part.filter(|part| part.abs() <= WIDEST_RELATIVE_INTERVAL);
+            let inside = part.filter(|part| part.abs() <= INTERVALS.widest);
             (
                 inside.is_some(),
                 place(inside.unwrap_or(0.0099 * sign * end)),
@@ -206,34 +244,9 @@ fn value_with_interval(it: &FitParameter) -> String {
     }
 }
 
-const RESULT_HEIGHT: f64 = 190.0;
-
-const RESIDUALS_HEIGHT: f64 = 70.0;
-
-/// Least pixels between ticks of residuals.
-const RESIDUAL_TICK_SPACING: f64 = 16.0;
-
-/// Between results and their residuals.
-const RESIDUALS_GAP: f64 = 12.0;
-
-/// Heights of a leaf, and between its two views.
-const LEAST_LEAF_HEIGHT: f64 = 110.0;
-
-const LARGEST_LEAF_HEIGHT: f64 = 300.0;
-
-const VIEWS_GAP: f64 = 70.0;
-
-/// Right of the panels, for the key.
-const KEY: f64 = 200.0;
-
 const CONFIDENCE_BAND_COLOR: Color = Color(200, 222, 238);
 
 const MODEL_STROKE: Stroke = Stroke::new(BLUE, 1.6);
-
-/// Half the width of the band of a single experiment, in pixels.
-const SINGLE_EXPERIMENT_HALF_WIDTH: f64 = 5.0;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 const LEAF_VIEWS: [PlaneView; 3] = [
     VIEW_FROM_ABOVE,
@@ -247,12 +260,20 @@ const LEAF_VIEWS: [PlaneView; 3] = [
 /// A result in words, with its unit.
 fn result_label(kind: &str, units: &Units) -> QuantityLabel {
     let (words, unit) = match kind.parse() {
-        Ok(MeasuredQuantity::Tip(axis)) => (format!("{} of the tip", AXES[axis]), &units.length),
-        Ok(MeasuredQuantity::Reaction(axis)) => {
-            (format!("reaction along {}", AXES[axis]), &units.force)
-        }
+        Ok(MeasuredQuantity::Tip(axis)) => (
+            format!("{} of the tip", COORDINATE_NAMES[axis]),
+            &units.length,
+        ),
+        Ok(MeasuredQuantity::Reaction(axis)) => (
+            format!("reaction along {}", COORDINATE_NAMES[axis]),
+            &units.force,
+        ),
         Ok(MeasuredQuantity::Grip(grip, axis)) => {
-            let words = format!("force on grip {} along {}", grip + 1, AXES[axis]);
+            let words = format!(
+                "force on grip {} along {}",
+                grip + 1,
+                COORDINATE_NAMES[axis]
+            );
             (words, &units.force)
         }
         Ok(MeasuredQuantity::Frequency(mode)) => (format!("frequency of mode {mode}"), &None),
@@ -271,7 +292,11 @@ pub fn draw_results(
     units: &Units,
     results: &ResultSeries,
 ) -> f64 {
-    let cell = PageRectangle::left_of_legend(top + PAGE.panel_title, RESULT_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(
+        top + PAGE.panel_title,
+        RESULT_LAYOUT.height,
+        RESULT_LAYOUT.key,
+    );
     let quantity = result_label(results.kind, units);
     let values = results
         .all_residuals()
@@ -389,7 +414,7 @@ fn draw_single_experiments(page: &mut Drawing, axes: &PanelAxes, experiments: &[
     {
         let ends = [r.model + r.band, r.model - r.band].map(|y| axes.page_position((*x, y)));
         if let ([Some(top), Some(end)], Some(at)) = (ends, axes.page_position((*x, r.model))) {
-            let half = DVec2::new(SINGLE_EXPERIMENT_HALF_WIDTH, 0.0);
+            let half = DVec2::new(RESULT_LAYOUT.half_band, 0.0);
             page.draw_shape(
                 rectangle_path(top - half, end - top + 2.0 * half),
                 CONFIDENCE_BAND_COLOR,
@@ -414,13 +439,16 @@ fn draw_residuals(
     across: Axis,
     points: Vec<ResidualMark>,
 ) -> f64 {
-    let corner = DVec2::new(above.corner.x, above.opposite_corner().y + RESIDUALS_GAP);
-    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS_HEIGHT));
+    let corner = DVec2::new(
+        above.corner.x,
+        above.opposite_corner().y + RESULT_LAYOUT.residuals_gap,
+    );
+    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESULT_LAYOUT.residuals));
     let sizes = points.iter().map(|mark| mark.residual.abs());
     let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
         emphasizes_zero: true,
-        tick_spacing: Some(RESIDUAL_TICK_SPACING),
+        tick_spacing: Some(RESULT_LAYOUT.residual_ticks),
         ..Axis::linear("residual", -most, most)
     };
     let axes = PanelAxes { cell, across, up };
@@ -463,10 +491,10 @@ pub fn draw_measured_veins(
         views = LEAF_VIEWS.into();
     }
     views.truncate(2);
-    let whole = PAGE.width - PAGE.left_margin - PAGE.right_margin - KEY;
+    let whole = PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.key;
     let width = match views.len() {
         1 => whole,
-        _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - VIEWS_GAP),
+        _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.views_gap),
     };
     let count = leaf.curves.len();
     let panels: Vec<_> = (views.iter())
@@ -480,7 +508,8 @@ pub fn draw_measured_veins(
             let curves = curves.map(|curve| curve.iter().map(flat).collect());
             let curves: Vec<Vec<(f64, f64)>> = curves.collect();
             let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
-            let name = |k: usize| name_with_unit(AXES[axes[k]], units.length.as_deref());
+            let name =
+                |k: usize| name_with_unit(COORDINATE_NAMES[axes[k]], units.length.as_deref());
             let across = Axis::linear_covering(&name(0), all().map(|p| p.0));
             let up = Axis::linear_covering(&name(1), all().map(|p| p.1));
             (across, up, curves, points)
@@ -493,15 +522,16 @@ pub fn draw_measured_veins(
         .iter()
         .map(tall)
         .fold(0.0, f64::max)
-        .clamp(LEAST_LEAF_HEIGHT, LARGEST_LEAF_HEIGHT);
+        .clamp(RESULT_LAYOUT.least_leaf, RESULT_LAYOUT.largest_leaf);
     let experiment = match experiment {
         "as it is" => "traced veins".to_string(),
         name => format!("traced veins, experiment {name}"),
     };
-    let mut below = PageRectangle::left_of_legend(top + PAGE.panel_title, height, KEY);
+    let mut below =
+        PageRectangle::left_of_legend(top + PAGE.panel_title, height, RESULT_LAYOUT.key);
     for (k, (view, (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
         let corner = DVec2::new(
-            PAGE.left_margin + k as f64 * (width + VIEWS_GAP),
+            PAGE.left_margin + k as f64 * (width + RESULT_LAYOUT.views_gap),
             top + PAGE.panel_title,
         );
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
@@ -529,7 +559,7 @@ pub fn draw_measured_veins(
             });
         }
     }
-    below.corner.y += PAGE.panel_axis - RESIDUALS_GAP;
+    below.corner.y += PAGE.panel_axis - RESULT_LAYOUT.residuals_gap;
     let along = Axis::linear("fraction of the length", 0.0, 1.0);
     let points = residuals.iter().filter_map(|it| {
         let color = color_of_vein(it.rod?.checked_sub(1)?, count);

@@ -7,8 +7,8 @@
 
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, PlaneView, SmallPanels, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT,
-    VIEW_FROM_SIDE, draw_plane_panel, padded_box,
+    BoxMargins, LEAF_PADDING, OBLIQUE_VIEW, PlaneView, SmallPanels, SpacePanel, VIEW_FROM_ABOVE,
+    VIEW_FROM_FRONT, VIEW_FROM_SIDE, draw_plane_panel, padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{Drawing, FONT_SIZE, PAGE, PageRectangle, Stroke, draw_panel_title};
@@ -97,25 +97,27 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-const BOTTOM: f64 = 4.0;
+/// Sizes of the four panels of a leaf, in pixels.
+struct LeafLayout {
+    /// Between the columns, for the right one's axis.
+    column_gap: f64,
+    /// Panels are at least this large, however flat the leaf is.
+    least_column: f64,
+    least_top_row: f64,
+    least_bottom_row: f64,
+    /// Both rows together are at most this high, however tall the leaf is.
+    largest_rows: f64,
+}
 
-/// Between the columns, for the right one's axis.
-const COLUMN_GAP: f64 = 74.0;
+const LAYOUT: LeafLayout = LeafLayout {
+    column_gap: 74.0,
+    least_column: 340.0,
+    least_top_row: 270.0,
+    least_bottom_row: 130.0,
+    largest_rows: 800.0,
+};
 
-const COLUMNS_WIDTH: f64 = PAGE.width - PAGE.left_margin - PAGE.right_margin - COLUMN_GAP;
-
-/// Panels are at least this large, however flat the leaf is.
-const LEAST_COLUMN_WIDTH: f64 = 340.0;
-
-const LEAST_TOP_HEIGHT: f64 = 270.0;
-
-const MIN_BOTTOM_ROW_HEIGHT: f64 = 130.0;
-
-/// Both rows together are at most this high, however tall the leaf is.
-const LARGEST_ROWS_HEIGHT: f64 = 800.0;
-
-/// Padding around the leaf, as a fraction of its largest extent.
-const PADDING: f64 = 0.06;
+const COLUMNS_WIDTH: f64 = PAGE.width - PAGE.left_margin - PAGE.right_margin - LAYOUT.column_gap;
 
 /// A flat panel: the name of its group, its letter, and what it shows.
 struct PlanePanel {
@@ -195,24 +197,24 @@ impl LeafPanels {
     /// The panels of these veins, placed below `start`.
     pub fn placed_below(start: f64, veins: &DrawnVeins) -> Self {
         let DVec3 { x, y, z } =
-            veins.high - veins.low + DVec3::splat(2.0 * PADDING * veins.largest_extent());
+            veins.high - veins.low + DVec3::splat(2.0 * LEAF_PADDING * veins.largest_extent());
         // The largest scale that lets every panel hold the leaf.
         let scale = [
             COLUMNS_WIDTH / (x + y),
-            (COLUMNS_WIDTH - LEAST_COLUMN_WIDTH) / x.max(y),
-            LARGEST_ROWS_HEIGHT / (y + z),
-            (LARGEST_ROWS_HEIGHT - MIN_BOTTOM_ROW_HEIGHT) / y,
-            (LARGEST_ROWS_HEIGHT - LEAST_TOP_HEIGHT) / z,
+            (COLUMNS_WIDTH - LAYOUT.least_column) / x.max(y),
+            LAYOUT.largest_rows / (y + z),
+            (LAYOUT.largest_rows - LAYOUT.least_bottom_row) / y,
+            (LAYOUT.largest_rows - LAYOUT.least_top_row) / z,
         ]
         .into_iter()
         .fold(f64::INFINITY, f64::min);
 
-        let widths = [x, y].map(|extent| (scale * extent).max(LEAST_COLUMN_WIDTH));
+        let widths = [x, y].map(|extent| (scale * extent).max(LAYOUT.least_column));
         let spare = COLUMNS_WIDTH - widths[0] - widths[1];
         let widths = widths.map(|width| width + 0.5 * spare);
         let heights = [
-            (scale * y).max(LEAST_TOP_HEIGHT),
-            (scale * z).max(MIN_BOTTOM_ROW_HEIGHT),
+            (scale * y).max(LAYOUT.least_top_row),
+            (scale * z).max(LAYOUT.least_bottom_row),
         ];
         let top = start + PAGE.panel_title;
         let bottom = top + heights[0] + PAGE.panel_axis + PAGE.panel_title;
@@ -222,7 +224,7 @@ impl LeafPanels {
                 length: lengths[k],
             })
         };
-        let right = PAGE.left_margin + widths[0] + COLUMN_GAP;
+        let right = PAGE.left_margin + widths[0] + LAYOUT.column_gap;
         LeafPanels {
             columns: spans([PAGE.left_margin, right], widths),
             rows: spans([top, bottom], heights),
@@ -231,7 +233,7 @@ impl LeafPanels {
     }
 
     pub fn bottom(&self) -> f64 {
-        self.rows[1].start + self.rows[1].length + PAGE.panel_axis + BOTTOM
+        self.rows[1].start + self.rows[1].length + PAGE.panel_axis + PAGE.bottom_margin
     }
 
     pub fn draw(&self, drawing: &mut Drawing, veins: &DrawnVeins, setting: &FigureSetting) {
@@ -252,7 +254,7 @@ impl LeafPanels {
             });
         }
         // The panel in space has no axis on its left: it takes half of the gap.
-        let shift = 0.5 * COLUMN_GAP;
+        let shift = 0.5 * LAYOUT.column_gap;
         let cell = cell(
             PanelSpan {
                 start: right.start - shift,
@@ -302,7 +304,7 @@ mod tests {
             let fits = left >= x && right >= y && top >= y && bottom >= z;
             assert!(fits, "{size:?}");
             assert!((left + right - COLUMNS_WIDTH).abs() < 1e-8, "{size:?}");
-            assert!(top + bottom <= LARGEST_ROWS_HEIGHT + 1e-8, "{size:?}");
+            assert!(top + bottom <= LAYOUT.largest_rows + 1e-8, "{size:?}");
         }
     }
 }

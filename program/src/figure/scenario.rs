@@ -189,7 +189,7 @@ pub struct DirectionArrow {
 /// Names of the axes as fractions of L, with what they mean.
 const FRACTION_AXIS_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
 
-const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
+pub const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl FigureSetting {
     pub fn from_scenario(scenario: &Scenario) -> Self {
@@ -488,7 +488,7 @@ impl<'t> KeyPart<'t> {
         };
         if let (Along | About, Some((&axis, veins))) = (entries, indices.split_last()) {
             let by = if entries == Along { "along" } else { "about" };
-            words += &format!(" {by} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?"));
+            words += &format!(" {by} {}", COORDINATE_NAMES.get(axis).unwrap_or(&"?"));
             indices = veins;
         }
         match (entries, indices) {

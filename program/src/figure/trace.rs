@@ -18,20 +18,28 @@ use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{ForceDisplacementLine, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
-const DIAGRAM: f64 = 380.0;
+/// Heights of the panels of a trace, in pixels.
+struct TraceLayout {
+    /// The first panel, and further ones.
+    diagram: f64,
+    further: f64,
+    /// The panel of force against displacement, and the gap above it.
+    force_line: f64,
+    between: f64,
+    /// Width right of the panels, for the key.
+    key: f64,
+    /// Most leaves drawn.
+    most_leaves: usize,
+}
 
-/// Height of the further panels.
-const FURTHER_PANEL_HEIGHT: f64 = 220.0;
-
-/// Right of the panel, for the key.
-const KEY: f64 = 190.0;
-
-const FORCE_LINE_HEIGHT: f64 = 240.0;
-
-const BETWEEN: f64 = 26.0;
-
-/// Most leaves drawn.
-const MOST_LEAVES: usize = 8;
+const LAYOUT: TraceLayout = TraceLayout {
+    diagram: 380.0,
+    further: 220.0,
+    force_line: 240.0,
+    between: 26.0,
+    key: 190.0,
+    most_leaves: 8,
+};
 
 /// Smaller differences are invisible in small panels, in lengths.
 const VISIBLE: f64 = 0.04;
@@ -64,11 +72,11 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let mut below = PAGE.header;
     for (place, &quantity) in quantities.iter().enumerate() {
         let height = if place == 0 {
-            DIAGRAM
+            LAYOUT.diagram
         } else {
-            FURTHER_PANEL_HEIGHT
+            LAYOUT.further
         };
-        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, KEY);
+        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, LAYOUT.key);
         drawing.draw_group("branches", |page| {
             let axis = varied_number_axis(trace, &varied);
             draw_branches(page, trace, axis, quantity, &shown, cell, &letter());
@@ -80,9 +88,9 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = PageRectangle::left_of_legend(
-            below + BETWEEN + PAGE.panel_title,
-            FORCE_LINE_HEIGHT,
-            KEY,
+            below + LAYOUT.between + PAGE.panel_title,
+            LAYOUT.force_line,
+            LAYOUT.key,
         );
         drawing.draw_group("law", |page| {
             draw_force_displacement_line(page, trace, law, branch, cell, &letter())
@@ -139,7 +147,7 @@ fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
         let alike = |&other: &[usize; 2]| largest_leaf_distance(point(at), point(other)) <= VISIBLE;
-        if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
+        if shown.len() < LAYOUT.most_leaves && !shown.iter().any(alike) {
             shown.push(at);
         }
     }

@@ -254,6 +254,8 @@ pub struct PageSizes {
     /// Room above a panel, for its title, and below, for its axis.
     pub panel_title: f64,
     pub panel_axis: f64,
+    /// Below the last panel.
+    pub bottom_margin: f64,
 }
 
 pub const PAGE: PageSizes = PageSizes {
@@ -266,6 +268,7 @@ pub const PAGE: PageSizes = PageSizes {
     header: 74.0,
     panel_title: 24.0,
     panel_axis: 48.0,
+    bottom_margin: 4.0,
 };
 
 /// Sizes of letters, in pixels: of a page's title, of text, and of the labels of ticks and points.

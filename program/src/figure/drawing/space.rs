@@ -38,7 +38,7 @@ pub const FRONT_VIEW: ViewAngles = ViewAngles {
 const SHORTEST_BOX_SIDE: f64 = 0.4;
 
 /// Padding around the leaf, as a fraction of its largest extent.
-const PADDING: f64 = 0.06;
+pub const LEAF_PADDING: f64 = 0.06;
 
 /// Margins around the box, for the labels of its axes.
 #[derive(Clone, Copy)]
@@ -55,20 +55,27 @@ impl BoxMargins {
     }
 }
 
-/// Least distance between the ticks of an axis.
-const TICK_DISTANCE: f64 = 30.0;
+/// Distances of ticks and names along the edges of a box in space, in pixels.
+struct EdgeLabels {
+    /// Least distance between the ticks of an axis.
+    ticks: f64,
+    /// From a name to the right edge of the page, at least.
+    page_edge: f64,
+    /// From the edge to the name of its axis, at least, besides half of the widest label.
+    name: f64,
+    /// From the middle of the edge to the name in a small panel.
+    small_panel_name: f64,
+    /// From the top of a vertical edge to its name.
+    vertical_name: DVec2,
+}
 
-/// Least distance of a name from the right edge of the page.
-const NAME_PAGE_EDGE_DISTANCE: f64 = 6.0;
-
-/// Least distance of the name of an axis from its edge, besides half of its widest label.
-const NAME_LABEL_DISTANCE: f64 = 25.0;
-
-/// From the middle of an edge to the name of its axis in a small panel.
-const SMALL_PANEL_NAME_DISTANCE: f64 = 14.0;
-
-/// From the top of a vertical edge to its name.
-const VERTICAL_NAME_OFFSET: DVec2 = DVec2::new(6.0, -12.0);
+const EDGE_LABELS: EdgeLabels = EdgeLabels {
+    ticks: 30.0,
+    page_edge: 6.0,
+    name: 25.0,
+    small_panel_name: 14.0,
+    vertical_name: DVec2::new(6.0, -12.0),
+};
 
 /// A box around all of these shapes.
 pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> [DVec3; 2] {
@@ -81,7 +88,7 @@ pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> 
 /// The box with padding around it, and no side too short.
 pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
-    let padding = DVec3::splat(PADDING * if extent > 1e-9 { extent } else { 1.0 });
+    let padding = DVec3::splat(LEAF_PADDING * if extent > 1e-9 { extent } else { 1.0 });
     let (low, high) = (low - padding, high + padding);
     let middle = 0.5 * (low + high);
     let sides = high - low;
@@ -216,7 +223,7 @@ impl<'s> SpacePanel<'s> {
             let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
             let step = step.unwrap_or_else(|| {
                 round_step(
-                    unit * TICK_DISTANCE / camera.project_direction(DVec3::AXES[axis]).length(),
+                    unit * EDGE_LABELS.ticks / camera.project_direction(DVec3::AXES[axis]).length(),
                 )
             });
             let inset = 0.02 * (high - low)[axis];
@@ -327,7 +334,7 @@ impl<'s> SpacePanel<'s> {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
             let widths = widths.map(|tick| Font::embedded().text_width(&tick.text, FONT_SIZE.tick));
-            let beyond = NAME_LABEL_DISTANCE + 0.5 * widths.fold(0.0, f64::max);
+            let beyond = EDGE_LABELS.name + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
             } else {
@@ -338,13 +345,13 @@ impl<'s> SpacePanel<'s> {
             // A long name extends away from its edge, on the page, or is placed on top of it.
             let size = FONT_SIZE.text + 1.0;
             let most =
-                page.width - Font::embedded().text_width(&name, size) - NAME_PAGE_EDGE_DISTANCE;
+                page.width - Font::embedded().text_width(&name, size) - EDGE_LABELS.page_edge;
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
                 0 => (at, TextAnchor::End),
                 1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
                 _ => (
-                    self.project_point(edge.to) + VERTICAL_NAME_OFFSET,
+                    self.project_point(edge.to) + EDGE_LABELS.vertical_name,
                     TextAnchor::End,
                 ),
             };
@@ -357,8 +364,9 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_direction_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
         let taken = box_corners([self.low, self.high]).map(|corner| self.project_point(corner));
         let names = self.edges.iter().zip(self.edge_middles());
-        let names = names
-            .flat_map(|(edge, middle)| [middle, middle + SMALL_PANEL_NAME_DISTANCE * edge.outward]);
+        let names = names.flat_map(|(edge, middle)| {
+            [middle, middle + EDGE_LABELS.small_panel_name * edge.outward]
+        });
         let taken = taken.chain(names);
         let arrows = self.setting.direction_arrows(first, time);
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
@@ -452,27 +460,37 @@ pub fn draw_plane_panel(
     camera
 }
 
-const COLUMNS: usize = 4;
+/// Sizes of small panels, in pixels.
+struct SmallPanelSizes {
+    /// Panels in a row.
+    columns: usize,
+    gap: f64,
+    /// Least and largest height.
+    lowest: f64,
+    highest: f64,
+    /// Below the last row.
+    bottom: f64,
+    /// Least distance between grid lines.
+    grid_spacing: f64,
+    margins: BoxMargins,
+}
 
-const PANEL_GAP: f64 = 12.0;
-
-const LOWEST: f64 = 110.0;
-
-const HIGHEST: f64 = 330.0;
-
-const BOTTOM: f64 = 10.0;
-
-/// Least pixels between grid lines.
-const LEAST_GRID_SPACING: f64 = 17.0;
+const SMALL_PANEL: SmallPanelSizes = SmallPanelSizes {
+    columns: 4,
+    gap: 12.0,
+    lowest: 110.0,
+    highest: 330.0,
+    bottom: 10.0,
+    grid_spacing: 17.0,
+    margins: BoxMargins {
+        left: 14.0,
+        right: 14.0,
+        below: 14.0,
+    },
+};
 
 /// Factor of the line width of veins in small panels.
 pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
-
-const SPACE_PANEL_MARGINS: BoxMargins = BoxMargins {
-    left: 14.0,
-    right: 14.0,
-    below: 14.0,
-};
 
 /// Where the panels are, and the box that all of them show.
 pub struct SmallPanels<'s> {
@@ -494,17 +512,19 @@ impl<'s> SmallPanels<'s> {
         top: f64,
     ) -> Self {
         let bounds = common_bounding_box(shapes);
-        let width = (PAGE.width - 2.0 * PAGE.side_margin - (COLUMNS - 1) as f64 * PANEL_GAP)
-            / COLUMNS as f64;
+        let width = (PAGE.width
+            - 2.0 * PAGE.side_margin
+            - (SMALL_PANEL.columns - 1) as f64 * SMALL_PANEL.gap)
+            / SMALL_PANEL.columns as f64;
         let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
-        let height = (width - SPACE_PANEL_MARGINS.left - SPACE_PANEL_MARGINS.right) * extent.y
+        let height = (width - SMALL_PANEL.margins.left - SMALL_PANEL.margins.right) * extent.y
             / extent.x
-            + SPACE_PANEL_MARGINS.below;
-        let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
-        let scale = (SPACE_PANEL_MARGINS.inner_size(size) / extent).min_element();
+            + SMALL_PANEL.margins.below;
+        let size = DVec2::new(width, height.clamp(SMALL_PANEL.lowest, SMALL_PANEL.highest));
+        let scale = (SMALL_PANEL.margins.inner_size(size) / extent).min_element();
         SmallPanels {
             bounds,
-            grid_step: round_step(setting.value_per_length() * LEAST_GRID_SPACING / scale),
+            grid_step: round_step(setting.value_per_length() * SMALL_PANEL.grid_spacing / scale),
             setting,
             size,
             top,
@@ -522,8 +542,11 @@ impl<'s> SmallPanels<'s> {
     }
 
     fn panel_rectangle(&self, index: usize) -> PageRectangle {
-        let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
-        let pitch = self.size + DVec2::new(PANEL_GAP, PAGE.panel_title + PANEL_GAP);
+        let place = DVec2::new(
+            (index % SMALL_PANEL.columns) as f64,
+            (index / SMALL_PANEL.columns) as f64,
+        );
+        let pitch = self.size + DVec2::new(SMALL_PANEL.gap, PAGE.panel_title + SMALL_PANEL.gap);
         PageRectangle::new(
             DVec2::new(PAGE.side_margin, self.top + PAGE.panel_title) + place * pitch,
             self.size,
@@ -531,9 +554,9 @@ impl<'s> SmallPanels<'s> {
     }
 
     pub fn bottom(&self) -> f64 {
-        let rows = self.count.div_ceil(COLUMNS).max(1);
-        let row = PAGE.panel_title + self.size.y + PANEL_GAP;
-        (self.top + rows as f64 * row + BOTTOM).ceil()
+        let rows = self.count.div_ceil(SMALL_PANEL.columns).max(1);
+        let row = PAGE.panel_title + self.size.y + SMALL_PANEL.gap;
+        (self.top + rows as f64 * row + SMALL_PANEL.bottom).ceil()
     }
 
     /// Draws a leaf with its letter and title in its panel.
@@ -568,7 +591,7 @@ impl<'s> SmallPanels<'s> {
         let cell = self.panel_rectangle(index);
         caption.draw(page, cell.corner);
         let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
-        let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_PANEL_MARGINS, step);
+        let scene = SpacePanel::new(bounds, setting, view, cell, SMALL_PANEL.margins, step);
         scene.draw_box(page);
         if index == 0 {
             scene.draw_axis_names(page, 9.0, false);

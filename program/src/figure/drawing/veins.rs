@@ -25,15 +25,23 @@ const LARGEST_CURVE_DEVIATION: f64 = 3e-4;
 /// Curves are drawn with at least this many pieces, if they have as many segments.
 const FEWEST_PIECES_PER_CURVE: usize = 8;
 
-/// Dots of a second solution: about the most veins with dots, about the most dots in
-/// total, dots per extent of the leaf, and the fewest on a vein that has as many nodes.
-const MOST_VEINS_DOTTED: usize = 24;
+/// How many dots a second solution has.
+struct DotLimits {
+    /// About the most veins with dots, and about the most dots of all.
+    veins: usize,
+    most: usize,
+    /// Dots per extent of the leaf.
+    per_extent: f64,
+    /// On a vein that has as many nodes.
+    fewest: usize,
+}
 
-const MOST_DOTS: usize = 160;
-
-const DOTS_PER_EXTENT: f64 = 14.0;
-
-const FEWEST_DOTS: usize = 8;
+const DOTS: DotLimits = DotLimits {
+    veins: 24,
+    most: 160,
+    per_extent: 14.0,
+    fewest: 8,
+};
 
 pub type BezierPiece = [DVec3; 4];
 
@@ -200,12 +208,12 @@ impl DrawnVeins {
     /// Adds a second solution as dots, on as many veins and at as many nodes as can be
     /// distinguished.
     pub fn add_second_solution(&mut self, rods: &[RodShape]) {
-        let every = self.count.div_ceil(MOST_VEINS_DOTTED).max(1);
-        let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
+        let every = self.count.div_ceil(DOTS.veins).max(1);
+        let most = (DOTS.most / rods.len().div_ceil(every).max(1)).max(DOTS.fewest);
         // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.largest_extent();
-        let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
-        let dots = wanted.clamp(FEWEST_DOTS, most);
+        let wanted = (DOTS.per_extent * lengths).ceil() as usize;
+        let dots = wanted.clamp(DOTS.fewest, most);
         for rod in rods.iter().step_by(every) {
             let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
             // The base is under the clamp's marker.
