@@ -18,7 +18,26 @@ use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, CheckVerdict, ComparedQuantity};
 
-const LINE_HEIGHT: f64 = 19.0;
+/// Sizes of the panel of differences, in pixels.
+struct DifferenceLayout {
+    /// Height of a line of the reason for a verdict.
+    reason_line: f64,
+    frame: f64,
+    /// Width right of the frame, for the key.
+    key: f64,
+    /// Height of the strip below for differences of exactly zero: one lane per quantity.
+    zero_strip: f64,
+    /// Most stations that are marked.
+    most_marked: usize,
+}
+
+const LAYOUT: DifferenceLayout = DifferenceLayout {
+    reason_line: 19.0,
+    frame: 216.0,
+    key: 212.0,
+    zero_strip: 30.0,
+    most_marked: 70,
+};
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -41,7 +60,7 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
             ),
         _ => Vec::new(),
     };
-    let key_line = PAGE.notes_base_line + LINE_HEIGHT * (reason.len() + 1) as f64;
+    let key_line = PAGE.notes_base_line + LAYOUT.reason_line * (reason.len() + 1) as f64;
     let panels = LeafPanels::placed_below(PAGE.header - PAGE.notes_base_line + key_line, &veins);
     let compared = !check.along.is_empty();
     let below = if compared { PANEL_HEIGHT } else { 0.0 };
@@ -53,7 +72,7 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(
                 PAGE.left_margin,
-                PAGE.notes_base_line + LINE_HEIGHT * (line + 1) as f64,
+                PAGE.notes_base_line + LAYOUT.reason_line * (line + 1) as f64,
             );
             page.draw_label(base, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         }
@@ -96,28 +115,25 @@ fn header_notes(check: &Check, veins: &DrawnVeins, setting: &FigureSetting) -> V
     notes
 }
 
-const FRAME_HEIGHT: f64 = 216.0;
-
-/// Right of the frame, for the key.
-const KEY: f64 = 212.0;
-
-const PANEL_HEIGHT: f64 = PAGE.panel_title + FRAME_HEIGHT + PAGE.panel_axis;
+const PANEL_HEIGHT: f64 = PAGE.panel_title + LAYOUT.frame + PAGE.panel_axis;
 
 const FEWEST_DECADES: f64 = 3.0;
 
-/// Height of the strip below for differences of exactly zero: one lane per quantity.
-const ZERO_STRIP_HEIGHT: f64 = 30.0;
+/// How much both solutions differ in a quantity.
+struct DifferenceCurve {
+    along: NamedCurve,
+    /// The largest difference at which the solutions agree.
+    allowed: Option<f64>,
+}
 
-const MOST_STATIONS_MARKED: usize = 70;
-
-/// Differences of a quantity along the veins, and the largest one at which the
-/// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
+/// Differences of a quantity along the veins: of positions in units of `unit`, of other quantities in
+/// those of the scenario.
 fn difference_curve(
     quantity: ComparedQuantity,
     check: &Check,
     unit: f64,
     color: Color,
-) -> (NamedCurve, Option<f64>) {
+) -> DifferenceCurve {
     let (name, unit, allowed) = match quantity {
         ComparedQuantity::Position => {
             ("position, in lengths L", unit, Some(check.allowed() / unit))
@@ -132,20 +148,22 @@ fn difference_curve(
         .map(|found| quantity.component(found) / unit);
     let stations = check.relaxed.shape.stations.iter().copied();
     let points = stations.zip(values).collect();
-    let curve = NamedCurve {
+    let along = NamedCurve {
         name,
         color,
         points,
     };
-    (curve, allowed)
+    DifferenceCurve { along, allowed }
 }
 
 fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let quantities = ComparedQuantity::ALL.into_iter().zip(CURVE_COLORS);
-    let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
+    let curves: Vec<DifferenceCurve> = quantities
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
-        .unzip();
-    let mut cell = PageRectangle::left_of_legend(start + PAGE.panel_title, FRAME_HEIGHT, KEY);
+        .collect();
+    let values = || curves.iter().flat_map(|curve| curve.along.ordinates());
+    let mut cell =
+        PageRectangle::left_of_legend(start + PAGE.panel_title, LAYOUT.frame, LAYOUT.key);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {
@@ -153,29 +171,27 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
-    let mut values = curves.iter().flat_map(NamedCurve::ordinates);
-    if values.any(|value| value == 0.0) {
-        cell.size.y -= ZERO_STRIP_HEIGHT;
+    if values().any(|value| value == 0.0) {
+        cell.size.y -= LAYOUT.zero_strip;
         across.labelled = false;
         draw_zero_strip(page, &curves, cell, stations);
     }
-    let values = curves.iter().flat_map(NamedCurve::ordinates);
-    let values = values.chain(allowed.iter().flatten().copied());
+    let allowed = curves.iter().filter_map(|curve| curve.allowed);
     let axes = PanelAxes {
         cell,
         across,
-        up: Axis::logarithmic("", values, FEWEST_DECADES),
+        up: Axis::logarithmic("", values().chain(allowed), FEWEST_DECADES),
     };
     axes.draw(page);
-    for (curve, allowed) in curves.iter().zip(allowed) {
-        if let Some(allowed) = allowed {
-            let stroke = Stroke::new(curve.color, 1.0).with_dashes(true);
+    for curve in &curves {
+        if let Some(allowed) = curve.allowed {
+            let stroke = Stroke::new(curve.along.color, 1.0).with_dashes(true);
             axes.draw_curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
         }
     }
-    for curve in &curves {
+    for DifferenceCurve { along: curve, .. } in &curves {
         axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        if curve.points.len() <= MOST_STATIONS_MARKED {
+        if curve.points.len() <= LAYOUT.most_marked {
             axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
         }
     }
@@ -186,14 +202,14 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
 /// below it.
 fn draw_zero_strip(
     page: &mut Drawing,
-    curves: &[NamedCurve],
+    curves: &[DifferenceCurve],
     above: PageRectangle,
     stations: Axis,
 ) {
     let strip = PanelAxes {
         cell: PageRectangle::new(
             DVec2::new(above.corner.x, above.opposite_corner().y),
-            DVec2::new(above.size.x, ZERO_STRIP_HEIGHT),
+            DVec2::new(above.size.x, LAYOUT.zero_strip),
         ),
         across: stations,
         up: Axis {
@@ -203,15 +219,15 @@ fn draw_zero_strip(
     };
     strip.draw(page);
     for (lane, curve) in curves.iter().enumerate() {
-        let zeros = curve.points.iter().filter(|point| point.1 == 0.0);
+        let zeros = (curve.along.points.iter()).filter(|point| point.1 == 0.0);
         let places = zeros.map(|point| (point.0, lane as f64 - 1.5));
-        strip.draw_markers(page, places, Marker::Dot, curve.color);
+        strip.draw_markers(page, places, Marker::Dot, curve.along.color);
     }
 }
 
-fn draw_legend(page: &mut Drawing, curves: &[NamedCurve], cell: PageRectangle) {
+fn draw_legend(page: &mut Drawing, curves: &[DifferenceCurve], cell: PageRectangle) {
     let mut key = Legend::right_of(cell);
-    for curve in curves {
+    for DifferenceCurve { along: curve, .. } in curves {
         let largest = match curve.ordinates().fold(0.0, f64::max) {
             0.0 => "no difference".into(),
             largest => format!("≤ {}", format_error_bound(largest)),

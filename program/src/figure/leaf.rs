@@ -7,7 +7,8 @@
 
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, SmallPanels, SpacePanel, draw_plane_panel, padded_box,
+    BoxMargins, LEAF_PADDING, OBLIQUE_VIEW, PlaneView, SmallPanels, SpacePanel, VIEW_FROM_ABOVE,
+    VIEW_FROM_FRONT, VIEW_FROM_SIDE, draw_plane_panel, padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{Drawing, FONT_SIZE, PAGE, PageRectangle, Stroke, draw_panel_title};
@@ -96,31 +97,51 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-const BOTTOM: f64 = 4.0;
+/// Sizes of the four panels of a leaf, in pixels.
+struct LeafLayout {
+    /// Between the columns, for the right one's axis.
+    column_gap: f64,
+    /// Panels are at least this large, however flat the leaf is.
+    least_column: f64,
+    least_top_row: f64,
+    least_bottom_row: f64,
+    /// Both rows together are at most this high, however tall the leaf is.
+    largest_rows: f64,
+}
 
-/// Between the columns, for the right one's axis.
-const COLUMN_GAP: f64 = 74.0;
+const LAYOUT: LeafLayout = LeafLayout {
+    column_gap: 74.0,
+    least_column: 340.0,
+    least_top_row: 270.0,
+    least_bottom_row: 130.0,
+    largest_rows: 800.0,
+};
 
-const COLUMNS_WIDTH: f64 = PAGE.width - PAGE.left_margin - PAGE.right_margin - COLUMN_GAP;
+const COLUMNS_WIDTH: f64 = PAGE.width - PAGE.left_margin - PAGE.right_margin - LAYOUT.column_gap;
 
-/// Panels are at least this large, however flat the leaf is.
-const LEAST_COLUMN_WIDTH: f64 = 340.0;
+/// A flat panel: the name of its group, its letter, and what it shows.
+struct PlanePanel {
+    group: &'static str,
+    letter: &'static str,
+    view: PlaneView,
+}
 
-const LEAST_TOP_HEIGHT: f64 = 270.0;
-
-const MIN_BOTTOM_ROW_HEIGHT: f64 = 130.0;
-
-/// Both rows together are at most this high, however tall the leaf is.
-const LARGEST_ROWS_HEIGHT: f64 = 800.0;
-
-/// Padding around the leaf, as a fraction of its largest extent.
-const PADDING: f64 = 0.06;
-
-/// The flat panels: names of their groups, letters, titles, and the two axes.
-const PLANE_PANELS: [(&str, &str, &str, [usize; 2]); 3] = [
-    ("top", "(a)", "from above", [0, 1]),
-    ("side", "(b)", "from the side", [0, 2]),
-    ("front", "(c)", "from the front", [1, 2]),
+const PLANE_PANELS: [PlanePanel; 3] = [
+    PlanePanel {
+        group: "top",
+        letter: "(a)",
+        view: VIEW_FROM_ABOVE,
+    },
+    PlanePanel {
+        group: "side",
+        letter: "(b)",
+        view: VIEW_FROM_SIDE,
+    },
+    PlanePanel {
+        group: "front",
+        letter: "(c)",
+        view: VIEW_FROM_FRONT,
+    },
 ];
 
 /// Of the panel in space.
@@ -158,11 +179,17 @@ fn draw_plane_projection(
     camera.draw_arrows(page, &arrows, cell, veins.piece_ends().map(place));
 }
 
-/// Starts and lengths of columns and rows, and the pixels per length of the
-/// flat panels.
+/// A column or a row of panels.
+#[derive(Clone, Copy)]
+struct PanelSpan {
+    start: f64,
+    length: f64,
+}
+
+/// Columns and rows, and the pixels per length of the flat panels.
 pub struct LeafPanels {
-    columns: [(f64, f64); 2],
-    rows: [(f64, f64); 2],
+    columns: [PanelSpan; 2],
+    rows: [PanelSpan; 2],
     scale: f64,
 }
 
@@ -170,60 +197,73 @@ impl LeafPanels {
     /// The panels of these veins, placed below `start`.
     pub fn placed_below(start: f64, veins: &DrawnVeins) -> Self {
         let DVec3 { x, y, z } =
-            veins.high - veins.low + DVec3::splat(2.0 * PADDING * veins.largest_extent());
+            veins.high - veins.low + DVec3::splat(2.0 * LEAF_PADDING * veins.largest_extent());
         // The largest scale that lets every panel hold the leaf.
         let scale = [
             COLUMNS_WIDTH / (x + y),
-            (COLUMNS_WIDTH - LEAST_COLUMN_WIDTH) / x.max(y),
-            LARGEST_ROWS_HEIGHT / (y + z),
-            (LARGEST_ROWS_HEIGHT - MIN_BOTTOM_ROW_HEIGHT) / y,
-            (LARGEST_ROWS_HEIGHT - LEAST_TOP_HEIGHT) / z,
+            (COLUMNS_WIDTH - LAYOUT.least_column) / x.max(y),
+            LAYOUT.largest_rows / (y + z),
+            (LAYOUT.largest_rows - LAYOUT.least_bottom_row) / y,
+            (LAYOUT.largest_rows - LAYOUT.least_top_row) / z,
         ]
         .into_iter()
         .fold(f64::INFINITY, f64::min);
 
-        let widths = [x, y].map(|extent| (scale * extent).max(LEAST_COLUMN_WIDTH));
+        let widths = [x, y].map(|extent| (scale * extent).max(LAYOUT.least_column));
         let spare = COLUMNS_WIDTH - widths[0] - widths[1];
         let widths = widths.map(|width| width + 0.5 * spare);
         let heights = [
-            (scale * y).max(LEAST_TOP_HEIGHT),
-            (scale * z).max(MIN_BOTTOM_ROW_HEIGHT),
+            (scale * y).max(LAYOUT.least_top_row),
+            (scale * z).max(LAYOUT.least_bottom_row),
         ];
         let top = start + PAGE.panel_title;
         let bottom = top + heights[0] + PAGE.panel_axis + PAGE.panel_title;
+        let spans = |starts: [f64; 2], lengths: [f64; 2]| {
+            [0, 1].map(|k| PanelSpan {
+                start: starts[k],
+                length: lengths[k],
+            })
+        };
+        let right = PAGE.left_margin + widths[0] + LAYOUT.column_gap;
         LeafPanels {
-            columns: [
-                (PAGE.left_margin, widths[0]),
-                (PAGE.left_margin + widths[0] + COLUMN_GAP, widths[1]),
-            ],
-            rows: [(top, heights[0]), (bottom, heights[1])],
+            columns: spans([PAGE.left_margin, right], widths),
+            rows: spans([top, bottom], heights),
             scale,
         }
     }
 
     pub fn bottom(&self) -> f64 {
-        self.rows[1].0 + self.rows[1].1 + PAGE.panel_axis + BOTTOM
+        self.rows[1].start + self.rows[1].length + PAGE.panel_axis + PAGE.bottom_margin
     }
 
     pub fn draw(&self, drawing: &mut Drawing, veins: &DrawnVeins, setting: &FigureSetting) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;
-        let cell = |column: (f64, f64), row: (f64, f64)| {
-            PageRectangle::new(DVec2::new(column.0, row.0), DVec2::new(column.1, row.1))
+        let cell = |column: PanelSpan, row: PanelSpan| {
+            PageRectangle::new(
+                DVec2::new(column.start, row.start),
+                DVec2::new(column.length, row.length),
+            )
         };
         let cells = [(left, top), (left, bottom), (right, bottom)];
-        for ((name, letter, text, axes), (column, row)) in PLANE_PANELS.into_iter().zip(cells) {
+        for (panel, (column, row)) in PLANE_PANELS.into_iter().zip(cells) {
             let cell = cell(column, row);
-            drawing.draw_group(name, |page| {
-                draw_panel_title(page, cell.corner, letter, text);
-                draw_plane_projection(page, veins, setting, cell, self.scale, axes);
+            drawing.draw_group(panel.group, |page| {
+                draw_panel_title(page, cell.corner, panel.letter, panel.view.title);
+                draw_plane_projection(page, veins, setting, cell, self.scale, panel.view.axes);
             });
         }
         // The panel in space has no axis on its left: it takes half of the gap.
-        let shift = 0.5 * COLUMN_GAP;
+        let shift = 0.5 * LAYOUT.column_gap;
         let cell = cell(
-            (right.0 - shift, right.1 + shift),
-            (top.0, top.1 + PAGE.panel_axis - FONT_SIZE.tick),
+            PanelSpan {
+                start: right.start - shift,
+                length: right.length + shift,
+            },
+            PanelSpan {
+                length: top.length + PAGE.panel_axis - FONT_SIZE.tick,
+                ..top
+            },
         );
         drawing.draw_group("space", |page| {
             let bounds = padded_box(veins.low, veins.high);
@@ -258,13 +298,13 @@ mod tests {
             veins.low = DVec3::ZERO;
             veins.high = DVec3::from_array(size);
             let found = LeafPanels::placed_below(0.0, &veins);
-            let [left, right] = found.columns.map(|column| column.1 + 1e-9);
-            let [top, bottom] = found.rows.map(|row| row.1 + 1e-9);
+            let [left, right] = found.columns.map(|column| column.length + 1e-9);
+            let [top, bottom] = found.rows.map(|row| row.length + 1e-9);
             let [x, y, z] = size.map(|extent| found.scale * extent);
             let fits = left >= x && right >= y && top >= y && bottom >= z;
             assert!(fits, "{size:?}");
             assert!((left + right - COLUMNS_WIDTH).abs() < 1e-8, "{size:?}");
-            assert!(top + bottom <= LARGEST_ROWS_HEIGHT + 1e-8, "{size:?}");
+            assert!(top + bottom <= LAYOUT.largest_rows + 1e-8, "{size:?}");
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::space::{
-    FRONT, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, ViewAngles,
+    FRONT_VIEW, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, ViewAngles,
 };
 use crate::figure::drawing::veins::{DrawnVeins, vein_tips};
 use crate::figure::drawing::{
-    Color, Drawing, FRAME_COLOR, NOTE_COLOR, PAGE, SECOND_SOLUTION_COLOR, Stroke,
+    Color, Drawing, FRAME_COLOR, NOTE_COLOR, PAGE, PanelCaption, SECOND_SOLUTION_COLOR, Stroke,
 };
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_four_digits;
@@ -18,7 +18,7 @@ use leafdyn::scenario::Scenario;
 const MOST_MODES_DRAWN: usize = 12;
 
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT];
+const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT_VIEW];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
@@ -51,14 +51,22 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
-            let (number, (text, color)) = ((index + 1).to_string(), mode_caption(mode));
+            let (number, text) = ((index + 1).to_string(), mode_text(mode));
             let captions = [
-                (&*number, &*text, color),
-                ("", "from the front", NOTE_COLOR),
+                PanelCaption {
+                    letter: &number,
+                    text: &text,
+                    color: mode_color(mode),
+                },
+                PanelCaption {
+                    letter: "",
+                    text: "from the front",
+                    color: NOTE_COLOR,
+                },
             ];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let scene =
-                    panels.draw_empty_panel(page, (VIEWS.len() * index + k, 0.0), view, caption);
+                let place = VIEWS.len() * index + k;
+                let scene = panels.draw_empty_panel(page, place, 0.0, view, caption);
                 let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
                 for vein in &rest.veins {
                     let path = vein.projected_path(|point| scene.project_point(point));
@@ -71,18 +79,23 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// The frequency of a mode or, if it is unstable, its growth rate in red.
-fn mode_caption(mode: &Mode) -> (String, Color) {
+/// The frequency of a mode or, if it is unstable, its growth rate.
+fn mode_text(mode: &Mode) -> String {
     match (mode.is_neutral(), mode.growth()) {
-        (true, _) => ("neutral: ω = 0".into(), NOTE_COLOR),
+        (true, _) => "neutral: ω = 0".into(),
         (_, None) => {
             let frequency = format_four_digits(mode.frequency().unwrap_or_default());
-            (format!("ω = {frequency}"), NOTE_COLOR)
+            format!("ω = {frequency}")
         }
-        (_, Some(growth)) => (
-            format!("unstable: grows at {}", format_four_digits(growth)),
-            SECOND_SOLUTION_COLOR,
-        ),
+        (_, Some(growth)) => format!("unstable: grows at {}", format_four_digits(growth)),
+    }
+}
+
+/// Unstable modes are red.
+fn mode_color(mode: &Mode) -> Color {
+    match mode.growth() {
+        Some(_) if !mode.is_neutral() => SECOND_SOLUTION_COLOR,
+        _ => NOTE_COLOR,
     }
 }
 

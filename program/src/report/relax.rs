@@ -65,14 +65,14 @@ impl ReportedResult for Equilibrium {
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
-            let sizes = (reaction.force, moments(&reaction.moments));
-            let force = reaction_text(self, sizes, reaction.error);
+            let moment = moments(&reaction.moments);
+            let force = reaction_text(self, reaction.force, moment, reaction.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
-            let sizes = (grip.force, grip.moment.map_or(0.0, DVec3::length));
-            let force = reaction_text(self, sizes, grip.error);
+            let moment = grip.moment.map_or(0.0, DVec3::length);
+            let force = reaction_text(self, grip.force, moment, grip.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             let grip = format!("{force} on the holder of grip {}", number + 1);
             lines.push(("grip", grip));
@@ -178,7 +178,8 @@ const FORCE_ERROR_FACTOR: f64 = 20.0;
 /// accurate it is.
 fn reaction_text(
     equilibrium: &Equilibrium,
-    (force, moment): (DVec3, f64),
+    force: DVec3,
+    moment: f64,
     error: Option<f64>,
 ) -> String {
     if let Some(error) = error {
@@ -504,7 +505,7 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| critical_tip_force_line((margin, push), length, units))
+        .map(|push| critical_tip_force_line(margin, push, length, units))
         .collect();
     lines.extend(stable_directions_line(margin, units));
     let unknown = margin.pushes.iter();
@@ -537,7 +538,8 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
 
 /// A push under which stability is lost.
 fn critical_tip_force_line(
-    (margin, push): (&Margin, &CriticalTipForce),
+    margin: &Margin,
+    push: &CriticalTipForce,
     length: f64,
     units: &Units,
 ) -> String {

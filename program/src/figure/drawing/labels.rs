@@ -12,22 +12,34 @@ use crate::figure::drawing::{
 use glam::DVec2;
 use leafdyn::scenario::SupportKind;
 
-/// Spacing in pixels of the points on curves that labels keep clear of.
-const SPACING: f64 = 4.0;
+/// Where labels are tried around a point, in pixels.
+struct LabelRules {
+    /// Between the points on curves that labels keep clear of, and how many there are at most.
+    curve_spacing: f64,
+    most_curve_points: usize,
+    /// From the point to the middle of its label, and in how many directions.
+    distances: [f64; 3],
+    directions: usize,
+    /// A clearance with which the search ends.
+    sufficient_clearance: f64,
+    /// Points closer than this share a label.
+    shared_distance: f64,
+}
 
-/// Most of these points.
-const MOST_PLACES: usize = 20_000;
+const LABEL: LabelRules = LabelRules {
+    curve_spacing: 4.0,
+    most_curve_points: 20_000,
+    distances: [11.0, 16.0, 24.0],
+    directions: 16,
+    sufficient_clearance: 5.0,
+    shared_distance: 10.0,
+};
 
-/// From a point to the middle of its label.
-const LABEL_DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
-
-const LABEL_DIRECTIONS: usize = 16;
-
-/// A clearance that is large enough.
-const SUFFICIENT_CLEARANCE: f64 = 5.0;
-
-/// Points closer than this share a label.
-const SHARED_LABEL_DISTANCE: f64 = 10.0;
+/// A text that is to stand next to a point.
+struct RequestedLabel {
+    at: DVec2,
+    text: String,
+}
 
 pub struct LabelPlacement {
     cell: PageRectangle,
@@ -36,7 +48,7 @@ pub struct LabelPlacement {
     /// Labels drawn so far.
     drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
-    requested_labels: Vec<(DVec2, String)>,
+    requested_labels: Vec<RequestedLabel>,
 }
 
 impl LabelPlacement {
@@ -57,8 +69,12 @@ impl LabelPlacement {
             .collect();
         self.curve_points.extend(places.first());
         for pair in places.windows(2) {
-            let parts = (pair[0].distance(pair[1]) / SPACING).ceil().max(1.0);
-            let room = MOST_PLACES.saturating_sub(self.curve_points.len());
+            let parts = (pair[0].distance(pair[1]) / LABEL.curve_spacing)
+                .ceil()
+                .max(1.0);
+            let room = LABEL
+                .most_curve_points
+                .saturating_sub(self.curve_points.len());
             let parts = (parts as usize).min(room);
             let place = |k: usize| pair[0].lerp(pair[1], k as f64 / parts as f64);
             self.curve_points.extend((1..=parts).map(place));
@@ -68,22 +84,25 @@ impl LabelPlacement {
     /// Requests a label next to a point; points close to each other share one.
     pub fn request_label(&mut self, at: DVec2, text: &str) {
         let mut wanted = self.requested_labels.iter_mut();
-        match wanted.find(|(place, _)| place.distance(at) < SHARED_LABEL_DISTANCE) {
-            Some((_, texts)) => *texts += &format!(", {text}"),
-            None => self.requested_labels.push((at, text.into())),
+        match wanted.find(|label| label.at.distance(at) < LABEL.shared_distance) {
+            Some(label) => label.text += &format!(", {text}"),
+            None => self.requested_labels.push(RequestedLabel {
+                at,
+                text: text.into(),
+            }),
         }
     }
 
     /// Draws all requested labels.
     pub fn draw_requested(&mut self, page: &mut Drawing) {
         self.curve_points
-            .extend(self.requested_labels.iter().map(|(at, _)| *at));
-        for (at, text) in std::mem::take(&mut self.requested_labels) {
+            .extend(self.requested_labels.iter().map(|label| label.at));
+        for RequestedLabel { at, text } in std::mem::take(&mut self.requested_labels) {
             let size = label_size(&text);
-            let places = LABEL_DISTANCES.into_iter().flat_map(|distance| {
-                (0..LABEL_DIRECTIONS).map(move |k| {
+            let places = LABEL.distances.into_iter().flat_map(|distance| {
+                (0..LABEL.directions).map(move |k| {
                     let angle = -0.25 * std::f64::consts::PI
-                        + std::f64::consts::TAU * k as f64 / LABEL_DIRECTIONS as f64;
+                        + std::f64::consts::TAU * k as f64 / LABEL.directions as f64;
                     distance * DVec2::from_angle(angle)
                 })
             });
@@ -92,8 +111,8 @@ impl LabelPlacement {
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
                 PageRectangle::new(at + offset + side - 0.5 * size, size)
             });
-            if let Some((_, cell)) = clearest_label(cells, |cell| self.clearance(cell)) {
-                self.draw_label_at(page, cell, &text, TEXT_COLOR);
+            if let Some(best) = clearest_label(cells, |cell| self.clearance(cell)) {
+                self.draw_label_at(page, best.label, &text, TEXT_COLOR);
             }
         }
     }
@@ -115,7 +134,7 @@ impl LabelPlacement {
         self.drawn_labels.push(cell);
     }
 
-    /// The distance of a label from curves, at most [`SUFFICIENT_CLEARANCE`]; negative where it leaves
+    /// The distance of a label from curves, at most `LABEL.sufficient_clearance`; negative where it leaves
     /// the panel or covers another label.
     pub fn clearance(&self, label: &PageRectangle) -> f64 {
         let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
@@ -135,22 +154,28 @@ impl LabelPlacement {
         self.curve_points
             .iter()
             .map(far)
-            .fold(SUFFICIENT_CLEARANCE, f64::min)
+            .fold(LABEL.sufficient_clearance, f64::min)
     }
+}
+
+/// A label, or several that are placed together, with the least of their clearances.
+pub struct ClearLabel<T> {
+    pub label: T,
+    pub clearance: f64,
 }
 
 /// The first of these labels that is clear enough, or the clearest of all.
 pub fn clearest_label<T>(
     labels: impl Iterator<Item = T>,
     clearance: impl Fn(&T) -> f64,
-) -> Option<(f64, T)> {
-    let mut best: Option<(f64, T)> = None;
+) -> Option<ClearLabel<T>> {
+    let mut best: Option<ClearLabel<T>> = None;
     for label in labels {
-        let clear = clearance(&label);
-        if best.as_ref().is_none_or(|(most, _)| clear > *most) {
-            best = Some((clear, label));
+        let clearance = clearance(&label);
+        if best.as_ref().is_none_or(|best| clearance > best.clearance) {
+            best = Some(ClearLabel { label, clearance });
         }
-        if clear >= SUFFICIENT_CLEARANCE {
+        if clearance >= LABEL.sufficient_clearance {
             break;
         }
     }
@@ -255,22 +280,36 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
     x + 16.0
 }
 
-/// Between a sample and its name.
-const GAP: f64 = 7.0;
+/// Sizes of keys, in pixels.
+struct LegendSizes {
+    sample_height: f64,
+    /// Between a sample and its name.
+    name_gap: f64,
+    /// Height of a line of text in a column of entries, and the gap below an entry.
+    line: f64,
+    entry_gap: f64,
+    /// Height of a row of entries, and the gap between its entries.
+    row: f64,
+    row_entry_gap: f64,
+}
 
-const LINE: f64 = 15.0;
-
-/// Between the entries of a column, and of a row.
-const ENTRY_GAP: f64 = 7.0;
-
-const ROW_ENTRY_GAP: f64 = 20.0;
-
-const ROW: f64 = 20.0;
-
-const SAMPLE_HEIGHT: f64 = 12.0;
+const LEGEND: LegendSizes = LegendSizes {
+    sample_height: 12.0,
+    name_gap: 7.0,
+    line: 15.0,
+    entry_gap: 7.0,
+    row: 20.0,
+    row_entry_gap: 20.0,
+};
 
 /// Most of many curves that a key names.
 pub const MOST_CURVES_NAMED: usize = 7;
+
+/// What a key says of a curve.
+pub struct LegendText {
+    pub name: String,
+    pub note: String,
+}
 
 /// The key of a panel: a column of samples with their names.
 pub struct Legend {
@@ -297,17 +336,17 @@ impl Legend {
     ) {
         let font = Font::embedded();
         sample(page, sample_rectangle(self.at, Self::SAMPLE_WIDTH));
-        let left = self.at.x + Self::SAMPLE_WIDTH + GAP;
+        let left = self.at.x + Self::SAMPLE_WIDTH + LEGEND.name_gap;
         let room = page.width - 6.0 - left;
         for (text, color) in [(name, TEXT_COLOR), (note, NOTE_COLOR)] {
             for line in font.wrap_text(text, FONT_SIZE.tick, room) {
                 let line = font.shorten_text(&line, FONT_SIZE.tick, room);
                 let at = DVec2::new(left, self.at.y);
                 page.draw_centered_label(at, &line, FONT_SIZE.tick, TextAnchor::Start, color);
-                self.at.y += LINE;
+                self.at.y += LEGEND.line;
             }
         }
-        self.at.y += ENTRY_GAP;
+        self.at.y += LEGEND.entry_gap;
     }
 
     pub fn add_line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
@@ -320,10 +359,10 @@ impl Legend {
     pub fn add_curves(
         &mut self,
         page: &mut Drawing,
-        curves: impl ExactSizeIterator<Item = (String, String)>,
+        curves: impl ExactSizeIterator<Item = LegendText>,
     ) {
         let more = curves.len().saturating_sub(MOST_CURVES_NAMED);
-        for ((name, note), color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
+        for (LegendText { name, note }, color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
             self.add_line(page, &name, &note, Stroke::new(color, 1.8));
         }
         if more > 0 {
@@ -377,14 +416,15 @@ impl LegendRows {
         name: &str,
         sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
-        let width = self.sample + GAP + Font::embedded().text_width(name, FONT_SIZE.text);
+        let width =
+            self.sample + LEGEND.name_gap + Font::embedded().text_width(name, FONT_SIZE.text);
         if self.at.x > self.left && self.at.x + width > page.width - PAGE.right_margin {
-            self.at = DVec2::new(self.left, self.at.y + ROW);
+            self.at = DVec2::new(self.left, self.at.y + LEGEND.row);
         }
         sample(page, sample_rectangle(self.at, self.sample));
-        let text = self.at + DVec2::new(self.sample + GAP, 0.0);
+        let text = self.at + DVec2::new(self.sample + LEGEND.name_gap, 0.0);
         page.draw_centered_label(text, name, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
-        self.at.x += width + ROW_ENTRY_GAP;
+        self.at.x += width + LEGEND.row_entry_gap;
     }
 
     pub fn bottom(&self) -> f64 {
@@ -394,8 +434,8 @@ impl LegendRows {
 
 fn sample_rectangle(at: DVec2, width: f64) -> PageRectangle {
     PageRectangle::new(
-        at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
-        DVec2::new(width, SAMPLE_HEIGHT),
+        at - DVec2::new(0.0, 0.5 * LEGEND.sample_height),
+        DVec2::new(width, LEGEND.sample_height),
     )
 }
 

@@ -254,6 +254,8 @@ pub struct PageSizes {
     /// Room above a panel, for its title, and below, for its axis.
     pub panel_title: f64,
     pub panel_axis: f64,
+    /// Below the last panel.
+    pub bottom_margin: f64,
 }
 
 pub const PAGE: PageSizes = PageSizes {
@@ -266,6 +268,7 @@ pub const PAGE: PageSizes = PageSizes {
     header: 74.0,
     panel_title: 24.0,
     panel_axis: 48.0,
+    bottom_margin: 4.0,
 };
 
 /// Sizes of letters, in pixels: of a page's title, of text, and of the labels of ticks and points.
@@ -339,23 +342,35 @@ impl PageRectangle {
     }
 }
 
-/// Draws a panel's title above its frame.
-pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
-    draw_colored_title(page, corner, letter, text, NOTE_COLOR);
+/// A panel's title: its letter, and a text in a colour.
+#[derive(Clone, Copy)]
+pub struct PanelCaption<'t> {
+    pub letter: &'t str,
+    pub text: &'t str,
+    pub color: Color,
 }
 
-/// Draws a panel's title above its frame, with the text in this colour.
-pub fn draw_colored_title(
-    page: &mut Drawing,
-    corner: DVec2,
-    letter: &str,
-    text: &str,
-    color: Color,
-) {
-    let base = corner - DVec2::new(0.0, 8.0);
-    page.draw_label(base, letter, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
-    let base = base + DVec2::new(24.0, 0.0);
-    page.draw_label(base, text, FONT_SIZE.text, TextAnchor::Start, color);
+impl PanelCaption<'_> {
+    /// Draws the title above the frame whose upper left corner is given.
+    pub fn draw(self, page: &mut Drawing, corner: DVec2) {
+        let base = corner - DVec2::new(0.0, 8.0);
+        let mut label = |at: DVec2, text: &str, color: Color| {
+            page.draw_label(at, text, FONT_SIZE.text, TextAnchor::Start, color);
+        };
+        label(base, self.letter, TEXT_COLOR);
+        label(base + DVec2::new(24.0, 0.0), self.text, self.color);
+    }
+}
+
+/// Draws a panel's title above its frame.
+pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
+    let color = NOTE_COLOR;
+    PanelCaption {
+        letter,
+        text,
+        color,
+    }
+    .draw(page, corner);
 }
 
 /// Letters of panels: `(a)`, `(b)`, ...

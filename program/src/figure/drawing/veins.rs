@@ -25,15 +25,23 @@ const LARGEST_CURVE_DEVIATION: f64 = 3e-4;
 /// Curves are drawn with at least this many pieces, if they have as many segments.
 const FEWEST_PIECES_PER_CURVE: usize = 8;
 
-/// Dots of a second solution: about the most veins with dots, about the most dots in
-/// total, dots per extent of the leaf, and the fewest on a vein that has as many nodes.
-const MOST_VEINS_DOTTED: usize = 24;
+/// How many dots a second solution has.
+struct DotLimits {
+    /// About the most veins with dots, and about the most dots of all.
+    veins: usize,
+    most: usize,
+    /// Dots per extent of the leaf.
+    per_extent: f64,
+    /// On a vein that has as many nodes.
+    fewest: usize,
+}
 
-const MOST_DOTS: usize = 160;
-
-const DOTS_PER_EXTENT: f64 = 14.0;
-
-const FEWEST_DOTS: usize = 8;
+const DOTS: DotLimits = DotLimits {
+    veins: 24,
+    most: 160,
+    per_extent: 14.0,
+    fewest: 8,
+};
 
 pub type BezierPiece = [DVec3; 4];
 
@@ -60,11 +68,17 @@ pub struct GrippedStretch {
     pub support: SupportKind,
 }
 
+/// The tip of a vein, or of all where they are joined.
+pub struct DrawnTip {
+    pub position: DVec3,
+    pub color: Color,
+}
+
 pub struct DrawnVeins {
     pub veins: Vec<DrawnVein>,
     pub count: usize,
     pub dots: Vec<DVec3>,
-    pub tips: Vec<(DVec3, Color)>,
+    pub tips: Vec<DrawnTip>,
     /// How the bases are held, and the tips if they are.
     pub base_support: SupportKind,
     pub tip_support: Option<SupportKind>,
@@ -81,10 +95,13 @@ impl DrawnVeins {
     pub fn from_equilibrium(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
         let veins = DrawnVeins::from_curves(&shape.curves, &equilibrium.tips, shape.longest());
-        let nodes = (&shape.curve_stations[..], &shape.curves[..]);
-        veins
-            .with_supports(scenario)
-            .with_loads(scenario, &load_marks(scenario, None), nodes)
+        let loads = load_marks(scenario, None);
+        veins.with_supports(scenario).with_loads(
+            scenario,
+            &loads,
+            &shape.curve_stations,
+            &shape.curves,
+        )
     }
 
     /// Where the veins that are drawn begin.
@@ -99,11 +116,9 @@ impl DrawnVeins {
         let veins = DrawnVeins::from_curves(&still.curves, &tips, record.length);
         let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
         let loads = load_marks(scenario, Some(time));
-        veins.with_supports(scenario).with_loads(
-            scenario,
-            &loads,
-            (&record.stations, &still.curves),
-        )
+        veins
+            .with_supports(scenario)
+            .with_loads(scenario, &loads, &record.stations, &still.curves)
     }
 
     /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
@@ -112,7 +127,8 @@ impl DrawnVeins {
         mut self,
         scenario: &Scenario,
         loads: &[LoadMark],
-        (stations, curves): (&[f64], &[Vec<DVec3>]),
+        stations: &[f64],
+        curves: &[Vec<DVec3>],
     ) -> Self {
         self.moments = moment_arrows(loads, |sigma| {
             let point =
@@ -162,8 +178,11 @@ impl DrawnVeins {
         let joined = tips.len() == 1;
         let tips = (0..tips.len())
             .filter(|&index| joined || is_vein_drawn(index, count))
-            .map(|index| (tips[index] / unit, color_of_vein(index, count)))
-            .filter(|(tip, _)| is_drawable(*tip))
+            .map(|index| DrawnTip {
+                position: tips[index] / unit,
+                color: color_of_vein(index, count),
+            })
+            .filter(|tip| is_drawable(tip.position))
             .collect();
 
         let pieces = veins.iter().flat_map(|vein| &vein.pieces);
@@ -189,12 +208,12 @@ impl DrawnVeins {
     /// Adds a second solution as dots, on as many veins and at as many nodes as can be
     /// distinguished.
     pub fn add_second_solution(&mut self, rods: &[RodShape]) {
-        let every = self.count.div_ceil(MOST_VEINS_DOTTED).max(1);
-        let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
+        let every = self.count.div_ceil(DOTS.veins).max(1);
+        let most = (DOTS.most / rods.len().div_ceil(every).max(1)).max(DOTS.fewest);
         // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.largest_extent();
-        let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
-        let dots = wanted.clamp(FEWEST_DOTS, most);
+        let wanted = (DOTS.per_extent * lengths).ceil() as usize;
+        let dots = wanted.clamp(DOTS.fewest, most);
         for rod in rods.iter().step_by(every) {
             let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
             // The base is under the clamp's marker.
@@ -301,17 +320,17 @@ pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(
             bases.push(base);
         }
     }
-    if let [(tip, _)] = veins.tips.as_slice() {
+    if let [tip] = veins.tips.as_slice() {
         return match veins.tip_support {
-            Some(held) => draw_support_marker(page, place(*tip), held),
-            None => draw_tip_marker(page, place(*tip)),
+            Some(held) => draw_support_marker(page, place(tip.position), held),
+            None => draw_tip_marker(page, place(tip.position)),
         };
     }
     // Many are small.
     let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
-    for (tip, color) in &veins.tips {
-        let rim = Stroke::new(*color, 0.5 * radius);
-        page.draw_shape(circle_path(place(*tip), radius), WHITE, Some(rim));
+    for tip in &veins.tips {
+        let rim = Stroke::new(tip.color, 0.5 * radius);
+        page.draw_shape(circle_path(place(tip.position), radius), WHITE, Some(rim));
     }
 }
 
