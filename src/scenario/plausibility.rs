@@ -74,11 +74,15 @@ impl GravityInUnit {
 
 /// What is probably not what was intended, one short sentence each.
 pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
-    let heavy = weight_stated_twice(scenario).or_else(|| too_long(scenario));
+    let heavy = weight_stated_twice(scenario).or_else(|| leaf_too_long_for_weight(scenario));
     let heavy = heavy
         .or_else(|| weight_of_another_mass(scenario))
         .or_else(|| gravity_of_another_unit(scenario));
-    let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
+    let lengths = [
+        section_wider_than_vein_long(scenario),
+        heavy,
+        held_tip_out_of_reach(scenario),
+    ];
     let angles = [
         fan_angles_in_degrees(scenario),
         clamp_angle_in_degrees(scenario),
@@ -87,12 +91,12 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
 }
 
 /// The implausible number that most probably keeps a leaf from coming to rest.
-pub fn obstacle(scenario: &Scenario) -> Option<String> {
+pub fn probable_obstacle_to_rest(scenario: &Scenario) -> Option<String> {
     let slips = [
-        out_of_reach,
+        held_tip_out_of_reach,
         clamp_angle_in_degrees,
         fan_angles_in_degrees,
-        thicker_than_long,
+        section_wider_than_vein_long,
         weight_stated_twice,
         weight_of_another_mass,
     ];
@@ -109,7 +113,7 @@ struct TipReach {
 }
 
 /// A tip that is held farther from the base than a vein plausibly stretches.
-pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
+pub fn held_tip_out_of_reach(scenario: &Scenario) -> Option<String> {
     let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
     let reach = |rod: &Rod| {
         let length = rod.length * rod.rest_stretch.integral(1.0);
@@ -133,15 +137,15 @@ pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
     (stretch > LARGEST_PLAUSIBLE_STRETCH).then(|| {
         format!(
             "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
-            four_digits(away),
+            round_to_four_digits(away),
             j + 1,
-            four_digits(length),
+            round_to_four_digits(length),
             100.0 * stretch
         )
     })
 }
 
-fn four_digits(number: f64) -> f64 {
+fn round_to_four_digits(number: f64) -> f64 {
     format!("{number:.3e}").parse().unwrap_or(number)
 }
 
@@ -152,7 +156,7 @@ fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
         turned.then(|| {
             format!(
                 "{key} is in radians, and {angle} is {}",
-                clamp_turn_meaning(angle)
+                turn_in_words(angle)
             )
         })
     };
@@ -181,11 +185,11 @@ fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<String> {
     let (key, angle) = clamps
         .iter()
         .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
-    let turned = clamp_turn_meaning(angle);
+    let turned = turn_in_words(angle);
     Some(format!("tip.{key} is in radians, and {angle} is {turned}"))
 }
 
-fn clamp_turn_meaning(angle: f64) -> &'static str {
+fn turn_in_words(angle: f64) -> &'static str {
     match angle.abs() > TAU {
         true => "more than a turn",
         false => "more than a right angle",
@@ -193,15 +197,15 @@ fn clamp_turn_meaning(angle: f64) -> &'static str {
 }
 
 /// A section with a side longer than its vein.
-fn thicker_than_long(scenario: &Scenario) -> Option<String> {
+fn section_wider_than_vein_long(scenario: &Scenario) -> Option<String> {
     let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
     let mut rods = scenario.rods.iter().enumerate();
     let (j, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
     Some(format!(
         "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
         j + 1,
-        four_digits(side(j)),
-        four_digits(rod.length)
+        round_to_four_digits(side(j)),
+        round_to_four_digits(rod.length)
     ))
 }
 
@@ -216,7 +220,10 @@ fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
         (given != DVec3::ZERO).then_some((vein, given, pulled))
     };
     let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
-    let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
+    let (one, other) = (
+        round_to_four_digits(given.length()),
+        round_to_four_digits(pulled.length()),
+    );
     let angle = given.angle_between(pulled);
     let states = match given.distance(pulled) <= PLAUSIBLE.weight_tolerance * pulled.length() {
         true => format!(
@@ -260,9 +267,9 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     (weight > 0.0 && !allowed.contains(&found)).then(|| {
         format!(
             "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
-            four_digits(weight),
-            four_digits(mass),
-            four_digits(found)
+            round_to_four_digits(weight),
+            round_to_four_digits(mass),
+            round_to_four_digits(found)
         )
     })
 }
@@ -281,12 +288,12 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
     let other = GRAVITY_IN_UNITS.iter().find(of_other)?.length;
     Some(format!(
         "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
-        four_digits(given)
+        round_to_four_digits(given)
     ))
 }
 
 /// A leaf that is too long for its weight and stiffness, if only its base is held.
-fn too_long(scenario: &Scenario) -> Option<String> {
+fn leaf_too_long_for_weight(scenario: &Scenario) -> Option<String> {
     if scenario.held_tip.is_some() {
         return None;
     }
@@ -394,7 +401,7 @@ mod tests {
                 section = {{ shape = "circle", diameter = 0.002, young = 1e9, mass_density = {density:e} }}
                 load = {{ gravity = [0.0, 0.0, -0.03] }}"#
             );
-            obstacle(&Scenario::from_toml(&text).unwrap())
+            probable_obstacle_to_rest(&Scenario::from_toml(&text).unwrap())
         };
         assert_eq!(heavy(1000.0), None);
         assert!(heavy(1e-6).is_some());

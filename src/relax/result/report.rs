@@ -13,7 +13,8 @@ use crate::relax::rest::RelaxationProblem;
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::scenario::{
-    LARGEST_PLAUSIBLE_STRETCH, Scenario, obstacle, out_of_reach, plausibility_warnings,
+    LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
+    probable_obstacle_to_rest,
 };
 use crate::shape::{Centerline, RodShape, Undulation};
 use glam::DVec3;
@@ -346,7 +347,7 @@ fn advice(
     found: &NestedEquilibrium,
     reached: Option<(Stage, f64)>,
 ) -> String {
-    if let Some(slip) = obstacle(problem.leaf.scenario()) {
+    if let Some(slip) = probable_obstacle_to_rest(problem.leaf.scenario()) {
         return format!(": {slip}");
     }
     let Some(level) = found.levels.last() else {
@@ -419,7 +420,7 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<St
     }
     let (rods, stations) = (&leaf.shape.rods, &leaf.shape.stations);
     let mut all = plausibility_warnings(scenario);
-    if out_of_reach(scenario).is_none() {
+    if held_tip_out_of_reach(scenario).is_none() {
         let strained = || stretch_doubt(excess_stretches(scenario, rods, stations));
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
