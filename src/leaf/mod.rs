@@ -331,7 +331,7 @@ impl Leaf {
         self.scenario
             .rods
             .iter()
-            .flat_map(Rod::profiles)
+            .flat_map(Rod::constitutive_profiles)
             .all(constant)
     }
 
@@ -390,7 +390,7 @@ impl Leaf {
             return [DVec3::ZERO; 2];
         };
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
-        let [along, across, normal, fold] = tissue[g].profiles().map(|of| of.at(sigma));
+        let [along, across, normal, fold] = tissue[g].stiffness_profiles().map(|of| of.at(sigma));
         let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
         [k, fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
     }

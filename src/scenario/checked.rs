@@ -110,10 +110,15 @@ impl Scenario {
     /// the nearest node.
     pub fn kinks(&self) -> Vec<f64> {
         let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
-        let profiles = self.rods.iter().flat_map(Rod::profiles);
+        let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
         let profiles = profiles
             .chain(masses.map(|(_, mass)| mass))
-            .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
+            .chain(
+                self.tissue
+                    .iter()
+                    .flatten()
+                    .flat_map(Tissue::stiffness_profiles),
+            )
             .chain(self.distributed.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);

@@ -80,14 +80,14 @@ impl Scenario {
         let point = |point: &PointLoad| {
             json!({
                 "vein": point.vein + 1, "at": point.at, "mass": point.mass,
-                "force": list(point.force), "moment": list(point.moment),
+                "force": list_value(point.force), "moment": list_value(point.moment),
             })
         };
         let grip = |grip: &Grip| {
             let [from, to] = grip.at;
             json!({
-                "vein": grip.vein + 1, "held": grip.held, "move": list(grip.displacement),
-                "at": if from == to { json!(from) } else { list(grip.at) },
+                "vein": grip.vein + 1, "held": grip.held, "move": list_value(grip.displacement),
+                "at": if from == to { json!(from) } else { list_value(grip.at) },
             })
         };
         let rows: Vec<Value> = match first {
@@ -117,13 +117,13 @@ impl Scenario {
             "wind" => return self.wind_value(key),
             "dynamics" => return self.dynamics_value(key, sections),
             _ if key == Key::Elevation && self.blade.is_some() => {
-                return Some(number(self.blade.as_ref()?.elevation));
+                return Some(number_value(self.blade.as_ref()?.elevation));
             }
             _ => {}
         }
         let triple = |keys: [Key; 3], of: fn(&Rod) -> &[Profile; 3]| {
             let axis = keys.iter().position(|one| *one == key)?;
-            Some(quantity(self.rods.iter().map(|rod| &of(rod)[axis])))
+            Some(quantity_value(self.rods.iter().map(|rod| &of(rod)[axis])))
         };
         let of_veins = triple(Key::COUPLE, |rod| &rod.couple_stiffness)
             .or_else(|| triple(Key::FORCE, |rod| &rod.force_stiffness))
@@ -141,9 +141,9 @@ impl Scenario {
             Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
             Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
             Key::BaseHeld => json!(self.base_held),
-            Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
+            Key::Fan => list_value(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => json!(self.joined),
-            Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
+            Key::RestStretch => quantity_value(self.rods.iter().map(|rod| &rod.rest_stretch)),
             Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
                 // A single rod has no gaps: any number will do.
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
@@ -153,11 +153,11 @@ impl Scenario {
                 let veins = 0..self.rods.len();
                 vector_or_list(veins.map(|vein| self.weight(vein).even))
             }
-            Key::G => list(self.g),
+            Key::G => list_value(self.g),
             Key::Distributed => vector_quantity(self.distributed.as_deref()?),
-            Key::TipForce => list(self.tip_force),
-            Key::TipMoment => list(self.tip_moment),
-            Key::Tolerance => number(self.tolerance),
+            Key::TipForce => list_value(self.tip_force),
+            Key::TipMoment => list_value(self.tip_moment),
+            Key::Tolerance => number_value(self.tolerance),
             _ => return None,
         })
     }
@@ -168,7 +168,7 @@ impl Scenario {
             return Some(json!(self.tissue_grown));
         }
         let which = Key::TISSUE.iter().position(|one| *one == key)?;
-        let of = |gap: &Tissue| gap.profiles()[which].at(0.0);
+        let of = |gap: &Tissue| gap.stiffness_profiles()[which].at(0.0);
         Some(number_or_list(tissue.iter().map(of)))
     }
 
@@ -176,18 +176,18 @@ impl Scenario {
         let blade = self.blade.as_ref()?;
         let materials = blade.materials.iter();
         Some(match key {
-            Key::BladeLength => number(blade.length()),
+            Key::BladeLength => number_value(blade.length()),
             Key::BladeWidth => spline_value(blade.width_profile()),
-            Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
-            Key::BladeYoung => quantity(materials.map(|of| &of.young)),
+            Key::BladeThickness => quantity_value(materials.map(|of| &of.thickness)),
+            Key::BladeYoung => quantity_value(materials.map(|of| &of.young)),
             Key::YoungAcross => optional_quantity(materials.map(|of| of.young_across.as_ref()))?,
             Key::ShearModulus => optional_quantity(materials.map(|of| of.shear_modulus.as_ref()))?,
-            Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
+            Key::BladePoisson => quantity_value(materials.map(|of| &of.poisson)),
             Key::BladeMassDensity => {
                 optional_quantity(materials.map(|of| of.mass_density.as_ref()))?
             }
             Key::Edges => json!(blade.edges),
-            _ => number(blade.least_width_fraction()),
+            _ => number_value(blade.least_width_fraction()),
         })
     }
 
@@ -199,11 +199,11 @@ impl Scenario {
     fn wind_value(&self, key: Key) -> Option<Value> {
         let wind = self.wind.as_ref()?;
         Some(match key {
-            Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
-            Key::WindVelocity => schedule_value(&wind.velocity, "value", list),
-            Key::WindDensity => number(wind.density),
-            Key::WindDrag => number(wind.drag),
-            _ => quantity(wind.width.iter()),
+            Key::WindVelocity if wind.velocity.is_constant() => list_value(wind.velocity.at(0.0)),
+            Key::WindVelocity => schedule_value(&wind.velocity, "value", list_value),
+            Key::WindDensity => number_value(wind.density),
+            Key::WindDrag => number_value(wind.drag),
+            _ => quantity_value(wind.width.iter()),
         })
     }
 
@@ -211,10 +211,10 @@ impl Scenario {
     fn photo_value(&self, key: Key) -> Option<Value> {
         let photo = self.photo.as_ref()?;
         match key {
-            Key::PhotoScale => Some(number(photo.scale)),
-            Key::PhotoX => Some(number(photo.origin[0])),
-            Key::PhotoY => Some(number(photo.origin[1])),
-            Key::PhotoRotation => Some(number(photo.rotation)),
+            Key::PhotoScale => Some(number_value(photo.scale)),
+            Key::PhotoX => Some(number_value(photo.origin[0])),
+            Key::PhotoY => Some(number_value(photo.origin[1])),
+            Key::PhotoRotation => Some(number_value(photo.rotation)),
             Key::PhotoRight => Some(json!(axis_name(photo.right))),
             Key::PhotoUp => Some(json!(axis_name(photo.up))),
             _ => None,
@@ -227,7 +227,7 @@ impl Scenario {
         Some(match key {
             Key::TipHeld if clamps.is_some() => json!("clamped"),
             Key::TipHeld => json!("pinned"),
-            Key::TipPosition => list(held.position),
+            Key::TipPosition => list_value(held.position),
             Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
             _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
         })
@@ -239,26 +239,31 @@ impl Scenario {
             Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
             Key::Density if sections.is_some_and(|it| it.density) => return None,
             Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
-            Key::Density => quantity(dynamics.density.iter()),
+            Key::Density => quantity_value(dynamics.density.iter()),
             // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
-            Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
-            Key::ExternalDamping => number(dynamics.external_damping),
-            Key::InternalDamping => number(dynamics.internal_damping),
-            Key::Duration => number(dynamics.duration),
-            Key::OutputInterval => number(dynamics.output_interval),
+            Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
+            Key::ExternalDamping => number_value(dynamics.external_damping),
+            Key::InternalDamping => number_value(dynamics.internal_damping),
+            Key::Duration => number_value(dynamics.duration),
+            Key::OutputInterval => number_value(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
             Key::Start => json!(dynamics.start),
             Key::GravityInTime => {
-                schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list)?
+                schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list_value)?
             }
             Key::TipForceInTime => {
-                schedule_unless_constant(&dynamics.tip_force, self.tip_force, "value", list)?
+                schedule_unless_constant(&dynamics.tip_force, self.tip_force, "value", list_value)?
             }
-            Key::TipMomentInTime => {
-                schedule_unless_constant(&dynamics.tip_moment, self.tip_moment, "value", list)?
+            Key::TipMomentInTime => schedule_unless_constant(
+                &dynamics.tip_moment,
+                self.tip_moment,
+                "value",
+                list_value,
+            )?,
+            Key::RestInTime => {
+                schedule_unless_constant(&dynamics.rest, 1.0, "factor", number_value)?
             }
-            Key::RestInTime => schedule_unless_constant(&dynamics.rest, 1.0, "factor", number)?,
             _ => return None,
         })
     }
@@ -293,7 +298,7 @@ impl SerializedSections<'_> {
     fn serialized_value(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {
-            quantity(self.sections.iter().map(|section| of(section)))
+            quantity_value(self.sections.iter().map(|section| of(section)))
         };
         Some(match key {
             Key::SectionShape => json!(outline),
@@ -309,7 +314,7 @@ impl SerializedSections<'_> {
                 if is_bore != (key == Key::InnerDiameter) {
                     return None;
                 }
-                quantity(hollow.iter().map(HollowSection::profile))
+                quantity_value(hollow.iter().map(HollowSection::profile))
             }
             Key::Young => of(|section| &section.young),
             Key::Poisson => of(|section| &section.poisson),
@@ -320,15 +325,15 @@ impl SerializedSections<'_> {
 }
 
 /// A number; JSON has no infinity: `"inf"`.
-fn number(number: f64) -> Value {
+fn number_value(number: f64) -> Value {
     match number.is_infinite() {
         true => json!("inf"),
         false => json!(number),
     }
 }
 
-fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
-    numbers.into_iter().map(number).collect()
+fn list_value(numbers: impl IntoIterator<Item = f64>) -> Value {
+    numbers.into_iter().map(number_value).collect()
 }
 
 /// A single number if all are the same.
@@ -336,8 +341,8 @@ fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
     let numbers: Vec<f64> = numbers.collect();
     let first = numbers.first().copied().unwrap_or(0.0);
     match numbers.iter().all(|number| *number == first) {
-        true => number(first),
-        false => list(numbers),
+        true => number_value(first),
+        false => list_value(numbers),
     }
 }
 
@@ -345,8 +350,8 @@ fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
 fn vector_or_list(vectors: impl Iterator<Item = [f64; 3]>) -> Value {
     let vectors: Vec<[f64; 3]> = vectors.collect();
     match vectors.first() {
-        Some(first) if vectors.iter().all(|vector| vector == first) => list(*first),
-        _ => vectors.into_iter().map(list).collect(),
+        Some(first) if vectors.iter().all(|vector| vector == first) => list_value(*first),
+        _ => vectors.into_iter().map(list_value).collect(),
     }
 }
 
@@ -360,7 +365,7 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
     let kinks = rods.iter().flatten().flat_map(Profile::kinks);
     let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
     let values = |rod: &[Profile; 3]| -> Value {
-        let knot = |&sigma: &f64| list(rod.each_ref().map(|profile| profile.at(sigma)));
+        let knot = |&sigma: &f64| list_value(rod.each_ref().map(|profile| profile.at(sigma)));
         at.iter().map(knot).collect()
     };
     let value = match rods.iter().all(|rod| *rod == rods[0]) {
@@ -371,14 +376,14 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
 }
 
 /// A quantity of all rods, in the shortest form.
-fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
+fn quantity_value<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     let profiles: Vec<&Profile> = profiles.collect();
     if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
     let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
-    let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
+    let values = |profile: &Profile| list_value(at.iter().map(|&sigma| profile.at(sigma)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
         false => profiles.iter().map(|profile| values(profile)).collect(),
@@ -390,7 +395,7 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
 fn spline_value(spline: &Spline) -> Value {
     let (at, value) = (spline.knots(), spline.values());
     match value.iter().all(|one| *one == value[0]) {
-        true => number(value[0]),
+        true => number_value(value[0]),
         false => json!({ "at": at, "value": value }),
     }
 }
@@ -398,7 +403,7 @@ fn spline_value(spline: &Spline) -> Value {
 /// A quantity of all rods; `None` if the quantity is left out.
 fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
     let profiles: Option<Vec<&Profile>> = profiles.collect();
-    Some(quantity(profiles?.into_iter()))
+    Some(quantity_value(profiles?.into_iter()))
 }
 
 /// A quantity in time; `None` if the quantity always has its value at rest.

@@ -180,7 +180,7 @@ const NATURAL_UNITS_REASON: &str = "T = sqrt(rho_mean L^4/A) is the natural unit
      choose a value, or a density, that brings this closer to 1";
 
 /// Refuses a scenario whose given values are beyond a limit.
-pub(super) fn check(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+pub(super) fn check_limits(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     check_magnitudes(entries, scenario)?;
     check_rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
@@ -188,7 +188,7 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()
         (Key::TipMoment, scenario.tip_moment, LIMITS.tip_moment),
     ] {
         if let Some(item) = entries.given_value(key) {
-            limit.check(item, norm(load) / smallest_unit(key, &scenario.rods))?;
+            limit.check(item, vector_norm(load) / smallest_unit(key, &scenario.rods))?;
         }
     }
     check_coupling(entries, scenario)?;
@@ -214,13 +214,17 @@ fn check_magnitudes(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()
             is_moderate(size.entry(rod), profile)?;
         }
     }
-    let tissue = scenario.tissue.iter().flatten().flat_map(Tissue::profiles);
+    let tissue = scenario
+        .tissue
+        .iter()
+        .flatten()
+        .flat_map(Tissue::stiffness_profiles);
     let mut tissue = tissue.filter(|_| scenario.blade.is_some());
     tissue.try_for_each(|profile| is_moderate(size, profile))
 }
 
 fn is_moderate(item: EntryValue, profile: &Profile) -> ScenarioResult<()> {
-    for value in extremes(profile) {
+    for value in positive_extremes(profile) {
         item.refuse_unless(
             MAGNITUDES.contains(&value),
             format_args!(
@@ -395,7 +399,7 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
         if let Some(list) = list(key, "value") {
             let unit = smallest_unit(key, rods);
             for (index, &value) in load.value.iter().enumerate() {
-                limit.check(list.entry(index), norm(value) / unit)?;
+                limit.check(list.entry(index), vector_norm(value) / unit)?;
             }
         }
     }
@@ -428,7 +432,11 @@ fn check_bases(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     };
     let longest = longest(&scenario.rods);
     let mut rods = scenario.rods.iter();
-    rods.try_for_each(|rod| LIMITS.base_distance.check(item, norm(rod.base) / longest))
+    rods.try_for_each(|rod| {
+        LIMITS
+            .base_distance
+            .check(item, vector_norm(rod.base) / longest)
+    })
 }
 
 fn check_tissue(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
@@ -452,7 +460,7 @@ fn check_tissue(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
             length: one.length.max(other.length),
             stiffness: one.stiffness.min(other.stiffness),
         };
-        for (key, profile) in Key::TISSUE.into_iter().zip(tissue.profiles()) {
+        for (key, profile) in Key::TISSUE.into_iter().zip(tissue.stiffness_profiles()) {
             let blade = || entries.given_value(Key::BladeThickness);
             let stiffness = match middle {
                 true => profile.at(0.5),
@@ -474,9 +482,13 @@ fn check_tissue(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
 fn check_weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let unit = smallest_unit(Key::Gravity, &scenario.rods);
     if let Some(item) = entries.given_value(Key::Gravity) {
-        LIMITS.gravity.check(item, norm(scenario.gravity) / unit)?;
+        LIMITS
+            .gravity
+            .check(item, vector_norm(scenario.gravity) / unit)?;
         for (vein, own) in scenario.own_gravity.iter().enumerate() {
-            LIMITS.gravity.check(item.entry(vein), norm(*own) / unit)?;
+            LIMITS
+                .gravity
+                .check(item.entry(vein), vector_norm(*own) / unit)?;
         }
     }
     let Some(item) = entries.given_value(Key::G) else {
@@ -486,7 +498,7 @@ fn check_weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
         let unit = softest_rod_scale(rod).unit(Key::Gravity, 1.0);
         LIMITS
             .rod_weight
-            .check(item, norm(scenario.g) / unit * density.max_abs())?;
+            .check(item, vector_norm(scenario.g) / unit * density.max_abs())?;
     }
     Ok(())
 }
@@ -499,7 +511,7 @@ fn check_distributed_loads(entries: &Entries, scenario: &Scenario) -> ScenarioRe
     let loads = scenario.distributed.iter().flatten();
     for load in loads {
         let most = load.each_ref().map(Profile::max_abs);
-        LIMITS.gravity.check(item, norm(most) / unit)?;
+        LIMITS.gravity.check(item, vector_norm(most) / unit)?;
     }
     Ok(())
 }
@@ -512,15 +524,15 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
         let item = |key| entries.value_in_row(key, row);
         LIMITS
             .tip_force
-            .check(item(Key::PointForce)?, norm(point.force) / force)?;
+            .check(item(Key::PointForce)?, vector_norm(point.force) / force)?;
         LIMITS
             .tip_moment
-            .check(item(Key::PointMoment)?, norm(point.moment) / moment)?;
+            .check(item(Key::PointMoment)?, vector_norm(point.moment) / moment)?;
         let weighed = item(Key::PointMass)?;
         LIMITS.point_mass.check(weighed, point.mass / mass)?;
         LIMITS
             .point_weight
-            .check(weighed, norm(scenario.g) / force * point.mass)?;
+            .check(weighed, vector_norm(scenario.g) / force * point.mass)?;
     }
     Ok(())
 }
@@ -537,7 +549,7 @@ fn check_wind(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
         LIMITS.times.check(item, at.abs() / time)?;
     }
     let velocity = scenario.unit(Key::WindVelocity);
-    for speed in wind.velocity.value.iter().map(|&value| norm(value)) {
+    for speed in wind.velocity.value.iter().map(|&value| vector_norm(value)) {
         LIMITS.wind_velocity.check(item, speed / velocity)?;
         for (rod, width) in scenario.rods.iter().zip(&wind.width) {
             let pressure = 0.5 * wind.density * wind.drag * speed * speed;
@@ -584,7 +596,7 @@ impl DimensionlessLimit {
         unit: f64,
     ) -> ScenarioResult<()> {
         for (index, profile) in profiles.iter().enumerate() {
-            for value in extremes(profile) {
+            for value in positive_extremes(profile) {
                 self.check(item.entry(index), value / unit)?;
             }
         }
@@ -594,7 +606,7 @@ impl DimensionlessLimit {
 
 /// The least and the largest value of a quantity that is positive. The mass of a blade may vanish at
 /// its ends: then the largest twice.
-fn extremes(profile: &Profile) -> [f64; 2] {
+fn positive_extremes(profile: &Profile) -> [f64; 2] {
     let (least, most) = (profile.min(), profile.max_abs());
     match profile {
         Profile::Derived(_) if least == 0.0 => [most; 2],
@@ -657,7 +669,7 @@ fn smallest_unit(key: Key, rods: &[Rod]) -> f64 {
     units.fold(f64::INFINITY, f64::min)
 }
 
-fn norm([x, y, z]: [f64; 3]) -> f64 {
+fn vector_norm([x, y, z]: [f64; 3]) -> f64 {
     // hypot avoids overflow of the squares of large components.
     x.hypot(y).hypot(z)
 }

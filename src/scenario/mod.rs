@@ -43,7 +43,8 @@ pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, Weight, Wind}
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{
-    LARGEST_PLAUSIBLE_STRETCH, obstacle, out_of_reach, plausibility_warnings,
+    LARGEST_PLAUSIBLE_STRETCH, held_tip_out_of_reach, plausibility_warnings,
+    probable_obstacle_to_rest,
 };
 pub use crate::scenario::profile::{DerivedProfile, Profile, Schedule};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};

@@ -33,13 +33,13 @@ pub struct PhotoParameterDerivative {
 impl Photo {
     /// The pixel of a point x is (a . x + b, c . x + d): (a, b) and (c, d).
     pub fn projection(&self) -> [(DVec3, f64); 2] {
-        let [right, up] = self.turned();
+        let [right, up] = self.picture_axes();
         let [x, y] = self.origin;
         [(right / self.scale, x), (-up / self.scale, y)]
     }
 
     /// The directions to the right and upwards in the picture.
-    fn turned(&self) -> [DVec3; 2] {
+    fn picture_axes(&self) -> [DVec3; 2] {
         let (sin, cos) = self.rotation.sin_cos();
         let (right, up) = (self.right, self.up);
         [cos * right - sin * up, sin * right + cos * up]
@@ -47,7 +47,7 @@ impl Photo {
 
     /// The derivative of the pixel of a point that does not move.
     pub fn rate(&self, point: DVec3, by: &PhotoParameterDerivative) -> [f64; 2] {
-        let [right, up] = self.turned().map(|axis| axis.dot(point) / self.scale);
+        let [right, up] = self.picture_axes().map(|axis| axis.dot(point) / self.scale);
         let growth = by.scale / self.scale;
         let [x, y] = by.origin;
         [
@@ -59,7 +59,7 @@ impl Photo {
     /// The coordinates of a point that are seen at a pixel: the third is not.
     pub fn point_at_pixel(&self, pixel: [f64; 2]) -> [Option<f64>; 3] {
         let [x, y] = [0, 1].map(|k| (pixel[k] - self.origin[k]) * self.scale);
-        let [right, up] = self.turned();
+        let [right, up] = self.picture_axes();
         let place = right * x - up * y;
         let seen = self.right.abs() + self.up.abs();
         [0, 1, 2].map(|axis| (seen[axis] > 0.5).then_some(place[axis]))

@@ -225,11 +225,15 @@ fn four_digits(number: f64) -> f64 {
 
 /// What is probably not what was intended.
 pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
-    let heavy = weight_stated_twice(scenario).or_else(|| too_long(scenario));
+    let heavy = weight_stated_twice(scenario).or_else(|| leaf_too_long_for_weight(scenario));
     let heavy = heavy
         .or_else(|| weight_of_another_mass(scenario))
         .or_else(|| gravity_of_another_unit(scenario));
-    let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
+    let lengths = [
+        section_wider_than_vein_long(scenario),
+        heavy,
+        held_tip_out_of_reach(scenario),
+    ];
     let angles = [
         fan_angles_in_degrees(scenario),
         clamp_angle_in_degrees(scenario),
@@ -238,12 +242,12 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
 }
 
 /// The one of them that most probably keeps a leaf from coming to rest.
-pub fn obstacle(scenario: &Scenario) -> Option<PlausibilityWarning> {
+pub fn probable_obstacle_to_rest(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let slips = [
-        out_of_reach,
+        held_tip_out_of_reach,
         clamp_angle_in_degrees,
         fan_angles_in_degrees,
-        thicker_than_long,
+        section_wider_than_vein_long,
         weight_stated_twice,
         weight_of_another_mass,
     ];
@@ -261,7 +265,7 @@ struct TipReach {
 }
 
 /// A tip that is held farther from the base than a vein plausibly stretches.
-pub fn out_of_reach(scenario: &Scenario) -> Option<PlausibilityWarning> {
+pub fn held_tip_out_of_reach(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
     let reach = |(vein, rod): (usize, &Rod)| {
         let length = rod.length * rod.rest_stretch.integral(1.0);
@@ -322,7 +326,7 @@ fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
 }
 
 /// A section with a side longer than its vein.
-fn thicker_than_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
+fn section_wider_than_vein_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
     let mut rods = scenario.rods.iter().enumerate();
     let (vein, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
@@ -406,7 +410,7 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<PlausibilityWarning> {
 }
 
 /// A leaf that is too long for its weight and stiffness, if only its base is held.
-fn too_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
+fn leaf_too_long_for_weight(scenario: &Scenario) -> Option<PlausibilityWarning> {
     if scenario.held_tip.is_some() {
         return None;
     }
@@ -516,7 +520,7 @@ mod tests {
                 section = {{ shape = "circle", diameter = 0.002, young = 1e9, mass_density = {density:e} }}
                 load = {{ gravity = [0.0, 0.0, -0.03] }}"#
             );
-            obstacle(&Scenario::from_toml(&text).unwrap())
+            probable_obstacle_to_rest(&Scenario::from_toml(&text).unwrap())
         };
         assert_eq!(heavy(1000.0), None);
         assert!(heavy(1e-6).is_some());

@@ -6,7 +6,7 @@
 use crate::memory;
 use crate::scenario::checked::Scenario;
 use crate::scenario::format::entries::{CollectedEntries, Entries, MOST_RODS};
-use crate::scenario::format::error::{ScenarioError, ScenarioResult, line_of};
+use crate::scenario::format::error::{ScenarioError, ScenarioResult, line_number_at};
 use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioSource;
 use crate::scenario::format::units::Units;
@@ -112,7 +112,7 @@ pub fn decode_utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         let byte = bytes[offset];
         let problem =
             format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
-        ScenarioError::in_file(file, Some(line_of(bytes, offset)), problem)
+        ScenarioError::in_file(file, Some(line_number_at(bytes, offset)), problem)
     })
 }
 
@@ -152,7 +152,7 @@ impl Entries {
     /// # Errors
     /// If it has an unknown key.
     pub fn from_table(table: Table) -> ScenarioResult<Self> {
-        Entries::collect(ScenarioSource::default(), table).refuse_unknown()
+        Entries::collect_from_table(ScenarioSource::default(), table).refuse_unknown()
     }
 
     /// The checked scenario.
@@ -161,7 +161,7 @@ impl Entries {
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> ScenarioResult<Scenario> {
         let scenario = self.read().map_err(|error| self.error_with_others(error))?;
-        limits::check(self, &scenario)?;
+        limits::check_limits(self, &scenario)?;
         Ok(scenario)
     }
 
@@ -386,7 +386,7 @@ impl Entries {
             MissingKeyRule::Required(example) => Some(example),
             _ => None,
         };
-        self.replace(key, value);
+        self.replace_value(key, value);
         true
     }
 
@@ -413,17 +413,17 @@ impl Entries {
             _ => return false,
         };
         self.given_value(key)
-            .is_some_and(|item| depth(item.value) > single)
+            .is_some_and(|item| list_depth(item.value) > single)
     }
 }
 
 /// How deep lists stand within each other; of a profile in those at each knot.
-fn depth(value: &Value) -> usize {
+fn list_depth(value: &Value) -> usize {
     match value {
-        Value::Array(list) => 1 + list.first().map_or(0, depth),
+        Value::Array(list) => 1 + list.first().map_or(0, list_depth),
         Value::Table(profile) => profile
             .get("value")
-            .map_or(0, |value| depth(value).saturating_sub(1)),
+            .map_or(0, |value| list_depth(value).saturating_sub(1)),
         _ => 0,
     }
 }

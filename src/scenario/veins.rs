@@ -44,7 +44,7 @@ pub struct Rod {
 
 impl Rod {
     /// All profiles in the constitutive law of the rod.
-    pub(crate) fn profiles(&self) -> impl Iterator<Item = &Profile> {
+    pub(crate) fn constitutive_profiles(&self) -> impl Iterator<Item = &Profile> {
         let triples = [
             &self.couple_stiffness,
             &self.force_stiffness,
@@ -143,7 +143,7 @@ impl Default for Tissue {
 
 impl Tissue {
     /// k1, k2, k3 and c1 along the gap.
-    pub(crate) fn profiles(&self) -> [&Profile; 4] {
+    pub(crate) fn stiffness_profiles(&self) -> [&Profile; 4] {
         let [along, across, normal] = &self.stiffness;
         [along, across, normal, &self.fold]
     }

@@ -261,13 +261,13 @@ impl<'a> TissueEnergy<'a> {
 
     /// k and c_1 of gap `g` at `sigma`, per unit of sigma.
     fn stiffness(&self, g: usize, sigma: f64) -> [f64; 4] {
-        let (of, factors) = (self.gaps[g].profiles(), self.factors[g]);
+        let (of, factors) = (self.gaps[g].stiffness_profiles(), self.factors[g]);
         [0, 1, 2, 3].map(|which| of[which].at(sigma) * factors[which])
     }
 
     /// The largest stiffness of gap `g`.
     pub fn largest(&self, g: usize) -> f64 {
-        let [along, across, normal, _] = self.gaps[g].profiles();
+        let [along, across, normal, _] = self.gaps[g].stiffness_profiles();
         let most = [along, across, normal].map(Profile::max_abs);
         most.into_iter().fold(0.0, f64::max) * self.factors[g][0]
     }

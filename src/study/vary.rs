@@ -476,7 +476,7 @@ impl BaseScenario {
 
     /// The text of the scenario's file.
     pub fn text(&self) -> &str {
-        self.entries.text()
+        self.entries.source_text()
     }
 
     /// The entries replaced, without the settings of methods.
@@ -691,7 +691,7 @@ impl BaseScenario {
     /// and profiles their common factor, and each entry of short ones.
     pub fn numbers(&self) -> Vec<ScenarioNumber> {
         let mut numbers = Vec::new();
-        for part in Key::all().flat_map(|key| self.entries.parts(key)) {
+        for part in Key::all().flat_map(|key| self.entries.paths_of_key(key)) {
             let Some(value) = self.entries.value_at(part) else {
                 continue;
             };

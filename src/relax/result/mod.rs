@@ -594,7 +594,7 @@ impl BladeReport {
             |profiles: &[crate::scenario::Profile; 3]| profiles.each_ref().map(|of| of.at(sigma));
         let tissue = |all: &Vec<crate::scenario::Tissue>| {
             let gap = &all[middle.min(all.len() - 1)];
-            gap.profiles().map(|of| of.at(sigma))
+            gap.stiffness_profiles().map(|of| of.at(sigma))
         };
         let sum = |axis: usize| {
             rods.iter()

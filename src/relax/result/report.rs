@@ -15,7 +15,8 @@ use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, Sp
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::scenario::{
-    LARGEST_PLAUSIBLE_STRETCH, Scenario, obstacle, out_of_reach, plausibility_warnings,
+    LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
+    probable_obstacle_to_rest,
 };
 use crate::shape::{Centerline, RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
 use glam::DVec3;
@@ -337,7 +338,7 @@ fn obstacle_to_rest(
     found: &NestedEquilibrium,
     reached: Option<(Stage, f64)>,
 ) -> Option<RestObstacle> {
-    if let Some(slip) = obstacle(problem.leaf.scenario()) {
+    if let Some(slip) = probable_obstacle_to_rest(problem.leaf.scenario()) {
         return Some(RestObstacle::Implausible(slip));
     }
     let level = found.levels.last()?;
@@ -396,7 +397,7 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
     let (rods, stations) = (&leaf.shape.rods, &leaf.shape.stations);
     let warnings = plausibility_warnings(scenario).into_iter();
     let mut all: Vec<_> = warnings.map(EquilibriumDoubt::Implausible).collect();
-    if out_of_reach(scenario).is_none() {
+    if held_tip_out_of_reach(scenario).is_none() {
         let strained = || stretch_doubt(excess_stretches(scenario, rods, stations));
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }

@@ -197,7 +197,7 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
     let gap = &leaf.tissue.as_ref().unwrap()[2];
     tissue
         .into_iter()
-        .zip(gap.profiles())
+        .zip(gap.stiffness_profiles())
         .for_each(|(wanted, found)| constant(wanted, found));
     constant(8e-6 * h * t, &leaf.dynamics.density[0]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.

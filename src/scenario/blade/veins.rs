@@ -192,7 +192,7 @@ impl BladeVein {
             places: Vec::new(),
             seams: Vec::new(),
         };
-        vein.measure();
+        vein.compute_arc_length();
         vein
     }
 
@@ -225,7 +225,7 @@ impl BladeVein {
     }
 
     /// Finds the length of the vein, and x at equal distances along the vein.
-    fn measure(&mut self) {
+    fn compute_arc_length(&mut self) {
         let even = (0..=ARC_LENGTH_PANELS).map(|k| k as f64 / ARC_LENGTH_PANELS as f64);
         let outline = self.outline.clone();
         let curved = outline.curvature.iter().flat_map(Spline::knots);
@@ -299,7 +299,7 @@ impl BladeVein {
 
     /// The mass and the moment of inertia per length, of the blade's own width: also where stiffnesses
     /// follow from a larger one.
-    fn masses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
+    fn mass_and_inertia(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
         let width = self
             .outline
             .width
@@ -323,7 +323,9 @@ impl BladeVein {
                 let axis = index - REST_CURVATURES.start;
                 self.rest_curvature(self.blade_fraction(sigma))[axis]
             }
-            index => self.masses(sigma, &self.material.local_material(sigma))[index - DENSITY],
+            index => {
+                self.mass_and_inertia(sigma, &self.material.local_material(sigma))[index - DENSITY]
+            }
         }
     }
 
@@ -333,7 +335,7 @@ impl BladeVein {
         let mut all = [0.0; MAX_PROPERTIES];
         all[STIFFNESSES].copy_from_slice(&self.stiffnesses(sigma, &material));
         all[REST_CURVATURES].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
-        all[DENSITY..].copy_from_slice(&self.masses(sigma, &material));
+        all[DENSITY..].copy_from_slice(&self.mass_and_inertia(sigma, &material));
         all
     }
 }

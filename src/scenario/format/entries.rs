@@ -5,11 +5,13 @@
 #[cfg(test)]
 mod tests;
 
-use crate::scenario::format::error::{ScenarioError, ScenarioResult, SourceLocation, shorten};
+use crate::scenario::format::error::{
+    ScenarioError, ScenarioResult, SourceLocation, shorten_excerpt,
+};
 use crate::scenario::format::path::{EntryPath, nearest_key};
 use crate::scenario::format::source::{
-    ParsedText, ScenarioSource, entry_span, multiply, number, parse_value, toml_error_message,
-    value_from_parsed,
+    ParsedText, ScenarioSource, entry_span, multiply_numbers, number_of_value, parse_value,
+    toml_error_message, value_from_parsed,
 };
 use crate::scenario::format::{Key, MissingKeyRule, TablePath, ValueSchema};
 use std::sync::{Arc, LazyLock};
@@ -84,23 +86,26 @@ impl Entries {
         file: &str,
     ) -> ScenarioResult<CollectedEntries> {
         let ParsedText { source, table } = ScenarioSource::parse(text, file)?;
-        Ok(Entries::collect(source, table))
+        Ok(Entries::collect_from_table(source, table))
     }
 
     /// The entries in a table.
-    pub(in crate::scenario) fn collect(source: ScenarioSource, table: Table) -> CollectedEntries {
+    pub(in crate::scenario) fn collect_from_table(
+        source: ScenarioSource,
+        table: Table,
+    ) -> CollectedEntries {
         let mut entries = Entries {
             entries: [const { Vec::new() }; Key::COUNT],
             rows: [0; Key::REPEATED_TABLES.len()],
             source: source.into(),
         };
         let mut unknown = Vec::new();
-        entries.add(TableRow { table: "", row: 0 }, table, &mut unknown);
+        entries.add_table(TableRow { table: "", row: 0 }, table, &mut unknown);
         CollectedEntries { entries, unknown }
     }
 
     /// Adds the entries of a table, and the errors about those that have no place in it.
-    fn add(&mut self, of: TableRow, entries: Table, errors: &mut Vec<ScenarioError>) {
+    fn add_table(&mut self, of: TableRow, entries: Table, errors: &mut Vec<ScenarioError>) {
         let TableRow { table, row } = of;
         for (name, value) in entries {
             let own_path = TablePath { table, name: &name };
@@ -114,7 +119,7 @@ impl Entries {
                 Some(inner) => self.add_inner(inner, value, errors),
                 None => {
                     let meant = nearest_key(path).map(|key| format!(" (did you mean {key}?)"));
-                    let (path, meant) = (shorten(path), meant.unwrap_or_default());
+                    let (path, meant) = (shorten_excerpt(path), meant.unwrap_or_default());
                     let allowed = Key::allowed_in(table).join(", ");
                     let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
                     errors.push(self.source.unknown_key_error(own_path, row, problem));
@@ -127,12 +132,14 @@ impl Entries {
     fn add_inner(&mut self, table: &'static str, value: Value, errors: &mut Vec<ScenarioError>) {
         let repeated = Key::REPEATED_TABLES.iter().position(|name| *name == table);
         match (repeated, value) {
-            (None, Value::Table(entries)) => self.add(TableRow { table, row: 0 }, entries, errors),
+            (None, Value::Table(entries)) => {
+                self.add_table(TableRow { table, row: 0 }, entries, errors)
+            }
             (Some(which), Value::Array(list)) if list.iter().all(Value::is_table) => {
                 self.rows[which] = list.len();
                 for (row, value) in list.into_iter().enumerate() {
                     if let Value::Table(entries) = value {
-                        self.add(TableRow { table, row }, entries, errors);
+                        self.add_table(TableRow { table, row }, entries, errors);
                     }
                 }
             }
@@ -149,7 +156,7 @@ impl Entries {
         let mut entries = self.clone();
         for given in overrides {
             let refuse = |problem: String| {
-                let given = shorten(given);
+                let given = shorten_excerpt(given);
                 ScenarioError::at_place(SourceLocation::Set { given }, problem)
             };
             let Some((path, text)) = given.split_once('=') else {
@@ -163,9 +170,10 @@ impl Entries {
             let value = match part.is_whole() {
                 true => value.map_err(|error| refuse(toml_error_message(&error, text)))?,
                 false => {
-                    let new = value.map_err(|_| format!("{} is no value", shorten(text)));
+                    let new = value.map_err(|_| format!("{} is no value", shorten_excerpt(text)));
                     // What is too large for a number is shown as it was given.
-                    let is_number = |new: &Value| number(new).is_none_or(|number| !number.is_nan());
+                    let is_number =
+                        |new: &Value| number_of_value(new).is_none_or(|number| !number.is_nan());
                     let new = new.map(|new| match is_number(&new) || text.contains("nan") {
                         true => new,
                         false => text.into(),
@@ -183,7 +191,7 @@ impl Entries {
     }
 
     /// The text that the entries are from, without overrides.
-    pub(crate) fn text(&self) -> &str {
+    pub(crate) fn source_text(&self) -> &str {
         &self.source.text
     }
 
@@ -214,7 +222,7 @@ impl Entries {
     }
 
     /// The whole value of a key, in each of its tables.
-    pub(crate) fn parts(&self, key: Key) -> impl Iterator<Item = EntryPath> {
+    pub(crate) fn paths_of_key(&self, key: Key) -> impl Iterator<Item = EntryPath> {
         let table = key.table();
         let rows = self.table_count(table).unwrap_or(1);
         (0..rows).map(move |row| EntryPath::whole_entry(key, row))
@@ -249,8 +257,8 @@ impl Entries {
         });
         let text = whole.map(|(_, text)| text.trim());
         let found = text.and_then(|text| text.get(entry_span(&parse_value(text).ok()?, part)));
-        let found = found.map_or_else(|| shorten(&value.to_string()), shorten);
-        let given = shorten(given);
+        let found = found.map_or_else(|| shorten_excerpt(&value.to_string()), shorten_excerpt);
+        let given = shorten_excerpt(given);
         WrittenEntry {
             place: SourceLocation::Set { given },
             text: found,
@@ -273,7 +281,7 @@ impl Entries {
     }
 
     /// The value of a key, or its default; in one of its tables if there may be several.
-    pub(super) fn get(&self, key: Key, row: usize) -> Option<&Value> {
+    pub(super) fn given_or_default(&self, key: Key, row: usize) -> Option<&Value> {
         let entry = self.entry(key, row);
         entry
             .map(|entry| &entry.value)
@@ -292,11 +300,11 @@ impl Entries {
     }
 
     /// Replaces a key in each of its tables by this value, as TOML, or by none.
-    pub(in crate::scenario) fn replace(&mut self, key: Key, value: Option<&str>) {
+    pub(in crate::scenario) fn replace_value(&mut self, key: Key, value: Option<&str>) {
         self.entries[key as usize].clear();
         let value = value.and_then(|text| parse_value(text).ok());
         if let Some(value) = value.map(|value| value_from_parsed(&value)) {
-            let parts: Vec<EntryPath> = self.parts(key).collect();
+            let parts: Vec<EntryPath> = self.paths_of_key(key).collect();
             for part in parts {
                 self.put_entry(part, value.clone(), None);
             }
@@ -306,7 +314,7 @@ impl Entries {
     /// The value at a path, if there is one.
     pub(crate) fn value_at(&self, part: EntryPath) -> Option<&Value> {
         self.check_row(part).ok()?;
-        let mut place = self.get(part.key, part.row)?;
+        let mut place = self.given_or_default(part.key, part.row)?;
         if let Some(list) = part.list {
             place = place.get(list)?;
         }
@@ -317,7 +325,7 @@ impl Entries {
             .skip(part.shared_indices(place))
         {
             // A single number holds for all rods.
-            if number(place).is_none() {
+            if number_of_value(place).is_none() {
                 place = place.get(index)?;
             }
         }
@@ -328,7 +336,7 @@ impl Entries {
     pub(crate) fn number_at(&self, part: EntryPath) -> Option<f64> {
         match part.scale {
             true => Some(1.0),
-            false => number(self.value_at(part)?),
+            false => number_of_value(self.value_at(part)?),
         }
     }
 
@@ -340,7 +348,7 @@ impl Entries {
 
     /// The whole value of a key after a part of it is replaced.
     fn replaced_value(&self, part: EntryPath, new: Value) -> Result<Value, String> {
-        let whole = self.get(part.key, part.row);
+        let whole = self.given_or_default(part.key, part.row);
         let mut whole = whole
             .cloned()
             .ok_or("is not in the scenario: write it first")?;
@@ -359,15 +367,15 @@ impl Entries {
                 let component = part
                     .check_is_number()
                     .err()
-                    .filter(|_| number(&new).is_some());
+                    .filter(|_| number_of_value(&new).is_some());
                 let there = || format!("there are {count} entries, and indices count from 0");
                 component.unwrap_or_else(there)
             })?;
         }
         match part.scale {
             true => {
-                let factor = number(&new).filter(|factor| factor.is_finite());
-                multiply(place, factor.ok_or("the factor must be a finite number")?)?;
+                let factor = number_of_value(&new).filter(|factor| factor.is_finite());
+                multiply_numbers(place, factor.ok_or("the factor must be a finite number")?)?;
             }
             false => *place = new,
         }
@@ -376,8 +384,10 @@ impl Entries {
 
     /// Turns a single number or vector for all rods, or gaps, into a list.
     fn expand_to_list(&self, part: EntryPath, place: &mut Value) -> Result<(), String> {
-        if number(place).is_some() || part.shared_indices(place) > 0 {
-            let rods = self.get(Key::Rods, 0).and_then(Value::as_integer);
+        if number_of_value(place).is_some() || part.shared_indices(place) > 0 {
+            let rods = self
+                .given_or_default(Key::Rods, 0)
+                .and_then(Value::as_integer);
             let rods = rods.and_then(|rods| usize::try_from(rods).ok());
             let rods = rods.filter(|rods| *rods <= MOST_RODS);
             let rods = rods.ok_or("leaf.rods must say of how many")?;

@@ -122,14 +122,14 @@ pub fn printable(message: &str) -> Cow<'_, str> {
 }
 
 /// The line of `text` that holds byte `at`, counted from 1.
-pub(in crate::scenario) fn line_of(text: &[u8], at: usize) -> usize {
+pub(in crate::scenario) fn line_number_at(text: &[u8], at: usize) -> usize {
     let before = text[..at.min(text.len())].iter();
     1 + before.filter(|byte| **byte == b'\n').count()
 }
 
 /// The offending line with a caret below, to be put after a message; empty
 /// where the line is too long to be read.
-pub(in crate::scenario) fn snippet(text: &str, span: Range<usize>) -> String {
+pub(in crate::scenario) fn line_with_caret(text: &str, span: Range<usize>) -> String {
     let at = span.start.min(text.len());
     let (Some(before), Some(after)) = (text.get(..at), text.get(at..)) else {
         return String::new();
@@ -140,7 +140,7 @@ pub(in crate::scenario) fn snippet(text: &str, span: Range<usize>) -> String {
     if length > EXCERPTS.line_width {
         return String::new();
     }
-    let number = line_of(text.as_bytes(), at).to_string();
+    let number = line_number_at(text.as_bytes(), at).to_string();
     let gap = " ".repeat(number.len());
     // Tabs stay tabs, so that the caret stands below its character.
     let indent = text[start..at].replace(|c| c != '\t', " ");
@@ -153,7 +153,7 @@ pub(in crate::scenario) fn snippet(text: &str, span: Range<usize>) -> String {
 }
 
 /// `text` on one line, cut off where it is long.
-pub(in crate::scenario) fn shorten(text: &str) -> String {
+pub(in crate::scenario) fn shorten_excerpt(text: &str) -> String {
     let mut short = String::new();
     for word in text.split_whitespace() {
         if !short.is_empty() {

@@ -2,9 +2,9 @@
 //! every form that a key can have.
 
 use crate::scenario::format::entries::{Entries, WrittenEntry};
-use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten};
+use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten_excerpt};
 use crate::scenario::format::path::EntryPath;
-use crate::scenario::format::source::{intended_number, number};
+use crate::scenario::format::source::{intended_number, number_of_value};
 use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
 use crate::scenario::profile::{Profile, Schedule};
 use std::fmt::Display;
@@ -66,7 +66,7 @@ impl Entries {
         key: Key,
         row: usize,
     ) -> ScenarioResult<EntryValue<'_>> {
-        match self.get(key, row) {
+        match self.given_or_default(key, row) {
             Some(value) => Ok(EntryValue {
                 entries: self,
                 part: EntryPath::whole_entry(key, row),
@@ -158,12 +158,16 @@ impl<'e> EntryValue<'e> {
 
     /// The two lists, `at` and `other`, of a table that may have no others. `form`
     /// describes such a table.
-    fn pair(&self, other: &'static str, form: &str) -> ScenarioResult<[EntryValue<'e>; 2]> {
+    fn knots_and_values(
+        &self,
+        other: &'static str,
+        form: &str,
+    ) -> ScenarioResult<[EntryValue<'e>; 2]> {
         let Some(table) = self.value.as_table() else {
             return Err(self.value_error(format_args!("must be a table: {form}")));
         };
         if let Some(key) = table.keys().find(|key| *key != "at" && *key != other) {
-            let key = shorten(key);
+            let key = shorten_excerpt(key);
             return Err(self.value_error(format_args!("unknown key {key}: {form}")));
         }
         let list = |name| {
@@ -252,7 +256,7 @@ impl<'e> EntryValue<'e> {
 
     /// A number in a range.
     pub fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
-        let value = number(self.value);
+        let value = number_of_value(self.value);
         let value = value.ok_or_else(|| match self.intended_number() {
             Some(meant) => self.value_error(format_args!("must be a number: {meant}")),
             None => self.value_error("must be a number"),
@@ -281,7 +285,7 @@ impl<'e> EntryValue<'e> {
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
     pub fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
-        if number(self.value).is_some() || self.intended_number().is_some() {
+        if number_of_value(self.value).is_some() || self.intended_number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {
@@ -305,10 +309,10 @@ impl<'e> EntryValue<'e> {
             let numbers = self.number_for_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
-        let [at, value] = self.pair("value", PROFILE_FORM)?;
+        let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
-        let mut list = value.array(&needed)?;
+        let mut list = value.list_entries(&needed)?;
         if (list.next()).is_none_or(|first| !first.value.is_array()) {
             return Ok(vec![value.linear_profile(&at)?; rods]);
         }
@@ -318,7 +322,7 @@ impl<'e> EntryValue<'e> {
 
     /// The knots of a profile along the leaf.
     pub fn knots(&self) -> ScenarioResult<Knots> {
-        let [at, value] = self.pair("value", PROFILE_FORM)?;
+        let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = list
@@ -344,7 +348,7 @@ impl<'e> EntryValue<'e> {
 
     /// A factor at given times.
     pub fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
-        let [at, factor] = self.pair("factor", FACTOR_SCHEDULE_FORM)?;
+        let [at, factor] = self.knots_and_values("factor", FACTOR_SCHEDULE_FORM)?;
         let at = at.increasing_numbers(false)?;
         let value = factor.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = value
@@ -363,7 +367,7 @@ impl<'e> EntryValue<'e> {
             ),
             false => ("times", 1, "at least one time is needed"),
         };
-        let list = self.array(LIST_OF_NUMBERS)?;
+        let list = self.list_entries(LIST_OF_NUMBERS)?;
         let count = list.len();
         self.refuse_unless(count >= least, too_few)?;
         let mut at: Vec<f64> = Vec::with_capacity(count);
@@ -388,7 +392,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The entries of a list; `needed` describes the list in the error about a value that is none.
-    fn array(
+    fn list_entries(
         &self,
         needed: &str,
     ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
@@ -407,7 +411,7 @@ impl<'e> EntryValue<'e> {
         because: &str,
         needed: &str,
     ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
-        let list = self.array(needed)?;
+        let list = self.list_entries(needed)?;
         let found = list.len();
         self.refuse_unless(
             found == count,
@@ -448,7 +452,7 @@ impl<'e> EntryValue<'e> {
             let each = self.vector_per_rod(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
-        let [at, value] = self.pair("value", VECTOR_PROFILE_FORM)?;
+        let [at, value] = self.knots_and_values("value", VECTOR_PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let profiles = |list: EntryValue| -> ScenarioResult<[Profile; 3]> {
             let each = list.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
@@ -475,7 +479,7 @@ impl<'e> EntryValue<'e> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
-        let [at, value] = self.pair("value", LOAD_SCHEDULE_FORM)?;
+        let [at, value] = self.knots_and_values("value", LOAD_SCHEDULE_FORM)?;
         let at = at.increasing_numbers(false)?;
         let value = value.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
         let value = value
@@ -496,7 +500,7 @@ impl<'e> EntryValue<'e> {
 
     /// A stretch of a rod, `[from, to]`, or one point of it.
     pub fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
-        if number(self.value).is_some() {
+        if number_of_value(self.value).is_some() {
             return Ok([self.fraction()?; 2]);
         }
         let needed = "a fraction of the length, or a list [from, to] of two";

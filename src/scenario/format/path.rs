@@ -2,7 +2,7 @@
 //! `stiffness.bending_2.value[1]`, `load.point[0].force[2]`, or all numbers of an entry together,
 //! `scale:stiffness.bending_2`; and what was meant by a path that the format does not have.
 
-use crate::scenario::format::error::shorten;
+use crate::scenario::format::error::shorten_excerpt;
 use crate::scenario::format::{Key, TablePath, ValueSchema, table_header};
 use std::fmt;
 use toml::Value;
@@ -314,7 +314,7 @@ pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
 
 /// The message for an unknown key, with what was probably meant.
 fn unknown_key_message(path: &str) -> String {
-    let found = shorten(path);
+    let found = shorten_excerpt(path);
     match nearest_key(path) {
         Some(meant) if meant != path => {
             return format!("unknown key {found} (did you mean {meant}?)");

@@ -2,7 +2,7 @@
 //! their meaning, and the places of errors in it.
 
 use crate::scenario::format::error::{
-    ScenarioError, ScenarioResult, SourceLocation, line_of, shorten, snippet,
+    ScenarioError, ScenarioResult, SourceLocation, line_number_at, line_with_caret, shorten_excerpt,
 };
 use crate::scenario::format::path::EntryPath;
 use crate::scenario::format::{Key, TablePath, is_repeated_table, table_header};
@@ -53,7 +53,8 @@ impl ScenarioSource {
                 Ok(table) => table_from_parsed(table.get_ref()),
                 Err(error) => {
                     let span = error.span().unwrap_or(0..0);
-                    let problem = toml_error_message(&error, text) + &snippet(text, span.clone());
+                    let problem =
+                        toml_error_message(&error, text) + &line_with_caret(text, span.clone());
                     return Err(source.error_at_span(Some(span), problem));
                 }
             },
@@ -92,14 +93,14 @@ impl ScenarioSource {
     /// A value as it is written, shortened.
     pub fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
         let written = spans.and_then(|spans| self.text.get(spans.value.clone()));
-        written.map_or_else(|| shorten(&value.to_string()), shorten)
+        written.map_or_else(|| shorten_excerpt(&value.to_string()), shorten_excerpt)
     }
 
     /// The line with byte `at` of the text.
     pub fn location(&self, at: Option<usize>) -> SourceLocation {
         SourceLocation::File {
             file: self.file.clone(),
-            line: at.map(|at| line_of(self.text.as_bytes(), at)),
+            line: at.map(|at| line_number_at(self.text.as_bytes(), at)),
         }
     }
 
@@ -113,7 +114,7 @@ impl ScenarioSource {
         let span = self
             .find_entry_spans(path, row, None)
             .map(|spans| spans.key);
-        let line = span.clone().map(|span| snippet(&self.text, span));
+        let line = span.clone().map(|span| line_with_caret(&self.text, span));
         self.error_at_span(span, problem + &line.unwrap_or_default())
     }
 
@@ -138,7 +139,7 @@ impl ScenarioSource {
 pub(super) fn toml_error_message(error: &Error, text: &str) -> String {
     let line = error
         .span()
-        .map(|span| line_of(text.as_bytes(), span.start));
+        .map(|span| line_number_at(text.as_bytes(), span.start));
     let line = line.and_then(|line| text.lines().nth(line - 1));
     let meant = line.and_then(intended_number_in_line);
     let meant = meant.map_or(String::new(), |meant| format!(": {meant}"));
@@ -246,7 +247,7 @@ pub(super) fn parse_value(text: &str) -> Result<Spanned<DeValue<'_>>, Error> {
 }
 
 /// The number that a value is, if any. JSON has no infinity: there it is the text `"inf"`.
-pub(super) fn number(value: &Value) -> Option<f64> {
+pub(super) fn number_of_value(value: &Value) -> Option<f64> {
     match value {
         Value::Float(float) => Some(*float),
         Value::Integer(integer) => Some(*integer as f64),
@@ -294,24 +295,24 @@ fn intended_number_in_line(line: &str) -> Option<String> {
 }
 
 /// Multiplies every number in a value; knots and times stay where they are.
-pub(super) fn multiply(value: &mut Value, factor: f64) -> Result<(), String> {
-    if let Some(number) = number(value) {
+pub(super) fn multiply_numbers(value: &mut Value, factor: f64) -> Result<(), String> {
+    if let Some(number) = number_of_value(value) {
         *value = Value::Float(number * factor);
         return Ok(());
     }
     match value {
         Value::Array(list) => list
             .iter_mut()
-            .try_for_each(|entry| multiply(entry, factor)),
+            .try_for_each(|entry| multiply_numbers(entry, factor)),
         Value::Table(table) => {
             let lists = table.iter_mut().filter(|(name, _)| *name != "at");
             lists
                 .map(|(_, list)| list)
-                .try_for_each(|list| multiply(list, factor))
+                .try_for_each(|list| multiply_numbers(list, factor))
         }
         other => Err(format!(
             "{} is no number to be scaled: write numbers first",
-            shorten(&other.to_string())
+            shorten_excerpt(&other.to_string())
         )),
     }
 }

@@ -183,7 +183,7 @@ impl Section {
         let area = sides.area();
         let second = sides.second_moments();
         match property {
-            Property::Couple(0) => shear * sides.torsion(),
+            Property::Couple(0) => shear * sides.torsion_constant(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
             Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
@@ -257,7 +257,7 @@ impl Radii {
     /// the outline of its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some((section.dimensions_at(sigma).enclosed() / PI).sqrt())
+        Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
     }
 
     /// The moduli of the section of a rod at a fraction of its length.

@@ -82,7 +82,7 @@ impl SectionDimensions {
     }
 
     /// The area within the outline, with the hole.
-    pub fn enclosed(self) -> f64 {
+    pub fn enclosed_area(self) -> f64 {
         match self.outline {
             SectionOutline::Circle | SectionOutline::Ellipse => {
                 PI / 4.0 * self.width * self.thickness
@@ -93,7 +93,7 @@ impl SectionDimensions {
 
     /// The area of the material.
     pub fn area(self) -> f64 {
-        self.enclosed() - self.hole().map_or(0.0, SectionDimensions::enclosed)
+        self.enclosed_area() - self.hole().map_or(0.0, SectionDimensions::enclosed_area)
     }
 
     /// The second moments I2 and I3 of the area, about d2 and d3.
@@ -114,9 +114,9 @@ impl SectionDimensions {
     }
 
     /// The torsion constant J.
-    pub fn torsion(self) -> f64 {
+    pub fn torsion_constant(self) -> f64 {
         let Some(wall) = self.wall else {
-            return self.outline.torsion(self.width, self.thickness);
+            return self.outline.torsion_constant(self.width, self.thickness);
         };
         let panel = |from: f64| -> f64 {
             let layers = GAUSS_LEGENDRE_RULE.iter();
@@ -139,7 +139,7 @@ impl SectionDimensions {
     /// The torsion constant of the outline less that of the hole.
     fn torsion_upper_bound(self) -> f64 {
         let of = |sides: SectionDimensions| match sides.width.min(sides.thickness) > 0.0 {
-            true => sides.outline.torsion(sides.width, sides.thickness),
+            true => sides.outline.torsion_constant(sides.width, sides.thickness),
             false => 0.0,
         };
         of(self) - self.hole().map_or(0.0, of)
@@ -213,7 +213,7 @@ fn box_shear_factor(along: f64, across: f64, nu: f64) -> f64 {
 impl SectionOutline {
     /// The torsion constant J. Of a rectangle with the long side a and the short
     /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
-    fn torsion(self, width: f64, thickness: f64) -> f64 {
+    fn torsion_constant(self, width: f64, thickness: f64) -> f64 {
         match self {
             SectionOutline::Circle | SectionOutline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
@@ -329,7 +329,7 @@ impl SectionDimensions {
         Moduli {
             area: self.area(),
             bending: [0.5 * t / second, 0.5 * w / third],
-            torsion: self.stress_function_slope() / self.torsion(),
+            torsion: self.stress_function_slope() / self.torsion_constant(),
             shear: [
                 turned.first_moment() / (third * turned.central_material_width()),
                 self.first_moment() / (second * self.central_material_width()),
@@ -340,7 +340,7 @@ impl SectionDimensions {
 
     /// The hole, if it has an area.
     fn open_hole(self) -> Option<SectionDimensions> {
-        self.hole().filter(|hole| hole.enclosed() > 0.0)
+        self.hole().filter(|hole| hole.enclosed_area() > 0.0)
     }
 
     /// The first moment of the upper half of the section about d2.
@@ -419,7 +419,7 @@ mod tests {
             (10.0, 0.312_332_5),
         ] {
             for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
-                let found = SectionOutline::Rectangle.torsion(width, thickness);
+                let found = SectionOutline::Rectangle.torsion_constant(width, thickness);
                 close(found, constant * sides, 3e-5);
             }
         }
@@ -430,12 +430,16 @@ mod tests {
         };
         for long in [1.0, 1.3, 4.0, 50.0] {
             close(
-                SectionOutline::Rectangle.torsion(long, 1.0),
+                SectionOutline::Rectangle.torsion_constant(long, 1.0),
                 direct(long),
                 1e-13,
             );
         }
-        close(SectionOutline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
+        close(
+            SectionOutline::Rectangle.torsion_constant(1e4, 1.0),
+            1e4 / 3.0,
+            1e-4,
+        );
     }
 
     fn hollow(outline: SectionOutline, width: f64, thickness: f64, wall: f64) -> SectionDimensions {
@@ -456,7 +460,7 @@ mod tests {
             let polar = PI / 32.0 * (1.0 - f64::powi(inner, 4));
             for outline in [SectionOutline::Circle, SectionOutline::Ellipse] {
                 let tube = hollow(outline, 1.0, 1.0, wall);
-                close(tube.torsion(), polar, 1e-13);
+                close(tube.torsion_constant(), polar, 1e-13);
                 close(tube.area(), PI / 4.0 * (1.0 - inner * inner), 1e-13);
                 let [second, third] = tube.second_moments();
                 close(second, polar / 2.0, 1e-13);
@@ -475,7 +479,7 @@ mod tests {
         let (w, t, wall) = (2.0, 1.0, 1e-7);
         let tube = hollow(SectionOutline::Rectangle, w, t, wall);
         close(
-            tube.torsion(),
+            tube.torsion_constant(),
             4.0 * (w * t).powi(2) * wall / (2.0 * (w + t)),
             1e-6,
         );
@@ -505,12 +509,16 @@ mod tests {
             (Ellipse, 20.0, 2.0, 0.2, 12.867_544, 3e-3),
         ] {
             let tube = hollow(outline, width, thickness, wall);
-            close(tube.torsion(), torsion, within);
-            assert!(tube.torsion() < tube.torsion_upper_bound());
+            close(tube.torsion_constant(), torsion, within);
+            assert!(tube.torsion_constant() < tube.torsion_upper_bound());
         }
         // A wall of half the thickness leaves no hole.
         let full = hollow(Rectangle, 1.7, 1.0, 0.5);
-        close(full.torsion(), Rectangle.torsion(1.7, 1.0), 1e-14);
+        close(
+            full.torsion_constant(),
+            Rectangle.torsion_constant(1.7, 1.0),
+            1e-14,
+        );
     }
 
     fn moduli(outline: SectionOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
