@@ -11,7 +11,9 @@
 //! number.
 
 use crate::relax::{ContinuationFailure, GridPolicy};
-use crate::study::fit::least_squares::{GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::least_squares::{
+    GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
 use crate::study::fit::model::{FitPoint, MOST_RELAXATION_STEPS};
 use crate::study::fit::prediction::CaseSolution;
 use crate::study::fit::statistics::{
@@ -43,7 +45,7 @@ pub(super) fn parameters_with_intervals(
                     budget: None,
                 })
             };
-            parameter_with_interval(stats, (shape, near.as_ref()), k, &mut profiling)
+            parameter_with_interval(stats, shape, near.as_ref(), k, &mut profiling)
         })
         .collect()
 }
@@ -73,7 +75,8 @@ fn parameter_without_interval(stats: &FitStatistics, k: usize) -> FitParameter {
 
 fn parameter_with_interval(
     stats: &FitStatistics,
-    (shape, near): (&FitStatistics, Option<&MinimumNeighbourhood>),
+    shape: &FitStatistics,
+    near: Option<&MinimumNeighbourhood>,
     k: usize,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<FitParameter, FitPoint> {
@@ -84,15 +87,16 @@ fn parameter_with_interval(
         return Ok(parameter);
     }
     let (low, high) = (parameter.low, parameter.high);
-    let own = stats.standard_error(k).0;
+    let own = stats.uncertainty(k).deviation;
     parameter.standard_error = Some(own * free.value_derivative(theta));
     let half = stats.coverage_factor * own;
     let mut sides = [ProfileEndpoint::End(half); 2];
-    let (deviation, along) = shape.standard_error(k);
-    let first = shape.coverage_factor * deviation;
+    let near_minimum = shape.uncertainty(k);
+    let along = &near_minimum.correlated_changes;
+    let first = shape.coverage_factor * near_minimum.deviation;
     let few = match near {
         Some(near) => interval_endpoints(near, k, first, half),
-        None if half > UNDETERMINED_UNCERTAINTY || !is_quadratic_at_ends(shape, &along, first) => {
+        None if half > UNDETERMINED_UNCERTAINTY || !is_quadratic_at_ends(shape, along, first) => {
             Some([Err(half), Err(half)])
         }
         None => None,
@@ -200,8 +204,11 @@ pub(super) enum ProfileEndpoint {
     Lost(f64),
 }
 
-/// Residuals at a point near a minimum.
-type EvaluatedPoint = (DVector<f64>, FitPoint);
+/// A point near a minimum, with its residuals.
+pub(super) struct EvaluatedPoint {
+    pub residuals: DVector<f64>,
+    pub point: FitPoint,
+}
 
 /// The ends of an interval below and above, from a few points around the minimum; as errors,
 /// approximate distances that are not confirmed. `None` if they are those of the quadratic
@@ -225,8 +232,8 @@ pub(super) fn interval_endpoints(
         };
         // By reflection, to second order.
         let linear = &stats.jacobian * change;
-        let down = &up.0 - &linear - &linear;
-        let sides = [&up.0, &down]
+        let down = &up.residuals - &linear - &linear;
+        let sides = [&up.residuals, &down]
             .map(|residuals| near.constrained_minimum(&slopes, k, residuals, f64::INFINITY));
         let clear = |least: &Option<ConstrainedMinimum>| {
             (least.as_ref()).is_some_and(|least| {
@@ -251,7 +258,10 @@ pub(super) fn interval_endpoints(
             most,
             distance: first.min(most),
             curvature: DVector::zeros(along.len()),
-            previous_point: (0.0, 0.0),
+            previous: ProfileRoot {
+                distance: 0.0,
+                root: 0.0,
+            },
             derivatives_elsewhere: None,
             longest: f64::INFINITY,
             last: ProfileCorrection {
@@ -283,12 +293,19 @@ struct EndpointSearch<'s, 'j, 'm, 'a> {
     /// Present estimate of the distance of the end.
     distance: f64,
     curvature: DVector<f64>,
-    /// Distance and root of the sum at the previous point.
-    previous_point: (f64, f64),
+    /// The previous point.
+    previous: ProfileRoot,
     /// Where derivatives are known, if not only at the minimum.
-    derivatives_elsewhere: Option<(FitPoint, GaussNewtonModel)>,
+    derivatives_elsewhere: Option<DifferentiatedPoint>,
     longest: f64,
     last: ProfileCorrection,
+}
+
+/// The sum of squares at a distance from the minimum.
+struct ProfileRoot {
+    distance: f64,
+    /// The root of its excess, normalized to one at an end of the interval.
+    root: f64,
 }
 
 /// A correction of the other numbers towards the least sum.
@@ -321,7 +338,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
                 if lost > MOST_LOST_LEAVES {
                     break;
                 }
-                self.distance = 0.5 * (self.previous_point.0 + self.distance);
+                self.distance = 0.5 * (self.previous.distance + self.distance);
                 continue;
             };
             match self.evaluate(step == 0, found) {
@@ -338,7 +355,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         let change =
             self.along * (self.sign * self.distance) + &self.curvature * self.distance.powi(2);
         let from = match &self.derivatives_elsewhere {
-            Some((point, _)) => point,
+            Some(elsewhere) => &elsewhere.point,
             None => self.neighbourhood.stats.point,
         };
         let found = self
@@ -352,7 +369,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         residuals: &DVector<f64>,
     ) -> Result<ConstrainedMinimum, EndpointSearchFailure> {
         let slopes = match &self.derivatives_elsewhere {
-            Some((_, slopes)) => slopes,
+            Some(elsewhere) => &elsewhere.model,
             None => self.at_minimum,
         };
         let least = self
@@ -373,7 +390,8 @@ impl EndpointSearch<'_, '_, '_, '_> {
         least.excess.max(0.0).sqrt() / self.neighbourhood.stats.coverage_factor
     }
 
-    fn evaluate(&mut self, first: bool, (residuals, point): EvaluatedPoint) -> EndpointSearchStep {
+    fn evaluate(&mut self, first: bool, found: EvaluatedPoint) -> EndpointSearchStep {
+        let EvaluatedPoint { residuals, point } = found;
         let wanted = self.neighbourhood.stats.coverage_factor.powi(2);
         let mut least = self.constrained_minimum(&residuals)?;
         if least.excess_without_correction < -BETTER_MINIMUM_EXCESS {
@@ -420,7 +438,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         self.curvature += &least.correction / self.distance.powi(2);
         // The root of the sum is nearly linear.
         let root = self.normalized_root(least);
-        let secant = (root - self.previous_point.1) / (self.distance - self.previous_point.0);
+        let secant = (root - self.previous.root) / (self.distance - self.previous.distance);
         let wanted = self.neighbourhood.stats.coverage_factor.powi(2);
         let next = match &self.derivatives_elsewhere {
             None if secant > 0.0 => self.distance + (1.0 - root) / secant,
@@ -429,7 +447,10 @@ impl EndpointSearch<'_, '_, '_, '_> {
         if !next.is_finite() {
             return Err(EndpointSearchFailure);
         }
-        self.previous_point = (self.distance, root);
+        self.previous = ProfileRoot {
+            distance: self.distance,
+            root,
+        };
         self.distance = next
             .clamp(0.5 * self.distance, 2.0 * self.distance)
             .min(self.most);
@@ -628,10 +649,10 @@ impl LikelihoodProfile<'_, '_, '_> {
             &|| relaxed(&initial()),
         ];
         ways.into_iter().find_map(|way| {
-            let (least, end) = self.minimize_over_others(way()?, progress);
+            let least = self.minimize_over_others(way()?, progress);
+            let converged = least.outcome == GaussNewtonOutcome::Converged;
             // Without a minimum there, the least sum is still no larger.
-            (end == GaussNewtonOutcome::Converged || self.normalized_root(&least) < 1.0)
-                .then_some(least)
+            (converged || self.normalized_root(&least.point) < 1.0).then_some(least.point)
         })
     }
 
@@ -662,14 +683,13 @@ impl LikelihoodProfile<'_, '_, '_> {
         &self,
         start: FitPoint,
         progress: &mut dyn FnMut(usize, f64),
-    ) -> (FitPoint, GaussNewtonOutcome) {
+    ) -> GaussNewtonResult {
         let mut iteration =
             GaussNewtonIteration::new(self.stats.model, self.stats.weighting, progress);
         iteration.held[self.k] = true;
         iteration.most_steps = MOST_PROFILE_ITERATIONS;
         iteration.gain_tolerance = CONSTRAINED_MINIMUM_ACCURACY;
-        let (least, end, _) = iteration.run(start);
-        (least, end)
+        iteration.run(start)
     }
 
     /// A lower sum with the same value of the number, if numbers that ran away are fitted again
@@ -706,7 +726,7 @@ impl LikelihoodProfile<'_, '_, '_> {
             let start = model.continue_leaves(&there, &theta);
             before = Some(there);
             let Ok(start) = start else { continue };
-            let (found, _) = self.minimize_over_others(start, progress);
+            let found = self.minimize_over_others(start, progress).point;
             if normalized_excess(stats, &found) < lowest - CONSTRAINED_MINIMUM_ACCURACY {
                 return Some(found);
             }
@@ -727,6 +747,12 @@ pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
 pub(super) struct GaussNewtonModel {
     jacobian: DMatrix<f64>,
     curvature: DMatrix<f64>,
+}
+
+/// A point with derivatives.
+pub(super) struct DifferentiatedPoint {
+    point: FitPoint,
+    model: GaussNewtonModel,
 }
 
 /// The least sum of squares with one number fixed away from the minimum.
@@ -765,10 +791,13 @@ impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
     pub fn gauss_newton_model_at(
         &self,
         mut there: FitPoint,
-    ) -> Result<(FitPoint, GaussNewtonModel), ContinuationFailure> {
+    ) -> Result<DifferentiatedPoint, ContinuationFailure> {
         self.stats.model.differentiate_data(&mut there)?;
-        let slopes = self.gauss_newton_from_jacobian(self.stats.weighting.jacobian(&there));
-        Ok((there, slopes))
+        let jacobian = self.stats.weighting.jacobian(&there);
+        Ok(DifferentiatedPoint {
+            model: self.gauss_newton_from_jacobian(jacobian),
+            point: there,
+        })
     }
 
     fn gauss_newton_from_jacobian(&self, mut jacobian: DMatrix<f64>) -> GaussNewtonModel {
@@ -802,12 +831,15 @@ impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
         &self,
         from: &FitPoint,
         theta: &[f64],
-    ) -> Result<(DVector<f64>, FitPoint), ContinuationFailure> {
+    ) -> Result<EvaluatedPoint, ContinuationFailure> {
         let stats = self.stats;
         let there = stats
             .model
             .continue_leaves_on_grids(from, theta, GridPolicy::These)?;
-        Ok((stats.weighting.residuals(&there), there))
+        Ok(EvaluatedPoint {
+            residuals: stats.weighting.residuals(&there),
+            point: there,
+        })
     }
 
     /// The least sum of squares over all numbers but the `k`th, linearised where the residuals

@@ -60,7 +60,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
     // By ascending frequency, so that a limit leaves out the highest.
     let mut energies = vec![0.0; series.len()];
     for frequency in 0..cosine_count(usize::MAX) {
-        for (energy, (_, places)) in energies.iter_mut().zip(&series) {
+        for (energy, ResidualSeries { places, .. }) in energies.iter_mut().zip(&series) {
             if frequency >= cosine_count(places.len()) || basis.len() - explained >= most {
                 continue;
             }
@@ -120,7 +120,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
         .iter()
         .fold(0.0_f64, |most, energy| most.max(*energy));
     let named = energies.iter().zip(&series);
-    for (_, (name, _)) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
+    for (_, ResidualSeries { name, .. }) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
         if !along.contains(name) {
             along.push(name.clone());
         }
@@ -133,9 +133,16 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
     })
 }
 
-/// The data in series, by their places among all, each with a name: results in the order of the experiments
-/// and in that of their predictions, points of a vein from its base to its tip.
-fn data_series(stats: &FitStatistics) -> Vec<(String, Vec<usize>)> {
+/// A series of data along which residuals may be smooth.
+struct ResidualSeries {
+    name: String,
+    /// Places among all data, in the order of the series.
+    places: Vec<usize>,
+}
+
+/// The data in series: results in the order of the experiments and in that of their predictions, points
+/// of a vein from its base to its tip.
+fn data_series(stats: &FitStatistics) -> Vec<ResidualSeries> {
     let components: Vec<_> = stats.point.components().collect();
     let mut all: BTreeMap<(String, usize, usize), Vec<usize>> = BTreeMap::new();
     for (place, component) in components.iter().enumerate() {
@@ -158,16 +165,25 @@ fn data_series(stats: &FitStatistics) -> Vec<(String, Vec<usize>)> {
                 DatumQuantity::Result(_) => 0.0,
             };
             places.sort_by(|a, b| sigma(a).total_cmp(&sigma(b)));
-            found.push((format!("{column} of vein {rod}"), places));
+            found.push(ResidualSeries {
+                name: format!("{column} of vein {rod}"),
+                places,
+            });
             continue;
         }
         places.sort_by_key(|place| components[*place].experiment);
         let mut by_size = places.clone();
         by_size.sort_by(|a, b| components[*a].model.total_cmp(&components[*b].model));
         let same = by_size == places || by_size.iter().rev().eq(&places);
-        found.push((column.clone(), places));
+        found.push(ResidualSeries {
+            name: column.clone(),
+            places,
+        });
         if !same {
-            found.push((column, by_size));
+            found.push(ResidualSeries {
+                name: column,
+                places: by_size,
+            });
         }
     }
     found

@@ -7,8 +7,10 @@
 
 use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::LONGEST_COORDINATE_STEP;
-use crate::study::fit::model::{FitModel, FitPoint, Weighting};
-use crate::study::fit::statistics::{NULL_SINGULAR_VALUE, singular_value_decomposition};
+use crate::study::fit::model::{FitModel, FitPoint, WeightedDerivatives, Weighting};
+use crate::study::fit::statistics::{
+    NULL_SINGULAR_VALUE, SingularDirections, singular_value_decomposition,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest number of steps of an iteration.
@@ -80,6 +82,14 @@ impl ExcludedMinimum<'_> {
     }
 }
 
+/// Where an iteration ended.
+pub(super) struct GaussNewtonResult {
+    pub point: FitPoint,
+    pub outcome: GaussNewtonOutcome,
+    /// How often the leaves were followed.
+    pub evaluations: usize,
+}
+
 pub(super) struct GaussNewtonIteration<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -119,12 +129,25 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, mut point: FitPoint) -> (FitPoint, GaussNewtonOutcome, usize) {
+    pub fn run(&mut self, point: FitPoint) -> GaussNewtonResult {
+        let mut evaluations = 0;
+        let (point, outcome) = self.iterate(point, &mut evaluations);
+        GaussNewtonResult {
+            point,
+            outcome,
+            evaluations,
+        }
+    }
+
+    fn iterate(
+        &mut self,
+        mut point: FitPoint,
+        evaluations: &mut usize,
+    ) -> (FitPoint, GaussNewtonOutcome) {
         if let Err(lost) = self.model.differentiate_data(&mut point) {
-            return (point, GaussNewtonOutcome::Stuck(Some(lost)), 0);
+            return (point, GaussNewtonOutcome::Stuck(Some(lost)));
         }
         let mut radius = INITIAL_TRUST_RADIUS;
-        let mut evaluations = 0;
         let mut small = 0;
         for step in 0..self.most_steps {
             let residuals = self.weighting.residuals(&point);
@@ -139,11 +162,11 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
             );
             let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
             if open < self.gain_tolerance * variance {
-                return (point, GaussNewtonOutcome::Converged, evaluations);
+                return (point, GaussNewtonOutcome::Converged);
             }
             let besides = self.excluded_minimum.as_ref();
             if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
-                return (point, GaussNewtonOutcome::Stuck(None), evaluations);
+                return (point, GaussNewtonOutcome::Stuck(None));
             }
             self.jumps.clear();
             let nearly = open < SUM_OF_SQUARES_ACCURACY * variance;
@@ -163,12 +186,12 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                     && predicted >= CONVERGED_GAIN * variance
                     && radius >= LEAST_TRUST_RADIUS;
                 if !number || !worth {
-                    return (point, end(lost), evaluations);
+                    return (point, end(lost));
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, GaussNewtonOutcome::BudgetExhausted, evaluations);
+                    return (point, GaussNewtonOutcome::BudgetExhausted);
                 }
-                evaluations += 1;
+                *evaluations += 1;
                 match self.model.continue_leaves(&point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
@@ -178,7 +201,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             && self.is_minimum(&point, &theta, &found)
                         {
                             trial.take_gradients(&mut point);
-                            return (trial, GaussNewtonOutcome::Converged, evaluations);
+                            return (trial, GaussNewtonOutcome::Converged);
                         }
                         if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
@@ -190,12 +213,12 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, GaussNewtonOutcome::Converged, evaluations);
+                                return (point, GaussNewtonOutcome::Converged);
                             }
                             break;
                         }
                         if nearly {
-                            return (point, GaussNewtonOutcome::Converged, evaluations);
+                            return (point, GaussNewtonOutcome::Converged);
                         }
                         lost = None;
                     }
@@ -209,7 +232,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, GaussNewtonOutcome::StepLimit, evaluations)
+        (point, GaussNewtonOutcome::StepLimit)
     }
 
     /// The linearised residuals in the coordinates that may move.
@@ -218,13 +241,16 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
         point: &FitPoint,
         residuals: &DVector<f64>,
     ) -> LinearizedResiduals {
-        let (roots, mut jacobian) = self.weighting.apply_weights(point, residuals);
+        let WeightedDerivatives {
+            roots,
+            mut jacobian,
+        } = self.weighting.weighted_derivatives(point, residuals);
         let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
         let active = self.movable_coordinates(point, &gradient);
         for k in (0..active.len()).filter(|&k| !active[k]) {
             jacobian.column_mut(k).fill(0.0);
         }
-        let (values, directions) = singular_value_decomposition(&jacobian);
+        let SingularDirections { values, directions } = singular_value_decomposition(&jacobian);
         let slopes = directions.tr_mul(&gradient);
         let null = match self.model.grids {
             GridPolicy::AsNeeded => NULL_SINGULAR_VALUE,

@@ -10,7 +10,9 @@ use crate::study::ParameterKeys;
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Experiment, ObservedExperiment};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
-use crate::study::fit::least_squares::{ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::least_squares::{
+    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
 use crate::study::fit::model::{FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::statistics::{
@@ -109,17 +111,22 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             };
             let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
             search.most_steps = search.most_steps.min(self.most_steps);
-            let (near, searched, more) = search.run(point);
-            work.evaluations += more;
+            let searched = search.run(point);
+            let near = searched.point;
+            work.evaluations += searched.evaluations;
             attempts += 1;
             let there = model.continue_leaves(&near, &near.theta);
             let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
             let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
             last.reuses_derivatives = true;
             last.most_steps = last.most_steps.min(self.most_steps);
-            let (mut least, end, more) = last.run(there);
-            work.evaluations += 1 + more;
-            work.accurate += 1 + more;
+            let GaussNewtonResult {
+                point: mut least,
+                outcome: end,
+                evaluations,
+            } = last.run(there);
+            work.evaluations += 1 + evaluations;
+            work.accurate += 1 + evaluations;
             let is_lost =
                 end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
             if is_lost
@@ -134,7 +141,7 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             let of_search =
                 FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
             let spread = self.statistics(&least).residual_deviation;
-            let same = searched == GaussNewtonOutcome::Converged
+            let same = searched.outcome == GaussNewtonOutcome::Converged
                 && of_search.residual_deviation < CONSISTENT_DEVIATION_RATIO * spread;
             if !same && end == GaussNewtonOutcome::Converged {
                 // Its neighbourhood is computed with its own leaves.

@@ -6,7 +6,9 @@
 
 use crate::run::Instant;
 use crate::study::fit::data::Experiment;
-use crate::study::fit::least_squares::{ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::least_squares::{
+    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
 use crate::study::fit::model::{FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
 use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
@@ -76,14 +78,15 @@ impl FitStart {
         let mut taken = 0;
         if let Some(point) = &initial {
             // One search from there costs less than a look at other decades.
-            let (found, evaluations) = find_coarse_minimum(
+            let found = find_coarse_minimum(
                 model,
                 weighting,
                 &point.theta,
-                (None, MOST_STEPS_TO_ALTERNATIVE),
+                None,
+                MOST_STEPS_TO_ALTERNATIVE,
             );
-            taken = evaluations;
-            let there = found.and_then(|found| loose.relax_leaves(&found.theta).ok());
+            taken = found.evaluations;
+            let there = (found.minimum).and_then(|found| loose.relax_leaves(&found.theta).ok());
             if let Some(there) =
                 there.filter(|there| model.relative_misfit(there) <= POOR_MINIMUM_MISFIT)
             {
@@ -144,30 +147,53 @@ impl FitStart {
     }
 }
 
-/// The minimum near some values, on coarse grids, and how often the leaves were relaxed.
+/// The minimum near some values, on coarse grids.
+struct CoarseMinimum {
+    /// None if there is none.
+    minimum: Option<EvaluatedStart>,
+    /// How often the leaves were relaxed.
+    evaluations: usize,
+}
+
+impl CoarseMinimum {
+    /// No minimum: the leaves do not come to rest at these values.
+    const NO_LEAVES: CoarseMinimum = CoarseMinimum {
+        minimum: None,
+        evaluations: 1,
+    };
+}
+
 fn find_coarse_minimum(
     model: &FitModel,
     weighting: Weighting,
     theta: &[f64],
-    (besides, most_steps): (Option<ExcludedMinimum>, usize),
-) -> (Option<EvaluatedStart>, usize) {
+    besides: Option<ExcludedMinimum>,
+    most_steps: usize,
+) -> CoarseMinimum {
     let first = model.with_loose_tolerance(weighting.assumed_deviation);
     let Ok(first) = first.relax_leaves_within_steps(theta, MOST_RELAXATION_STEPS) else {
-        return (None, 1);
+        return CoarseMinimum::NO_LEAVES;
     };
     let Ok((coarse, point)) = model.coarse_model(&first, weighting) else {
-        return (None, 1);
+        return CoarseMinimum::NO_LEAVES;
     };
     let mut quietly = |_, _| {};
     let mut iteration = GaussNewtonIteration::new(&coarse, weighting, &mut quietly);
     iteration.most_steps = most_steps;
     iteration.excluded_minimum = besides;
-    let (point, end, more) = iteration.run(point);
-    let found = (end == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
+    let GaussNewtonResult {
+        point,
+        outcome,
+        evaluations,
+    } = iteration.run(point);
+    let minimum = (outcome == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
         sum: weighting.sum_of_squares(&point),
         theta: point.theta,
     });
-    (found, 1 + more)
+    CoarseMinimum {
+        minimum,
+        evaluations: 1 + evaluations,
+    }
 }
 
 /// Other minima, and what was tried to find them.
@@ -254,7 +280,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
             let significant = best.significant_excess;
             let as_well = |other: &&EvaluatedStart| other.sum <= best.sum + significant;
             for other in others.minima.iter().filter(as_well) {
-                self.add_alternative(&mut fit, (other, best.sum));
+                self.add_alternative(&mut fit, other, best.sum);
             }
         }
         fit.tried = others.tried;
@@ -405,14 +431,14 @@ impl<'a> GlobalFitSearch<'_, 'a> {
     fn minima_from_symmetric_values(&self, best: &FitMinimum) -> AlternativeMinima {
         let mut others = AlternativeMinima::default();
         let most = self.search_evaluation_limit(best);
-        for (theta, what) in symmetric_values(self.model, &best.theta) {
+        for SymmetricValues { theta, description } in symmetric_values(self.model, &best.theta) {
             let Some(most_steps) = self.remaining_evaluations(most) else {
                 break;
             };
             let found =
                 self.find_coarse_minimum(&theta, Some(best.exclude_from(&theta)), most_steps);
             others.minima.extend(found);
-            others.tried.push(what);
+            others.tried.push(description);
         }
         others
     }
@@ -424,15 +450,14 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         besides: Option<ExcludedMinimum>,
         most_steps: usize,
     ) -> Option<EvaluatedStart> {
-        let (found, evaluations) =
-            find_coarse_minimum(self.model, self.weighting, theta, (besides, most_steps));
-        self.count_evaluations(evaluations);
-        found
+        let found = find_coarse_minimum(self.model, self.weighting, theta, besides, most_steps);
+        self.count_evaluations(found.evaluations);
+        found.minimum
     }
 
     /// Adds another minimum to a fit, if a number that is determined has a value there beyond its
     /// interval: then it is not.
-    fn add_alternative(&self, fit: &mut Fit, (other, least): (&EvaluatedStart, f64)) {
+    fn add_alternative(&self, fit: &mut Fit, other: &EvaluatedStart, least: f64) {
         let values = self.model.named_values(&other.theta);
         let beyond = |parameter: &FitParameter, value: f64| {
             let (low, high) = (parameter.low, parameter.high);
@@ -549,13 +574,16 @@ impl<'a> Multistart<'a> {
         let positive: Vec<usize> = (0..free.len())
             .filter(|&k| free[k].is_searched_in_decades())
             .collect();
-        let mut found = self.scan_decades_both_ways((from, least), &positive);
+        let given = EvaluatedStart {
+            theta: from.to_vec(),
+            sum: least,
+        };
+        let mut found = self.scan_decades_both_ways(&given, &positive);
         if positive.len() > 1 && positive.len() <= MOST_PARAMETERS_VARIED_SINGLY {
             for &k in &positive {
                 let best = found.iter().min_by(|a, b| a.sum.total_cmp(&b.sum));
                 let best = best.filter(|best| best.sum < least);
-                let from = best.map_or((from, least), |best| (&best.theta, best.sum));
-                let more = self.scan_decades_both_ways(from, &[k]);
+                let more = self.scan_decades_both_ways(best.unwrap_or(&given), &[k]);
                 found.extend(more);
             }
         }
@@ -563,13 +591,17 @@ impl<'a> Multistart<'a> {
         found
     }
 
-    fn scan_decades_both_ways(&self, from: (&[f64], f64), moving: &[usize]) -> Vec<EvaluatedStart> {
+    fn scan_decades_both_ways(
+        &self,
+        from: &EvaluatedStart,
+        moving: &[usize],
+    ) -> Vec<EvaluatedStart> {
         if moving.is_empty() {
             return Vec::new();
         }
         let mut found = self.scan_decades_one_way(from, moving, UNDETERMINED_UNCERTAINTY);
-        let better = |start: &EvaluatedStart| start.sum < SUFFICIENT_SUM_RATIO * from.1;
-        if from.1.is_infinite() || !found.iter().any(better) {
+        let better = |start: &EvaluatedStart| start.sum < SUFFICIENT_SUM_RATIO * from.sum;
+        if from.sum.is_infinite() || !found.iter().any(better) {
             found.extend(self.scan_decades_one_way(from, moving, -UNDETERMINED_UNCERTAINTY));
         }
         found
@@ -578,14 +610,14 @@ impl<'a> Multistart<'a> {
     /// Decade after decade, until no more are better.
     fn scan_decades_one_way(
         &self,
-        (from, least): (&[f64], f64),
+        from: &EvaluatedStart,
         moving: &[usize],
         decade: f64,
     ) -> Vec<EvaluatedStart> {
         let mut found: Vec<EvaluatedStart> = Vec::new();
-        let (mut best, mut no_better) = (least, 0);
+        let (mut best, mut no_better) = (from.sum, 0);
         for step in 1..=MOST_DECADES_SEARCHED {
-            let mut theta = from.to_vec();
+            let mut theta = from.theta.clone();
             for &k in moving {
                 theta[k] += step as f64 * decade;
             }
@@ -596,7 +628,7 @@ impl<'a> Multistart<'a> {
                 }
                 found.push(start);
             }
-            if no_better == FRUITLESS_DECADES_LIMIT[usize::from(best < least)] {
+            if no_better == FRUITLESS_DECADES_LIMIT[usize::from(best < from.sum)] {
                 break;
             }
         }
@@ -652,9 +684,14 @@ impl<'a> Multistart<'a> {
     }
 }
 
-/// Values that may fit as well as given ones, and what they are: of exchanged directions of a section,
-/// of reversed lists of veins, and of the other sign.
-pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, String)> {
+/// Values that may fit as well as given ones.
+struct SymmetricValues {
+    theta: Vec<f64>,
+    description: String,
+}
+
+/// Values of exchanged directions of a section, of reversed lists of veins, and of the other sign.
+fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<SymmetricValues> {
     let keys = model.coordinates.iter().map(|free| free.number.to_string());
     let keys: Vec<String> = keys.collect();
     let place = |key: &str| keys.iter().position(|other| other == key);
@@ -673,14 +710,14 @@ pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, S
         place(&format!("{name}[{}]", rods.checked_sub(index + 1)?))
     };
     let mut all = vec![
-        (
-            permuted(&exchange),
-            "the axes of the section exchanged".to_string(),
-        ),
-        (
-            permuted(&reverse),
-            "the veins in reversed order".to_string(),
-        ),
+        SymmetricValues {
+            theta: permuted(&exchange),
+            description: "the axes of the section exchanged".into(),
+        },
+        SymmetricValues {
+            theta: permuted(&reverse),
+            description: "the veins in reversed order".into(),
+        },
     ];
     let can_be_mirrored = |k: &usize| {
         let free = &model.coordinates[*k];
@@ -694,13 +731,14 @@ pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, S
     {
         let mut theta = of.to_vec();
         theta[k] = -theta[k];
-        all.push((theta, format!("{} with the other sign", keys[k])));
+        let description = format!("{} with the other sign", keys[k]);
+        all.push(SymmetricValues { theta, description });
     }
-    let mut images: Vec<(Vec<f64>, String)> = Vec::new();
-    for (theta, what) in all {
-        let known = images.iter().any(|(known, _)| *known == theta);
-        if theta != of && !known && is_within_given_bounds(model, &theta) {
-            images.push((theta, what));
+    let mut images: Vec<SymmetricValues> = Vec::new();
+    for values in all {
+        let known = images.iter().any(|known| known.theta == values.theta);
+        if values.theta != of && !known && is_within_given_bounds(model, &values.theta) {
+            images.push(values);
         }
     }
     images
