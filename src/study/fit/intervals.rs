@@ -173,25 +173,34 @@ fn is_quadratic_at_ends(stats: &FitStatistics, along: &DVector<f64>, half: f64) 
 /// beyond it the interval is taken from the profile of the sum.
 pub(super) const QUADRATIC_DEVIATION_LIMIT: f64 = 0.15;
 
-/// Largest number of points in the search for an end before the full profile is computed, the
-/// relative reduction still possible by a correction there, and the accuracy of the end.
-const MOST_ENDPOINT_POINTS: usize = 14;
+/// The search for an end of an interval from a few points.
+struct EndpointSearchLimits {
+    /// Largest number of points before the full profile is computed.
+    most_points: usize,
+    /// The sum is the least one if a correction can still reduce it by less than this part.
+    settled_reduction: f64,
+    /// Relative accuracy of the distance of the end.
+    accuracy: f64,
+    /// A correction that leaves more than this part of the expected reduction has failed.
+    failed_correction: f64,
+    /// The part of a correction that went too far, taken next.
+    shortening: f64,
+    /// Largest number of points at which leaves are lost.
+    most_lost_leaves: usize,
+    /// A sum with a smaller relative error needs no further evaluation, as a part of the deviation
+    /// from a quadratic that is allowed.
+    clear_sum_error: f64,
+}
 
-const SETTLED_REDUCTION: f64 = 0.1;
-
-const ENDPOINT_ACCURACY: f64 = 0.03;
-
-/// A correction that leaves more than this part of the expected reduction has failed, and
-/// the part of it that is taken next if it went too far.
-const FAILED_CORRECTION_RATIO: f64 = 0.5;
-
-const CORRECTION_SHORTENING: f64 = 0.5;
-
-/// Largest number of lost leaves in the search.
-const MOST_LOST_LEAVES: usize = 3;
-
-/// A sum with a smaller relative error than this needs no further evaluation.
-const CLEAR_SUM_ERROR: f64 = 0.3;
+const ENDPOINT_SEARCH: EndpointSearchLimits = EndpointSearchLimits {
+    most_points: 14,
+    settled_reduction: 0.1,
+    accuracy: 0.03,
+    failed_correction: 0.5,
+    shortening: 0.5,
+    most_lost_leaves: 3,
+    clear_sum_error: 0.3,
+};
 
 /// Where a profile ends on one side of the minimum.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +246,7 @@ pub(super) fn interval_endpoints(
             .map(|residuals| near.constrained_minimum(&slopes, k, residuals, f64::INFINITY));
         let clear = |least: &Option<ConstrainedMinimum>| {
             (least.as_ref()).is_some_and(|least| {
-                off(least.excess) < CLEAR_SUM_ERROR * QUADRATIC_DEVIATION_LIMIT
+                off(least.excess) < ENDPOINT_SEARCH.clear_sum_error * QUADRATIC_DEVIATION_LIMIT
             })
         };
         if sides.iter().all(clear) {
@@ -332,10 +341,10 @@ impl EndpointSearch<'_, '_, '_, '_> {
             return Ok(ProfileEndpoint::Open);
         }
         let mut lost = 0;
-        for step in 0..MOST_ENDPOINT_POINTS {
+        for step in 0..ENDPOINT_SEARCH.most_points {
             let Some(found) = known.take().or_else(|| self.leaves_at_estimate()) else {
                 lost += 1;
-                if lost > MOST_LOST_LEAVES {
+                if lost > ENDPOINT_SEARCH.most_lost_leaves {
                     break;
                 }
                 self.distance = 0.5 * (self.previous.distance + self.distance);
@@ -380,9 +389,9 @@ impl EndpointSearch<'_, '_, '_, '_> {
 
     /// Whether the sum is the least one, and that of an end.
     fn is_converged(&self, least: &ConstrainedMinimum) -> bool {
-        let corrected =
-            least.excess_without_correction - least.excess < SETTLED_REDUCTION * least.excess;
-        corrected && (self.normalized_root(least) - 1.0).abs() < ENDPOINT_ACCURACY
+        let corrected = least.excess_without_correction - least.excess
+            < ENDPOINT_SEARCH.settled_reduction * least.excess;
+        corrected && (self.normalized_root(least) - 1.0).abs() < ENDPOINT_SEARCH.accuracy
     }
 
     /// The root of the sum, normalised to one at an end.
@@ -404,8 +413,8 @@ impl EndpointSearch<'_, '_, '_, '_> {
             return Ok(Some(ProfileEndpoint::End(self.distance)));
         }
         let gain = least.excess_without_correction - least.excess;
-        let stagnates =
-            self.derivatives_elsewhere.is_some() && gain > FAILED_CORRECTION_RATIO * self.last.gain;
+        let stagnates = self.derivatives_elsewhere.is_some()
+            && gain > ENDPOINT_SEARCH.failed_correction * self.last.gain;
         if stagnates || self.is_converged(&least) {
             // With the derivatives there it may be reduced further.
             self.derivatives_elsewhere = Some(
@@ -421,7 +430,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         if stagnates {
             // The last correction went too far, or not far enough.
             self.longest = match least.excess_without_correction > self.last.from {
-                true => CORRECTION_SHORTENING * self.last.length,
+                true => ENDPOINT_SEARCH.shortening * self.last.length,
                 false => 2.0 * self.longest,
             };
             least = self.constrained_minimum(&residuals)?;
@@ -458,24 +467,34 @@ impl EndpointSearch<'_, '_, '_, '_> {
     }
 }
 
-/// Steps to an end of a profile, iterations at each, accuracy of the least sum there, in
-/// variances, and accuracy of the end.
-const MOST_PROFILE_STEPS: usize = 16;
+/// The search for an end of an interval by whole fits.
+struct ProfileLimits {
+    /// Largest number of distances at which the number is held.
+    most_steps: usize,
+    /// Largest number of steps of the fit at each distance.
+    most_iterations: usize,
+    /// Accuracy of the least sum of squares there, in variances.
+    sum_accuracy: f64,
+    /// Relative accuracy of the distance of the end.
+    accuracy: f64,
+    /// Largest number of distances at which the other numbers cannot be fitted.
+    most_lost_distances: usize,
+    /// Number of smaller steps by which leaves are followed to such a distance.
+    substeps_after_loss: usize,
+    /// Where fits begin again for numbers that ran away: so far on the way from their initial
+    /// values.
+    restart_fractions: [f64; 3],
+}
 
-const MOST_PROFILE_ITERATIONS: usize = 25;
-
-const CONSTRAINED_MINIMUM_ACCURACY: f64 = 1e-2;
-
-const PROFILE_ENDPOINT_ACCURACY: f64 = 0.01;
-
-/// Largest number of distances at which the other numbers cannot be fitted, in the search for an
-/// end of a profile, and number of the smaller steps by which leaves are followed there.
-const MOST_LOST_DISTANCES: usize = 6;
-
-const SUBSTEPS_AFTER_LOSS: usize = 4;
-
-/// Where fits begin again for numbers that ran away: so far on the way from their initial values.
-const RESTART_FRACTIONS: [f64; 3] = [1.0 / 3.0, 0.0, 2.0 / 3.0];
+const PROFILE: ProfileLimits = ProfileLimits {
+    most_steps: 16,
+    most_iterations: 25,
+    sum_accuracy: 1e-2,
+    accuracy: 0.01,
+    most_lost_distances: 6,
+    substeps_after_loss: 4,
+    restart_fractions: [1.0 / 3.0, 0.0, 2.0 / 3.0],
+};
 
 /// The profile of the sum of squares along a number.
 pub(super) struct LikelihoodProfile<'s, 'm, 'a> {
@@ -532,28 +551,28 @@ impl LikelihoodProfile<'_, '_, '_> {
         // The nearest distance at which all fits failed.
         let mut lost = f64::INFINITY;
         let mut failures = 0;
-        for _ in 0..MOST_PROFILE_STEPS {
+        for _ in 0..PROFILE.most_steps {
             if self.stats.model.budget.is_used_up() {
                 return Ok(ProfileEndpoint::Lost(inside.distance));
             }
             let least = self.constrained_minimum(sign * reach, &inside, outside.as_ref(), progress);
             let Some(mut least) = least else {
                 failures += 1;
-                if failures > MOST_LOST_DISTANCES {
+                if failures > PROFILE.most_lost_distances {
                     break;
                 }
                 lost = reach;
                 reach = 0.5 * (inside.distance + reach);
                 continue;
             };
-            if self.normalized_root(&least) > 1.0 - PROFILE_ENDPOINT_ACCURACY {
+            if self.normalized_root(&least) > 1.0 - PROFILE.accuracy {
                 least = self.restart_runaways(&least, progress).unwrap_or(least);
             }
             if normalized_excess(self.stats, &least) < -BETTER_MINIMUM_EXCESS {
                 return Err(least);
             }
             let root = self.normalized_root(&least);
-            if (root - 1.0).abs() < PROFILE_ENDPOINT_ACCURACY {
+            if (root - 1.0).abs() < PROFILE.accuracy {
                 return Ok(ProfileEndpoint::End(reach));
             }
             let known = ProfilePoint {
@@ -580,7 +599,7 @@ impl LikelihoodProfile<'_, '_, '_> {
             };
         }
         Ok(match outside {
-            Some(outside) if failures <= MOST_LOST_DISTANCES => {
+            Some(outside) if failures <= PROFILE.most_lost_distances => {
                 ProfileEndpoint::End(outside.distance)
             }
             _ => ProfileEndpoint::Lost(inside.distance),
@@ -660,8 +679,8 @@ impl LikelihoodProfile<'_, '_, '_> {
     fn continue_in_substeps(&self, from: &FitPoint, step: f64) -> Option<FitPoint> {
         let model = self.stats.model;
         let mut there: Option<FitPoint> = None;
-        for part in 1..=SUBSTEPS_AFTER_LOSS {
-            let part = part as f64 / SUBSTEPS_AFTER_LOSS as f64;
+        for part in 1..=PROFILE.substeps_after_loss {
+            let part = part as f64 / PROFILE.substeps_after_loss as f64;
             let theta = model.bounded_update(&from.theta, part * step, self.along);
             let mut next = model
                 .continue_leaves(there.as_ref().unwrap_or(from), &theta)
@@ -687,8 +706,8 @@ impl LikelihoodProfile<'_, '_, '_> {
         let mut iteration =
             GaussNewtonIteration::new(self.stats.model, self.stats.weighting, progress);
         iteration.held[self.k] = true;
-        iteration.most_steps = MOST_PROFILE_ITERATIONS;
-        iteration.gain_tolerance = CONSTRAINED_MINIMUM_ACCURACY;
+        iteration.most_steps = PROFILE.most_iterations;
+        iteration.gain_tolerance = PROFILE.sum_accuracy;
         iteration.run(start)
     }
 
@@ -705,7 +724,7 @@ impl LikelihoodProfile<'_, '_, '_> {
         let (stats, model) = (self.stats, self.stats.model);
         let lowest = normalized_excess(stats, least);
         let mut before: Option<FitPoint> = None;
-        for part in RESTART_FRACTIONS {
+        for part in PROFILE.restart_fractions {
             let mut theta = least.theta.clone();
             for &j in self.runaways {
                 theta[j] =
@@ -727,7 +746,7 @@ impl LikelihoodProfile<'_, '_, '_> {
             before = Some(there);
             let Ok(start) = start else { continue };
             let found = self.minimize_over_others(start, progress).point;
-            if normalized_excess(stats, &found) < lowest - CONSTRAINED_MINIMUM_ACCURACY {
+            if normalized_excess(stats, &found) < lowest - PROFILE.sum_accuracy {
                 return Some(found);
             }
         }

@@ -16,24 +16,32 @@ use crate::study::fit::{FitParameter, FreeParameterTarget, SystematicResiduals};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// The level of the test: so often residuals of a true model are called systematic.
-const SIGNIFICANCE_LEVEL: f64 = 5e-3;
+/// Levels of the test for lack of fit, and its cosines.
+struct LackOfFitTest {
+    /// So often residuals of a true model are called systematic.
+    level: f64,
+    /// Where deviations are given, the p-value below which residuals are smooth beside the others.
+    smooth_p_value: f64,
+    /// Below this p-value the rest of the residuals is too large for the standard deviations that
+    /// are given, and takes their place.
+    large_p_value: f64,
+    /// The least standard deviation of data, in assumed ones: below it errors of the equilibria
+    /// decide.
+    least_deviation: f64,
+    /// The part of a cosine that free numbers and the cosines before it must leave unexplained.
+    least_independent_part: f64,
+    /// Largest number of cosines of all series.
+    most_cosines: usize,
+}
 
-/// Where deviations are given, the p-value below which residuals are smooth beside the others.
-const SMOOTH_RESIDUALS_P_VALUE: f64 = 0.05;
-
-/// Below this p-value the rest of the residuals is too large for the standard deviations that are given, and
-/// takes their place.
-const LARGE_RESIDUALS_P_VALUE: f64 = 0.01;
-
-/// The least standard deviation of data, in assumed ones: below it errors of the equilibria decide.
-const LEAST_RELATIVE_DEVIATION: f64 = 1e-2;
-
-/// Of a cosine at least this part is not explained by free numbers and the cosines before it.
-const LEAST_INDEPENDENT_FRACTION: f64 = 0.1;
-
-/// Largest number of cosines of all series.
-const MOST_COSINES: usize = 48;
+const LACK_OF_FIT: LackOfFitTest = LackOfFitTest {
+    level: 5e-3,
+    smooth_p_value: 0.05,
+    large_p_value: 0.01,
+    least_deviation: 1e-2,
+    least_independent_part: 0.1,
+    most_cosines: 48,
+};
 
 /// The number of cosines of a series of so many data.
 fn cosine_count(data: usize) -> usize {
@@ -56,7 +64,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
         .map(|k| (&stats.jacobian * stats.singular_directions.column(k)) / stats.singular_values[k])
         .collect();
     let explained = basis.len();
-    let most = MOST_COSINES.min(stats.degrees_of_freedom / 2);
+    let most = LACK_OF_FIT.most_cosines.min(stats.degrees_of_freedom / 2);
     // By ascending frequency, so that a limit leaves out the highest.
     let mut energies = vec![0.0; series.len()];
     for frequency in 0..cosine_count(usize::MAX) {
@@ -78,7 +86,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
                 }
             }
             let left = wave.norm();
-            if left > LEAST_INDEPENDENT_FRACTION {
+            if left > LACK_OF_FIT.least_independent_part {
                 wave /= left;
                 *energy += wave.dot(&residuals).powi(2);
                 basis.push(wave);
@@ -96,23 +104,23 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
     let smooth: f64 = energies.iter().sum();
     let scattered = (residuals.norm_squared() - smooth).max(0.0) / rest as f64;
     let is_as_given = stats.has_known_deviations
-        && f_distribution_tail(scattered, rest, None) > LARGE_RESIDUALS_P_VALUE;
+        && f_distribution_tail(scattered, rest, None) > LACK_OF_FIT.large_p_value;
     // Deviations that are given too small make all residuals too large, and none of them smooth.
     let among_residuals = f_distribution_tail(smooth / count as f64 / scattered, count, Some(rest));
     let p_value = match is_as_given {
-        true if among_residuals > SMOOTH_RESIDUALS_P_VALUE => return None,
+        true if among_residuals > LACK_OF_FIT.smooth_p_value => return None,
         true => f_distribution_tail(smooth / count as f64, count, None),
         false => {
             let least = if stats.has_known_deviations {
                 1.0
             } else {
-                LEAST_RELATIVE_DEVIATION.powi(2)
+                LACK_OF_FIT.least_deviation.powi(2)
             };
             let ratio = smooth / count as f64 / scattered.max(least);
             f_distribution_tail(ratio, count, Some(rest))
         }
     };
-    if p_value >= SIGNIFICANCE_LEVEL {
+    if p_value >= LACK_OF_FIT.level {
         return None;
     }
     let mut along: Vec<String> = Vec::new();
