@@ -132,35 +132,55 @@ impl Serialize for Choice {
     }
 }
 
-/// Measured seconds of an explicit step: in all, and per segment.
-const EXPLICIT_STEP: f64 = 1e-7;
+/// Measured seconds of steps.
+struct MotionCosts {
+    /// Of an explicit step in all.
+    explicit_step: f64,
+    /// Of an explicit step per segment.
+    explicit_segment: f64,
+    /// Of a semi-implicit step in all, with the iterations and the rejected attempts that belong to
+    /// it.
+    semi_implicit_step: f64,
+    /// Of a semi-implicit step per segment of rods.
+    semi_implicit_segment: f64,
+    /// Number of rods that it processes at a time.
+    rods_at_once: usize,
+}
 
-const EXPLICIT_SEGMENT_SECONDS: f64 = 2e-8;
+const COSTS: MotionCosts = MotionCosts {
+    explicit_step: 1e-7,
+    explicit_segment: 2e-8,
+    semi_implicit_step: 3e-6,
+    semi_implicit_segment: 8e-7,
+    rods_at_once: 4,
+};
 
-/// Measured seconds of a semi-implicit step, with the iterations and the rejected attempts that
-/// belong to it: in all, and per segment of rods processed four at a time.
-const SEMI_IMPLICIT_STEP: f64 = 3e-6;
+/// The pilot that estimates the number of semi-implicit steps. Of 60 leaves as people measure them
+/// the estimates were 0.54 to 1.45 of the true numbers, of 200 with internal damping, which need
+/// few steps, 1.2 to 3.2.
+struct PilotRun {
+    /// The permitted local error of its steps, as a multiple of the tolerance.
+    error_ratio: f64,
+    /// The largest permitted local error of its steps.
+    largest_error: f64,
+    /// The exponent with which the number of steps grows with the accuracy. By the order of the
+    /// method it is 1/3; measured, it is a little more, as fast motions count that longer steps
+    /// pass over.
+    step_exponent: f64,
+    /// Measured part of a step's time that a step of the pilot takes, whose equations are solved
+    /// with lower accuracy.
+    step_cost: f64,
+    /// The longest time of the pilot in seconds.
+    longest_seconds: f64,
+}
 
-const SEMI_IMPLICIT_SEGMENT_SECONDS: f64 = 8e-7;
-
-const SIMD_LANES: usize = 4;
-
-/// The permitted local error of the pilot's steps, as a multiple of the tolerance and at most, and
-/// the exponent with which the number of steps grows with the accuracy. By the order of the method
-/// it is 1/3; measured, it is a little more, as fast motions count that longer steps pass over.
-/// Of 60 leaves as people measure them the estimates were 0.54 to 1.45 of the true numbers, of 200
-/// with internal damping, which need few steps, 1.2 to 3.2.
-const PILOT_ERROR_RATIO: f64 = 1000.0;
-
-const LARGEST_PILOT_ERROR: f64 = 0.1;
-
-const STEP_COUNT_EXPONENT: f64 = 0.357;
-
-/// Measured part of a step's time that a step of the pilot takes, whose equations are solved with
-/// lower accuracy, and the longest time of the pilot in seconds.
-const PILOT_STEP: f64 = 0.5;
-
-const LONGEST_PILOT: f64 = 0.3;
+const PILOT: PilotRun = PilotRun {
+    error_ratio: 1000.0,
+    largest_error: 0.1,
+    step_exponent: 0.357,
+    step_cost: 0.5,
+    longest_seconds: 0.3,
+};
 
 /// The cost of a motion by a method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -175,13 +195,13 @@ pub struct Cost {
 
 /// Approximate seconds of an explicit step.
 pub(super) fn explicit_step(rods: usize, segments: usize) -> f64 {
-    EXPLICIT_STEP + EXPLICIT_SEGMENT_SECONDS * (rods * segments) as f64
+    COSTS.explicit_step + COSTS.explicit_segment * (rods * segments) as f64
 }
 
 /// Approximate seconds of a semi-implicit step.
 pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
-    let segments = rods.next_multiple_of(SIMD_LANES) * segments;
-    SEMI_IMPLICIT_STEP + SEMI_IMPLICIT_SEGMENT_SECONDS * segments as f64
+    let segments = rods.next_multiple_of(COSTS.rods_at_once) * segments;
+    COSTS.semi_implicit_step + COSTS.semi_implicit_segment * segments as f64
 }
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
@@ -208,10 +228,10 @@ pub(super) fn semi_implicit_cost(
     most: f64,
 ) -> Cost {
     let (duration, interval) = physics.duration_and_interval();
-    let error = (PILOT_ERROR_RATIO * tolerance)
-        .min(LARGEST_PILOT_ERROR)
+    let error = (PILOT.error_ratio * tolerance)
+        .min(PILOT.largest_error)
         .max(tolerance);
-    let of_step = (error / tolerance).powf(STEP_COUNT_EXPONENT);
+    let of_step = (error / tolerance).powf(PILOT.step_exponent);
     let seconds = semi_implicit_step(leaf.rods(), leaf.segments());
     let cost = |steps: f64, at_least: bool| Cost {
         steps,
@@ -224,7 +244,7 @@ pub(super) fn semi_implicit_cost(
     if outputs > most {
         return cost(outputs, true);
     }
-    let longest = (LONGEST_PILOT / (PILOT_STEP * seconds)) as usize;
+    let longest = (PILOT.longest_seconds / (PILOT.step_cost * seconds)) as usize;
     let steps = StepControl::CountOnly(error);
     let mut pilot = SemiImplicit::new(leaf.clone(), physics.clone(), state, steps);
     let (mut steps, mut attempts, mut failed) = (0.0, 0_usize, false);

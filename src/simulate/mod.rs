@@ -659,15 +659,22 @@ pub enum SimulationError {
     },
 }
 
-/// Largest distance of a start from the equilibrium that it is compared with, in lengths.
-const LARGEST_START_DISTANCE: f64 = 0.1;
+/// When a start counts as an unstable equilibrium.
+struct UnstableStartTest {
+    /// Largest distance of a start from the equilibrium that it is compared with, in lengths.
+    largest_distance: f64,
+    /// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
+    /// none: it would have to grow by e fourteen times.
+    negligible_deviation: f64,
+    /// Accuracy of these modes.
+    mode_accuracy: f64,
+}
 
-/// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
-/// none: it would have to grow by e fourteen times.
-const NEGLIGIBLE_MODE_DEVIATION: f64 = 1e-6;
-
-/// Accuracy of these modes.
-const MODE_ACCURACY: f64 = 1e-9;
+const UNSTABLE_START: UnstableStartTest = UnstableStartTest {
+    largest_distance: 0.1,
+    negligible_deviation: 1e-6,
+    mode_accuracy: 1e-9,
+};
 
 /// The doubt about a start at an unstable equilibrium, or beside one but without a deviation along
 /// its unstable modes, such as that of a straight column under its weight.
@@ -693,7 +700,7 @@ pub(super) fn unstable_start_doubt(
     let wanted = ModeRequest {
         count: index,
         modes_below: None,
-        accuracy: MODE_ACCURACY,
+        accuracy: UNSTABLE_START.mode_accuracy,
         approximate_modes: &[],
         time: &Limit::default(),
     };
@@ -701,7 +708,8 @@ pub(super) fn unstable_start_doubt(
     modes.retain(|mode| mode.eigenvalue < 0.0);
     let fastest = -modes.first()?.eigenvalue;
     let deviates = |mode: &Eigenpair| {
-        deviation(&leaf, physics, (&exact, start), &mode.shape) > NEGLIGIBLE_MODE_DEVIATION
+        deviation(&leaf, physics, (&exact, start), &mode.shape)
+            > UNSTABLE_START.negligible_deviation
     };
     if modes.iter().any(deviates) {
         return None;
@@ -723,7 +731,7 @@ fn may_be_near(leaf: &DiscreteLeaf, start: &State, system: &mut System) -> bool 
     };
     // It is not converged after one step.
     let _ = first.solve(leaf, &mut next, system, INDEFINITE_NEWTON_EQUATIONS);
-    start.largest_displacement_to(&next) < LARGEST_START_DISTANCE
+    start.largest_displacement_to(&next) < UNSTABLE_START.largest_distance
 }
 
 /// The largest rotation or displacement in the part along a mode of what leads from one state to

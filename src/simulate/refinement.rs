@@ -9,7 +9,7 @@
 //! (Richardson). Differences grow in time, mostly as phases do; but they vanish at the turning
 //! points of a vibration, so that the bar at an output is the largest so far. A component whose
 //! phase the coarser run has lost altogether is wrong in it by up to twice its amplitude, and no
-//! more in the finer run: [`SAFETY`] lets the bar be the difference itself.
+//! more in the finer run: `COMPARISON.safety` lets the bar be the difference itself.
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
@@ -27,24 +27,32 @@ use glam::DVec3;
 /// first run, and that which it is compared with, take what they need.
 pub const REFINEMENT_SECONDS: f64 = 10.0;
 
-/// The coarsest grid that a motion is compared with; below, a finer one is.
-const COARSEST: usize = 4;
+/// How runs of a refinement follow each other.
+struct RefinementSteps {
+    /// The coarsest grid that a motion is compared with; below, a finer one is.
+    coarsest_segments: usize,
+    /// The ratio of the local errors of steps of which one is half as long: they are of third
+    /// order.
+    local_error_ratio: f64,
+    /// Bounds on the local error of a step.
+    local_error: (f64, f64),
+    /// The time of a run over that on a grid of half as many segments, in steps twice as long.
+    cost_ratio: f64,
+    /// Explicit steps that are longer by no more than this factor count as equally long.
+    equal_step: f64,
+    /// Where runs part later than runs on coarser grids by less than this factor, they part for
+    /// another reason than the phases of vibrations, and finer grids do not help.
+    later_parting: f64,
+}
 
-/// The ratio of the local errors of steps of which one is half as long: they are of third order.
-const LOCAL_ERROR_RATIO: f64 = 8.0;
-
-/// Bounds on the local error of a step.
-const LOCAL_ERROR: (f64, f64) = (1e-12, 0.1);
-
-/// The time of a run over that on a grid of half as many segments, in steps twice as long.
-const COST_RATIO: f64 = 4.0;
-
-/// Explicit steps that are longer by no more than this factor count as equally long.
-const EQUAL_STEP_FACTOR: f64 = 1.1;
-
-/// Where runs part later than runs on coarser grids by less than this factor, they part for
-/// another reason than the phases of vibrations, and finer grids do not help.
-const LATER_PARTING_FACTOR: f64 = 1.3;
+const REFINEMENT: RefinementSteps = RefinementSteps {
+    coarsest_segments: 4,
+    local_error_ratio: 8.0,
+    local_error: (1e-12, 0.1),
+    cost_ratio: 4.0,
+    equal_step: 1.1,
+    later_parting: 1.3,
+};
 
 /// The grid of a run, and its steps as in [`Options`].
 #[derive(Clone, Copy, Debug)]
@@ -241,12 +249,13 @@ impl Refinement {
         let until = ended.known_until().filter(|_| ended.error_bar().is_none());
         if let (Some(until), Some(before)) = (until, self.known_until)
             && before > 0.0
-            && until < LATER_PARTING_FACTOR * before
+            && until < REFINEMENT.later_parting * before
         {
             return;
         }
         let part = ended.time() / self.scenario.dynamics.duration;
-        let expected = COST_RATIO * ended.seconds_so_far() / part.clamp(f64::EPSILON, 1.0);
+        let expected =
+            REFINEMENT.cost_ratio * ended.seconds_so_far() / part.clamp(f64::EPSILON, 1.0);
         if self.seconds + expected > REFINEMENT_SECONDS {
             return;
         }
@@ -254,7 +263,7 @@ impl Refinement {
         let halved = Resolution {
             segments: 2 * now.segments,
             step: now.step.map(|step| 0.5 * step),
-            tolerance: self.local_error(now.tolerance / LOCAL_ERROR_RATIO),
+            tolerance: self.local_error(now.tolerance / REFINEMENT.local_error_ratio),
         };
         let Ok(next) = self.build_with_steps(halved) else {
             return;
@@ -276,7 +285,9 @@ impl Refinement {
     fn local_error(&self, tolerance: f64) -> f64 {
         match self.choice.scheme {
             Scheme::Explicit => self.resolution.tolerance,
-            Scheme::SemiImplicit => tolerance.clamp(LOCAL_ERROR.0, LOCAL_ERROR.1),
+            Scheme::SemiImplicit => {
+                tolerance.clamp(REFINEMENT.local_error.0, REFINEMENT.local_error.1)
+            }
         }
     }
 
@@ -300,7 +311,7 @@ impl Refinement {
     fn build_with_steps(&self, at: Resolution) -> Result<Simulation, SimulationError> {
         let stable = self.build(Resolution { step: None, ..at })?;
         match (at.step, stable.longest_step()) {
-            (Some(step), Some(longest)) if longest > EQUAL_STEP_FACTOR * step => self.build(at),
+            (Some(step), Some(longest)) if longest > REFINEMENT.equal_step * step => self.build(at),
             _ => Ok(stable),
         }
     }
@@ -334,10 +345,11 @@ impl Refinement {
     ) -> Option<Option<Comparison>> {
         let own = self.resolution;
         let coarser = own.segments.div_ceil(2);
-        let (segments, factor) = match coarser >= COARSEST && self.has_grid(coarser) {
-            true => (coarser, 2.0),
-            false => (2 * own.segments, 0.5),
-        };
+        let (segments, factor) =
+            match coarser >= REFINEMENT.coarsest_segments && self.has_grid(coarser) {
+                true => (coarser, 2.0),
+                false => (2 * own.segments, 0.5),
+            };
         let with = |step: Option<f64>| Resolution {
             segments,
             step,
@@ -361,7 +373,7 @@ impl Refinement {
         };
         if let (Some(step), Some(longer)) = (run.longest_step(), longer)
             && factor > 1.0
-            && EQUAL_STEP_FACTOR * step < longer
+            && REFINEMENT.equal_step * step < longer
         {
             // The coarser grid does not allow explicit steps twice as long.
             self.resolution.step = Some(0.5 * step);
@@ -400,25 +412,33 @@ impl Refinement {
     }
 }
 
-/// The bar over the error that the order of the methods says.
-const SAFETY: f64 = 3.0;
+/// How the error of a run follows from its difference from another.
+struct RunComparison {
+    /// The bar over the error that the order of the methods says: the difference itself where a
+    /// phase is lost.
+    safety: f64,
+    /// Two runs have parted where they differ by more than this part of the largest displacement in
+    /// the motion: phases differ by so many radians, or one has snapped and the other has not.
+    parted: f64,
+    /// As long as displacements since the start differ by more than that part of the largest of
+    /// them so far, as those of a shared tip do while waves cross the first segments, the order of
+    /// the methods is not to be seen, and this factor is in its place. (A joined leaf let go needed
+    /// 8.)
+    unresolved_safety: f64,
+    /// Runs that differ by less than this part of the longest rod have not parted, however little
+    /// the leaf moves: they have come to rest, or vibrate with such an amplitude.
+    negligible: f64,
+    /// What rounding leaves of differences, relative to the longest rod.
+    rounding: f64,
+}
 
-/// Two runs have parted where they differ by more than this part of the largest displacement in
-/// the motion: phases differ by so many radians, or one has snapped and the other has not.
-const PARTED_DISPLACEMENT_FRACTION: f64 = 0.2;
-
-/// As long as displacements since the start differ by more than that part of the largest of them
-/// so far, as those of a shared tip do while waves cross the first segments, the order of the
-/// methods is not to be seen, and this factor is in its place. (A joined
-/// leaf let go needed 8.)
-const UNRESOLVED_ERROR_FACTOR: f64 = 10.0;
-
-/// Runs that differ by less than this part of the longest rod have not parted, however little the
-/// leaf moves: they have come to rest, or vibrate with such an amplitude.
-const NEGLIGIBLE_RUN_DIFFERENCE: f64 = 1e-3;
-
-/// What rounding leaves of differences, relative to the longest rod.
-const ROUNDING: f64 = 1e-12;
+const COMPARISON: RunComparison = RunComparison {
+    safety: 3.0,
+    parted: 0.2,
+    unresolved_safety: 10.0,
+    negligible: 1e-3,
+    rounding: 1e-12,
+};
 
 /// Number of nodes for cubic interpolation.
 const CUBIC: usize = 4;
@@ -511,12 +531,12 @@ impl Comparison {
         let (others, other) = other;
         let [own, its] = [segments, others].map(|count| (count as f64).powi(-2));
         Comparison {
-            factor: SAFETY * own / (its - own).abs(),
+            factor: COMPARISON.safety * own / (its - own).abs(),
             segments: others,
             of_steps: None,
-            parting_distance: (PARTED_DISPLACEMENT_FRACTION * other.largest_displacement())
-                .max(NEGLIGIBLE_RUN_DIFFERENCE * length),
-            rounding: ROUNDING * length,
+            parting_distance: (COMPARISON.parted * other.largest_displacement())
+                .max(COMPARISON.negligible * length),
+            rounding: COMPARISON.rounding * length,
             start: Vec::new(),
             displacement: 0.0,
             error_bar: Some(0.0),
@@ -528,7 +548,7 @@ impl Comparison {
     pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
         let distances = self.other.distances(halved);
         let bar = |distance: f64| match distance <= self.parting_distance {
-            true => 4.0 / 3.0 * SAFETY * distance,
+            true => 4.0 / 3.0 * COMPARISON.safety * distance,
             false => f64::INFINITY,
         };
         self.of_steps = Some(distances.into_iter().map(bar).collect());
@@ -558,9 +578,9 @@ impl Comparison {
             let moves = points.iter().zip(other).zip(start.iter().zip(others_start));
             let moves = moves.map(|((a, b), (a0, b0))| ((*a - *a0) - (*b - *b0)).length());
             let of_moves = largest(moves);
-            let factor = match of_moves <= PARTED_DISPLACEMENT_FRACTION * self.displacement {
+            let factor = match of_moves <= COMPARISON.parted * self.displacement {
                 true => self.factor,
-                false => UNRESOLVED_ERROR_FACTOR * self.factor,
+                false => COMPARISON.unresolved_safety * self.factor,
             };
             let bar = factor * distance + of_steps + self.rounding;
             (distance <= self.parting_distance).then(|| bar.max(before))

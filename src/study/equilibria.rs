@@ -12,21 +12,29 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-/// Starts relaxed in parallel, before the next check for new equilibria.
-const PARALLEL_STARTS: usize = 16;
+/// The search for equilibria, which also ends after [`MOST_FRUITLESS_STARTS`].
+struct EquilibriaSearch {
+    /// Starts relaxed in parallel, before the next check for new equilibria.
+    parallel_starts: usize,
+    /// Largest number of starts.
+    most_starts: usize,
+    /// Equilibria closer to each other than this part of the longest rod, or than their error
+    /// estimates, are the same.
+    same_distance: f64,
+    /// Energies that differ by less than this, relatively, are the same.
+    same_energy: f64,
+}
+
+const SEARCH: EquilibriaSearch = EquilibriaSearch {
+    parallel_starts: 16,
+    most_starts: 160,
+    same_distance: 1e-3,
+    same_energy: 1e-6,
+};
 
 /// The search ends after so many starts in a row without a new equilibrium, or after
 /// all starts.
 pub const MOST_FRUITLESS_STARTS: usize = 32;
-
-const MOST_STARTS: usize = 160;
-
-/// Equilibria closer to each other than this part of the longest rod, or than
-/// their error estimates, are the same.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 1e-3;
-
-/// Energies that differ by less than this, relatively, are the same.
-const SAME_ENERGY_DIFFERENCE: f64 = 1e-6;
 
 /// The equilibria of a leaf that many starts have found. As JSON it is
 /// `equilibria.json`.
@@ -131,8 +139,8 @@ pub fn equilibria(
     all.add_equilibrium(any, false);
     let mut in_vain = 0;
     let mut next = 0;
-    while next < MOST_STARTS && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
-        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + PARALLEL_STARTS)
+    while next < SEARCH.most_starts && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
+        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + SEARCH.parallel_starts)
             .into_par_iter()
             .map(|number| {
                 find(SemiImplicit {
@@ -141,7 +149,7 @@ pub fn equilibria(
                 })
             })
             .collect();
-        next += PARALLEL_STARTS;
+        next += SEARCH.parallel_starts;
         for ended in batch {
             let before = all.found.len();
             let ended = ended?;
@@ -208,13 +216,11 @@ impl Equilibria {
         let (least, energy) = (least?, energy?);
         // Mirror images differ by rounding only.
         let difference = energy - least;
-        (difference > SAME_ENERGY_DIFFERENCE * energy.abs()).then_some(
-            EquilibriaRemark::LowerEnergy {
-                plain,
-                lowest,
-                difference,
-            },
-        )
+        (difference > SEARCH.same_energy * energy.abs()).then_some(EquilibriaRemark::LowerEnergy {
+            plain,
+            lowest,
+            difference,
+        })
     }
 }
 
@@ -227,7 +233,7 @@ fn serialize_remarks<S: Serializer>(
 
 fn is_same_equilibrium(a: &Equilibrium, b: &Equilibrium) -> bool {
     let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
-    let within = (SAME_EQUILIBRIUM_DISTANCE * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
+    let within = (SEARCH.same_distance * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at common stations.
     let both = common_stations(&a.shape.stations, &b.shape.stations);
     let mut apart = rod_differences(&both, &a.shape.rods, &b.shape.rods).flatten();

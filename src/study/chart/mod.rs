@@ -332,17 +332,25 @@ fn shoot_from_relaxed_leaf(
     Ok((answer, seconds))
 }
 
-/// Runs that take longer, in seconds, are slow: they are not repeated.
-const SLOW_RUN_SECONDS: f64 = 1.0;
+/// How often a setting is run.
+struct RunTiming {
+    /// Runs that take longer, in seconds, are not repeated.
+    slow_seconds: f64,
+    /// Shorter runs, in seconds, follow one that is not measured: those of the others have
+    /// displaced their code and data from the processor's caches.
+    short_seconds: f64,
+    /// Least number of runs of a setting that is not slow.
+    fewest_runs: usize,
+    /// Largest number of runs.
+    most_runs: usize,
+}
 
-/// Shorter runs, in seconds, follow one that is not measured: those of the others have
-/// displaced their code and data from the processor's caches.
-const SHORT_RUN_SECONDS: f64 = 0.01;
-
-/// Least and largest number of runs of the others.
-const FEWEST_RUNS: usize = 3;
-
-const MOST_RUNS: usize = 101;
+const TIMING: RunTiming = RunTiming {
+    slow_seconds: 1.0,
+    short_seconds: 0.01,
+    fewest_runs: 3,
+    most_runs: 101,
+};
 
 /// Progress of the measurement.
 #[derive(Clone, Copy, Debug)]
@@ -437,13 +445,13 @@ pub fn time_runs(
         });
         runs.run_once()
     };
-    let longest = budget.max(SLOW_RUN_SECONDS);
+    let longest = budget.max(TIMING.slow_seconds);
     let mut too_slow = Vec::new();
     for runs in all.iter_mut() {
         if too_slow.contains(&runs.contender) {
             continue;
         }
-        runs.first_result = Some(run(runs, 1, FEWEST_RUNS).map(|(answer, time)| {
+        runs.first_result = Some(run(runs, 1, TIMING.fewest_runs).map(|(answer, time)| {
             runs.seconds.push(time);
             if time > longest {
                 too_slow.push(runs.contender);
@@ -452,7 +460,7 @@ pub fn time_runs(
         }));
     }
     let mut run_again = |runs: &mut RepeatedRuns, round: usize, rounds: usize| {
-        if runs.seconds[0] < SHORT_RUN_SECONDS {
+        if runs.seconds[0] < TIMING.short_seconds {
             let _ = run(runs, round, rounds);
         }
         // It succeeded before, and does so again.
@@ -463,11 +471,11 @@ pub fn time_runs(
     let is_fast = |runs: &RepeatedRuns| {
         runs.seconds
             .first()
-            .is_some_and(|&time| time < SLOW_RUN_SECONDS)
+            .is_some_and(|&time| time < TIMING.slow_seconds)
     };
-    for round in 1..FEWEST_RUNS {
+    for round in 1..TIMING.fewest_runs {
         for runs in all.iter_mut().filter(|runs| is_fast(runs)) {
-            run_again(runs, round + 1, FEWEST_RUNS);
+            run_again(runs, round + 1, TIMING.fewest_runs);
         }
     }
     let share = budget / all.iter().filter(|runs| is_fast(runs)).count().max(1) as f64;
@@ -478,14 +486,18 @@ pub fn time_runs(
     for round in 0..rest {
         for (runs, repeats) in all.iter_mut().zip(&repeats) {
             if is_run_in_round(round, *repeats, rest) {
-                run_again(runs, FEWEST_RUNS + round + 1, FEWEST_RUNS + rest);
+                run_again(
+                    runs,
+                    TIMING.fewest_runs + round + 1,
+                    TIMING.fewest_runs + rest,
+                );
             }
         }
     }
     for runs in all {
         runs.seconds.sort_by(f64::total_cmp);
     }
-    FEWEST_RUNS + rest
+    TIMING.fewest_runs + rest
 }
 
 /// Number of further runs after the first few, within a `share` of the time: none for a slow
@@ -493,13 +505,14 @@ pub fn time_runs(
 fn repeat_count(seconds: &[f64], share: f64) -> usize {
     let shortest = seconds.iter().copied().reduce(f64::min);
     match shortest {
-        Some(time) if seconds.len() >= FEWEST_RUNS => {
-            let all = if time < SHORT_RUN_SECONDS {
+        Some(time) if seconds.len() >= TIMING.fewest_runs => {
+            let all = if time < TIMING.short_seconds {
                 2.0 * time
             } else {
                 time
             };
-            ((share / all) as usize).clamp(FEWEST_RUNS, MOST_RUNS) - FEWEST_RUNS
+            ((share / all) as usize).clamp(TIMING.fewest_runs, TIMING.most_runs)
+                - TIMING.fewest_runs
         }
         _ => 0,
     }
@@ -711,8 +724,14 @@ mod timing_tests {
 
     #[test]
     fn fast_runs_are_repeated_often_and_slow_ones_not() {
-        assert_eq!(repeat_count(&[1e-6; 3], 0.1), MOST_RUNS - FEWEST_RUNS);
-        assert_eq!(repeat_count(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST_RUNS);
+        assert_eq!(
+            repeat_count(&[1e-6; 3], 0.1),
+            TIMING.most_runs - TIMING.fewest_runs
+        );
+        assert_eq!(
+            repeat_count(&[0.3, 0.01, 0.02], 0.1),
+            10 - TIMING.fewest_runs
+        );
         assert_eq!(repeat_count(&[2.0], 0.1), 0);
     }
 

@@ -134,8 +134,22 @@ pub struct MeasuredColumn {
     pub offset: f64,
 }
 
-/// The two numbers in FACTOR, FACTOR+OFFSET and FACTOR-OFFSET.
-fn parse_factor_and_offset(text: &str) -> Option<(f64, f64)> {
+/// The conversion of numbers in a column: factor times number plus offset.
+#[derive(Clone, Copy, PartialEq)]
+struct ColumnConversion {
+    factor: f64,
+    offset: f64,
+}
+
+impl ColumnConversion {
+    const NONE: ColumnConversion = ColumnConversion {
+        factor: 1.0,
+        offset: 0.0,
+    };
+}
+
+/// Parses FACTOR, FACTOR+OFFSET and FACTOR-OFFSET.
+fn parse_column_conversion(text: &str) -> Option<ColumnConversion> {
     let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
     let sign = text.char_indices().skip(1).find(|(at, character)| {
         matches!(character, '+' | '-') && !text[..*at].ends_with(['e', 'E'])
@@ -146,7 +160,10 @@ fn parse_factor_and_offset(text: &str) -> Option<(f64, f64)> {
     } else {
         finite(offset)
     };
-    Some((finite(factor).filter(|factor| *factor != 0.0)?, offset?))
+    Some(ColumnConversion {
+        factor: finite(factor).filter(|factor| *factor != 0.0)?,
+        offset: offset?,
+    })
 }
 
 impl FromStr for MeasuredColumn {
@@ -164,11 +181,11 @@ impl FromStr for MeasuredColumn {
         if name.is_empty() {
             return refuse("write the name that it has in the file before =");
         }
-        let (quantity, [factor, offset]) = match rest.rsplit_once(':') {
-            _ if is_known_column(rest) => (rest, [1.0, 0.0]),
-            None => (rest, [1.0, 0.0]),
-            Some((quantity, numbers)) => match parse_factor_and_offset(numbers.trim()) {
-                Some((factor, offset)) => (quantity.trim(), [factor, offset]),
+        let (quantity, conversion) = match rest.rsplit_once(':') {
+            _ if is_known_column(rest) => (rest, ColumnConversion::NONE),
+            None => (rest, ColumnConversion::NONE),
+            Some((quantity, numbers)) => match parse_column_conversion(numbers.trim()) {
+                Some(conversion) => (quantity.trim(), conversion),
                 None => {
                     return refuse(
                         "behind : stands a factor, which is not 0, and an offset if there is one, such as 1e-3 or 1e-3+0.12",
@@ -189,14 +206,14 @@ impl FromStr for MeasuredColumn {
                 }
             ));
         }
-        if quantity == EXPERIMENT_NAME_COLUMN && [factor, offset] != [1.0, 0.0] {
+        if quantity == EXPERIMENT_NAME_COLUMN && conversion != ColumnConversion::NONE {
             return refuse("a name has no factor and no offset: leave them out");
         }
         Ok(MeasuredColumn {
             name: name.into(),
             quantity: quantity.into(),
-            factor,
-            offset,
+            factor: conversion.factor,
+            offset: conversion.offset,
         })
     }
 }

@@ -25,8 +25,8 @@ impl FitModel<'_> {
     pub fn differentiate_data(&self, point: &mut FitPoint) -> Result<(), ContinuationFailure> {
         let theta = point.theta.clone();
         let shared = OnceLock::new();
-        let each = |(case, at): (usize, &mut CaseSolution)| {
-            self.differentiate_case((case, at), &theta, &shared)
+        let each = |(case, found): (usize, &mut CaseSolution)| {
+            self.differentiate_case(case, found, &theta, &shared)
         };
         let cases = point.case_solutions.par_iter_mut().enumerate();
         cases.map(each).collect()
@@ -60,7 +60,8 @@ impl FitModel<'_> {
     /// The same for one leaf. Leaves that differ by loads only share their derivatives.
     fn differentiate_case<'s>(
         &'s self,
-        (case, found): (usize, &mut CaseSolution),
+        case: usize,
+        found: &mut CaseSolution,
         theta: &[f64],
         shared: &OnceLock<Vec<LeafParameterDerivative<'s>>>,
     ) -> Result<(), ContinuationFailure> {
@@ -112,11 +113,24 @@ impl FitModel<'_> {
             return Ok(());
         }
         responses.solve_for_parameters(&found.equilibrium.levels)?;
-        found.gradients = found.datum_gradients(&responses, (&numbers, changes, rates), &slopes);
+        let parameters = ParameterDerivatives {
+            parameters: &numbers,
+            scenarios: changes,
+            leaves: rates,
+        };
+        found.gradients = found.datum_gradients(&responses, &parameters, &slopes);
         self.add_offset_derivatives(found, &slopes);
         found.responses = Some(responses);
         Ok(())
     }
+}
+
+/// The free numbers of a case, with the derivatives of its scenario and of its leaf with respect to
+/// each.
+struct ParameterDerivatives<'d> {
+    parameters: &'d [Parameter<'d>],
+    scenarios: &'d [ScenarioDerivative],
+    leaves: &'d [LeafParameterDerivative<'d>],
 }
 
 fn leaf_rates<'c>(
@@ -144,15 +158,11 @@ impl CaseSolution {
     fn datum_gradients(
         &self,
         responses: &ParameterResponses,
-        (numbers, changes, rates): (
-            &[Parameter],
-            &[ScenarioDerivative],
-            &[LeafParameterDerivative],
-        ),
+        with: &ParameterDerivatives,
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();
-        let photos = photo_rates(changes);
+        let photos = photo_rates(with.scenarios);
         // Measured more than once, a result has the same derivatives.
         let mut known: Vec<(MeasuredQuantity, Vec<f64>)> = Vec::new();
         let mut index = 0;
@@ -166,14 +176,15 @@ impl CaseSolution {
                         continue;
                     }
                     let by = |k: usize| {
-                        let of = (
-                            &numbers[k],
-                            &rates[k],
-                            responses.per_parameter[k].as_slice(),
-                        );
-                        slopes[k] * self.result_derivative(quantity, of)
+                        slopes[k]
+                            * self.result_derivative(
+                                quantity,
+                                &with.parameters[k],
+                                &with.leaves[k],
+                                &responses.per_parameter[k],
+                            )
                     };
-                    let row: Vec<f64> = (0..numbers.len()).map(by).collect();
+                    let row: Vec<f64> = (0..with.parameters.len()).map(by).collect();
                     known.push((quantity, row.clone()));
                     gradients.push(row);
                 }
@@ -185,12 +196,8 @@ impl CaseSolution {
                     };
                     let point: Vec<&ScalarDatum> =
                         self.scalar_data[index..].iter().take_while(same).collect();
-                    let rows = self.vein_point_gradients(
-                        (responses, &photos),
-                        (rod, sigma),
-                        &point,
-                        slopes,
-                    );
+                    let rows =
+                        self.vein_point_gradients(responses, &photos, rod, sigma, &point, slopes);
                     index += point.len();
                     gradients.extend(rows);
                 }
@@ -231,7 +238,7 @@ impl CaseSolution {
             }
             let all = unit_forces(&level.leaf, 1);
             let units: Vec<_> = axes.iter().map(|&axis| all[axis].clone()).collect();
-            let rates = responses.adjoint_derivatives((k, level), &units)?;
+            let rates = responses.adjoint_derivatives(k, level, &units)?;
             for (axis, rates) in axes.iter().zip(rates) {
                 let sums = sums[*axis].iter_mut().zip(rates).zip(slopes);
                 sums.for_each(|((sum, rate), slope)| *sum += weight * rate * slope);
@@ -248,7 +255,9 @@ impl CaseSolution {
     pub fn result_derivative(
         &self,
         quantity: MeasuredQuantity,
-        (number, rate, responses): (&Parameter, &LeafParameterDerivative, &[LinearResponse]),
+        number: &Parameter,
+        rate: &LeafParameterDerivative,
+        responses: &[LinearResponse],
     ) -> f64 {
         match quantity {
             MeasuredQuantity::Tip(axis) => {
@@ -294,8 +303,10 @@ impl CaseSolution {
     /// photograph; for the nearest point to an unmarked one, only the components normal to the vein.
     pub fn vein_point_gradients(
         &self,
-        (responses, photos): (&ParameterResponses, &[PhotoParameterDerivative]),
-        (rod, sigma): (usize, f64),
+        responses: &ParameterResponses,
+        photos: &[PhotoParameterDerivative],
+        rod: usize,
+        sigma: f64,
         point: &[&ScalarDatum],
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {

@@ -7,43 +7,54 @@
 
 use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::LONGEST_COORDINATE_STEP;
-use crate::study::fit::model::{FitModel, FitPoint, Weighting};
-use crate::study::fit::statistics::{NULL_SINGULAR_VALUE, singular_value_decomposition};
+use crate::study::fit::model::{FitModel, FitPoint, WeightedDerivatives, Weighting};
+use crate::study::fit::statistics::{
+    NULL_SINGULAR_VALUE, SingularDirections, singular_value_decomposition,
+};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest number of steps of an iteration.
-const MOST_GAUSS_NEWTON_STEPS: usize = 100;
+/// Steps of a Gauss-Newton iteration, and where it ends. Lengths of steps are in logarithms or
+/// units of the free numbers, gains are reductions of the sum of squares in variances of one datum.
+struct GaussNewtonLimits {
+    /// Largest number of steps.
+    most_steps: usize,
+    /// The initial radius of the trust region.
+    initial_radius: f64,
+    /// A smaller trust region ends the iteration.
+    least_radius: f64,
+    /// A shorter step ends the iteration.
+    shortest_step: f64,
+    /// A point ends the iteration from which the longest step is expected to gain no more.
+    converged_gain: f64,
+    /// Smaller gains may be errors of the equilibria: two in succession end the iteration, and so
+    /// does a loss.
+    uncertain_gain: f64,
+    /// The end is no minimum if the longest step was expected to gain more.
+    open_gain: f64,
+    /// The part of the way to the sum of another minimum that the longest step must be expected to
+    /// lead.
+    hopeless_part: f64,
+    /// The part of the way back to a known minimum that the longest step may lead.
+    returning_part: f64,
+    /// Bisections for the damping that shortens a step to the trust region.
+    damping_bisections: usize,
+    /// Least variance of residuals in units of the assumed one: equilibria are not more accurate.
+    least_variance: f64,
+}
 
-/// The initial radius of the trust region, in logarithms or units, and the least one.
-const INITIAL_TRUST_RADIUS: f64 = 0.7;
-
-const LEAST_TRUST_RADIUS: f64 = 1e-12;
-
-/// A smaller step ends the iteration; and a point from which the longest step is
-/// expected to gain no more than this part of one datum's variance.
-const CONVERGED_STEP: f64 = 1e-9;
-
-const CONVERGED_GAIN: f64 = 1e-7;
-
-/// Gains below this part of the variance may be errors of the equilibria: two in
-/// succession end the iteration, and so does a loss.
-const SUM_OF_SQUARES_ACCURACY: f64 = 1e-2;
-
-/// A minimum is rejected if the longest step was expected to gain more than this part.
-const REMAINING_GAIN_LIMIT: f64 = 0.1;
-
-/// The part of the way to a sum that the longest step must be expected to lead, and that of the
-/// way back to a known minimum that it may lead.
-const HOPELESS_STEP_THRESHOLD: f64 = 0.5;
-
-const RETURN_TO_KNOWN_MINIMUM: f64 = 0.5;
-
-/// Bisections for the damping that shortens a step.
-const DAMPING_BISECTIONS: usize = 40;
-
-/// Least variance of residuals in units of the assumed deviation: equilibria are not more
-/// accurate.
-const LEAST_VARIANCE: f64 = 1e-6;
+const GAUSS_NEWTON: GaussNewtonLimits = GaussNewtonLimits {
+    most_steps: 100,
+    initial_radius: 0.7,
+    least_radius: 1e-12,
+    shortest_step: 1e-9,
+    converged_gain: 1e-7,
+    uncertain_gain: 1e-2,
+    open_gain: 0.1,
+    hopeless_part: 0.5,
+    returning_part: 0.5,
+    damping_bisections: 40,
+    least_variance: 1e-6,
+};
 
 /// As [`NULL_SINGULAR_VALUE`], for the less accurate derivatives of the search.
 const NULL_SINGULAR_VALUE_SEARCH: f64 = 3e-7;
@@ -72,12 +83,20 @@ impl ExcludedMinimum<'_> {
     /// Whether a step hardly leads to such a minimum: the sum that is expected after it is too large
     /// still, or it leads back to the known minimum.
     fn is_step_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
-        let returns =
-            coordinate_change(self.theta, theta).norm() < RETURN_TO_KNOWN_MINIMUM * self.distance;
+        let returns = coordinate_change(self.theta, theta).norm()
+            < GAUSS_NEWTON.returning_part * self.distance;
         returns
             || expected - self.largest_sum
-                > (1.0 - HOPELESS_STEP_THRESHOLD) * (sum - self.largest_sum).max(0.0)
+                > (1.0 - GAUSS_NEWTON.hopeless_part) * (sum - self.largest_sum).max(0.0)
     }
+}
+
+/// Where an iteration ended.
+pub(super) struct GaussNewtonResult {
+    pub point: FitPoint,
+    pub outcome: GaussNewtonOutcome,
+    /// How often the leaves were followed.
+    pub evaluations: usize,
 }
 
 pub(super) struct GaussNewtonIteration<'m, 'a> {
@@ -109,8 +128,8 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
             model,
             weighting,
             held: vec![false; model.coordinates.len()],
-            most_steps: MOST_GAUSS_NEWTON_STEPS,
-            gain_tolerance: CONVERGED_GAIN,
+            most_steps: GAUSS_NEWTON.most_steps,
+            gain_tolerance: GAUSS_NEWTON.converged_gain,
             reuses_derivatives: false,
             excluded_minimum: None,
             jumps: Vec::new(),
@@ -119,12 +138,25 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, mut point: FitPoint) -> (FitPoint, GaussNewtonOutcome, usize) {
-        if let Err(lost) = self.model.differentiate_data(&mut point) {
-            return (point, GaussNewtonOutcome::Stuck(Some(lost)), 0);
-        }
-        let mut radius = INITIAL_TRUST_RADIUS;
+    pub fn run(&mut self, point: FitPoint) -> GaussNewtonResult {
         let mut evaluations = 0;
+        let (point, outcome) = self.iterate(point, &mut evaluations);
+        GaussNewtonResult {
+            point,
+            outcome,
+            evaluations,
+        }
+    }
+
+    fn iterate(
+        &mut self,
+        mut point: FitPoint,
+        evaluations: &mut usize,
+    ) -> (FitPoint, GaussNewtonOutcome) {
+        if let Err(lost) = self.model.differentiate_data(&mut point) {
+            return (point, GaussNewtonOutcome::Stuck(Some(lost)));
+        }
+        let mut radius = GAUSS_NEWTON.initial_radius;
         let mut small = 0;
         for step in 0..self.most_steps {
             let residuals = self.weighting.residuals(&point);
@@ -139,36 +171,36 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
             );
             let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
             if open < self.gain_tolerance * variance {
-                return (point, GaussNewtonOutcome::Converged, evaluations);
+                return (point, GaussNewtonOutcome::Converged);
             }
             let besides = self.excluded_minimum.as_ref();
             if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
-                return (point, GaussNewtonOutcome::Stuck(None), evaluations);
+                return (point, GaussNewtonOutcome::Stuck(None));
             }
             self.jumps.clear();
-            let nearly = open < SUM_OF_SQUARES_ACCURACY * variance;
+            let nearly = open < GAUSS_NEWTON.uncertain_gain * variance;
             let mut lost = None;
             loop {
                 let theta = self.bounded_update(&point.theta, &linear.trust_region_step(radius));
                 let change = coordinate_change(&point.theta, &theta);
                 let (size, predicted) = (change.norm(), linear.expected_reduction(&change));
                 let end = |lost: Option<ContinuationFailure>| match open
-                    > REMAINING_GAIN_LIMIT * variance
+                    > GAUSS_NEWTON.open_gain * variance
                 {
                     true => GaussNewtonOutcome::Stuck(lost),
                     false => GaussNewtonOutcome::Converged,
                 };
                 let number = size.is_finite() && predicted.is_finite();
-                let worth = size >= CONVERGED_STEP
-                    && predicted >= CONVERGED_GAIN * variance
-                    && radius >= LEAST_TRUST_RADIUS;
+                let worth = size >= GAUSS_NEWTON.shortest_step
+                    && predicted >= GAUSS_NEWTON.converged_gain * variance
+                    && radius >= GAUSS_NEWTON.least_radius;
                 if !number || !worth {
-                    return (point, end(lost), evaluations);
+                    return (point, end(lost));
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, GaussNewtonOutcome::BudgetExhausted, evaluations);
+                    return (point, GaussNewtonOutcome::BudgetExhausted);
                 }
-                evaluations += 1;
+                *evaluations += 1;
                 match self.model.continue_leaves(&point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
@@ -178,7 +210,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             && self.is_minimum(&point, &theta, &found)
                         {
                             trial.take_gradients(&mut point);
-                            return (trial, GaussNewtonOutcome::Converged, evaluations);
+                            return (trial, GaussNewtonOutcome::Converged);
                         }
                         if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
@@ -190,12 +222,12 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, GaussNewtonOutcome::Converged, evaluations);
+                                return (point, GaussNewtonOutcome::Converged);
                             }
                             break;
                         }
                         if nearly {
-                            return (point, GaussNewtonOutcome::Converged, evaluations);
+                            return (point, GaussNewtonOutcome::Converged);
                         }
                         lost = None;
                     }
@@ -209,7 +241,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, GaussNewtonOutcome::StepLimit, evaluations)
+        (point, GaussNewtonOutcome::StepLimit)
     }
 
     /// The linearised residuals in the coordinates that may move.
@@ -218,13 +250,16 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
         point: &FitPoint,
         residuals: &DVector<f64>,
     ) -> LinearizedResiduals {
-        let (roots, mut jacobian) = self.weighting.apply_weights(point, residuals);
+        let WeightedDerivatives {
+            roots,
+            mut jacobian,
+        } = self.weighting.weighted_derivatives(point, residuals);
         let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
         let active = self.movable_coordinates(point, &gradient);
         for k in (0..active.len()).filter(|&k| !active[k]) {
             jacobian.column_mut(k).fill(0.0);
         }
-        let (values, directions) = singular_value_decomposition(&jacobian);
+        let SingularDirections { values, directions } = singular_value_decomposition(&jacobian);
         let slopes = directions.tr_mul(&gradient);
         let null = match self.model.grids {
             GridPolicy::AsNeeded => NULL_SINGULAR_VALUE,
@@ -298,7 +333,8 @@ impl LinearizedResiduals {
         }
         match known {
             true => 1.0,
-            false => (sum / count.saturating_sub(sensitive).max(1) as f64).max(LEAST_VARIANCE),
+            false => (sum / count.saturating_sub(sensitive).max(1) as f64)
+                .max(GAUSS_NEWTON.least_variance),
         }
     }
 
@@ -316,7 +352,7 @@ impl LinearizedResiduals {
         if parts.norm() > radius {
             // The length decreases with the damping.
             let (mut low, mut high) = (0.0, self.slopes.norm() / radius);
-            for _ in 0..DAMPING_BISECTIONS {
+            for _ in 0..GAUSS_NEWTON.damping_bisections {
                 let middle = match low > 0.0 {
                     true => f64::sqrt(low * high),
                     false => 1e-4 * high,

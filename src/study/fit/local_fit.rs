@@ -10,7 +10,9 @@ use crate::study::ParameterKeys;
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Experiment, ObservedExperiment};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
-use crate::study::fit::least_squares::{ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome};
+use crate::study::fit::least_squares::{
+    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
 use crate::study::fit::model::{FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::remark::FitRemark;
@@ -23,15 +25,25 @@ use crate::study::fit::{
 };
 use std::collections::BTreeMap;
 
-/// Largest number of minima abandoned for better ones.
-const MOST_MINIMA_ABANDONED: usize = 4;
+/// How often a local search begins again.
+struct LocalSearchLimits {
+    /// Largest number of minima abandoned for better ones.
+    most_minima_abandoned: usize,
+    /// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
+    most_jumps: usize,
+    /// Number of values, of those at which a leaf would have to jump, at which it is relaxed again.
+    most_jumps_relaxed: usize,
+    /// If the standard deviation of the data is estimated from the residuals, the largest ratio of
+    /// that of the search to it: a larger one is due to coarse grids.
+    consistent_deviation: f64,
+}
 
-/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
-const MOST_EQUILIBRIUM_JUMPS: usize = 3;
-
-/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
-/// that of the search to it: a larger one is due to coarse grids.
-const CONSISTENT_DEVIATION_RATIO: f64 = 1.05;
+const LOCAL_SEARCH: LocalSearchLimits = LocalSearchLimits {
+    most_minima_abandoned: 4,
+    most_jumps: 3,
+    most_jumps_relaxed: 3,
+    consistent_deviation: 1.05,
+};
 
 /// A minimum, or where the search for it ended.
 pub(super) struct FitMinimum {
@@ -106,21 +118,26 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             };
             let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
             search.most_steps = search.most_steps.min(self.most_steps);
-            let (near, searched, more) = search.run(point);
-            work.evaluations += more;
+            let searched = search.run(point);
+            let near = searched.point;
+            work.evaluations += searched.evaluations;
             attempts += 1;
             let there = model.continue_leaves(&near, &near.theta);
             let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
             let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
             last.reuses_derivatives = true;
             last.most_steps = last.most_steps.min(self.most_steps);
-            let (mut least, end, more) = last.run(there);
-            work.evaluations += 1 + more;
-            work.accurate += 1 + more;
+            let GaussNewtonResult {
+                point: mut least,
+                outcome: end,
+                evaluations,
+            } = last.run(there);
+            work.evaluations += 1 + evaluations;
+            work.accurate += 1 + evaluations;
             let is_lost =
                 end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
             if is_lost
-                && jumps < MOST_EQUILIBRIUM_JUMPS
+                && jumps < LOCAL_SEARCH.most_jumps
                 && let Some(there) = model.relax_beyond_jump(&last.jumps, &least, weighting)
             {
                 jumps += 1;
@@ -131,8 +148,8 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             let of_search =
                 FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
             let spread = self.statistics(&least).residual_deviation;
-            let same = searched == GaussNewtonOutcome::Converged
-                && of_search.residual_deviation < CONSISTENT_DEVIATION_RATIO * spread;
+            let same = searched.outcome == GaussNewtonOutcome::Converged
+                && of_search.residual_deviation < LOCAL_SEARCH.consistent_deviation * spread;
             if !same && end == GaussNewtonOutcome::Converged {
                 // Its neighbourhood is computed with its own leaves.
                 let differentiated = model.differentiate_data(&mut least);
@@ -149,7 +166,7 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             };
             let (end, parameters) = match parameters {
                 Ok(parameters) => (end, parameters),
-                Err(better) if attempts < MOST_MINIMA_ABANDONED => {
+                Err(better) if attempts < LOCAL_SEARCH.most_minima_abandoned => {
                     point = better;
                     continue;
                 }
@@ -199,9 +216,6 @@ fn falls_beyond_window(stats: &FitStatistics) -> bool {
     })
 }
 
-/// Values, of those at which a leaf would have to jump, at which it is relaxed again.
-const MOST_JUMPS_RELAXED: usize = 3;
-
 impl FitModel<'_> {
     /// The leaves relaxed from their usual starts, beyond the values at which one of
     /// `before` would have to jump; or there, if another equilibrium exists. `None`
@@ -216,8 +230,11 @@ impl FitModel<'_> {
         let bound = weighting.huber_bound(&residuals);
         let sum = weighting.huber_sum(&residuals, bound);
         // The farthest are the steps that the data ask for; close to where a leaf buckles none is followed.
-        let far = jumps.iter().take(MOST_JUMPS_RELAXED);
-        let near = jumps.iter().skip(MOST_JUMPS_RELAXED).next_back();
+        let far = jumps.iter().take(LOCAL_SEARCH.most_jumps_relaxed);
+        let near = jumps
+            .iter()
+            .skip(LOCAL_SEARCH.most_jumps_relaxed)
+            .next_back();
         far.chain(near).chain([&before.theta]).find_map(|theta| {
             let there = self.relax_leaves(theta).ok()?;
             let nearer = weighting.huber_sum(&weighting.residuals(&there), bound) < sum;

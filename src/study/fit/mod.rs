@@ -129,8 +129,8 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         ..Options::default()
     };
     let most = request.most_evaluations.unwrap_or(DEFAULT_EVALUATION_LIMIT);
-    let data = (request.data.clone(), EvaluationBudget::new(most));
-    let model = FitModel::new(base, &coordinates, &options, data)?;
+    let (data, budget) = (request.data.clone(), EvaluationBudget::new(most));
+    let model = FitModel::new(base, &coordinates, &options, data, budget)?;
     let weighting = Weighting {
         assumed_deviation: ASSUMED_DEVIATION_PER_LENGTH * model.data_length_unit(),
         is_robust: request.robust,

@@ -130,7 +130,8 @@ impl<'a> FitModel<'a> {
         base: &'a BaseScenario,
         coordinates: &'a [FitCoordinate],
         options: &Options,
-        (data, budget): (Data, EvaluationBudget),
+        data: Data,
+        budget: EvaluationBudget,
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
         let cases = experiment_cases(data)?;
@@ -638,6 +639,14 @@ pub(super) struct Weighting {
     pub is_robust: bool,
 }
 
+/// Derivatives of weighted residuals.
+pub(super) struct WeightedDerivatives {
+    /// Square roots of the weights of residuals.
+    pub roots: DVector<f64>,
+    /// Derivatives of the residuals times these, a row for each datum.
+    pub jacobian: DMatrix<f64>,
+}
+
 impl Weighting {
     /// Residuals divided by their standard deviations.
     pub fn residuals(&self, point: &FitPoint) -> DVector<f64> {
@@ -662,17 +671,17 @@ impl Weighting {
         DMatrix::from_fn(sd.len(), point.theta.len(), |i, k| gradient(i, k) / sd[i])
     }
 
-    /// Square roots of the weights of residuals, and derivatives times these.
-    pub fn apply_weights(
+    /// The weights of these residuals, and the derivatives times their roots.
+    pub fn weighted_derivatives(
         &self,
         point: &FitPoint,
         residuals: &DVector<f64>,
-    ) -> (DVector<f64>, DMatrix<f64>) {
+    ) -> WeightedDerivatives {
         let (roots, mut jacobian) = (self.weight_roots(residuals), self.jacobian(point));
         for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
             row *= *root;
         }
-        (roots, jacobian)
+        WeightedDerivatives { roots, jacobian }
     }
 
     /// Square roots of the weights of residuals: less than one beyond Huber's

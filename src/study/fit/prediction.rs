@@ -100,8 +100,8 @@ impl CaseSolution {
                 VeinInterpolant::from_equilibrium(&self.equilibrium, traced.rod)
             });
             let beside = traced.sigma.is_none();
-            let (sigma, model) = match traced.sigma {
-                Some(sigma) => (sigma, vein.point_and_tangent(sigma).0),
+            let nearest = match traced.sigma {
+                Some(sigma) => vein.point(sigma),
                 None => vein.nearest_point(&traced.coordinates, &view),
             };
             let seen = traced.coordinates.iter().enumerate();
@@ -112,10 +112,10 @@ impl CaseSolution {
                     quantity: DatumQuantity::Vein {
                         rod: traced.rod,
                         coordinate,
-                        sigma,
+                        sigma: nearest.sigma,
                     },
                     observed,
-                    model: view.project_point(coordinate, model),
+                    model: view.project_point(coordinate, nearest.position),
                     sd: traced.sd,
                     is_uninformative: beside && number == 0,
                     origin: Some(traced.origin.clone()),
@@ -347,12 +347,28 @@ const NEAREST_POINT_ITERATIONS: usize = 60;
 
 const NEAREST_POINT_ACCURACY: f64 = 1e-10;
 
-/// A vein at the nodes of its finest grid.
+/// A point of a vein.
+#[derive(Clone, Copy)]
+pub(super) struct VeinPoint {
+    /// Fraction of the length; outside 0 to 1 on a straight extension.
+    sigma: f64,
+    /// In the scenario's units.
+    position: DVec3,
+}
+
+/// A point of a vein with its tangent, both in the scenario's units.
+struct PointWithTangent {
+    position: DVec3,
+    /// The derivative with respect to the fraction of the length.
+    tangent: DVec3,
+}
+
+/// A vein as a curve.
 pub(super) struct VeinInterpolant<'a> {
     equilibrium: &'a NestedEquilibrium,
     rod: usize,
-    /// Fractions of the length, and positions in the scenario's units.
-    nodes: Vec<(f64, DVec3)>,
+    /// The nodes of the finest grid.
+    nodes: Vec<VeinPoint>,
 }
 
 impl<'a> VeinInterpolant<'a> {
@@ -361,7 +377,10 @@ impl<'a> VeinInterpolant<'a> {
             let (base, length) = (level.state.base(rod), level.leaf.leaf.scale.length);
             let sigma = level.leaf.grid.sigma().iter().enumerate();
             sigma
-                .map(|(i, sigma)| (*sigma, level.state.x[base + i] * length))
+                .map(|(i, sigma)| VeinPoint {
+                    sigma: *sigma,
+                    position: level.state.x[base + i] * length,
+                })
                 .collect()
         });
         VeinInterpolant {
@@ -371,9 +390,13 @@ impl<'a> VeinInterpolant<'a> {
         }
     }
 
-    /// The point at a fraction of the length, in the scenario's units, and its derivative
-    /// with respect to the fraction. The vein is extended straight beyond its ends.
-    pub fn point_and_tangent(&self, sigma: f64) -> (DVec3, DVec3) {
+    /// The point at a fraction of the length. The vein is extended straight beyond its ends.
+    fn point(&self, sigma: f64) -> VeinPoint {
+        let position = self.point_with_tangent(sigma).position;
+        VeinPoint { sigma, position }
+    }
+
+    fn point_with_tangent(&self, sigma: f64) -> PointWithTangent {
         let length = self.equilibrium.levels[0].leaf.leaf.scale.length;
         let (mut x, mut slope) = (DVec3::ZERO, DVec3::ZERO);
         for (level, weight) in self
@@ -391,33 +414,35 @@ impl<'a> VeinInterpolant<'a> {
                 slope += *weight * derivative.value(node);
             }
         }
-        (x * length, slope * length)
+        PointWithTangent {
+            position: x * length,
+            tangent: slope * length,
+        }
     }
 
-    /// The fraction of the length nearest to a point with these measured coordinates,
-    /// and the point there. The vein is extended straight beyond its ends: a traced
+    /// The point nearest to one with these measured coordinates. The vein is extended straight
+    /// beyond its ends: a traced
     /// point near an end is compared across the vein like all others, so that noise along
     /// it, half of which is beyond the end, does not lengthen the vein.
-    pub fn nearest_point(
-        &self,
-        seen: &ObservedCoordinates,
-        view: &ObservationModel,
-    ) -> (f64, DVec3) {
+    pub fn nearest_point(&self, seen: &ObservedCoordinates, view: &ObservationModel) -> VeinPoint {
         let known = || {
             let known = seen.iter().enumerate();
             known.filter_map(|(coordinate, value)| Some((coordinate, (*value)?)))
         };
         let apart = |x: DVec3| known().map(move |(k, value)| (k, view.project_point(k, x) - value));
-        let square = |node: &(f64, DVec3)| apart(node.1).map(|(_, it)| it * it).sum::<f64>();
+        let square = |node: &VeinPoint| apart(node.position).map(|(_, it)| it * it).sum::<f64>();
         let order =
             |a: &usize, b: &usize| square(&self.nodes[*a]).total_cmp(&square(&self.nodes[*b]));
         let last = self.nodes.len().saturating_sub(1);
         let best = (0..=last).min_by(order).unwrap_or(0);
         let [low, high] =
-            [best.saturating_sub(1), (best + 1).min(last)].map(|node| self.nodes[node].0);
+            [best.saturating_sub(1), (best + 1).min(last)].map(|node| self.nodes[node].sigma);
         // The derivative of half the squared distance, and the point.
         let rate = |sigma: f64| {
-            let (x, slope) = self.point_and_tangent(sigma);
+            let PointWithTangent {
+                position: x,
+                tangent: slope,
+            } = self.point_with_tangent(sigma);
             let (mut value, mut squared) = (0.0, 0.0);
             for (k, apart) in apart(x) {
                 let slope = view.project_displacement(k, slope);
@@ -428,7 +453,7 @@ impl<'a> VeinInterpolant<'a> {
         };
         // Newton's method without the curvature, then the secant method; bisection where a step
         // leaves the bracket of the zero.
-        let mut sigma = self.nodes[best].0;
+        let mut sigma = self.nodes[best].sigma;
         let (mut below, mut above) = (low, high);
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..NEAREST_POINT_ITERATIONS {
@@ -441,7 +466,7 @@ impl<'a> VeinInterpolant<'a> {
                 _ => 0.0,
             };
             if step.abs() < NEAREST_POINT_ACCURACY {
-                return (sigma, x);
+                return VeinPoint { sigma, position: x };
             }
             match value < 0.0 {
                 true => below = sigma,
@@ -455,7 +480,7 @@ impl<'a> VeinInterpolant<'a> {
                 // On a straight extension, the first step is exact.
                 Some((end, ..)) if sigma == *end => {
                     let beyond = end - value / squared;
-                    return (beyond, self.point_and_tangent(beyond).0);
+                    return self.point(beyond);
                 }
                 Some((end, ..)) => {
                     before = None;
@@ -465,7 +490,7 @@ impl<'a> VeinInterpolant<'a> {
                 None => 0.5 * (below + above),
             };
         }
-        (sigma, self.point_and_tangent(sigma).0)
+        self.point(sigma)
     }
 }
 
@@ -535,7 +560,8 @@ impl ParameterResponses {
     /// to unit forces on the leaf: by one solution per result.
     pub fn adjoint_derivatives(
         &self,
-        (k, level): (usize, &GridLevel),
+        k: usize,
+        level: &GridLevel,
         units: &[ParameterForces],
     ) -> Result<Vec<Vec<f64>>, ContinuationFailure> {
         let mut all = self

@@ -6,7 +6,9 @@
 
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Data, Experiment};
-use crate::study::fit::model::{EvaluationBudget, FitModel, FitPoint, Weighting};
+use crate::study::fit::model::{
+    EvaluationBudget, FitModel, FitPoint, WeightedDerivatives, Weighting,
+};
 use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
 use crate::study::fit::remark::FitCandidateRemark;
 use crate::study::fit::{FitCandidate, FitError};
@@ -46,6 +48,14 @@ pub(super) struct FitStatistics<'m, 'a> {
     pub coverage_factor: f64,
 }
 
+/// Uncertainty of a coordinate.
+pub(super) struct CoordinateUncertainty {
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Changes of all coordinates correlated with a change of this one by one.
+    pub correlated_changes: DVector<f64>,
+}
+
 impl<'m, 'a> FitStatistics<'m, 'a> {
     pub fn new(
         model: &'m FitModel<'a>,
@@ -54,8 +64,9 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         point: &'m FitPoint,
     ) -> Self {
         let residuals = weighting.residuals(point);
-        let (roots, jacobian) = weighting.apply_weights(point, &residuals);
-        let (values, directions) = singular_value_decomposition(&jacobian);
+        let WeightedDerivatives { roots, jacobian } =
+            weighting.weighted_derivatives(point, &residuals);
+        let SingularDirections { values, directions } = singular_value_decomposition(&jacobian);
         let largest = values.last().copied().unwrap_or(0.0);
         let insensitive = values
             .iter()
@@ -90,8 +101,8 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
     }
 
-    /// Standard deviation of a coordinate, and the correlated changes of the others.
-    pub fn standard_error(&self, k: usize) -> (f64, DVector<f64>) {
+    /// The uncertainty of a coordinate.
+    pub fn uncertainty(&self, k: usize) -> CoordinateUncertainty {
         let sensitive = self.insensitive_count..self.singular_values.len();
         let mut along = DVector::zeros(self.singular_values.len());
         for direction in sensitive {
@@ -101,8 +112,14 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
         let variance = along[k];
         match variance > 0.0 {
-            true => (variance.sqrt(), along / variance),
-            false => (0.0, along),
+            true => CoordinateUncertainty {
+                deviation: variance.sqrt(),
+                correlated_changes: along / variance,
+            },
+            false => CoordinateUncertainty {
+                deviation: 0.0,
+                correlated_changes: along,
+            },
         }
     }
 
@@ -147,7 +164,7 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
 
     /// Whether the data determine a coordinate to no better than a factor of ten.
     pub fn is_weakly_determined(&self, k: usize) -> bool {
-        self.coverage_factor * self.standard_error(k).0 > UNDETERMINED_UNCERTAINTY
+        self.coverage_factor * self.uncertainty(k).deviation > UNDETERMINED_UNCERTAINTY
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
@@ -169,13 +186,14 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
     /// Correlations of the coordinates to which the data are sensitive.
     pub fn correlations(&self) -> Vec<Vec<Option<f64>>> {
         let count = self.singular_values.len();
-        let deviations: Vec<_> = (0..count).map(|k| self.standard_error(k)).collect();
+        let uncertainties: Vec<_> = (0..count).map(|k| self.uncertainty(k)).collect();
         let entry = |a: usize, b: usize| {
-            let ((own, along), (other, _)) = (&deviations[a], &deviations[b]);
+            let [own, other] = [a, b].map(|k| uncertainties[k].deviation);
             let known =
-                self.is_sensitive_to(a) && self.is_sensitive_to(b) && *own > 0.0 && *other > 0.0;
-            // along is the covariance with a over its variance.
-            known.then(|| (along[b] * own / other).clamp(-1.0, 1.0))
+                self.is_sensitive_to(a) && self.is_sensitive_to(b) && own > 0.0 && other > 0.0;
+            // The correlated change is the covariance with `a` over the variance of `a`.
+            let change = uncertainties[a].correlated_changes[b];
+            known.then(|| (change * own / other).clamp(-1.0, 1.0))
         };
         let row = |a: usize| (0..count).map(|b| entry(a, b)).collect();
         (0..count).map(row).collect()
@@ -212,8 +230,15 @@ const NEGLIGIBLE_COMPONENT: f64 = 1e-3;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 pub(super) const NORMAL_QUANTILE_95: f64 = 1.959_963_984_540_054;
 
-/// Singular values, ascending, and their right singular vectors as columns.
-pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+/// Singular values and right singular vectors of derivatives of the data.
+pub(super) struct SingularDirections {
+    /// Singular values, ascending.
+    pub values: Vec<f64>,
+    /// Right singular vectors, as columns.
+    pub directions: DMatrix<f64>,
+}
+
+pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> SingularDirections {
     let count = jacobian.ncols();
     if jacobian.nrows() > 2 * count {
         // For many rows: those of the triangular factor, which are the same.
@@ -228,7 +253,7 @@ pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> (Vec<f64>
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
     let values = order.iter().map(|&k| svd.singular_values[k]).collect();
     let directions = DMatrix::from_fn(count, count, |r, c| rows[(order[c], r)]);
-    (values, directions)
+    SingularDirections { values, directions }
 }
 
 /// A basis of a space of directions with as many zero components as possible:
@@ -302,8 +327,8 @@ pub(super) fn rank_candidate_experiments(
         };
         let of = stats.model;
         // One leaf for each, whatever the search took.
-        let data = (data, EvaluationBudget::new(usize::MAX));
-        let model = FitModel::new(of.base, of.coordinates, &of.options, data)?;
+        let budget = EvaluationBudget::new(usize::MAX);
+        let model = FitModel::new(of.base, of.coordinates, &of.options, data, budget)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),
             bits: 0.0,
@@ -388,7 +413,7 @@ mod tests {
 
     #[test]
     fn rows_fewer_than_columns_leave_directions_unfelt() {
-        let (values, directions) =
+        let SingularDirections { values, directions } =
             singular_value_decomposition(&DMatrix::from_row_slice(1, 2, &[3.0, 4.0]));
         assert!(values[0] < 1e-12 && (values[1] - 5.0).abs() < 1e-12);
         let insensitive = directions.column(0);

@@ -541,20 +541,27 @@ pub fn reference_stations(scenario: &Scenario, knobs: SolverSettings) -> Vec<f64
     }
 }
 
-/// Leaves closer than this, in lengths, count as the same.
-const SAME_ROW_DISTANCE: f64 = 0.01;
+/// The search for jumps between neighbouring cells.
+struct JumpSearch {
+    /// Leaves closer than this, in lengths, count as the same.
+    same_leaf: f64,
+    /// A pair is examined if its tips, or its twists, are farther apart than those of a
+    /// neighbouring pair by this factor.
+    suspicious_ratio: f64,
+    /// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
+    /// part of their distance.
+    continuous_part: f64,
+    /// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
+    /// distance from it, here a sixty-fourth.
+    bisections: usize,
+}
 
-/// A pair is examined if its tips, or its twists, are farther apart than those of
-/// a neighbouring pair by this factor.
-const SUSPICIOUS_DISTANCE_RATIO: f64 = 1.5;
-
-/// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
-/// part of their distance.
-const CONTINUITY_RATIO: f64 = 0.1;
-
-/// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
-/// distance from it, here a sixty-fourth.
-const JUMP_BISECTIONS: usize = 12;
+const JUMP_SEARCH: JumpSearch = JumpSearch {
+    same_leaf: 0.01,
+    suspicious_ratio: 1.5,
+    continuous_part: 0.1,
+    bisections: 12,
+};
 
 /// Two neighbouring cells between which the leaf jumps to another equilibrium.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -652,8 +659,8 @@ fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &Neighbouring
     (0..2).any(|k| {
         let others = [before, after].into_iter().flatten().map(|it| it[k]);
         let least = others.fold(f64::INFINITY, f64::min);
-        own[k] > SAME_ROW_DISTANCE * units[k]
-            && (!least.is_finite() || own[k] > SUSPICIOUS_DISTANCE_RATIO * least)
+        own[k] > JUMP_SEARCH.same_leaf * units[k]
+            && (!least.is_finite() || own[k] > JUMP_SEARCH.suspicious_ratio * least)
     })
 }
 
@@ -674,13 +681,15 @@ fn locate_jump(request: &MapRequest, pair: &NeighbouringCells) -> Option<MapJump
     let length = longest(&request.base.scenario().rods);
     let [mut low, mut high] = [(0.0, at(0.0)?), (1.0, at(1.0)?)];
     let mut distance = low.1.largest_distance(&high.1)?;
-    for half in 0..JUMP_BISECTIONS {
-        if distance < SAME_ROW_DISTANCE * length {
+    for half in 0..JUMP_SEARCH.bisections {
+        if distance < JUMP_SEARCH.same_leaf * length {
             return None;
         }
         let part = 0.5 * (low.0 + high.0);
         let middle = at(part)?;
-        if half == 0 && distance_from_mean(&low.1, &middle, &high.1)? < CONTINUITY_RATIO * distance
+        if half == 0
+            && distance_from_mean(&low.1, &middle, &high.1)?
+                < JUMP_SEARCH.continuous_part * distance
         {
             return None;
         }
@@ -693,7 +702,7 @@ fn locate_jump(request: &MapRequest, pair: &NeighbouringCells) -> Option<MapJump
             false => (low, distance) = ((part, middle), above),
         }
     }
-    (distance >= SAME_ROW_DISTANCE * length).then(|| MapJump {
+    (distance >= JUMP_SEARCH.same_leaf * length).then(|| MapJump {
         key: axis.keys.to_string(),
         from: request.texts(pair.cells[0]),
         to: request.texts(pair.cells[1]),

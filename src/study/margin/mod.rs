@@ -25,18 +25,47 @@ use std::f64::consts::PI;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The largest push: this many A/L^2, the load under which the veins buckle as columns pinned at
-/// both ends (Euler), and so many weights; but no more than this part of
-/// their axial stiffness.
-const LARGEST_BENDING_LOAD_FACTOR: f64 = PI * PI;
+/// The largest push: the sum of the first two loads, but no more than the third.
+struct LargestPush {
+    /// In A/L^2: the load under which the veins buckle as columns pinned at both ends (Euler).
+    bending: f64,
+    /// In weights of the leaf.
+    weight: f64,
+    /// A part of the axial stiffness of the veins.
+    axial_strain: f64,
+}
 
-const LARGEST_WEIGHT_FACTOR: f64 = 10.0;
+const LARGEST_PUSH: LargestPush = LargestPush {
+    bending: PI * PI,
+    weight: 10.0,
+    axial_strain: 0.2,
+};
 
-const LARGEST_AXIAL_LOAD_FACTOR: f64 = 0.2;
+/// How the branch of a push is followed until the leaf has lost its stability.
+struct PushBranch {
+    /// Accuracy of points on it (of the tips, relative to the leaf); a critical one has its own
+    /// error.
+    accuracy: f64,
+    /// Longest step, as a part of the largest push.
+    longest_step: f64,
+    /// Largest number of points.
+    most_points: usize,
+    /// Points after the loss of stability that are needed to confirm it.
+    confirming_points: usize,
+    /// Grids of a critical point: for a leaf of few nodes, and for others.
+    critical_grids: [usize; 2],
+    /// Largest number of nodes of a leaf of few nodes.
+    few_nodes: usize,
+}
 
-/// Accuracy of points on the branch (of the tips, relative to the leaf); a
-/// critical one has its own error.
-const BRANCH_ACCURACY: f64 = 1e-4;
+const PUSH_BRANCH: PushBranch = PushBranch {
+    accuracy: 1e-4,
+    longest_step: 0.1,
+    most_points: 400,
+    confirming_points: 2,
+    critical_grids: [4, 3],
+    few_nodes: 500,
+};
 
 /// Why a margin cannot be found.
 #[derive(Debug, thiserror::Error)]
@@ -175,7 +204,7 @@ fn stability_margin(
         rest,
         grid,
         state,
-        accuracy: tolerance.max(BRANCH_ACCURACY),
+        accuracy: tolerance.max(PUSH_BRANCH.accuracy),
         largest_force: largest_tip_force(scenario, weight),
         limit: &options.limit,
         searches: SearchProgress {
@@ -318,9 +347,9 @@ fn largest_tip_force(scenario: &Scenario, weight: f64) -> f64 {
     } else {
         1
     } as f64;
-    let stiff = LARGEST_BENDING_LOAD_FACTOR * together * scenario.scale().force();
-    (stiff + LARGEST_WEIGHT_FACTOR * weight)
-        .min(LARGEST_AXIAL_LOAD_FACTOR * axial * together / scenario.rods.len() as f64)
+    let stiff = LARGEST_PUSH.bending * together * scenario.scale().force();
+    (stiff + LARGEST_PUSH.weight * weight)
+        .min(LARGEST_PUSH.axial_strain * axial * together / scenario.rods.len() as f64)
 }
 
 /// Veins at rest are each other's mirror images within this part of the leaf's length, and within
@@ -383,24 +412,19 @@ fn add_mirrored_forces(pushes: &mut Vec<CriticalTipForce>, rods: usize) {
     pushes.extend(images);
 }
 
-/// Longest step along the branch, and largest number of points.
-const LONGEST_BRANCH_STEP: f64 = 0.1;
+/// Rounding error of a critical force.
+struct ForceRounding {
+    /// Relative to the force itself.
+    relative: f64,
+    /// Of a nearly rigid leaf, relative to the total force on its tip: in eight runs of a buckled
+    /// column it was at most 9e-10.
+    nearly_rigid: f64,
+}
 
-const MOST_BRANCH_POINTS: usize = 400;
-
-/// Points after the loss of stability that are needed to confirm it.
-const CONFIRMING_POINTS: usize = 2;
-
-/// Grids of a critical point: for a leaf of few nodes, and for others.
-const CRITICAL_GRIDS: [usize; 2] = [4, 3];
-
-const FEW_NODES_LIMIT: usize = 500;
-
-/// Rounding error of a force, relative to itself, and for a nearly rigid leaf relative to the
-/// total force on its tip: in eight runs of a buckled column it was at most 9e-10.
-const FORCE_ROUNDING: f64 = 1e-14;
-
-const RIGID_LEAF_ROUNDING: f64 = 3e-9;
+const FORCE_ROUNDING_ERROR: ForceRounding = ForceRounding {
+    relative: 1e-14,
+    nearly_rigid: 3e-9,
+};
 
 /// Pushes a leaf in one direction until it loses its stability, or to the largest push;
 /// also returns start points for saddle searches there.
@@ -471,9 +495,9 @@ fn force_rounding_error(stable: &StableLeaf, force: f64, weight: f64) -> f64 {
     let stiffest = stiffness.fold(0.0, |most: f64, it| most.max(it.max_abs()));
     let rigid = stiffest > NEARLY_RIGID * stable.scenario.scale().force();
     let borne = force + weight + DVec3::from_array(stable.scenario.tip_force).length();
-    FORCE_ROUNDING * force
+    FORCE_ROUNDING_ERROR.relative * force
         + if rigid {
-            RIGID_LEAF_ROUNDING * borne
+            FORCE_ROUNDING_ERROR.nearly_rigid * borne
         } else {
             0.0
         }
@@ -488,14 +512,14 @@ fn continue_to_stability_loss(
     let mut first = (grids.on_grid_of(&stable.state)).correct(&stable.state, 0.0, None)?;
     first.tangent = first.tangent.towards_larger_parameter();
     let enough = |points: &[EquilibriumPoint]| {
-        let behind = points.len().checked_sub(CONFIRMING_POINTS);
+        let behind = points.len().checked_sub(PUSH_BRANCH.confirming_points);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
     };
     let nodes = stable.state.rods() * stable.grid.segments();
     let walk = ContinuationOptions {
-        longest_step: LONGEST_BRANCH_STEP,
-        max_points: MOST_BRANCH_POINTS,
-        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES_LIMIT)],
+        longest_step: PUSH_BRANCH.longest_step,
+        max_points: PUSH_BRANCH.most_points,
+        critical_grids: PUSH_BRANCH.critical_grids[usize::from(nodes > PUSH_BRANCH.few_nodes)],
         stop_criterion: Some(&enough),
     };
     let mut report = |_, fraction: f64| {
