@@ -115,7 +115,7 @@ pub fn array_chunks_mut(
     ]
 }
 
-/// One number for each of several neighbouring nodes, or rods.
+/// One number for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
     pub(crate) simd: S,
@@ -316,7 +316,7 @@ impl From<Lanes<Scalar>> for f64 {
     }
 }
 
-/// A vector for each of several neighbouring nodes, or rods.
+/// A vector for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Vectors<S: Simd> {
     /// Along the first axis.

@@ -542,10 +542,10 @@ impl Leaf {
             let mut before = natural.vein_pose(j, 0.0);
             for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
                 let next = natural.vein_pose(j, *sigma);
-                let ((x0, q0), (x1, q1)) = (before, next);
-                let chord = (x1 - x0) / (self.scale.length * section.ds);
-                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
-                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
+                let chord = (next.position - before.position) / (self.scale.length * section.ds);
+                let [from, to] = [before, next].map(|pose| pose.rotation);
+                section.rest_strain = rotation::midpoint(from, to).inverse() * chord;
+                section.rest_curvature = rotation::log(from.conjugate() * to) / section.ds;
                 before = next;
             }
         }

@@ -119,7 +119,7 @@ pub enum Stopped {
         /// Segments per rod.
         segments: usize,
     },
-    /// Sections of neighbouring veins passed half a turn against each other.
+    /// Sections of neighboring veins passed half a turn against each other.
     #[error("at t = {time:.6e} {}; the motion cannot be followed beyond: end it before", half_turn.sentence())]
     HalfTurn {
         /// Time.

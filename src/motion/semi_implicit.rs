@@ -1,4 +1,4 @@
-//! The semi-implicit method: the generalised-alpha method of Chung and Hulbert
+//! The semi-implicit method: the generalized-alpha method of Chung and Hulbert
 //! (J. Appl. Mech. 60, 1993) on rotations (Bruls, Cardona, Arnold, Mech. Mach.
 //! Theory 48, 2012).
 //!
@@ -153,7 +153,7 @@ pub struct SemiImplicit {
     longest_taken: f64,
     time: f64,
     count: usize,
-    /// Number of factorisations.
+    /// Number of factorizations.
     pub factorizations: usize,
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
@@ -201,7 +201,7 @@ impl SemiImplicit {
             leaf,
             physics,
         };
-        motion.initialise();
+        motion.initialize();
         motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
@@ -356,7 +356,7 @@ const MAX_NODE_ROTATION: f64 = 0.5;
 const CONDENSING_INERTIA_RATIO: f64 = 1e3;
 
 impl SemiImplicit {
-    /// Factorises and solves; false if the matrix is not positive definite.
+    /// Factorizes and solves; false if the matrix is not positive definite.
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;
         let mut uncounted = SolverCounts::default();
@@ -783,8 +783,8 @@ const RIGID_STRAIN_ROUNDING: f64 = 1e-12;
 const INCONSISTENT_RIGID_STRAIN: f64 = 1e-8;
 
 impl SemiImplicit {
-    /// Initialises the forces of the segments and the accelerations of the nodes.
-    pub(super) fn initialise(&mut self) {
+    /// Initializes the forces of the segments and the accelerations of the nodes.
+    pub(super) fn initialize(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP_INVERSE_SQUARE);
         let violation = self.leaf.strain_forces(&mut self.state);
         if self.leaf.least_compliance() > 0.0 {

@@ -29,7 +29,7 @@ mod segment;
 mod strip;
 
 pub use crate::rod::segment::{
-    LaneSections, NodePair, Section, SectionParameterDerivative, Segment, SegmentHessian,
+    LaneSections, NodePair, Section, SectionParameterDerivative, Segment, SegmentHessian, Wrench,
 };
 pub use crate::rod::strip::{NodeBlock, TissueStrip};
 use crate::rotation::{Quaternions, RelativeRotation};

@@ -9,6 +9,15 @@ use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
+/// Moment and force on a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Moment.
+    pub moment: DVec3,
+    /// Force.
+    pub force: DVec3,
+}
+
 /// The two nodes of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct NodePair {

@@ -148,7 +148,7 @@ impl<'a> DrawnRod<'a> {
         let at = |k: usize| {
             natural
                 .vein_pose(0, k as f64 / UNLOADED_SHAPE_POINTS as f64)
-                .0
+                .position
                 / veins.unit
         };
         let mut unloaded: Vec<DVec3> = (0..=UNLOADED_SHAPE_POINTS)

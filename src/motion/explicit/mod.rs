@@ -20,7 +20,7 @@
 //! Motion to a given time, and snapshots.
 //!
 //! Moments and forces on the nodes besides those of segments, coupling and dead loads: of the
-//! tissue between neighbouring rods, of loads of single rods, and of wind.
+//! tissue between neighboring rods, of loads of single rods, and of wind.
 //!
 //! Drag depends on the velocities at the time of the positions. Known are those half a step before,
 //! and half a step before the last step: it takes their linear extrapolation, so that the method
@@ -62,8 +62,8 @@ use rayon::prelude::*;
 /// Part of the stable time step used.
 const STABLE_STEP_FRACTION: f64 = 0.9;
 
-/// Steps between normalisations of the quaternions.
-const NORMALISATION_INTERVAL: usize = 8;
+/// Steps between normalizations of the quaternions.
+const NORMALIZATION_INTERVAL: usize = 8;
 
 /// Number of segments from which rods are distributed to threads. Measured: below
 /// it waking the threads costs more than it saves.
@@ -360,7 +360,7 @@ impl Explicit {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
-        let normalise = self.steps.is_multiple_of(NORMALISATION_INTERVAL);
+        let normalize = self.steps.is_multiple_of(NORMALIZATION_INTERVAL);
         let (positions, leaf, moments) =
             (&self.positions, &self.leaf, self.moments.nodal_moments());
         let applied = self.applied.as_ref().map(AppliedLoads::loads);
@@ -386,7 +386,7 @@ impl Explicit {
                 velocity_factor: keep,
                 kick,
                 drift,
-                normalise,
+                normalize,
                 block,
             };
             pack.totals = arch.dispatch(step);

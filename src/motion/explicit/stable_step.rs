@@ -27,7 +27,7 @@
 //! Masses with which a leaf comes to rest fastest.
 //!
 //! If only the equilibrium matters, masses are arbitrary. With these, the
-//! fastest motion of every single segment and of every coupling between neighbours,
+//! fastest motion of every single segment and of every coupling between neighbors,
 //! alone with its share of the masses, has the frequency 2: that bounds the frequencies of
 //! the leaf, the longest stable time step is one, and slow motions are as fast relative
 //! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
@@ -295,7 +295,7 @@ pub fn set_fictitious_masses(
                 inertia += 2.0 * (bend + stretch * arm * arm) / ROTATION_FREQUENCY_FRACTION;
             }
             let node = &mut new[i];
-            // Both neighbours pull on a node, and may move as much as it does.
+            // Both neighbors pull on a node, and may move as much as it does.
             for (gap, coupled) in [j.wrapping_sub(1), j]
                 .into_iter()
                 .zip(node.coupling_weights)

@@ -14,6 +14,7 @@ use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::rotation::Pose;
 use crate::scenario::{
     LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
@@ -108,7 +109,7 @@ pub fn equilibrium(
             rods,
             joined,
             curves: (lines.iter())
-                .map(|line| line.iter().map(|(x, _)| *x).collect())
+                .map(|line| line.iter().map(|pose| pose.position).collect())
                 .collect(),
             curve_stations: grid.sigma().to_vec(),
         },
@@ -214,11 +215,18 @@ fn centerlines<'f>(
 ) -> (&'f Grid, Vec<Centerline>) {
     let length = finest.leaf.leaf.scale.length;
     if let Some(estimate) = found.corrected_estimate() {
-        let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
+        let pose = |fields: &RodFields| Pose {
+            position: fields.x * length,
+            rotation: fields.q,
+        };
+        let line = |rod: &Vec<RodFields>| rod.iter().map(pose).collect();
         return (&estimate.grid, estimate.rods.iter().map(line).collect());
     }
     let n = finest.leaf.segments();
-    let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);
+    let node = |k: usize| Pose {
+        position: finest.state.x[k] * length,
+        rotation: finest.state.q[k],
+    };
     let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
     let lines = bases.map(|base| (base..=base + n).map(node).collect());
     (&finest.leaf.grid, lines.collect())
