@@ -52,7 +52,7 @@ use crate::motion::{
     measure, rate_weights,
 };
 use crate::numbers::largest;
-use crate::rod::RESOLVED_TURN;
+use crate::rod::{RESOLVED_TURN, Wrench};
 use crate::run::Limit;
 use crate::simd::widest_arch;
 use glam::{DQuat, DVec3};
@@ -276,7 +276,7 @@ impl Explicit {
         let last = self.leaf.segments();
         let before = self.moving(0, last).0;
         (self.moments).begin_step(
-            self.leaf.dead_moments_under(loads),
+            (self.leaf.dead_moments_under(loads)).map(|it| (it.node, it.moment)),
             self.layout,
             &self.packs,
         );
@@ -556,7 +556,7 @@ pub struct AppliedLoads {
     state: State,
     /// Those of the tissue's strips at the start.
     alignments: Vec<bool>,
-    nodes: Vec<[DVec3; 2]>,
+    nodes: Vec<Wrench>,
     /// Moments and forces, laid out as positions.
     loads: [[AlignedArray; 3]; 2],
     nodes_in_wind: Option<NodesInWind>,
@@ -588,7 +588,7 @@ impl AppliedLoads {
         let state = leaf.stress_free_state();
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
         Some(AppliedLoads {
-            nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
+            nodes: vec![Wrench::default(); state.x.len()],
             alignments: leaf.strip_alignments(start),
             loads: [vectors(), vectors()],
             nodes_in_wind: wind.map(|wind| NodesInWind {
@@ -631,7 +631,7 @@ impl AppliedLoads {
                 blown.velocity[k] = packs[p].moving(at).0;
             }
         }
-        self.nodes.fill([DVec3::ZERO; 2]);
+        self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
@@ -639,12 +639,12 @@ impl AppliedLoads {
             let velocity = |k: usize| now[k] + ahead * (now[k] - earlier[k]);
             (blown.wind).set_forces(&self.state, air, velocity, &mut blown.forces);
             for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
-                node[1] += *force;
+                node.force += *force;
             }
         }
         for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
             let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
-            for (arrays, load) in self.loads.iter_mut().zip(node) {
+            for (arrays, load) in self.loads.iter_mut().zip([node.moment, node.force]) {
                 for (c, array) in arrays.iter_mut().enumerate() {
                     array[at] = load[c];
                 }

@@ -4,7 +4,7 @@
 //!
 //! Conversion of the leaf to the arrays of the explicit method, and back.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
 use crate::motion::explicit::kernel::{
     BlockMaterial, NODES_PER_BLOCK, NodeData, PackMotion, StepTotals, StrainHistory,
@@ -258,17 +258,17 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         load_length: leaf.grid.node_weight(i) * leaf.leaf.length(j),
         ..NodeData::default()
     };
-    let [turns, shifts] = match i == 0 && !physics.clamped() {
-        true => [true; 2],
-        false => leaf.allows_rotation_and_displacement(j, i),
+    let free = match i == 0 && !physics.clamped() {
+        true => NodeFreedom::FREE,
+        false => leaf.node_freedom(j, i),
     };
-    if turns || shifts {
+    if !free.is_fixed() {
         let inertia = physics.inertia(leaf, j, i);
-        if turns {
+        if free.rotation {
             node.inverse_inertia = 1.0 / inertia.transverse;
             node.inverse_spin_excess = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
         }
-        if shifts && (i < n || !joined) {
+        if free.displacement && (i < n || !joined) {
             node.mass = inertia.mass;
             node.inverse_mass = 1.0 / inertia.mass;
             let neighbours = [j > 0, j + 1 < leaf.rods()];
