@@ -153,7 +153,7 @@ fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
         })
     };
     if let Some(blade) = &scenario.blade {
-        // The directions of its veins follow from this angle and its outline.
+        // The directions of a blade's veins follow from this angle and the outline.
         return doubt("leaf.elevation", blade.elevation);
     }
     let largest = |key: &str, angle: fn(&Rod) -> f64| {

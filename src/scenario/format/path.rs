@@ -18,13 +18,13 @@ const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
 pub struct EntryPath {
     /// The key of the entry.
     pub key: Key,
-    /// Which of its tables, counted from 0, if there may be several; else 0.
+    /// Which of the tables with this key, counted from 0, if there may be several; else 0.
     pub(crate) row: usize,
     /// Which list of a profile or schedule.
     pub(crate) list: Option<&'static str>,
-    /// Which entry of the list, which of that, and so on, counted from 0.
+    /// Indices within the value or its list, the outermost first, counted from 0.
     pub(crate) indices: [Option<usize>; 3],
-    /// Whether its numbers are multiplied instead of replaced.
+    /// Whether all numbers of the target are multiplied instead of replaced.
     pub(crate) scale: bool,
 }
 
@@ -298,7 +298,7 @@ const SPELLING: SpellingLimits = SpellingLimits {
 /// another table, or the nearest spelling.
 pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
-    // The name of a unit is none of a number.
+    // `units.mass` does not mean `load.point.mass`.
     let of_numbers = |key: &Key| key.table_path().name == name && !path.starts_with("units.");
     if let Some(key) = Key::all().find(of_numbers) {
         return Some(key.path());

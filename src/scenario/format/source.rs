@@ -39,12 +39,12 @@ pub(in crate::scenario) struct EntrySpans {
 impl ScenarioSource {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
     pub fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
-        // A mark that some editors write.
+        // The byte order mark, which some editors write.
         let text = text.trim_start_matches('\u{feff}');
         let mut source = ScenarioSource {
             file: file.into(),
             text: text.into(),
-            // No TOML begins like this.
+            // TOML never begins with a brace.
             has_lines: !text.trim_start().starts_with('{'),
             tables: Vec::new(),
         };
@@ -214,7 +214,7 @@ fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
         let error = refuse(None, problem);
         return Err(ScenarioError { key, ..error });
     }
-    // Unlike the document, these refuse a key that is there twice.
+    // Unlike the generic JSON above, tables refuse a key that is there twice.
     let form = match input {
         Some(_) => serde_json::from_str(text).map(|ResultInput { input }| input),
         None => serde_json::from_str(text),
