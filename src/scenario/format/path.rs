@@ -30,7 +30,7 @@ pub struct EntryPath {
 
 impl EntryPath {
     /// The whole value of a key in one of its tables.
-    pub(in crate::scenario) fn whole_entry(key: Key, row: usize) -> EntryPath {
+    pub(super) fn whole_entry(key: Key, row: usize) -> EntryPath {
         EntryPath {
             key,
             row,
@@ -157,7 +157,7 @@ impl EntryPath {
     }
 
     /// Whether the path names the whole value of its key.
-    pub(in crate::scenario) fn is_whole(&self) -> bool {
+    pub(super) fn is_whole(&self) -> bool {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
 
@@ -167,7 +167,7 @@ impl EntryPath {
     }
 
     /// How many of the indices of a vector for each rod are in vain where one `value` holds for all.
-    pub(in crate::scenario) fn shared_indices(&self, value: &Value) -> usize {
+    pub(super) fn shared_indices(&self, value: &Value) -> usize {
         let is_vector = matches!(
             self.key.form(),
             ValueSchema::VectorPerRod | ValueSchema::VectorQuantity

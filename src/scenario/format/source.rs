@@ -25,20 +25,20 @@ pub(in crate::scenario) struct ScenarioSource {
 }
 
 /// A text that was parsed.
-pub(in crate::scenario) struct ParsedText {
+pub(super) struct ParsedText {
     pub source: ScenarioSource,
     pub table: Table,
 }
 
 /// The places of a key and of its value in the text.
-pub(in crate::scenario) struct EntrySpans {
+pub(super) struct EntrySpans {
     pub key: Range<usize>,
     pub value: Range<usize>,
 }
 
 impl ScenarioSource {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
-    pub fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
+    pub(super) fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
         // The byte order mark, which some editors write.
         let text = text.trim_start_matches('\u{feff}');
         let mut source = ScenarioSource {
@@ -67,7 +67,7 @@ impl ScenarioSource {
 
     /// The places of a key, and of its value or a part of that; in one of its tables if there are
     /// several.
-    pub fn find_entry_spans(
+    pub(super) fn find_entry_spans(
         &self,
         path: TablePath,
         row: usize,
@@ -91,7 +91,7 @@ impl ScenarioSource {
     }
 
     /// A value as it is written, shortened.
-    pub fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
+    pub(super) fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
         let written = spans.and_then(|spans| self.text.get(spans.value.clone()));
         written.map_or_else(|| shorten_excerpt(&value.to_string()), shorten_excerpt)
     }
