@@ -1,10 +1,8 @@
-//! The boundary of stability: curves in the plane of two numbers, with the index on both
-//! sides, and leaves from either side.
+//! The boundary of stability in the plane of two numbers: curves with the index on both sides, shaded
+//! ground on which the branch is stable, cells of a coarse map, and leaves from either side of a curve.
 //!
-//! Labels with the index on both sides of the curves of a boundary.
-//!
-//! The ground of a plane of two numbers on which the branch is stable, between the curves of a
-//! boundary.
+//! Labels stand on both sides of a curve where there is room; curves close to each other share them. Ground
+//! is stable where all curves around it say so, which is found along rows and columns of the panel.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
@@ -17,7 +15,7 @@ use crate::figure::drawing::{
     BLUE, Color, DashPattern, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, PAGE, PURPLE, PageRectangle,
     SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, draw_panel_title, polygon_path,
 };
-use crate::figure::map::{DARKEST_MORSE_INDEX, PALE, fill_cell_by_index};
+use crate::figure::map::{DARKEST_MORSE_INDEX, STABLE_GROUND_COLOR, fill_cell_by_index};
 use crate::figure::scenario::{FigureSetting, QuantityLabel};
 use crate::report::numbers::{
     count_in_words, format_error_bound, format_four_digits, vein_count_text,
@@ -48,7 +46,7 @@ const LAYOUT: BoundaryLayout = BoundaryLayout {
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
 
-/// Colours of neighbouring curves; they also differ in their dashes.
+/// Colors of neighboring curves; they also differ in their dashes.
 const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
 pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
@@ -240,7 +238,7 @@ fn join_segments(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<D
     lines
 }
 
-/// Draws the cells of the map, each in the colour of its index.
+/// Draws the cells of the map, each in the color of its index.
 fn draw_index_cells(
     page: &mut Drawing,
     axes: &PanelAxes,
@@ -431,7 +429,7 @@ pub struct BoundaryLine {
     segments: Vec<BoundarySegment>,
     /// Whether two branches meet and vanish there, so that it has no sides.
     is_fold: bool,
-    /// Of a fold, to which side there is a stable leaf, if that is known.
+    /// On which sides of a fold there is a stable leaf, if that is known.
     stable_sides: Option<[bool; 2]>,
 }
 
@@ -491,7 +489,6 @@ impl BoundaryLine {
         }
     }
 
-    /// The ends of its segments.
     pub fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
         self.segments.iter().map(|segment| segment.ends)
     }
@@ -552,7 +549,7 @@ impl BoundaryLine {
         places.into_iter().map(|(_, place)| place).collect()
     }
 
-    /// Its crossings with a line, and the indices on both sides.
+    /// Where the curve crosses a line through a point along this normal, with the indices on both sides.
     fn index_crossings(
         &self,
         at: DVec2,
@@ -708,7 +705,7 @@ pub fn shade_stable_region(
         let left = ends.iter().map(|ends| ends[0]);
         let right = ends.iter().rev().map(|ends| ends[1]);
         let corners: Vec<DVec2> = left.chain(right).collect();
-        page.draw_shape(polygon_path(&corners), PALE, None);
+        page.draw_shape(polygon_path(&corners), STABLE_GROUND_COLOR, None);
     }
     any
 }
@@ -748,7 +745,7 @@ fn row_stretches(
         .collect()
 }
 
-/// The region of each stretch: those of neighbouring rows are one where a column leads from one to the
+/// The region of each stretch: those of neighboring rows are one where a column leads from one to the
 /// other without a curve in between.
 fn connected_regions(
     stretches: &[RowStretch],

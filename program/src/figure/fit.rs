@@ -1,11 +1,7 @@
-//! A fit: its numbers with their intervals, results of experiments with the model and its confidence
-//! band along what varied, measured points over the veins, and below each the residuals.
-//!
-//! The free numbers of a fit with their intervals.
-//!
-//! The panels of the figure of a fit.
-//!
-//! The results of experiments as series along the column that varies.
+//! A fit: the free numbers with their intervals, results of experiments with the model and its confidence
+//! band, measured points over the veins, and below each panel the residuals. Results of experiments that
+//! differ along a line are a series along the column that varies most; other results keep the numbers of
+//! their experiments.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
@@ -600,7 +596,7 @@ pub struct PlacedResidual<'f> {
 
 /// Results of one kind, drawn in one panel.
 pub struct ResultSeries<'f> {
-    /// As in the data: `tip_x`.
+    /// The name of its column in the data, such as `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
     /// experiments.
@@ -686,7 +682,7 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     all
 }
 
-/// Which of their numbers varies most, if the experiments differ along a line.
+/// Which setting of the experiments varies most, if they differ along a line.
 fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
     let first = settings.first()?;
     let same = |it: &&ExperimentSettings| {

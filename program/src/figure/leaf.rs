@@ -66,7 +66,6 @@ fn header_notes(
     notes
 }
 
-/// Most equilibria drawn.
 const MOST_EQUILIBRIA_DRAWN: usize = 24;
 
 pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
@@ -144,14 +143,14 @@ const PLANE_PANELS: [PlanePanel; 3] = [
     },
 ];
 
-/// Of the panel in space.
-const MARGINS: BoxMargins = BoxMargins {
+/// Margins of the panel in space.
+const SPACE_MARGINS: BoxMargins = BoxMargins {
     left: 56.0,
     right: 22.0,
     below: 36.0,
 };
 
-/// Draws the projection of the leaf onto two axes, centred.
+/// Draws the projection of the leaf onto two axes, centered.
 fn draw_plane_projection(
     page: &mut Drawing,
     veins: &DrawnVeins,
@@ -267,7 +266,7 @@ impl LeafPanels {
         );
         drawing.draw_group("space", |page| {
             let bounds = padded_box(veins.low, veins.high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
+            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, SPACE_MARGINS, None);
             draw_panel_title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
             scene.draw_axes(page, 38.0);

@@ -1,8 +1,7 @@
 //! Figures, one file or few for the result of each verb.
 //!
-//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a
-//! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
-//! `png` write the same drawing in both formats.
+//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a header, keys, and panels
+//! with axes or in space. SVG and PNG are written from the same drawing.
 
 mod boundary;
 mod chart;
@@ -72,7 +71,6 @@ mod tests {
         }
     }
 
-    /// A scenario with units.
     fn in_cm() -> Scenario {
         let mut scenario = scenario();
         scenario.units.length = Some("cm".into());

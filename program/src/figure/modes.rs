@@ -18,7 +18,7 @@ use leafdyn::scenario::Scenario;
 const MOST_MODES_DRAWN: usize = 12;
 
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT_VIEW];
+const MODE_VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT_VIEW];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
@@ -34,7 +34,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
         .map(|mode| displaced_veins(equilibrium, &rest, mode));
     let shapes: Vec<DrawnVeins> = shapes.collect();
     // Every mode in two views.
-    let count = VIEWS.len() * drawn.len();
+    let count = MODE_VIEWS.len() * drawn.len();
     let panels =
         SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, PAGE.header);
     let mut notes = vec![
@@ -64,8 +64,8 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
                     color: NOTE_COLOR,
                 },
             ];
-            for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let place = VIEWS.len() * index + k;
+            for (k, (view, caption)) in MODE_VIEWS.into_iter().zip(captions).enumerate() {
+                let place = MODE_VIEWS.len() * index + k;
                 let scene = panels.draw_empty_panel(page, place, 0.0, view, caption);
                 let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
                 for vein in &rest.veins {

@@ -25,11 +25,11 @@ struct RodLayout {
     /// Least and largest height, in pixels.
     lowest: f64,
     highest: f64,
-    /// Around the box in space.
+    /// Margins around the box in space.
     margins: BoxMargins,
     /// Width of the rod, in pixels.
     line: f64,
-    /// Around the rod and its arrows, as a fraction of the largest extent.
+    /// Padding around the rod and its arrows, as a fraction of the largest extent.
     padding: f64,
 }
 
@@ -61,7 +61,7 @@ const VISIBILITY: RodVisibility = RodVisibility {
     farthest: 4.0,
 };
 
-/// Points of the unloaded shape.
+/// Segments of which the unloaded shape is drawn.
 const UNLOADED_SHAPE_POINTS: usize = 96;
 
 const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
@@ -70,7 +70,7 @@ const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
 struct ClampWall {
     half_length: f64,
     hatching_depth: f64,
-    /// To each side of the middle.
+    /// Strokes to each side of the middle.
     hatching_strokes: i32,
 }
 

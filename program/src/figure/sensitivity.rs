@@ -48,7 +48,7 @@ const SHOWN_VALUE_PRECISION: f64 = 5e-3;
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
 const RELATIVE_CHANGE: f64 = 0.01;
 
-/// What changes with a number.
+/// What a change of one number of the scenario does.
 struct SensitivityRow {
     words: String,
     change_text: String,

@@ -1,7 +1,5 @@
-//! Output files: each complete or absent, never half written; and recordings, which grow
-//! during a run.
-//!
-//! Which files a result has, and their formats.
+//! Output files, complete or absent and never half written: which files a result has, their formats, and
+//! which of them a request asks for. Recordings grow during a run.
 
 mod atomic;
 mod peers;
@@ -326,7 +324,7 @@ impl<R> FileFormat<R> {
 pub struct ResultFile<R: 'static> {
     /// Its name in the folder of the result.
     pub name: &'static str,
-    /// How it is written.
+    /// How its content is made.
     pub format: &'static FileFormat<R>,
 }
 
@@ -346,7 +344,7 @@ pub trait WrittenResult: Serialize + Sync + Sized + 'static {
     /// lacks a part, a file left by an earlier run is removed.
     const MORE: &'static [FileFormat<Self>] = &[];
 
-    /// Whether it has the optional part that a file of this name shows.
+    /// Whether the result has the optional part that a file of this name shows.
     fn has_more(&self, _file: &str) -> bool {
         false
     }
@@ -366,7 +364,7 @@ pub trait WrittenResult: Serialize + Sync + Sized + 'static {
         names.chain(more.copied()).collect()
     }
 
-    /// Its files of these kinds but JSON.
+    /// The files of the result of these kinds, without its JSON.
     fn files_of_kinds(&self, kinds: &[FileKind]) -> Vec<ResultFile<Self>> {
         let more = Self::MORE.iter();
         let more = more.filter(|format| self.has_more(format.file_names()[0]));

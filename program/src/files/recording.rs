@@ -1,14 +1,8 @@
 //! The files of a simulation, which grow while it runs.
 //!
-//! Every output is written at once to `motion.csv` (or `motion.npy`) and `energy.csv`,
-//! under temporary names, so that memory does not grow. At the end of the run the files
-//! get their final names, and figures and a summary are made from them.
-//!
-//! The leaf at all outputs: `motion.csv`, or `motion.npy` for long motions.
-//!
-//! `energy.csv`: energies and the tip at all outputs.
-//!
-//! A file that grows during a run.
+//! Every output is written at once to `motion.csv` (`motion.npy` for long motions), which has the leaf, and to
+//! `energy.csv`, which has energies and the tip, under temporary names, so that memory does not grow. At the
+//! end of the run the files get their final names, and figures and a summary are made from them.
 
 use crate::files::atomic::DraftFile;
 use crate::files::{FileKind, FileSelection, atomic, write_result_files};
@@ -82,7 +76,7 @@ impl MotionRecording {
         MotionRecording::begin_with_frame(folder, simulation, selection, &frame)
     }
 
-    /// The same with another first output.
+    /// Begins a recording whose first output is this frame.
     pub fn begin_with_frame(
         folder: &Path,
         simulation: &Simulation,
@@ -281,12 +275,10 @@ pub enum MotionFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MotionSize {
     pub rods: usize,
-    /// Nodes of each rod.
     pub nodes: usize,
 }
 
 impl MotionSize {
-    /// Nodes of all rods.
     pub fn rows(self) -> usize {
         self.rods * self.nodes
     }
@@ -371,7 +363,7 @@ impl MotionFormat {
     }
 }
 
-/// All numbers of a node.
+/// Position, rotation as a quaternion, linear and angular velocity of a node.
 fn node_numbers(frame: &Frame, node: usize) -> [f64; NUMBERS_PER_NODE] {
     let (r, q) = (frame.positions[node], frame.rotations[node]);
     let velocity = &frame.velocities[node];
@@ -436,7 +428,7 @@ fn read_npy_positions(
 
 pub const ENERGY_FILE_NAME: &str = "energy.csv";
 
-/// Approximate bytes of a row.
+/// Approximate bytes of a row of the table of energies.
 pub const ENERGY_BYTES: u64 = 200;
 
 pub const ENERGY_COLUMNS: &str =
@@ -455,11 +447,11 @@ pub fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()
 }
 
 pub struct GrowingFile {
-    /// The finished file.
+    /// The path that the file has once it is complete.
     file: PathBuf,
     draft: DraftFile,
     out: File,
-    /// Data to be appended.
+    /// Rows that are not yet written.
     buffer: Vec<u8>,
 }
 

@@ -45,7 +45,7 @@ pub fn relative_source_path(folder: &Path, file: &Path) -> String {
     relative.display().to_string()
 }
 
-/// The path without `..`.
+/// Resolves `..` in a path by its text alone.
 fn resolve_parent_components(path: PathBuf) -> PathBuf {
     let mut plain = PathBuf::new();
     for component in path.components() {

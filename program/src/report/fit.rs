@@ -11,7 +11,6 @@ use std::io;
 use std::io::Write;
 use std::path::Path;
 
-/// Most candidates that are listed.
 const MOST_CANDIDATES_LISTED: usize = 5;
 
 impl ReportedResult for Fit {
@@ -80,7 +79,7 @@ impl ReportedResult for Fit {
     }
 }
 
-/// One line on what a file was read as.
+/// A line on what a file of data was read as.
 fn data_file_line(file: &DataFile) -> String {
     let name = Path::new(&file.file).file_name();
     let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());

@@ -15,13 +15,12 @@ use std::io::Write;
 const MAP_COLUMNS: &str = "method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,\
     error_estimate,margin_waves,margin_amplitude,twist,seconds,reference";
 
-/// Most jumps that are listed.
 const MOST_JUMPS_LISTED: usize = 5;
 
 /// A map, and the work that was done for it.
 pub struct ReportedMap<'m> {
     pub map: &'m Map,
-    /// Total time.
+    /// Time that the map took.
     pub seconds: f64,
 }
 

@@ -1,8 +1,5 @@
-//! Output of results: as lines on the console, as rows of tables, as JSON.
-//!
-//! JSON, for scripts: compact, numbers that are not finite as null.
-//!
-//! Phrases about results that figures and the command line share.
+//! Results as lines on the console, as rows of tables, and as JSON for scripts: compact, with null for
+//! numbers that are not finite. Phrases about results are shared by figures and the command line.
 
 mod chart;
 mod check;
@@ -38,10 +35,10 @@ use std::path::Path;
 pub trait ReportedResult {
     fn heading(&self) -> String;
 
-    /// What it is, in the units of the scenario.
+    /// What was found, in the units of the scenario.
     fn report_lines(&self, units: &Units) -> LabelledLines;
 
-    /// What it took, for those who ask.
+    /// What the result took: steps and time, told if the report is verbose.
     fn work_line(&self) -> Option<String> {
         None
     }
@@ -51,7 +48,7 @@ pub trait ReportedResult {
         LabelledLines::new()
     }
 
-    /// All lines but that list.
+    /// All lines except the list of written files.
     fn summary(&self, units: &Units) -> LabelledLines {
         [
             self.report_lines(units),
@@ -80,7 +77,7 @@ pub trait ReportedResult {
 /// `--json`.
 #[derive(Serialize)]
 pub struct ResultDocument<'a, R> {
-    /// Of the program.
+    /// Version of the program.
     version: &'static str,
     /// The relative path from the output folder to the scenario's file, if known: it
     /// identifies the scenario whose results a folder holds.
@@ -234,7 +231,7 @@ pub fn equilibrium_kind(negative_eigenvalues: Option<usize>) -> String {
     }
 }
 
-/// The same in a word or two, of a known index.
+/// The kind of equilibrium of a known index in a word or two.
 pub fn stability_phrase(index: usize) -> String {
     match index {
         0 => "stable".into(),

@@ -1,10 +1,5 @@
-//! The text report of a relaxation.
-//!
-//! A blade in the report of a relaxation.
-//!
-//! All equilibria of a leaf, as text.
-//!
-//! The stability margin of a leaf, as text.
+//! The text report of a relaxation: the leaf at rest, the blade of which it is made, its modes and
+//! sensitivities, all of its equilibria, and its stability margin.
 
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
@@ -119,7 +114,7 @@ pub fn equilibrium_phrase(equilibrium: &Equilibrium) -> String {
     }
 }
 
-/// That it is one of a circle of equilibria, if it is.
+/// Says that an equilibrium is one of a circle of equilibria, if it is.
 fn zero_energy_rotation_line(equilibrium: &Equilibrium) -> String {
     match (
         equilibrium.stability.neutral_directions,

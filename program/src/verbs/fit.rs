@@ -78,7 +78,6 @@ fn announce_budget(name: &str, budget: FitBudget) {
     }
 }
 
-/// Parses the distance of rows.
 fn parse_row_stride(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number from 1")
 }

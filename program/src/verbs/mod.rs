@@ -218,7 +218,7 @@ impl ExitStatus {
         }
     }
 
-    /// That of a run that ended with this refusal.
+    /// The status of a run that ended with this refusal.
     fn from_refusal(refusal: &Refusal) -> Self {
         match find_cause::<InterruptedRun>(refusal) {
             Some(_) => ExitStatus::Interrupted,
@@ -241,7 +241,7 @@ const SIGINT: i32 = 2;
 #[cfg(unix)]
 const SIGTERM: i32 = 15;
 
-/// The first signal that came.
+/// The first signal that asked the process to end.
 static FIRST_SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
 
 /// What is told of a run that a signal ended.
@@ -293,7 +293,7 @@ fn ignores_hangup() -> bool {
 
 /// Ends the process after a signal: at once, or with what it has found.
 fn handle_signal(signal: i32) {
-    if let Some(cancel) = cancel().as_ref()
+    if let Some(cancel) = lock_cancel_flag().as_ref()
         && !cancel.load(Ordering::Relaxed)
     {
         FIRST_SIGNAL.store(signal, Ordering::Relaxed);
@@ -334,15 +334,15 @@ fn clear_progress_line() {
 /// The limit of a run that ends with what it has found when the process is stopped.
 fn limit_until_interrupt() -> Limit {
     let cancel = Arc::new(AtomicBool::new(false));
-    *self::cancel() = Some(cancel.clone());
+    *lock_cancel_flag() = Some(cancel.clone());
     Limit {
         cancel: Some(cancel),
         ..Limit::default()
     }
 }
 
-/// What Ctrl-C cancels.
-fn cancel() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
+/// The run that a signal cancels, if one does.
+fn lock_cancel_flag() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
     // It is only replaced as a whole, so it is valid even if the lock is poisoned.
     CANCEL.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -21,7 +21,7 @@ const FINER_GRID_ANNOUNCED_SECONDS: f64 = 5.0;
 const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
 /// What is told of an option that is gone.
-const RESUME: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
+const RESUME_REFUSAL: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
                       none is continued; leave it out to simulate from the beginning";
 
 /// What is told where no output but the first was made.
@@ -71,7 +71,7 @@ impl SimulateArguments {
             ..VerbTraits::default()
         };
         if self.resume {
-            return Err(RESUME.into());
+            return Err(RESUME_REFUSAL.into());
         }
         self.request
             .run_each_scenario::<Record>(traits, |job| self.run_scenario(job))

@@ -43,9 +43,8 @@ struct RequestedLabel {
 
 pub struct LabelPlacement {
     cell: PageRectangle,
-    /// Points on curves.
+    /// Points on curves that labels keep clear of.
     curve_points: Vec<DVec2>,
-    /// Labels drawn so far.
     drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
     requested_labels: Vec<RequestedLabel>,
@@ -93,7 +92,6 @@ impl LabelPlacement {
         }
     }
 
-    /// Draws all requested labels.
     pub fn draw_requested(&mut self, page: &mut Drawing) {
         self.curve_points
             .extend(self.requested_labels.iter().map(|label| label.at));
