@@ -375,7 +375,7 @@ const SIDE_LABEL: SideLabelRules = SideLabelRules {
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
-pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
+fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
     let mut named = vec![false; curves.len()];
     for c in 0..curves.len() {
         if named[c] {
@@ -412,20 +412,20 @@ struct LabelPlace {
 }
 
 /// A straight piece of a curve.
-pub struct BoundarySegment {
+struct BoundarySegment {
     pub ends: [DVec2; 2],
     /// Indices to the left and to the right.
     pub sides: [usize; 2],
 }
 
 /// Where a curve crosses a line: how far along the line, and what is on both sides.
-pub struct LineCrossing<S> {
+struct LineCrossing<S> {
     pub along: f64,
     pub sides: S,
 }
 
 /// A curve on the page.
-pub struct BoundaryLine {
+struct BoundaryLine {
     segments: Vec<BoundarySegment>,
     /// Whether two branches meet and vanish there, so that it has no sides.
     is_fold: bool,
@@ -443,11 +443,7 @@ impl BoundaryLine {
         }
     }
 
-    pub fn from_curve(
-        axes: &PanelAxes,
-        boundary: &StabilityBoundary,
-        curve: &BoundaryCurve,
-    ) -> Self {
+    fn from_curve(axes: &PanelAxes, boundary: &StabilityBoundary, curve: &BoundaryCurve) -> Self {
         // Along the axis the first number may move towards the end of its range, or away.
         let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
         let points = curve.points.iter();
@@ -489,18 +485,18 @@ impl BoundaryLine {
         }
     }
 
-    pub fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
+    fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
         self.segments.iter().map(|segment| segment.ends)
     }
 
     /// Whether ground on one of its sides is stable.
-    pub fn bounds_stable_region(&self) -> bool {
+    fn bounds_stable_region(&self) -> bool {
         (self.segments.iter()).any(|segment| segment.sides.contains(&0))
     }
 
     /// Its crossings with a line, and whether the ground on both sides is stable, unless that is not
     /// known.
-    pub fn stability_crossings(
+    fn stability_crossings(
         &self,
         at: DVec2,
         normal: DVec2,
@@ -655,11 +651,7 @@ struct RowStretch {
 
 /// Shades where the branch is stable in a part of the plane that curves leave only at its rim; whether
 /// there is such ground.
-pub fn shade_stable_region(
-    page: &mut Drawing,
-    cell: PageRectangle,
-    curves: &[BoundaryLine],
-) -> bool {
+fn shade_stable_region(page: &mut Drawing, cell: PageRectangle, curves: &[BoundaryLine]) -> bool {
     let rows = (cell.size.y / SHADING.row).floor().max(1.0) as usize;
     let height = cell.size.y / rows as f64;
     let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;

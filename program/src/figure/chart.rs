@@ -129,7 +129,7 @@ struct RowOfLeaf<'c> {
 
 /// How the points of a series look, and the line through them.
 #[derive(Clone, Copy)]
-pub struct SeriesStyle {
+struct SeriesStyle {
     color: Color,
     marker: Marker,
     dashed: bool,
@@ -261,7 +261,7 @@ const FAILURE_LANES_COLOR: Color = Color(250, 240, 238);
 
 /// A point, in the units of the axes.
 #[derive(Clone, Copy, Debug)]
-pub struct ChartPoint {
+struct ChartPoint {
     pub coordinates: (f64, f64),
     /// Ends of its spread in repeated measurements.
     pub spread: [(f64, f64); 2],
@@ -270,13 +270,13 @@ pub struct ChartPoint {
 
 /// A run without a point.
 #[derive(Clone, Debug)]
-pub struct FailedRun {
+struct FailedRun {
     /// Its value along the horizontal axis, if that is known.
     pub x: Option<f64>,
     pub word: String,
 }
 
-pub struct ChartSeries {
+struct ChartSeries {
     pub name: String,
     pub style: SeriesStyle,
     pub points: Vec<ChartPoint>,
@@ -302,7 +302,7 @@ impl ChartSeries {
     }
 }
 
-pub struct ChartPanel {
+struct ChartPanel {
     pub series: Vec<ChartSeries>,
     pub across: Axis,
     pub up: Axis,
@@ -329,7 +329,7 @@ impl ChartPanel {
     }
 
     /// Height of the panel with lanes and axis.
-    pub fn total_height(&self) -> f64 {
+    fn total_height(&self) -> f64 {
         self.lanes_height() + LAYOUT.frame + PAGE.panel_axis
     }
 

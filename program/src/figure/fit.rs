@@ -118,7 +118,7 @@ const INTERVALS: IntervalLayout = IntervalLayout {
 };
 
 /// Draws the free numbers with their intervals; returns where that ends.
-pub fn draw_fit_parameters(
+fn draw_fit_parameters(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -281,7 +281,7 @@ fn result_label(kind: &str, units: &Units) -> QuantityLabel {
 
 /// Draws results of one kind with the model along what varied, and their residuals along the same;
 /// returns where that ends.
-pub fn draw_results(
+fn draw_results(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -467,7 +467,7 @@ fn draw_residuals(
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
-pub fn draw_measured_veins(
+fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -589,13 +589,13 @@ const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 /// A result of an experiment, and where a panel has it: the value that varied, or the number of the
 /// experiment.
 #[derive(Clone, Copy)]
-pub struct PlacedResidual<'f> {
+struct PlacedResidual<'f> {
     pub abscissa: f64,
     pub residual: &'f FitResidual,
 }
 
 /// Results of one kind, drawn in one panel.
-pub struct ResultSeries<'f> {
+struct ResultSeries<'f> {
     /// The name of its column in the data, such as `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
@@ -606,7 +606,7 @@ pub struct ResultSeries<'f> {
 }
 
 impl<'f> ResultSeries<'f> {
-    pub fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
+    fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
         self.series.iter().flatten().copied()
     }
 }
@@ -615,7 +615,7 @@ type ExperimentSettings = [(ParameterKeys, f64)];
 
 /// The results of all experiments by their kinds. Those of experiments that differ along a line, as
 /// one column varies or several together, are a series; those of others keep their numbers.
-pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
+fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     let leaves = fit.leaves.iter();
     let settings: HashMap<usize, &ExperimentSettings> = leaves
         .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))

@@ -447,12 +447,12 @@ fn outcome_color(outcome: MapOutcome) -> Color {
 }
 
 /// Waves along the margins, where these are shown and the leaf is stable.
-pub fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
+fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
 /// Fills a cell, with the mark of its outcome if it has one and is large enough.
-pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
+fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
     page.draw_shape(
         rectangle_path(cell.corner, cell.size),
         outcome_color(outcome),
@@ -477,7 +477,7 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
     }
 }
 
-pub fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
+fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
     let color = match waves {
         0.0 => STABLE_GROUND_COLOR,
         waves => vein_color((waves - 1.0) / (MOST_WAVES_DISTINGUISHED - 1.0)),
@@ -502,7 +502,7 @@ pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize)
 
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
 /// none.
-pub fn mark_unconfirmed_reference(
+fn mark_unconfirmed_reference(
     page: &mut Drawing,
     cell: PageRectangle,
     reference: ReferenceConfidence,
@@ -518,9 +518,9 @@ pub fn mark_unconfirmed_reference(
 }
 
 /// Stroke of the longest stable step.
-pub const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
+const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
-pub struct VariedAxis {
+struct VariedAxis {
     pub axis: Axis,
     /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
@@ -528,7 +528,7 @@ pub struct VariedAxis {
 
 impl VariedAxis {
     /// Cells in the order given, each around its value.
-    pub fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
+    fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -562,7 +562,7 @@ impl VariedAxis {
 }
 
 /// A panel; with one axis it is a strip.
-pub struct MapPanel<'a> {
+struct MapPanel<'a> {
     axes: PanelAxes,
     x: &'a VariedAxis,
     y: Option<&'a VariedAxis>,
@@ -656,7 +656,7 @@ impl<'a> MapPanel<'a> {
     }
 
     /// Draws the longest step known to be stable, across every row or column.
-    pub fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
+    fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
         let along_x = request.axes[0]
             .keys
             .contains_solver_setting(SolverSetting::Step);

@@ -266,14 +266,14 @@ const NPY_HEADER_BYTES: usize = 128;
 
 /// The file format of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MotionFormat {
+enum MotionFormat {
     Csv,
     Npy,
 }
 
 /// Size of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MotionSize {
+struct MotionSize {
     pub rods: usize,
     pub nodes: usize,
 }
@@ -286,7 +286,7 @@ impl MotionSize {
 
 impl MotionFormat {
     /// The format for this number of outputs.
-    pub fn for_outputs(size: MotionSize, outputs: usize) -> Self {
+    fn for_outputs(size: MotionSize, outputs: usize) -> Self {
         match size.rows().saturating_mul(outputs) {
             0..=MOST_CSV_ROWS => MotionFormat::Csv,
             _ => MotionFormat::Npy,
@@ -301,7 +301,7 @@ impl MotionFormat {
     }
 
     /// Bytes of an output, in a table approximately.
-    pub fn bytes_per_output(self, size: MotionSize) -> u64 {
+    fn bytes_per_output(self, size: MotionSize) -> u64 {
         let row = match self {
             MotionFormat::Csv => MOTION_COLUMNS.split(',').count() * BYTES_PER_NUMBER,
             MotionFormat::Npy => NUMBERS_PER_NODE * size_of::<f64>(),
@@ -310,19 +310,14 @@ impl MotionFormat {
     }
 
     /// The header of a file with this number of outputs.
-    pub fn file_header(self, size: MotionSize, outputs: usize) -> Vec<u8> {
+    fn file_header(self, size: MotionSize, outputs: usize) -> Vec<u8> {
         match self {
             MotionFormat::Csv => table_header(MOTION_COLUMNS),
             MotionFormat::Npy => npy_header(size, outputs),
         }
     }
 
-    pub fn write_output(
-        self,
-        frame: &Frame,
-        stations: &[f64],
-        out: &mut Vec<u8>,
-    ) -> io::Result<()> {
+    fn write_output(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
         let nodes = 0..frame.positions.len();
         match self {
             MotionFormat::Csv => {
@@ -346,7 +341,7 @@ impl MotionFormat {
     }
 
     /// Reads the positions of all nodes at some outputs, given in increasing order.
-    pub fn read_positions(
+    fn read_positions(
         self,
         size: MotionSize,
         outputs: &[usize],
@@ -426,15 +421,15 @@ fn read_npy_positions(
     Ok(points)
 }
 
-pub const ENERGY_FILE_NAME: &str = "energy.csv";
+const ENERGY_FILE_NAME: &str = "energy.csv";
 
 /// Approximate bytes of a row of the table of energies.
-pub const ENERGY_BYTES: u64 = 200;
+const ENERGY_BYTES: u64 = 200;
 
-pub const ENERGY_COLUMNS: &str =
+const ENERGY_COLUMNS: &str =
     "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z,error";
 
-pub fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()> {
+fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()> {
     let tip = moment.tip.to_array();
     let OutputSample {
         time,
@@ -446,7 +441,7 @@ pub fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()
     append_csv_rows([(time, steps, energy, tip, error)], out)
 }
 
-pub struct GrowingFile {
+struct GrowingFile {
     /// The path that the file has once it is complete.
     file: PathBuf,
     draft: DraftFile,
@@ -482,7 +477,7 @@ impl GrowingFile {
     }
 
     /// Replaces the beginning of the file; nothing can be appended after that.
-    pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
+    fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let replaced = self.out.rewind().and_then(|()| self.out.write_all(bytes));
         replaced.map_err(|reason| self.write_error(reason))
     }

@@ -363,7 +363,7 @@ fn solver_work_line(equilibrium: &Equilibrium) -> String {
 }
 
 /// The lines about a blade.
-pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
+fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     let length = |it: f64| number_in_unit(format_five_digits(it), units, LENGTH);
     let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, COUPLE_STIFFNESS);
     let mass = |it: f64| match units.grams() {
@@ -481,7 +481,7 @@ fn equilibrium_line(number: usize, found: &FoundEquilibrium, units: &Units) -> S
 const SINGLE_GRID_PRECISION: f64 = 1e-3;
 
 /// The lines about a margin of a leaf of this length, the smallest push first.
-pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
+fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
@@ -581,7 +581,7 @@ fn energy_barrier_line(barrier: &Barrier, length: f64, units: &Units) -> String 
     )
 }
 
-pub fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
+fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
     let tip = format_position(
         tip.to_array(),
         decimals_for_error(SINGLE_GRID_PRECISION * length),

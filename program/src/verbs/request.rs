@@ -431,7 +431,7 @@ pub struct ScenarioJob {
 }
 
 /// The lines that list files, or why these could not be written.
-pub type FileLines = Result<Vec<String>, Refusal>;
+type FileLines = Result<Vec<String>, Refusal>;
 
 /// The delivered result of a scenario.
 pub struct DeliveredResult {
@@ -451,7 +451,7 @@ struct UnsolvedScenario {
 }
 
 /// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.
-pub fn run_catching_panics(
+fn run_catching_panics(
     job: &ScenarioJob,
     run: impl Fn(&ScenarioJob) -> Result<DeliveredResult, Refusal>,
 ) -> Result<DeliveredResult, Refusal> {

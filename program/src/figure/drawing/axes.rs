@@ -579,7 +579,7 @@ impl Axis {
     }
 
     /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
-    pub fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
+    fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
         let divided = length > TICK_SPACING.subdivided_decade * (high - low)
             && !matches!(self.ticks, TickPlacement::WholeNumbers(_));

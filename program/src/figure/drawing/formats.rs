@@ -362,7 +362,7 @@ impl Font {
     }
 
     /// The outlines of a text that starts at the origin of its base line.
-    pub fn text_outline(&self, text: &str, size: f64) -> DrawingPath {
+    fn text_outline(&self, text: &str, size: f64) -> DrawingPath {
         let mut outline = GlyphOutlineBuilder {
             scale: self.units_to_size(size),
             line_position: 0.0,

@@ -51,7 +51,7 @@ pub struct BoxMargins {
 
 impl BoxMargins {
     /// Pixels that are left to the box, of a cell of this size.
-    pub fn inner_size(self, size: DVec2) -> DVec2 {
+    fn inner_size(self, size: DVec2) -> DVec2 {
         size - DVec2::new(self.left + self.right, self.below)
     }
 }
@@ -120,7 +120,7 @@ impl ParallelProjection {
         }
     }
 
-    pub fn from_view(view: ViewAngles) -> Self {
+    fn from_view(view: ViewAngles) -> Self {
         let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let right = DVec3::new(-sin_a, cos_a, 0.0);
@@ -128,7 +128,7 @@ impl ParallelProjection {
     }
 
     /// Shows a point at a place on the page.
-    pub fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
+    fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
         self.scale = scale;
         self.origin += at - self.project_point(point);
         self
@@ -143,7 +143,7 @@ impl ParallelProjection {
     }
 
     /// Width and height of a box on the page.
-    pub fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
+    fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
         let corners = || box_corners(bounds).map(|corner| self.project_point(corner));
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
@@ -331,7 +331,7 @@ impl<'s> SpacePanel<'s> {
 
     /// Draws the names of all axes at a distance from their edges, with units if values
     /// are shown.
-    pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
+    fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
             let widths = widths.map(|tick| Font::embedded().text_width(&tick.text, FONT_SIZE.tick));
