@@ -1,9 +1,9 @@
 //! `leafdyn map`: maps where each method fails.
 
 use crate::report;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
 use crate::verbs::progress::completed_fraction;
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::study;
 use leafdyn::study::{

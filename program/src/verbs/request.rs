@@ -4,12 +4,12 @@
 use crate::files::{FileKind, FileSelection, ResultDocument, WrittenResult};
 use crate::report::table::{ScenarioOutput, file_list_text, table_of_json_results};
 use crate::report::{RefusalDocument, ReportedResult};
-use crate::verbs::help::EXPERT_OPTIONS_HEADING;
-use crate::verbs::progress::{ProgressLine, completed_fraction};
-use crate::verbs::{
+use crate::verbs::exit::{
     ExitStatus, InterruptedRun, Refusal, find_cause, limit_until_interrupt, print_note,
     refusal_with_option_names, report_refusal, show_report, signal_phrase, write_standard_output,
 };
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::{files, live, report};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};

@@ -2,11 +2,11 @@
 
 use crate::files::MotionRecording;
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::progress::{ProgressLine, format_duration, range_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal, print_note};
 use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
