@@ -18,9 +18,8 @@ use crate::branch::refine::{
 use crate::leaf::{Grid, State};
 use crate::newton::Contraction;
 use crate::numbers::larger;
-use crate::relax::accuracy::GridLevel;
 use crate::relax::accuracy::richardson::Richardson;
-use crate::relax::accuracy::transfer::{predict_on_finer_grid, weights};
+use crate::relax::accuracy::transfer::{GridLevel, predict_on_finer_grid, weights};
 use glam::DVec3;
 
 /// Least and largest number of grids of a point, that of a nearly rigid leaf, and segments of
