@@ -710,25 +710,29 @@ fn row_stretches(
     y: f64,
 ) -> Vec<RowStretch> {
     let from = cell.corner.with_y(y);
-    let mut crossings: Vec<(f64, [bool; 2], usize)> = (curves.iter().enumerate())
+    let mut crossings: Vec<(usize, LineCrossing<Option<[bool; 2]>>)> = (curves.iter().enumerate())
         .flat_map(|(k, curve)| {
             let found = curve.stability_crossings(from, DVec2::X);
-            found.map(move |it| (it.along, it.sides.unwrap_or_default(), k))
+            found.map(move |crossing| (k, crossing))
         })
-        .filter(|(x, ..)| (0.0..=cell.size.x).contains(x))
+        .filter(|(_, crossing)| (0.0..=cell.size.x).contains(&crossing.along))
         .collect();
-    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    crossings.sort_by(|(_, a), (_, b)| a.along.total_cmp(&b.along));
     let at = |k: Option<usize>| k.and_then(|k| crossings.get(k));
+    let sides = |crossing: &LineCrossing<Option<[bool; 2]>>| crossing.sides.unwrap_or_default();
     (0..=crossings.len())
         .map(|k| {
             let (left, right) = (at(k.checked_sub(1)), at(Some(k)));
-            let said = [left.map(|it| it.1[1]), right.map(|it| it.1[0])];
+            let said = [
+                left.map(|(_, it)| sides(it)[1]),
+                right.map(|(_, it)| sides(it)[0]),
+            ];
             RowStretch {
                 row,
-                end_curves: [left, right].map(|it| it.map(|it| it.2)),
+                end_curves: [left, right].map(|it| it.map(|(curve, _)| *curve)),
                 ends: [
-                    left.map_or(0.0, |it| it.0),
-                    right.map_or(cell.size.x, |it| it.0),
+                    left.map_or(0.0, |(_, it)| it.along),
+                    right.map_or(cell.size.x, |(_, it)| it.along),
                 ]
                 .map(|x| from.x + x),
                 stable: said.into_iter().flatten().reduce(|a, b| a && b),

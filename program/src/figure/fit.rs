@@ -154,12 +154,13 @@ fn draw_fit_parameters(
         emphasizes_zero: true,
         ..Axis::linear("from the value / %", -end, end)
     };
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
+    let axes = PanelAxes::draw_titled(
+        page,
+        cell,
+        [letter, "95 % intervals"],
+        across,
+        Axis::blank(),
+    );
     for (k, it) in shown.iter().enumerate() {
         let middle = corner.y + INTERVALS.row * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {

@@ -584,11 +584,7 @@ impl<'a> MapPanel<'a> {
             labelled,
             ..unnamed(&x.axis)
         };
-        let strip = Axis {
-            ticks: TickPlacement::WholeNumbers(Vec::new()),
-            ..Axis::linear("", 0.0, 1.0)
-        };
-        let up = y.map_or(strip, |y| unnamed(&y.axis));
+        let up = y.map_or(Axis::blank(), |y| unnamed(&y.axis));
         let axes = PanelAxes { cell, across, up };
         MapPanel { axes, x, y }
     }

@@ -1,7 +1,7 @@
 //! A single rod at rest in one large view: of the plane in which it lies, or in space; with its loads,
 //! its supports and its unloaded shape.
 
-use crate::figure::drawing::labels::{LegendRows, new_page};
+use crate::figure::drawing::labels::{LegendRows, SUPPORT_NAMES, new_page};
 use crate::figure::drawing::markers::{
     ForceArrow, RodPoint, draw_support_marker, draw_tip_marker, force_arrows,
 };
@@ -257,13 +257,8 @@ impl<'a> DrawnRod<'a> {
             });
         }
         let veins = self.veins;
-        for (how, name) in [
-            (SupportKind::Clamped, "clamp"),
-            (SupportKind::Pinned, "pinned"),
-        ] {
-            let mut grips = veins.grips.iter();
-            let gripped = grips.any(|grip| grip.support == how);
-            let ends = veins.base_support == how || veins.tip_support == Some(how);
+        for (how, name) in SUPPORT_NAMES {
+            let (ends, gripped) = (veins.has_held_ends(how), veins.has_grips(how));
             match how {
                 SupportKind::Clamped if ends => key.add_entry(page, name, |page, cell| {
                     let [left, right] = cell.midline();

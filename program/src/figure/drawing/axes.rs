@@ -390,6 +390,15 @@ impl Axis {
         }
     }
 
+    /// An axis from 0 to 1 without ticks, for rows that are placed by their number.
+    pub fn blank() -> Self {
+        Axis {
+            ticks: TickPlacement::WholeNumbers(Vec::new()),
+            labelled: false,
+            ..Axis::linear("", 0.0, 1.0)
+        }
+    }
+
     /// A linear axis that covers these values, with padding.
     pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) =

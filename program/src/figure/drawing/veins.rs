@@ -104,6 +104,16 @@ impl DrawnVeins {
         )
     }
 
+    /// Whether bases or tips are held like this.
+    pub fn has_held_ends(&self, how: SupportKind) -> bool {
+        self.base_support == how || self.tip_support == Some(how)
+    }
+
+    /// Whether a grip holds like this.
+    pub fn has_grips(&self, how: SupportKind) -> bool {
+        self.grips.iter().any(|grip| grip.support == how)
+    }
+
     /// Where the drawn veins begin.
     pub fn bases(&self) -> impl Iterator<Item = DVec3> {
         let first = |vein: &DrawnVein| vein.pieces.first().map_or(DVec3::ZERO, |piece| piece[0]);
