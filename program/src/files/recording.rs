@@ -4,8 +4,9 @@
 //! `energy.csv`, which has energies and the tip, under temporary names, so that memory does not grow. At the
 //! end of the run the files get their final names, and figures and a summary are made from them.
 
+use crate::files::atomic;
 use crate::files::atomic::DraftFile;
-use crate::files::{FileKind, FileSelection, atomic, write_result_files};
+use crate::files::result_files::{FileKind, FileSelection, write_result_files};
 use crate::report::table::{append_csv_rows, table_header};
 use crate::report::{FileError, ResultDocument};
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! The scenario whose results a folder holds: the JSON files in it name its file; and files that
 //! results must not replace.
 
-use crate::files::WrittenResult;
+use crate::files::result_files::WrittenResult;
 use crate::report::FileError;
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;

@@ -1,6 +1,6 @@
 //! The text report of a fit, and its table.
 
-use crate::report::ReportedResult;
+use crate::report::document::ReportedResult;
 use crate::report::numbers::{
     count_in_words, duration_text, format_five_digits, number_in_key_unit, round_to_error,
 };

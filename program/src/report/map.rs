@@ -1,10 +1,10 @@
 //! A map as text, and its rows as CSV.
 
+use crate::report::document::{ReportedResult, map_title};
 use crate::report::numbers::{
     duration_text, format_five_digits, number_in_key_unit, number_in_unit,
 };
 use crate::report::table::{LabelledLines, append_csv_rows, label_first_line, text_cell};
-use crate::report::{ReportedResult, map_title};
 use leafdyn::scenario::Units;
 use leafdyn::study::{Map, MapOutcome, MapRow};
 use std::fmt::Write as _;

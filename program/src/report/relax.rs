@@ -1,6 +1,9 @@
 //! The text report of a relaxation: the leaf at rest, the blade of which it is made, its modes and
 //! sensitivities, all of its equilibria, and its stability margin.
 
+use crate::report::document::{
+    ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase,
+};
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
     format_five_digits, format_position, format_within_error, grids_text,
@@ -8,7 +11,6 @@ use crate::report::numbers::{
     position_error_text, round_to_error, upper_bound_text, veins_text,
 };
 use crate::report::table::{LabelledLines, label_first_line};
-use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
