@@ -1,11 +1,7 @@
-//! A fit: its numbers with their intervals, results of experiments with the model and its confidence
-//! band along what varied, measured points over the veins, and below each the residuals.
-//!
-//! The free numbers of a fit with their intervals.
-//!
-//! The panels of the figure of a fit.
-//!
-//! The results of experiments as series along the column that varies.
+//! A fit: the free numbers with their intervals, results of experiments with the model and its confidence
+//! band, measured points over the veins, and below each panel the residuals. Results of experiments that
+//! differ along a line are a series along the column that varies most; other results keep the numbers of
+//! their experiments.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
@@ -122,7 +118,7 @@ const INTERVALS: IntervalLayout = IntervalLayout {
 };
 
 /// Draws the free numbers with their intervals; returns where that ends.
-pub fn draw_fit_parameters(
+fn draw_fit_parameters(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -158,12 +154,13 @@ pub fn draw_fit_parameters(
         emphasizes_zero: true,
         ..Axis::linear("from the value / %", -end, end)
     };
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
+    let axes = PanelAxes::draw_titled(
+        page,
+        cell,
+        [letter, "95 % intervals"],
+        across,
+        Axis::blank(),
+    );
     for (k, it) in shown.iter().enumerate() {
         let middle = corner.y + INTERVALS.row * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
@@ -285,7 +282,7 @@ fn result_label(kind: &str, units: &Units) -> QuantityLabel {
 
 /// Draws results of one kind with the model along what varied, and their residuals along the same;
 /// returns where that ends.
-pub fn draw_results(
+fn draw_results(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -471,7 +468,7 @@ fn draw_residuals(
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
-pub fn draw_measured_veins(
+fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -593,14 +590,14 @@ const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 /// A result of an experiment, and where a panel has it: the value that varied, or the number of the
 /// experiment.
 #[derive(Clone, Copy)]
-pub struct PlacedResidual<'f> {
+struct PlacedResidual<'f> {
     pub abscissa: f64,
     pub residual: &'f FitResidual,
 }
 
 /// Results of one kind, drawn in one panel.
-pub struct ResultSeries<'f> {
-    /// As in the data: `tip_x`.
+struct ResultSeries<'f> {
+    /// The name of its column in the data, such as `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
     /// experiments.
@@ -610,7 +607,7 @@ pub struct ResultSeries<'f> {
 }
 
 impl<'f> ResultSeries<'f> {
-    pub fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
+    fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
         self.series.iter().flatten().copied()
     }
 }
@@ -619,7 +616,7 @@ type ExperimentSettings = [(ParameterKeys, f64)];
 
 /// The results of all experiments by their kinds. Those of experiments that differ along a line, as
 /// one column varies or several together, are a series; those of others keep their numbers.
-pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
+fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     let leaves = fit.leaves.iter();
     let settings: HashMap<usize, &ExperimentSettings> = leaves
         .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))
@@ -686,7 +683,7 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     all
 }
 
-/// Which of their numbers varies most, if the experiments differ along a line.
+/// Which setting of the experiments varies most, if they differ along a line.
 fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
     let first = settings.first()?;
     let same = |it: &&ExperimentSettings| {
