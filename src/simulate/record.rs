@@ -261,7 +261,7 @@ fn serialize_moments<S: Serializer>(
 }
 
 /// Number of nodes for cubic interpolation.
-const CUBIC: usize = 4;
+pub(super) const CUBIC: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
 /// by rod, base to tip.

@@ -9,6 +9,7 @@ use crate::relax::{
     Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
+use crate::study::judge::SAME_STATION_DISTANCE;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
 use glam::DVec3;
 
@@ -127,9 +128,6 @@ fn no_derivative_remark(key: &str) -> String {
 
 /// Tolerance of the blades that a blade is compared with.
 const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
-
-/// Stations nearer to each other than this are the same.
-const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Relaxes the leaf of `base` and, if it is a blade that comes to rest in a stable equilibrium,
 /// compares it with others: [`Equilibrium::blade`] tells how far they are apart. Neither is

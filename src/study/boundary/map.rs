@@ -100,7 +100,7 @@ impl<'p> IndexMapSweep<'p> {
             if let Some(from) = now.take_if(|from| from.solution.params != to) {
                 let mut path = follow_path(self.plane, &from, to);
                 now = path.end.take();
-                unexplained.extend(self.record_path((&from, to, now.as_ref()), cell, path, curves));
+                unexplained.extend(self.record_path(&from, to, now.as_ref(), cell, path, curves));
             }
         }
         self.frontier[cell] = now;
@@ -157,8 +157,14 @@ impl<'p> IndexMapSweep<'p> {
             for (from, mut path) in paths {
                 let (to, end) = (self.cell_center(*cell), path.end.take());
                 if let Some(from) = &before[from] {
-                    let ends = (from, to, end.as_ref());
-                    unexplained.extend(self.record_path(ends, *cell, path, curves));
+                    unexplained.extend(self.record_path(
+                        from,
+                        to,
+                        end.as_ref(),
+                        *cell,
+                        path,
+                        curves,
+                    ));
                 }
                 self.frontier[*cell] = end;
             }
@@ -186,11 +192,9 @@ impl<'p> IndexMapSweep<'p> {
     /// Records a path to a cell; returns it if it contradicts the curves.
     fn record_path(
         &mut self,
-        (from, to, end): (
-            &ConfirmedEquilibrium,
-            [f64; 2],
-            Option<&ConfirmedEquilibrium>,
-        ),
+        from: &ConfirmedEquilibrium,
+        to: [f64; 2],
+        end: Option<&ConfirmedEquilibrium>,
         cell: usize,
         mut path: ParameterPath,
         curves: &[ContinuedBoundary],

@@ -19,7 +19,9 @@ use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 use crate::study::ParameterKeys;
 use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
-use crate::study::trace::{Trace, TraceError, TraceRequest, trace_with_points};
+use crate::study::trace::{
+    PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest, trace_with_points,
+};
 use crate::study::vary::ParameterSweep;
 use glam::DVec3;
 use serde::ser::Serializer;
@@ -127,7 +129,7 @@ pub fn trace_stability_boundary(
         seeds_tried: 0,
         progress,
     };
-    for (critical, refined) in &begun.critical_points {
+    for RefinedCriticalPoint { critical, refined } in &begun.critical_points {
         let seed = BoundarySeed {
             critical,
             refined,
@@ -136,7 +138,7 @@ pub fn trace_stability_boundary(
         };
         run.follow_unknown_curve(&seed, &mut boundary);
     }
-    if let (Some(size), Some((point, grid))) = (request.map, begun.first_point) {
+    if let (Some(size), Some(PointOnGrid { point, grid })) = (request.map, begun.first_point) {
         let kinks = plane.first_leaf().kinks();
         let first = ConfirmedEquilibrium {
             grid: coarsened(&grid, point.state.segments(), kinks),

@@ -438,6 +438,12 @@ pub struct ReferenceSolution {
     pub neutral: Option<String>,
 }
 
+/// The reference of a scenario, and what is told of it.
+pub struct FoundReference {
+    pub reference: ReferenceSolution,
+    pub solution: MethodSolution,
+}
+
 /// Finds the reference of a scenario, at the `wanted` stations if shooting
 /// succeeds. `None` if neither method finds an equilibrium.
 ///
@@ -446,7 +452,7 @@ pub struct ReferenceSolution {
 pub fn find_reference(
     scenario: &Scenario,
     wanted: Vec<f64>,
-) -> Result<Option<(ReferenceSolution, MethodSolution)>, RelaxError> {
+) -> Result<Option<FoundReference>, RelaxError> {
     let relaxed = most_accurate_relaxation(scenario)?;
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
     let ends = [0.0, 1.0].into_iter();
@@ -474,7 +480,7 @@ pub fn find_reference(
         difference: None,
         neutral,
     };
-    let (told, answer) = match (relaxed, shot) {
+    let ChosenReference { told, solution } = match (relaxed, shot) {
         (Some(leaf), Ok(shot)) => {
             let distance = leaf.largest_distance(&shot);
             reference.difference = distance.map(|distance| distance / unit);
@@ -485,12 +491,16 @@ pub fn find_reference(
         (Some(leaf), Err(failure)) => {
             let why = &failure.reason;
             let told = format!("the relaxed leaf: shooting does not confirm it, {why}");
-            (told, leaf)
+            ChosenReference {
+                told,
+                solution: leaf,
+            }
         }
-        (None, Ok(shot)) => (
-            "the boundary-value solution from arcs: the relaxation does not come to rest".into(),
-            shot,
-        ),
+        (None, Ok(shot)) => ChosenReference {
+            told: "the boundary-value solution from arcs: the relaxation does not come to rest"
+                .into(),
+            solution: shot,
+        },
         (None, Err(_)) => return Ok(None),
     };
     let estimates = [reference.relaxation_estimate, reference.shooting_estimate];
@@ -500,7 +510,10 @@ pub fn find_reference(
         Some(difference) if reference.confirmed => better.max(difference),
         _ => better,
     };
-    Ok(Some((reference, answer)))
+    Ok(Some(FoundReference {
+        reference,
+        solution,
+    }))
 }
 
 /// The most accurate relaxation that comes to rest.
@@ -525,13 +538,19 @@ fn most_accurate_relaxation(scenario: &Scenario) -> Result<Option<MethodSolution
         .or(Some(first)))
 }
 
+/// The solution that is the reference, and a sentence on which it is.
+struct ChosenReference {
+    told: String,
+    solution: MethodSolution,
+}
+
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one with the smaller error estimate.
 fn choose_reference(
     leaf: MethodSolution,
     shot: MethodSolution,
     confirmed: bool,
-) -> (String, MethodSolution) {
+) -> ChosenReference {
     let leaf_is_better = leaf.error_bound() < shot.error_bound();
     let told = match (confirmed, leaf_is_better) {
         (true, _) => "relaxation and shooting agree within their error estimates",
@@ -539,7 +558,10 @@ fn choose_reference(
         (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
     };
     let takes_leaf = !confirmed && leaf_is_better;
-    (told.into(), if takes_leaf { leaf } else { shot })
+    ChosenReference {
+        told: told.into(),
+        solution: if takes_leaf { leaf } else { shot },
+    }
 }
 
 /// First words of outcomes that are equilibria.
@@ -596,14 +618,21 @@ impl PeerProgram {
     }
 }
 
-/// The rows for a leaf, rows with equal settings combined, and remarks on
-/// the others. Errors become relative to the longest rod.
+/// Measurements of other programs on a leaf.
+pub struct PeerRows {
+    /// Rows with equal settings are combined; errors are relative to the longest rod.
+    pub peers: Vec<PeerProgram>,
+    /// On the rows that are left out.
+    pub remarks: Vec<String>,
+}
+
+/// The rows for a leaf of this name and number of rods.
 pub fn combine_peer_measurements(
     rows: &[PeerMeasurement],
     scenario: &str,
     rods: usize,
     longest: f64,
-) -> (Vec<PeerProgram>, Vec<String>) {
+) -> PeerRows {
     let mut peers: Vec<PeerProgram> = Vec::new();
     let mut times: Vec<Vec<f64>> = Vec::new();
     let (mut other, mut silent) = (0, 0);
@@ -659,7 +688,7 @@ pub fn combine_peer_measurements(
         let what = "without the error of a leaf at rest, and left out";
         remarks.push(format!("{} {what}", rows(silent)));
     }
-    (peers, remarks)
+    PeerRows { peers, remarks }
 }
 
 #[cfg(test)]
@@ -833,7 +862,8 @@ mod reference_tests {
         "#;
         let scenario = Scenario::from_toml(leaf).unwrap();
         let relaxed = most_accurate_relaxation(&scenario).unwrap().unwrap();
-        let (_, mut elsewhere) = find_reference(&scenario, Vec::new()).unwrap().unwrap();
+        let found = find_reference(&scenario, Vec::new()).unwrap().unwrap();
+        let mut elsewhere = found.solution;
         for node in elsewhere.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
             node.position.z += 1e-6;
         }
@@ -841,7 +871,7 @@ mod reference_tests {
             elsewhere.error_estimate = Some(error);
             let apart = relaxed.largest_distance(&elsewhere).unwrap();
             assert!(!relaxed.agrees_within_errors(&elsewhere, apart));
-            let (_, taken) = choose_reference(relaxed.clone(), elsewhere.clone(), false);
+            let taken = choose_reference(relaxed.clone(), elsewhere.clone(), false).solution;
             assert_eq!(taken.rods == elsewhere.rods, is_taken);
         }
         // An estimate as large as the difference confirms little, but validly.
@@ -883,7 +913,7 @@ mod peers_tests {
             "a,tree,5,n=20,2,1e-3,converged",
         ]
         .map(row);
-        let (peers, remarks) = combine_peer_measurements(&rows, "leaf", 5, 2.0);
+        let PeerRows { peers, remarks } = combine_peer_measurements(&rows, "leaf", 5, 2.0);
         let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
         let names: Vec<(&str, &str)> = names.collect();
         assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);

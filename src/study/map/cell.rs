@@ -21,8 +21,9 @@ use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::Undulation;
 use crate::shooting::{ShootingFailureReason, ShootingStart};
+use crate::simulate::DEFAULT_MOTION_SEGMENTS;
 use crate::study::judge::{
-    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, eigenvalue_grid,
+    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, Timed, eigenvalue_grid,
     morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
 use crate::study::map::{
@@ -58,7 +59,7 @@ pub struct MapCell<'a> {
     /// Time limit for all cells.
     total_limit: &'a Limit,
     /// The default method's answer and its seconds: the start of shooting from rest.
-    relaxed_answer: (CellSolution, f64),
+    relaxed_answer: Timed<CellSolution>,
     reference: Option<MethodSolution>,
     confidence: ReferenceConfidence,
 }
@@ -96,10 +97,11 @@ impl<'a> MapCell<'a> {
             confidence: ReferenceConfidence::None,
         };
         let sharp = (REFERENCE_TOLERANCE_RATIO * tolerance).max(LEAST_REFERENCE_TOLERANCE);
-        let (shot, _) = run_within_limit(limit, all, |limit| {
+        let shot = run_within_limit(limit, all, |limit| {
             cell.shoot_from_relaxed_leaf(sharp, limit)
-        });
-        if let Ok(relaxed) = &cell.relaxed_answer.0 {
+        })
+        .result;
+        if let Ok(relaxed) = &cell.relaxed_answer.result {
             let (confidence, reference) = choose_reference(relaxed, shot.ok());
             (cell.confidence, cell.reference) = (confidence, Some(reference));
         }
@@ -108,7 +110,10 @@ impl<'a> MapCell<'a> {
 
     /// Solves by a method and judges the answer.
     pub fn solve_by_method(&self, cell: usize, method: MapMethod) -> MapRow {
-        let (found, seconds) = self.timed_solution(method);
+        let Timed {
+            result: found,
+            seconds,
+        } = self.timed_solution(method);
         let blank = MapRow {
             seconds,
             cell,
@@ -149,7 +154,7 @@ impl<'a> MapCell<'a> {
         }
     }
 
-    fn timed_solution(&self, method: MapMethod) -> (CellSolution, f64) {
+    fn timed_solution(&self, method: MapMethod) -> Timed<CellSolution> {
         let segments = self.solver_settings.segments;
         let (scenario, tolerance) = (self.scenario, self.tolerance);
         let is_relaxed = |method: Method| method.semi_implicit().is_some() && segments.is_none();
@@ -191,7 +196,7 @@ impl<'a> MapCell<'a> {
         intervals: Option<usize>,
         limit: &Limit,
     ) -> CellSolution {
-        let segments = match &self.relaxed_answer.0 {
+        let segments = match &self.relaxed_answer.result {
             Ok(relaxed) => relaxed.stations.len() - 1,
             Err(_) => LEAST_EIGENVALUE_SEGMENTS,
         };
@@ -243,7 +248,8 @@ impl<'a> MapCell<'a> {
             index: morse_index_near(
                 self.scenario,
                 grid,
-                (&answer.stations, &answer.rods),
+                &answer.stations,
+                &answer.rods,
                 answer.error_bound(),
             ),
             remark: Some(note),
@@ -252,7 +258,7 @@ impl<'a> MapCell<'a> {
     }
 
     fn shoot_from_relaxed_leaf(&self, accuracy: f64, limit: &Limit) -> CellSolution {
-        match &self.relaxed_answer.0 {
+        match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
             Err((outcome, why)) => {
                 let why = format!("the leaf to start from is not at rest: {why}");
@@ -297,10 +303,10 @@ impl<'a> MapCell<'a> {
         reference: &MethodSolution,
         distance: f64,
     ) -> bool {
-        let (near, _) = run_within_limit(self.limit, self.total_limit, |limit| {
+        let near = run_within_limit(self.limit, self.total_limit, |limit| {
             self.solve_by_shooting(answer.shooting_start(), self.tolerance, None, limit)
         });
-        match near {
+        match near.result {
             Ok(near) if near.largest_distance(answer) < Some(distance) => {
                 near.largest_distance(reference) > Some(0.5 * distance)
             }
@@ -310,11 +316,14 @@ impl<'a> MapCell<'a> {
 }
 
 /// The outcome on a grid that takes longer than the limit in any case.
-fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<(CellSolution, f64)> {
+fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<Timed<CellSolution>> {
     let (nodes, limit) = (segments.saturating_mul(rods), limit.as_secs_f64());
     let late = nodes as f64 * LEAST_SECONDS_PER_NODE > limit;
     let why = || format!("{nodes} nodes take longer than {limit} s");
-    late.then(|| (Err((MapOutcome::OutOfTime, why())), 0.0))
+    late.then(|| Timed {
+        result: Err((MapOutcome::OutOfTime, why())),
+        seconds: 0.0,
+    })
 }
 
 /// Runs a method with a time limit; also returns the seconds it took.
@@ -323,20 +332,18 @@ fn run_within_limit(
     limit: Duration,
     all: &Limit,
     run: impl FnOnce(&Limit) -> CellSolution,
-) -> (CellSolution, f64) {
+) -> Timed<CellSolution> {
     let until = Limit {
         deadline: Some(Instant::now() + limit),
         ..all.clone()
     };
-    let (found, seconds) = run_timed(|| run(&until));
+    let mut found = run_timed(|| run(&until));
     let limit = limit.as_secs_f64();
-    match seconds > limit {
-        true => {
-            let late = format!("no answer within {limit} s");
-            (Err((MapOutcome::OutOfTime, late)), seconds)
-        }
-        false => (found, seconds),
+    if found.seconds > limit {
+        let late = format!("no answer within {limit} s");
+        found.result = Err((MapOutcome::OutOfTime, late));
     }
+    found
 }
 
 /// Relaxes, perhaps on one grid. That has no error estimate of its own: a finer grid gives one.
@@ -402,9 +409,6 @@ fn choose_reference(
 pub fn join_lines(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
-
-/// Default number of segments per rod: as in a simulation.
-const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// Largest number of stations at which answers are compared.
 const MOST_COMPARED_STATIONS: usize = 4096;

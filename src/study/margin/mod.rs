@@ -200,7 +200,7 @@ fn stability_margin(
     let Ok(family) = LeafFamily::new(&make, [0.0, 1.0], false) else {
         return Ok(Margin::none(UNRESOLVED_EIGENVALUE_REASON));
     };
-    let (grid, state) = match continuation_grid(&family, levels) {
+    let LeafOnGrid { grid, point, .. } = match continuation_grid(&family, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
@@ -214,7 +214,7 @@ fn stability_margin(
         family: &family,
         rest,
         grid,
-        state,
+        state: point.state,
         accuracy: tolerance.max(PUSH_BRANCH.accuracy),
         largest_force: largest_tip_force(scenario, weight),
         limit: &options.limit,
@@ -242,7 +242,8 @@ fn stability_margin(
         let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
         a.total_cmp(&b)
     });
-    let (barrier, climbs) = barrier::lowest_energy_barrier(&stable, starts, weight);
+    let barrier::LowestBarrier { barrier, searches } =
+        barrier::lowest_energy_barrier(&stable, starts, weight);
     let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
         true => Some("the time allowed was over before all was tried".into()),
@@ -257,7 +258,7 @@ fn stability_margin(
         largest_push: (!held).then_some(stable.largest_force),
         pushes,
         barrier,
-        climbs,
+        climbs: searches,
         remark,
         wall_seconds: clock.elapsed().as_secs_f64(),
     })
@@ -306,7 +307,7 @@ fn is_softest_eigenvalue_resolved(grids: &[LeafOnGrid]) -> bool {
 fn continuation_grid(
     family: &LeafFamily,
     levels: &[GridLevel],
-) -> Result<(Grid, State), &'static str> {
+) -> Result<LeafOnGrid, &'static str> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
@@ -326,9 +327,12 @@ fn continuation_grid(
             LeafOnGrid::from_point(&mut equations, &point)
                 .map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?,
         );
-        for grids in [2, 3].map(|count| grids.len().checked_sub(count).map(|k| &grids[k..])) {
-            if let Some(grids) = grids.filter(|grids| is_softest_eigenvalue_resolved(grids)) {
-                return Ok((grids[0].grid.clone(), grids[0].point.state.clone()));
+        for first in [2, 3]
+            .into_iter()
+            .filter_map(|count| grids.len().checked_sub(count))
+        {
+            if is_softest_eigenvalue_resolved(&grids[first..]) {
+                return Ok(grids.swap_remove(first));
             }
         }
         if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_CONTINUATION_NODES
@@ -494,7 +498,7 @@ fn find_critical_tip_force(
         error: Some(error),
         per_weight: (weight > 0.0).then(|| force / weight),
         then: Some(then),
-        neighbour: equilibrium_beyond_fold(stable, &mut grids, (critical, refined), &starts),
+        neighbour: equilibrium_beyond_fold(stable, &mut grids, critical, refined, &starts),
         tips: family.tips(&refined.tips),
         ..unknown
     };
@@ -595,7 +599,8 @@ fn postcritical_behavior(
 fn equilibrium_beyond_fold(
     stable: &StableLeaf,
     grids: &mut NestedBranchEquations,
-    (critical, fold): (&CriticalPoint, &ExtrapolatedPoint),
+    critical: &CriticalPoint,
+    fold: &ExtrapolatedPoint,
     starts: &[SaddleSearchStart],
 ) -> Option<Neighbour> {
     let start = starts

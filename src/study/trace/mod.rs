@@ -184,12 +184,24 @@ pub fn trace_through(
     Ok(trace_with_points_from(request, Some(leaf), progress)?.trace)
 }
 
+/// A point of a branch, and a grid that refines its own.
+pub struct PointOnGrid {
+    pub point: EquilibriumPoint,
+    pub grid: Grid,
+}
+
+/// A critical point on the grid on which it was found, and extrapolated over grids.
+pub struct RefinedCriticalPoint {
+    pub critical: CriticalPoint,
+    pub refined: ExtrapolatedPoint,
+}
+
 /// A trace, with its first point and its critical points.
 pub struct TraceWithPoints {
     pub trace: Trace,
-    /// The first point, and a grid that refines its own; none if there is no first point.
-    pub first_point: Option<(EquilibriumPoint, Grid)>,
-    pub critical_points: Vec<(CriticalPoint, ExtrapolatedPoint)>,
+    /// None if there is no first equilibrium.
+    pub first_point: Option<PointOnGrid>,
+    pub critical_points: Vec<RefinedCriticalPoint>,
 }
 
 /// The same as [`trace`], with those points.
@@ -230,13 +242,14 @@ fn trace_with_points_from(
         .base
         .scenario_with_values(&[(keys, ends[1])])?
         .scenario;
-    let leaning = total_load(&last) - total_load(&scenario);
+    let bias_direction = total_load(&last) - total_load(&scenario);
     let (rest, options) = match given {
         Some((leaf, _)) => {
-            let options = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
+            let options =
+                relaxation_options(request, tolerance, bias_direction, request.keep_unstable);
             (leaf.clone(), options)
         }
-        None => first_equilibrium(request, &scenario, (tolerance, leaning))?,
+        None => first_equilibrium(request, &scenario, tolerance, bias_direction)?,
     };
     let fraction = ParameterRange {
         ends,
@@ -319,13 +332,14 @@ fn total_load(scenario: &Scenario) -> DVec3 {
 fn first_equilibrium(
     request: &TraceRequest,
     scenario: &Scenario,
-    (tolerance, leaning): (f64, DVec3),
+    tolerance: f64,
+    bias_direction: DVec3,
 ) -> Result<(Equilibrium, Options), RelaxError> {
-    let wanted = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
+    let wanted = relaxation_options(request, tolerance, bias_direction, request.keep_unstable);
     let mut rest = relax(scenario, &wanted, &mut |_| {})?;
     if request.keep_unstable && !rest.outcome.is_at_rest() {
         // Newton's method leads nowhere from this start.
-        let stable = relaxation_options(request, (tolerance, leaning), false);
+        let stable = relaxation_options(request, tolerance, bias_direction, false);
         rest = relax(scenario, &stable, &mut |_| {})?;
     }
     Ok((rest, wanted))
@@ -333,13 +347,14 @@ fn first_equilibrium(
 
 fn relaxation_options(
     request: &TraceRequest,
-    (tolerance, leaning): (f64, DVec3),
+    tolerance: f64,
+    bias_direction: DVec3,
     keep_unstable: bool,
 ) -> Options {
     Options {
         limit: request.limit.clone(),
         tolerance: Some(tolerance),
-        bias_direction: leaning,
+        bias_direction,
         method: SemiImplicit {
             keep_unstable,
             ..SemiImplicit::default()
@@ -378,11 +393,21 @@ fn force_displacement_line(
         return None;
     };
     let points = branch.points.iter().map(|point| match point.tips[..] {
-        [tip] => Some((point.force_on_tip(*axis), tip)),
+        [tip] => Some(LoadedTip {
+            force: point.force_on_tip(*axis),
+            tip,
+        }),
         _ => None,
     });
-    let points: Option<Vec<(f64, DVec3)>> = points.collect();
+    let points: Option<Vec<LoadedTip>> = points.collect();
     ForceDisplacementLine::fit(*axis, &points?)
+}
+
+/// Where a branch is entered.
+struct BranchEntrance {
+    point: EquilibriumPoint,
+    /// The indices of the branch and the point from which it was entered; none for the first.
+    from: Option<[usize; 2]>,
 }
 
 /// Data common to all branches.
@@ -392,9 +417,9 @@ struct BranchTracer<'r, 'p> {
     /// The grids on which branches are followed.
     grids: NestedBranchEquations<'r>,
     tolerance: f64,
-    /// As in [`Traced`], so far.
-    first: Option<(EquilibriumPoint, Grid)>,
-    critical: Vec<(CriticalPoint, ExtrapolatedPoint)>,
+    /// The first point of the first branch, and the critical points so far.
+    first: Option<PointOnGrid>,
+    critical: Vec<RefinedCriticalPoint>,
     /// Whether the run was stopped before branches that cross were sought.
     stopped_before_crossings: bool,
     progress: &'p mut dyn FnMut(usize, usize, f64),
@@ -431,9 +456,9 @@ impl BranchTracer<'_, '_> {
         let mut entrances: VecDeque<_> = [first]
             .into_iter()
             .chain(back)
-            .map(|it| (it, None))
+            .map(|point| BranchEntrance { point, from: None })
             .collect();
-        while let Some((first, from)) = entrances.pop_front() {
+        while let Some(BranchEntrance { point, from }) = entrances.pop_front() {
             let number = trace.branches.len();
             if number == MOST_BRANCHES {
                 trace.remark = Some(format!("there are more than {MOST_BRANCHES} branches"));
@@ -441,7 +466,7 @@ impl BranchTracer<'_, '_> {
             }
             let (family, progress) = (self.family, &mut *self.progress);
             let mut report = |points, at| progress(number, points, family.value(at));
-            let mut followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
+            let mut followed = (self.grids).follow(point, &how, self.tolerance, &mut report);
             if followed.end == BranchEnd::StopCriterionMet {
                 truncate_at_destabilization(&mut followed);
             }
@@ -452,7 +477,10 @@ impl BranchTracer<'_, '_> {
                 .branches
                 .push(self.branch_in_scenario_units(&followed, from));
             let begun = followed.branch.points.first().zip(followed.points.first());
-            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
+            let begun = begun.map(|(point, refined)| PointOnGrid {
+                point: point.clone(),
+                grid: refined.grid.clone(),
+            });
             self.first = self.first.take().or(begun);
             let missing = self.record_crossings(&followed, number, &mut entrances);
             trace.branches[number].add_remarks(missing);
@@ -481,15 +509,18 @@ impl BranchTracer<'_, '_> {
         &mut self,
         followed: &VerifiedBranch,
         number: usize,
-        entrances: &mut VecDeque<(EquilibriumPoint, Option<[usize; 2]>)>,
+        entrances: &mut VecDeque<BranchEntrance>,
     ) -> Vec<String> {
         let mut missing = Vec::new();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
             let mut crossings =
-                (self.critical.iter()).filter(|(it, _)| it.kind == CriticalKind::Branching);
-            let known = crossings.any(|(_, other)| is_same_point(other, refined));
-            self.critical.push((critical.clone(), refined.clone()));
+                (self.critical.iter()).filter(|it| it.critical.kind == CriticalKind::Branching);
+            let known = crossings.any(|other| is_same_point(&other.refined, refined));
+            self.critical.push(RefinedCriticalPoint {
+                critical: critical.clone(),
+                refined: refined.clone(),
+            });
             if critical.kind != CriticalKind::Branching || known || !self.request.switch {
                 continue;
             }
@@ -511,7 +542,7 @@ impl BranchTracer<'_, '_> {
             }
             self.stopped_before_crossings |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
-            entrances.extend(new.into_iter().map(|point| (point, from)));
+            entrances.extend(new.into_iter().map(|point| BranchEntrance { point, from }));
         }
         missing
     }
@@ -658,13 +689,19 @@ pub struct ForceDisplacementLine {
     pub length: f64,
 }
 
+/// A tip under a force along an axis.
+struct LoadedTip {
+    force: f64,
+    tip: DVec3,
+}
+
 impl ForceDisplacementLine {
-    /// From forces along an axis and the tips under them; `None` with fewer than three, if the
-    /// tip moves by no more than rounding, or if the forces are not [`LINEAR`].
-    pub(super) fn fit(axis: usize, points: &[(f64, DVec3)]) -> Option<ForceDisplacementLine> {
-        let (_, tip) = *points.first()?;
+    /// `None` with fewer than three points, if the tip moves by no more than rounding, or if the
+    /// forces are not linear.
+    fn fit(axis: usize, points: &[LoadedTip]) -> Option<ForceDisplacementLine> {
+        let tip = points.first()?.tip;
         let points: Vec<(f64, f64)> = (points.iter())
-            .map(|(force, moved)| (moved[axis] - tip[axis], *force))
+            .map(|point| (point.tip[axis] - tip[axis], point.force))
             .collect();
         let count = points.len() as f64;
         if points.len() < 3 {
@@ -775,7 +812,11 @@ mod tests {
 
     fn law(tip: impl Fn(f64) -> f64) -> Option<ForceDisplacementLine> {
         let forces = (0..=10).map(|k| 0.1 * f64::from(k));
-        let points: Vec<_> = forces.map(|f| (f, DVec3::new(tip(f), 0.0, 0.0))).collect();
+        let point = |force: f64| LoadedTip {
+            force,
+            tip: DVec3::new(tip(force), 0.0, 0.0),
+        };
+        let points: Vec<_> = forces.map(point).collect();
         ForceDisplacementLine::fit(0, &points)
     }
 
@@ -788,8 +829,11 @@ mod tests {
 
     #[test]
     fn of_a_tip_that_does_not_move_there_is_none() {
-        let rounding = |k: i32| DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0);
-        let points: Vec<_> = (0..=10).map(|k| (f64::from(k), rounding(k))).collect();
+        let point = |k: i32| LoadedTip {
+            force: f64::from(k),
+            tip: DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0),
+        };
+        let points: Vec<_> = (0..=10).map(point).collect();
         assert_eq!(ForceDisplacementLine::fit(0, &points), None);
     }
 
