@@ -31,11 +31,11 @@ pub use crate::study::equilibria::{
     Equilibria, FoundEquilibrium, MOST_FRUITLESS_STARTS, equilibria,
 };
 pub use crate::study::fit::{
-    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, Fit,
-    FitAlternative, FitBudget, FitCandidate, FitError, FitExperiment, FitLeaf, FitOutcome,
-    FitParameter, FitRequest, FitResidual, FitStep, FitWork, FreeParameter, FreeParameterTarget,
-    MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn, RowCondition, RowFilter,
-    SystematicResiduals, TracedVeinPoint, fit,
+    ComparisonOperator, Data, DataFile, DataFileOptions, DataOrigin, Experiment,
+    ExperimentConditions, Fit, FitAlternative, FitCandidate, FitCostLimit, FitError, FitLeaf,
+    FitOutcome, FitParameter, FitRequest, FitResidual, FitStep, FitWork, FreeParameter,
+    FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn,
+    RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
     DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
@@ -79,7 +79,10 @@ crate::renamed! {
     PeerRow => PeerMeasurement,
     Place => DifferenceLocation,
     Quantity => ComparedQuantity,
-    Reading => DataReadingOptions,
+    Reading => DataFileOptions,
+    DataReadingOptions => DataFileOptions,
+    FitBudget => FitCostLimit,
+    FitExperiment => ExperimentConditions,
     Reference => ReferenceSolution,
     Row => ChartRow,
     RowChoice => RowFilter,

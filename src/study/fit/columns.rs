@@ -312,7 +312,7 @@ impl FromStr for RowFilter {
 
 /// How files of data are read.
 #[derive(Clone, Debug)]
-pub struct DataReadingOptions {
+pub struct DataFileOptions {
     /// Columns that have other names in the files.
     pub columns: Vec<MeasuredColumn>,
     /// The first row is read, and then each that is so many further.
@@ -321,9 +321,9 @@ pub struct DataReadingOptions {
     pub rows: Vec<RowFilter>,
 }
 
-impl Default for DataReadingOptions {
+impl Default for DataFileOptions {
     fn default() -> Self {
-        DataReadingOptions {
+        DataFileOptions {
             columns: Vec::new(),
             every: NonZeroUsize::MIN,
             rows: Vec::new(),

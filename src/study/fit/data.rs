@@ -6,7 +6,7 @@
 use crate::study::ParameterKeys;
 use crate::study::fit::FitError;
 use crate::study::fit::columns::{
-    COORDINATE_COLUMNS, DataReadingOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
+    COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
     MeasuredColumn, MeasuredQuantity, ObservedCoordinates, TRACED_POINT_COLUMNS,
 };
 use crate::study::fit::table::{DataTable, line_error};
@@ -102,7 +102,7 @@ pub struct DataFile {
 #[derive(Clone, Debug, Default)]
 pub struct Data {
     /// How files are read.
-    pub reading: DataReadingOptions,
+    pub reading: DataFileOptions,
     /// The files.
     pub files: Vec<DataFile>,
     /// Experiments.
@@ -265,9 +265,9 @@ pub fn read_candidate_experiments(
     file: &str,
     columns: &[MeasuredColumn],
 ) -> Result<Vec<Experiment>, FitError> {
-    let reading = DataReadingOptions {
+    let reading = DataFileOptions {
         columns: columns.to_vec(),
-        ..DataReadingOptions::default()
+        ..DataFileOptions::default()
     };
     read_experiments(&DataTable::parse(table, file, &reading)?, true, 0)
 }

@@ -19,8 +19,8 @@ use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
 };
 use crate::study::fit::{
-    Fit, FitCoordinate, FitError, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual,
-    FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
+    ExperimentConditions, Fit, FitCoordinate, FitError, FitLeaf, FitOutcome, FitParameter,
+    FitResidual, FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
 };
 use std::collections::BTreeMap;
 
@@ -502,10 +502,10 @@ fn experiments_in_data_order<'s>(stats: &'s FitStatistics) -> Vec<&'s ObservedEx
     observed
 }
 
-fn fit_experiments(stats: &FitStatistics) -> Vec<FitExperiment> {
+fn fit_experiments(stats: &FitStatistics) -> Vec<ExperimentConditions> {
     let experiment = |observed: &ObservedExperiment| {
         let settings = observed.experiment.settings.iter();
-        FitExperiment {
+        ExperimentConditions {
             experiment: observed.experiment.name.clone(),
             settings: settings
                 .map(|(keys, value)| (keys.to_string(), *value))

@@ -28,8 +28,7 @@ use crate::run::{Instant, Limit};
 use crate::scenario::format::units::LENGTH;
 
 pub use crate::study::fit::columns::{
-    ComparisonOperator, DataReadingOptions, MeasuredColumn, MeasuredQuantity, RowCondition,
-    RowFilter,
+    ComparisonOperator, DataFileOptions, MeasuredColumn, MeasuredQuantity, RowCondition, RowFilter,
 };
 pub use crate::study::fit::data::{
     Data, DataFile, DataOrigin, Experiment, MeasuredValue, TracedVeinPoint,
@@ -139,7 +138,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             step: 0,
             sum: f64::INFINITY,
             known: None,
-            budget: Some(FitBudget {
+            budget: Some(FitCostLimit {
                 evaluations: most,
                 leaves,
                 seconds: seconds * most as f64,
@@ -300,7 +299,7 @@ pub struct SystematicResiduals {
 
 /// An experiment with data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FitExperiment {
+pub struct ExperimentConditions {
     /// Its name.
     pub experiment: String,
     /// What was set, by keys.
@@ -368,12 +367,12 @@ pub struct FitStep {
     /// Once the minimum is found: the number of known intervals, and that of all numbers.
     pub known: Option<(usize, usize)>,
     /// Before the first step: what the fit takes at most.
-    pub budget: Option<FitBudget>,
+    pub budget: Option<FitCostLimit>,
 }
 
 /// What a fit takes at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitBudget {
+pub struct FitCostLimit {
     /// Number of times that the leaves of all experiments are relaxed or followed.
     pub evaluations: usize,
     /// Number of these leaves.
@@ -437,7 +436,7 @@ pub struct Fit {
     #[serde(skip)]
     pub files: Vec<DataFile>,
     /// The experiments in the order of the data.
-    pub experiments: Vec<FitExperiment>,
+    pub experiments: Vec<ExperimentConditions>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.

@@ -11,7 +11,7 @@
 use crate::scenario::MOST_BYTES;
 use crate::study::fit::FitError;
 use crate::study::fit::columns::{
-    DataReadingOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
+    DataFileOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
 };
 
 /// A parsed table.
@@ -78,11 +78,7 @@ fn column_names(header: &TableLine, groups: Option<&TableLine>) -> Vec<String> {
 }
 
 impl<'t> DataTable<'t> {
-    pub fn parse(
-        bytes: &[u8],
-        file: &'t str,
-        reading: &DataReadingOptions,
-    ) -> Result<Self, FitError> {
+    pub fn parse(bytes: &[u8], file: &'t str, reading: &DataFileOptions) -> Result<Self, FitError> {
         let decoded = decode(bytes, file)?;
         let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
         let known = |name: &str| is_known_column(name) || mapped(name).is_some();
@@ -260,7 +256,7 @@ impl<'t> DataTable<'t> {
     }
 
     /// Chooses the columns that are used, and returns words for others.
-    fn select_columns(&mut self, reading: &DataReadingOptions) -> Result<Vec<String>, FitError> {
+    fn select_columns(&mut self, reading: &DataFileOptions) -> Result<Vec<String>, FitError> {
         let (mut unnamed, mut unused) = (None, Vec::new());
         let maps_of = |name: &str| {
             let maps = reading.columns.iter();

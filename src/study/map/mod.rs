@@ -122,7 +122,7 @@ pub fn map(
     let done = Mutex::new(done);
     let work = || {
         while let Some(&cell) = next() {
-            let rows = request.solve(cell, &request.methods);
+            let rows = request.solve_cell(cell, &request.methods);
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             if !(*done)(rows) {
                 *left.lock().unwrap_or_else(PoisonError::into_inner) = [].iter();
@@ -307,8 +307,14 @@ impl MapRequest {
         cell::longest_stable_step(&self.base.scenario_with_values(&self.values(cell)).ok()?)
     }
 
-    /// Solves one cell by these methods.
+    /// Renamed to [`MapRequest::solve_cell`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
     pub fn solve(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
+        self.solve_cell(cell, methods)
+    }
+
+    /// Solves one cell by these methods.
+    pub fn solve_cell(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
         let varied = match self.base.scenario_with_values(&self.values(cell)) {
             Ok(varied) => varied,
             Err(refused) => {

@@ -234,9 +234,15 @@ impl Serialize for BranchEnd {
 
 impl TraceBranch {
     /// How often its Morse index grows along it: at a critical point, or between two points.
-    pub fn destabilizations(&self) -> usize {
+    pub fn index_increase_count(&self) -> usize {
         let pairs = self.points.windows(2);
         pairs.filter(|pair| pair[1].index > pair[0].index).count()
+    }
+
+    /// Renamed to [`TraceBranch::index_increase_count`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
+    pub fn destabilizations(&self) -> usize {
+        self.index_increase_count()
     }
 
     /// Adds sentences to its remark.
