@@ -19,13 +19,6 @@
 //! # assert!((simulation.frame().time - 10.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! Where a motion begins.
-//!
-//! Requests that cannot be simulated.
-//!
-//! What makes a motion doubtful from its beginning: it starts where it would stay for ever but for
-//! rounding.
 
 mod choice;
 mod record;
@@ -128,7 +121,7 @@ impl Simulation {
         Simulation::with_initial_state(scenario, options, &from)
     }
 
-    /// The same from where a leaf is that followed another scenario, without velocity: what it is
+    /// The motion from where a leaf is that followed another scenario, without velocity: what it is
     /// released from, or where its stable equilibria end.
     pub fn from_tracker(
         follower: &EquilibriumTracker,

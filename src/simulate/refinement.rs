@@ -1,8 +1,6 @@
 //! A motion followed on finer and finer grids in shorter and shorter steps, each run compared with
-//! the one before, until its tips are as accurate as requested.
-//!
-//! How accurate a motion is: its tips, and the middles of its veins, compared at every output with
-//! those of a run on another grid in other steps.
+//! the one before, until its tips are as accurate as requested. Compared are the tips and the middles
+//! of the veins, at every output.
 //!
 //! Both methods are of second order in space and time. With the length h of segments, and steps in
 //! proportion to it, the error of a run is C h^2, and the difference of two runs tells C
@@ -106,7 +104,7 @@ pub struct Refinement {
     /// known.
     next: Option<Simulation>,
     coarser: Option<RunTrajectory>,
-    /// Those of the run before that.
+    /// The points of the run before that.
     coarsest: Option<RunTrajectory>,
     /// Number of runs that have ended, and whether the next is the last in any case.
     runs: usize,
@@ -378,7 +376,7 @@ impl Refinement {
             self.resolution.step = Some(0.5 * step);
             match self.build(self.resolution) {
                 Ok(shorter) => *first = shorter,
-                // It was accepted with longer steps.
+                // Unreachable: the run was accepted with longer steps.
                 Err(_) => return Some(None),
             }
         }
@@ -548,7 +546,7 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// Of a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
+    /// Compares a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
     /// longest rod has this length.
     pub fn new(segments: usize, other: RunTrajectory, length: f64) -> Self {
         let RunTrajectory {
@@ -570,7 +568,7 @@ impl Comparison {
         }
     }
 
-    /// With the distances of the other run from one like it in steps half as long.
+    /// Adds the distances of the other run from one like it in steps half as long.
     pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
         let distances = self.other.distances(halved);
         let bar = |distance: f64| match distance <= self.parting_distance {

@@ -1,6 +1,5 @@
-//! Two independent methods for the same equilibrium, compared.
-//!
-//! Serialisation of both solutions for `check.json`.
+//! Two independent methods for the same equilibrium, compared: relaxation, and the boundary-value problem
+//! by shooting.
 
 use crate::numbers::{larger, largest};
 use crate::relax::{

@@ -1,9 +1,5 @@
-//! Common basis of all comparisons of methods: the answer of a method, within a
-//! time limit if there is one, the distance of two answers, and whether they
-//! confirm each other.
-//!
-//! The reference is determined by two independent methods: the relaxed leaf,
-//! and the solution of the boundary-value problem that starts from it.
+//! Common basis of all comparisons of methods: the answer of a method, its time, the distance of two
+//! answers, and whether they confirm each other.
 
 use crate::leaf::{Grid, Leaf};
 use crate::relax;

@@ -1,6 +1,5 @@
-//! A leaf at rest, and its derivatives with respect to numbers of its scenario.
-//!
-//! A blade at rest, and what its division into veins matters: the same blade with half as many, and
+//! A leaf at rest with the derivatives of its results with respect to numbers of its scenario; and a blade
+//! at rest with the effect of its division into veins, told by the same blade with half as many veins, and
 //! with narrower ends.
 
 use crate::numbers::largest;
@@ -22,7 +21,7 @@ pub enum SensitivityError {
     /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
-    /// Shooting has no grids on which equations are linearised.
+    /// Shooting has no grids on which equations are linearized.
     #[error("sensitivities are those of a relaxed leaf: use the method semi-implicit")]
     Method,
 }
@@ -64,7 +63,8 @@ pub fn relax_with_sensitivities(
     Ok(leaf)
 }
 
-/// The same derivatives of a leaf that follows, and is where `base` has it.
+/// Derivatives of the tip, the energy and the lowest eigenvalue of a leaf that is followed, where
+/// `base` has it now.
 pub fn sensitivities_of_tracker(
     follower: &EquilibriumTracker,
     base: &BaseScenario,
@@ -92,7 +92,7 @@ fn values_of_keys<'k>(
         .collect()
 }
 
-/// These numbers by their names.
+/// The numbers as parameters of the scenario, by their names.
 fn named_parameters<'v>(
     base: &'v BaseScenario,
     values: &'v [(&'v ParameterKeys, f64)],

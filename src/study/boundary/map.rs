@@ -1,9 +1,8 @@
-//! The coarse map under the curves of a boundary: the index of equilibria at the centres of
-//! cells, each continued from a neighbouring cell, independently of the curves.
+//! The coarse map under the curves of a boundary: the Morse index of equilibria at the centers of cells,
+//! each continued from a neighboring cell, independently of the curves.
 //!
-//! The index along a straight path through the plane, as implied by the curves.
-//!
-//! Whether critical points of branches in the plane lie on a known curve.
+//! A path contradicts the curves if its critical points are not where the curves cross it, or if its end
+//! has another index than they imply; such paths lead to curves that are not known yet.
 
 use crate::branch::boundary::{
     BoundarySeed, CodimensionTwoKind, ConfirmedEquilibrium, ContinuedBoundary, ParameterPath,
@@ -55,7 +54,7 @@ impl<'p> IndexMapSweep<'p> {
         }
     }
 
-    /// The centre of a cell.
+    /// The center of a cell.
     fn cell_center(&self, cell: usize) -> [f64; 2] {
         let at = [
             cell % self.columns_and_rows[0],

@@ -1,16 +1,7 @@
 //! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
-//! measured together against one reference.
+//! measured together against one reference; and cost against the number of veins at one accuracy.
 //!
-//! The contents of a chart: contenders and their accuracy settings.
-//!
-//! The runs of one contender with one setting on a leaf.
-//!
-//! Fair timing: all settings take turns, so that a varying load of the machine affects
-//! them equally.
-//!
-//! The Pareto front of speed and accuracy.
-//!
-//! Cost against the number of veins, at a fixed accuracy.
+//! All settings take turns, so that a varying load of the machine affects them equally.
 
 mod result;
 
@@ -389,7 +380,7 @@ pub struct TimingSpread {
 }
 
 impl TimingSpread {
-    /// Of measurements in ascending order; `None` without any.
+    /// The spread of measurements in ascending order; `None` without any.
     pub fn from_sorted(sorted: &[f64]) -> Option<Self> {
         let last = sorted.len().checked_sub(1)?;
         let at = |part: f64| {
@@ -409,7 +400,7 @@ impl TimingSpread {
     }
 }
 
-/// The same keys without a measurement: all null, and no run.
+/// A spread as JSON; without a measurement the same keys are null, with no run.
 pub fn serialize_spread<S: Serializer>(
     spread: &Option<TimingSpread>,
     serializer: S,
@@ -465,7 +456,7 @@ pub fn time_runs(
         if runs.seconds[0] < TIMING.short_seconds {
             let _ = run(runs, round, rounds);
         }
-        // It succeeded before, and does so again.
+        // The run succeeded before, and does so again.
         if let Ok(found) = run(runs, round, rounds) {
             runs.seconds.push(found.seconds);
         }

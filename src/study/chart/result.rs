@@ -1,11 +1,7 @@
-//! The result of a chart: `chart.json`.
+//! The result of a chart, `chart.json`: rows with true errors, the reference against which these are
+//! measured, and measurements of other programs.
 //!
-//! Rows of a chart from the results of runs: true errors, and runs that ended in another
-//! equilibrium.
-//!
-//! The solution against which all others are measured.
-//!
-//! Measurements of other programs, next to ours.
+//! A run that ended in another equilibrium than the reference is told apart from an inaccurate one.
 
 use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
@@ -71,7 +67,7 @@ pub struct ChartRow {
     pub seconds: Option<TimingSpread>,
     /// Steps or iterations of a run; these counts are `None` if it did not run.
     pub steps: Option<usize>,
-    /// Its factorisations.
+    /// Its factorizations.
     pub factorizations: Option<usize>,
     /// Its evaluations of all forces of the leaf.
     pub force_evaluations: Option<usize>,
@@ -249,7 +245,7 @@ impl Chart {
     }
 }
 
-/// Errors above this are not due to discretisation if the run's own estimate is
+/// Errors above this are not due to discretization if the run's own estimate is
 /// less than half as large: it is another equilibrium.
 const OTHER_EQUILIBRIUM_ERROR: f64 = 1e-2;
 

@@ -40,7 +40,7 @@ impl MeasuredQuantity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum DatumDimension {
     Length,
-    /// Of photographs.
+    /// Lengths in photographs.
     Pixel,
     Force,
     Frequency,

@@ -205,7 +205,7 @@ impl Data {
                 Some(column) => table.number(row, column),
                 None => Ok(None),
             };
-            // Of one vein, every point is on that.
+            // A leaf of one vein needs no column: every point is on that vein.
             let rod = match column("rod") {
                 Some(column) => table.number(row, column)?,
                 None => Some(1.0),

@@ -244,7 +244,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
         (point, GaussNewtonOutcome::StepLimit)
     }
 
-    /// The linearised residuals in the coordinates that may move.
+    /// The linearized residuals in the coordinates that may move.
     fn linearize_residuals(
         &self,
         point: &FitPoint,
@@ -310,7 +310,7 @@ fn coordinate_change(from: &[f64], to: &[f64]) -> DVector<f64> {
     DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
 }
 
-/// Weighted residuals, linearised, along their singular directions.
+/// Weighted residuals, linearized, along their singular directions.
 struct LinearizedResiduals {
     /// Singular values, ascending, and their directions as columns.
     singular_values: Vec<f64>,
@@ -338,7 +338,7 @@ impl LinearizedResiduals {
         }
     }
 
-    /// The step within a radius that minimises the sum of squares.
+    /// The step within a radius that minimizes the sum of squares.
     fn trust_region_step(&self, radius: f64) -> DVector<f64> {
         let along = |damping: f64| {
             let part = |k: usize, slope: f64| match k < self.insensitive_count {

@@ -349,7 +349,7 @@ fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<String> {
     let mut remarks = Vec::new();
     match end {
         GaussNewtonOutcome::Converged => {}
-        // That is said at the end.
+        // The used-up budget is told once, by the search for the best minimum.
         GaussNewtonOutcome::BudgetExhausted => {}
         GaussNewtonOutcome::StepLimit => remarks.push(
             "the step limit came before the minimum: start from values nearer to it".into(),
@@ -470,7 +470,7 @@ fn unidentifiable_combinations(
             let parts: Vec<_> = parts
                 .filter(|(_, part)| part.abs() > NEGLIGIBLE_COEFFICIENT)
                 .collect();
-            // Of a number alone its profile decides.
+            // Whether a single number is determined its profile decides.
             if !matches!(parts[..], [(k, _)] if parameters[k].determined) {
                 let exactly = false;
                 open.push(UnidentifiableCombination {
@@ -694,7 +694,7 @@ fn combination_sentence(
             format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
-            // Of numbers that are not logarithms the combination is the tangent.
+            // In numbers that are not logarithms the combination is a tangent.
             let change = |(k, part): &(usize, f64)| match free[*k].is_logarithmic {
                 true => format!(
                     "{} in proportion to t^{}",

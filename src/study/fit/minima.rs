@@ -1,8 +1,8 @@
 //! Which minimum is the answer: where the search begins, where it begins again if it ends without a
 //! good one, and other minima that fit the data as well.
 //!
-//! Other values from which a search may begin: in decades around given ones, near them, and those
-//! that exchange or mirror what the data may not distinguish.
+//! Searches begin in decades around given values, near them, and at values that exchange or mirror what
+//! the data may not distinguish.
 
 use crate::run::Instant;
 use crate::study::fit::data::Experiment;
@@ -158,7 +158,7 @@ impl FitStart {
 
 /// The minimum near some values, on coarse grids.
 struct CoarseMinimum {
-    /// None if there is none.
+    /// None if the search does not converge.
     minimum: Option<EvaluatedStart>,
     /// How often the leaves were relaxed.
     evaluations: usize,
@@ -577,7 +577,7 @@ impl<'a> Multistart<'a> {
         sum.is_finite().then_some(EvaluatedStart { theta, sum })
     }
 
-    /// Those of these values at which all leaves come to rest, by ascending sums of squares.
+    /// The values, of all given ones, at which all leaves come to rest, by ascending sums of squares.
     pub fn ranked_starts(&self, all: Vec<Vec<f64>>) -> Vec<EvaluatedStart> {
         let found = all.into_par_iter().map(|theta| self.evaluate_start(theta));
         let mut found: Vec<EvaluatedStart> =

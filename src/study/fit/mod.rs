@@ -2,12 +2,8 @@
 //! traced veins, and what the data determine about each number and what they do not.
 //!
 //! The leaves of all experiments are followed from equilibrium to equilibrium, with
-//! derivatives from their linearised equations, so that a fit does not jump between
+//! derivatives from their linearized equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
-//!
-//! The result of a fit.
-//!
-//! The free numbers of a fit.
 
 mod columns;
 mod data;
@@ -485,9 +481,9 @@ const LARGEST_DISTANCE_FROM_INITIAL: f64 = 6.907_755_278_982_137;
 /// A column of the data whose zero may be unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OffsetColumn {
-    /// Of what was set in experiments.
+    /// A number that was set in experiments.
     Setting(ParameterKeys),
-    /// Of what was measured in experiments.
+    /// A result that was measured in experiments.
     Result(MeasuredQuantity),
 }
 

@@ -27,12 +27,14 @@ pub(super) type ScenarioDerivative = Vec<(f64, Scenario)>;
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;
 
-/// Error of an iteration on them: of positions, in standard deviations.
+/// Iteration error of positions on coarse grids, in standard deviations.
 const COARSE_ITERATION_ERROR: f64 = 10.0 * INSIGNIFICANT_PREDICTION_ERROR;
 
-/// Largest number of grids of a leaf.
+/// Largest number of coarse grids of a leaf.
 const MOST_COARSE_GRIDS: usize = 2;
 
+/// Largest number of steps in which leaves that are only compared come to rest: soft leaves far from
+/// the data may take thousands.
 pub(super) const MOST_RELAXATION_STEPS: usize = 400;
 
 /// The largest tolerance of leaves from which a search starts.
@@ -61,7 +63,7 @@ impl EvaluationBudget {
     }
 }
 
-/// Data common to all points of a fit.
+/// The leaves of all experiments as a function of the free numbers.
 #[derive(Clone)]
 pub(super) struct FitModel<'a> {
     pub base: &'a BaseScenario,
@@ -227,7 +229,7 @@ impl<'a> FitModel<'a> {
         settings.chain(entries).collect()
     }
 
-    /// Where the number that a coordinate changes stands among [`Model::values`]; none if it changes
+    /// Where the number that a coordinate changes stands among [`FitModel::scenario_values`]; none if it changes
     /// nothing in this experiment's leaf.
     pub(super) fn scenario_value_index(&self, case: &ExperimentCase, k: usize) -> Option<usize> {
         match &self.coordinates[k].number {
@@ -288,7 +290,7 @@ impl<'a> FitModel<'a> {
         self.assemble_point(theta, find)
     }
 
-    /// The same in no more than so many steps of each leaf.
+    /// The leaves relaxed from their usual starts, each in no more than so many steps.
     pub fn relax_leaves_within_steps(
         &self,
         theta: &[f64],
@@ -347,7 +349,7 @@ impl<'a> FitModel<'a> {
             .collect()
     }
 
-    /// These in words.
+    /// The numbers and their values in words, for messages.
     pub fn values_in_words(&self, theta: &[f64]) -> String {
         let numbers = self.named_values(theta);
         let each = numbers
@@ -365,7 +367,7 @@ impl<'a> FitModel<'a> {
         self.continue_leaves_on_grids(from, theta, self.grids)
     }
 
-    /// The same on these grids.
+    /// The leaves at other values, followed on these grids.
     pub fn continue_leaves_on_grids(
         &self,
         from: &FitPoint,
@@ -656,7 +658,7 @@ impl Weighting {
         DVector::from_vec(residual.collect())
     }
 
-    /// Their derivatives; zero if they are not known.
+    /// Derivatives of the residuals, a row for each datum; zero if they are not known.
     pub fn jacobian(&self, point: &FitPoint) -> DMatrix<f64> {
         let components = point.components();
         let sd: Vec<f64> = components

@@ -252,7 +252,7 @@ impl ScalarDatum {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum DatumQuantity {
     Result(MeasuredQuantity),
-    /// One of [`COORDINATES`] of a point on a rod, at this fraction of its length.
+    /// One of [`COORDINATE_COLUMNS`] of a point on a rod, at this fraction of its length.
     Vein {
         rod: usize,
         coordinate: usize,
@@ -497,7 +497,7 @@ impl<'a> VeinInterpolant<'a> {
 /// Relative accuracy of the predicted state from which a leaf is relaxed.
 const PREDICTED_STATE_ACCURACY: f64 = 1e-3;
 
-/// The linearised equations of a leaf at rest on every grid, and the force rates of the free
+/// The linearized equations of a leaf at rest on every grid, and the force rates of the free
 /// numbers.
 pub(super) struct ParameterResponses {
     linearized: Mutex<Vec<Linearized>>,
@@ -513,7 +513,7 @@ fn singular_matrix_failure() -> ContinuationFailure {
 }
 
 impl ParameterResponses {
-    /// The linearised equations at a leaf at rest.
+    /// The linearized equations at a leaf at rest.
     pub fn new(
         at: &NestedEquilibrium,
         rates: &[LeafParameterDerivative],

@@ -1,8 +1,8 @@
-//! Statistics of a minimum: deviations, correlations, bands.
+//! Statistics of a minimum: deviations, correlations, bands, and which candidate experiment would be most
+//! informative.
 //!
-//! Singular directions of derivatives, and quantiles of Student's distribution.
-//!
-//! Which candidate experiment would be most informative.
+//! All follow from the singular values of the weighted derivatives: combinations of the free numbers with
+//! the smallest ones are those to which the data are insensitive.
 
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Data, Experiment};

@@ -1,12 +1,7 @@
 //! Tables of numbers, as instruments, spreadsheets and people write them.
 //!
-//! The lines of a table, divided into cells, and which of them is the header.
-//!
-//! Decimal points and decimal commas.
-//!
-//! The text of a table from its bytes.
-//!
-//! The row of units below a header.
+//! Encoding, separator of cells, header, decimal mark and a row of units are recognized from the text
+//! itself; where it can be read in two ways, the file is refused with what to change.
 
 use crate::scenario::MOST_BYTES;
 use crate::study::fit::FitError;

@@ -1,11 +1,10 @@
-//! One cell: the reference, and each method's answer with its verdict.
+//! One cell of a map: the reference, and each method's answer with its verdict; and the jumps of the leaf
+//! between neighboring cells.
 //!
-//! Explicit motion with one time step, stable or not: the answer of a plain simulation
-//! of the damped leaf.
+//! Explicit motion has one time step, stable or not: its answer is that of a plain simulation of the damped
+//! leaf.
 //!
-//! Jumps: neighbouring cells in which the leaf rests in different equilibria.
-//!
-//! Pairs of cells whose answers are farther apart than those of the neighbouring pairs are
+//! Pairs of cells whose answers are farther apart than those of the neighboring pairs are
 //! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
 //! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
@@ -572,7 +571,7 @@ pub struct MapJump {
     pub key: String,
     /// The varied values of one cell.
     pub from: Vec<String>,
-    /// Those of the other.
+    /// The varied values of the other cell.
     pub to: Vec<String>,
     /// The two values of the key between which it jumps.
     pub between: [f64; 2],

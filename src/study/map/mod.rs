@@ -5,10 +5,6 @@
 //! leaf, and the solution of the boundary-value problem that starts from it,
 //! both at a hundredth of the tolerance. If they agree within their estimates the
 //! reference is confirmed. All answers are measured against it.
-//!
-//! Requests for maps, and their validation.
-//!
-//! The result of one method in one cell: a closed set of words, and numbers.
 
 mod cell;
 
@@ -295,7 +291,7 @@ impl MapRequest {
             .collect()
     }
 
-    /// The same as texts, as in tables.
+    /// The varied values of a cell as texts, as in tables.
     pub fn texts(&self, cell: usize) -> Vec<String> {
         let values = self.values(cell).into_iter();
         values.map(|(keys, value)| keys.text(value)).collect()
@@ -522,7 +518,7 @@ pub struct MapRow {
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_waves: Option<f64>,
-    /// Their amplitude.
+    /// Amplitude of the waves along the margins.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_amplitude: Option<f64>,
     /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
@@ -535,7 +531,7 @@ pub struct MapRow {
     pub reference: ReferenceConfidence,
 }
 
-/// As in Rust's notation, from which every bit can be read.
+/// Numbers as Rust writes them, from which every bit can be read.
 fn serialize_exact_number<S: Serializer>(
     value: &Option<f64>,
     serializer: S,

@@ -142,7 +142,7 @@ fn start_on_halved_grid(
     })
 }
 
-/// Both directions along the softest modes of the leaf.
+/// Start points at the leaf in both directions along its softest modes.
 fn starts_along_modes(stable: &StableLeaf) -> Option<Vec<SaddleSearchStart>> {
     let mut equations = BranchEquations::new(stable.family, stable.grid.clone());
     let point = equations.correct(&stable.state, 0.0, None).ok()?;

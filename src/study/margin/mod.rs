@@ -1,6 +1,8 @@
 //! `relax --margin`: how far a stable leaf is from losing its stability.
 //!
-//! The force at the tip at which a leaf loses its stability.
+//! A force on the tip is increased along each axis, both ways, and the leaf followed until it becomes
+//! unstable; saddles are sought from there and along the softest modes, and the lowest is the barrier to
+//! another equilibrium.
 
 mod barrier;
 

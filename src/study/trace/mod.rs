@@ -1,10 +1,8 @@
 //! `trace`: an equilibrium followed through a parameter of its scenario.
 //!
-//! Computation of a trace.
-//!
-//! Force against displacement, as a tensile test measures it.
-//!
-//! What the figure of a trace shows.
+//! Branches that cross at critical points are followed as well, breadth first, if that is requested.
+//! Where the parameter is a force on the tip, or a coordinate of a held one, the trace tells the stiffness
+//! that a tensile test would measure ([`ForceDisplacementLine`]).
 
 mod result;
 
@@ -171,8 +169,8 @@ pub fn trace(
     Ok(trace_with_points(request, progress)?.trace)
 }
 
-/// The same from a leaf at rest, which the scenario has at this `value` of its number: through that
-/// leaf towards both ends of the range, as two branches, of which the first goes to larger fractions.
+/// Follows the equilibrium through a given leaf at rest, which the scenario has at this value of its
+/// number, towards both ends of the range, as two branches, of which the first goes to larger fractions.
 ///
 /// # Errors
 /// Requests that cannot be met; failures during the run are part of the result.
@@ -204,7 +202,7 @@ pub struct TraceWithPoints {
     pub critical_points: Vec<RefinedCriticalPoint>,
 }
 
-/// The same as [`trace`], with those points.
+/// As [`trace`], with the first point and the critical points.
 pub fn trace_with_points(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
@@ -212,7 +210,7 @@ pub fn trace_with_points(
     trace_with_points_from(request, None, progress)
 }
 
-/// Both: from a relaxation at the start of the range, or both ways from a given leaf.
+/// The trace from a relaxation at the start of the range, or both ways from a given leaf.
 fn trace_with_points_from(
     request: &TraceRequest,
     given: Option<(&Equilibrium, f64)>,

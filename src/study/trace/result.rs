@@ -60,7 +60,7 @@ pub struct Trace {
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if what varied is a tip force or the position of held tips.
     pub law: Option<ForceDisplacementLine>,
-    /// Number of matrices factorised by the continuation.
+    /// Number of matrices factorized by the continuation.
     pub factorizations: usize,
     /// Total time, in seconds.
     pub wall_seconds: f64,
@@ -258,7 +258,7 @@ impl TraceBranch {
     }
 }
 
-/// Also with the numbers of its first, last and critical points.
+/// A branch as JSON: with its first, last and critical points, and the number of all.
 impl Serialize for TraceBranch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let critical: Vec<&TracePoint> = self.critical_points().map(|(_, point)| point).collect();
