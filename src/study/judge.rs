@@ -59,7 +59,6 @@ impl From<Equilibrium> for MethodSolution {
 }
 
 impl MethodSolution {
-    /// Relaxes a leaf.
     pub fn from_relaxation(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
         relax::relax(scenario, options, &mut |_| {}).map(MethodSolution::from)
     }
@@ -142,7 +141,6 @@ impl<T, E> Timed<Result<T, E>> {
     }
 }
 
-/// Measures the time of `run`.
 pub fn run_timed<T>(run: impl FnOnce() -> T) -> Timed<T> {
     let clock = Instant::now();
     let result = run();

@@ -22,7 +22,6 @@ pub const MOST_CELLS_PER_SIDE: usize = 256;
 /// The cells of a map, as far as they have been computed.
 pub struct IndexMapSweep<'p> {
     plane: &'p TwoParameterProblem<'p>,
-    /// Columns and rows.
     columns_and_rows: [usize; 2],
     /// The equilibria found in the last sweep, from which others may be reached.
     frontier: Vec<Option<ConfirmedEquilibrium>>,
@@ -54,7 +53,6 @@ impl<'p> IndexMapSweep<'p> {
         }
     }
 
-    /// The center of a cell.
     fn cell_center(&self, cell: usize) -> [f64; 2] {
         let at = [
             cell % self.columns_and_rows[0],
@@ -63,7 +61,6 @@ impl<'p> IndexMapSweep<'p> {
         [0, 1].map(|i| (at[i] as f64 + 0.5) / self.columns_and_rows[i] as f64)
     }
 
-    /// The neighbours of a cell.
     fn neighbouring_cells(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
         let [columns, rows] = self.columns_and_rows;
         let (column, row) = (cell % columns, cell / columns);
@@ -416,7 +413,6 @@ fn largest_tip_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 /// the same.
 const SAME_POINT_DISTANCE: f64 = 1e-6;
 
-/// Iterations for the nearest point.
 const NEAREST_POINT_ITERATIONS: usize = 20;
 
 /// Points of a curve closer than this are merged for interpolation: their errors would dominate

@@ -223,7 +223,6 @@ pub struct RepeatedRuns<'s> {
 }
 
 impl<'s> RepeatedRuns<'s> {
-    /// Before the first run.
     pub fn new(scenario: &'s Scenario, contender: SolverConfig, knob: AccuracySetting) -> Self {
         RepeatedRuns {
             scenario,

@@ -268,7 +268,6 @@ pub fn reference_stations(all: &[RepeatedRuns]) -> Vec<f64> {
     wanted
 }
 
-/// The rows of one leaf.
 pub fn chart_rows(all: &[RepeatedRuns], reference: Option<&MethodSolution>) -> Vec<ChartRow> {
     let errors: Vec<Option<f64>> = all
         .iter()

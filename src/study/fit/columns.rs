@@ -98,7 +98,6 @@ pub(super) type ObservedCoordinates = [Option<f64>; COORDINATE_COLUMNS.len()];
 /// The column of the names of experiments.
 pub(super) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
 
-/// Columns of points on veins.
 pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
     "rod",
     "x",

@@ -476,7 +476,6 @@ pub(super) fn experiment_cases(data: Data) -> Result<Vec<ExperimentCase>, FitErr
     Ok(cases)
 }
 
-/// The experiments with data.
 fn observed_experiments(data: Data) -> Result<Vec<ObservedExperiment>, FitError> {
     let observed = |experiment: Experiment| ObservedExperiment {
         number: 0,

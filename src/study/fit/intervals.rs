@@ -297,7 +297,6 @@ struct EndpointSearch<'s, 'j, 'm, 'a> {
     /// Present estimate of the distance of the end.
     distance: f64,
     curvature: DVector<f64>,
-    /// The previous point.
     previous: ProfileRoot,
     /// Where derivatives are known, if not only at the minimum.
     derivatives_elsewhere: Option<DifferentiatedPoint>,
@@ -320,7 +319,6 @@ struct ProfileCorrection {
     gain: f64,
 }
 
-/// The search fails.
 struct EndpointSearchFailure;
 
 /// The result at a point: the end if this is it, or none, if another point follows.
@@ -502,7 +500,6 @@ pub(super) struct LikelihoodProfile<'s, 'm, 'a> {
     pub runaways: &'s [usize],
 }
 
-/// A point of a profile.
 struct ProfilePoint {
     distance: f64,
     /// The root of the sum, normalized to one at an end.
@@ -686,7 +683,6 @@ impl LikelihoodProfile<'_, '_, '_> {
         there
     }
 
-    /// The initial values.
     fn initial_values(&self) -> Vec<f64> {
         let coordinates = self.stats.model.coordinates.iter();
         coordinates.map(|free| free.initial).collect()
@@ -749,7 +745,6 @@ impl LikelihoodProfile<'_, '_, '_> {
     }
 }
 
-/// The neighbourhood of a minimum.
 pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
     pub stats: &'j FitStatistics<'m, 'a>,
     /// Numbers at a bound, which stay fixed.

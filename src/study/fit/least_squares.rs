@@ -102,7 +102,6 @@ pub(super) struct GaussNewtonResult {
 pub(super) struct GaussNewtonIteration<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
-    /// Coordinates that are held fixed.
     pub held: Vec<bool>,
     pub most_steps: usize,
     /// Gain that the longest step may still promise at the end, as a part of a datum's variance.

@@ -46,7 +46,6 @@ const GLOBAL_SEARCH: GlobalSearchLimits = GlobalSearchLimits {
     same_values: 1e-3,
 };
 
-/// Where a search begins.
 pub(super) struct FitStart {
     pub point: FitPoint,
     /// The values of the scenario, if it does not begin there although all leaves come to rest.
@@ -212,7 +211,6 @@ struct AlternativeMinima {
     tried: Vec<String>,
 }
 
-/// Searches for the best minimum.
 pub(super) struct GlobalFitSearch<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,

@@ -79,7 +79,6 @@ pub(super) struct FitModel<'a> {
     pub budget: Arc<EvaluationBudget>,
 }
 
-/// The leaves of all experiments.
 pub(super) struct FitPoint {
     pub theta: Vec<f64>,
     pub case_solutions: Vec<CaseSolution>,
@@ -264,7 +263,6 @@ impl<'a> FitModel<'a> {
         Ok(found)
     }
 
-    /// The scenario of an experiment.
     pub(super) fn case_scenario(
         &self,
         case: &ExperimentCase,
@@ -632,7 +630,6 @@ const HUBER_TUNING_CONSTANT: f64 = 1.345;
 /// leaf, until it is estimated from the residuals.
 pub(super) const ASSUMED_DEVIATION_PER_LENGTH: f64 = 1e-3;
 
-/// Weights of residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighting {
     /// Replaces unknown standard deviations.
@@ -641,7 +638,6 @@ pub(super) struct Weighting {
     pub is_robust: bool,
 }
 
-/// Derivatives of weighted residuals.
 pub(super) struct WeightedDerivatives {
     /// Square roots of the weights of residuals.
     pub roots: DVector<f64>,

@@ -75,7 +75,6 @@ impl CaseSolution {
         Ok(found)
     }
 
-    /// The components of an experiment.
     fn experiment_data<'v>(
         &'v self,
         of: &ObservedExperiment,
@@ -220,7 +219,6 @@ impl CaseSolution {
     }
 }
 
-/// One scalar datum.
 #[derive(Clone, Debug)]
 pub(super) struct ScalarDatum {
     /// The number of its experiment.
@@ -305,7 +303,6 @@ impl<'p> ObservationModel<'p> {
         }
     }
 
-    /// A coordinate of a point.
     pub fn project_point(&self, coordinate: usize, point: DVec3) -> f64 {
         let (row, offset) = self.linear_forms[coordinate];
         row.dot(point) + offset
@@ -347,7 +344,6 @@ const NEAREST_POINT_ITERATIONS: usize = 60;
 
 const NEAREST_POINT_ACCURACY: f64 = 1e-10;
 
-/// A point of a vein.
 #[derive(Clone, Copy)]
 pub(super) struct VeinPoint {
     /// Fraction of the length; outside 0 to 1 on a straight extension.
@@ -363,7 +359,6 @@ struct PointWithTangent {
     tangent: DVec3,
 }
 
-/// A vein as a curve.
 pub(super) struct VeinInterpolant<'a> {
     equilibrium: &'a NestedEquilibrium,
     rod: usize,

@@ -24,7 +24,6 @@ pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
 /// is not determined.
 const INSENSITIVE_COMPONENT: f64 = 1e-3;
 
-/// The minimum and its statistics.
 pub(super) struct FitStatistics<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -47,9 +46,7 @@ pub(super) struct FitStatistics<'m, 'a> {
     pub coverage_factor: f64,
 }
 
-/// Uncertainty of a coordinate.
 pub(super) struct CoordinateUncertainty {
-    /// Standard deviation.
     pub deviation: f64,
     /// Changes of all coordinates correlated with a change of this one by one.
     pub correlated_changes: DVector<f64>,
@@ -100,7 +97,6 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
     }
 
-    /// The uncertainty of a coordinate.
     pub fn uncertainty(&self, k: usize) -> CoordinateUncertainty {
         let sensitive = self.insensitive_count..self.singular_values.len();
         let mut along = DVector::zeros(self.singular_values.len());

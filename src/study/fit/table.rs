@@ -9,7 +9,6 @@ use crate::study::fit::columns::{
     DataFileOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
 };
 
-/// A parsed table.
 pub(super) struct DataTable<'t> {
     pub file: &'t str,
     /// Line of the header, counted from 1.
@@ -22,7 +21,6 @@ pub(super) struct DataTable<'t> {
     pub comments: [usize; 2],
     /// What the file was taken for, where that is not the usual CSV.
     pub taken: Vec<String>,
-    /// What was left out.
     pub left_out: Vec<String>,
     sources: Vec<ColumnSource>,
     rows: Vec<TableLine>,
@@ -362,7 +360,6 @@ impl<'t> DataTable<'t> {
         Ok(())
     }
 
-    /// Number of rows.
     pub fn row_count(&self) -> usize {
         self.rows.len()
     }
@@ -372,7 +369,6 @@ impl<'t> DataTable<'t> {
         self.rows[row].number
     }
 
-    /// Where a column is.
     pub fn column_index(&self, name: &str) -> Option<usize> {
         self.header.iter().position(|known| known == name)
     }
@@ -459,7 +455,6 @@ impl TableLine {
 /// Lines, one of which is the header.
 pub struct TableLines {
     pub lines: Vec<TableLine>,
-    /// Index of the header.
     pub header: usize,
     /// What divides cells, in words.
     pub separator: &'static str,

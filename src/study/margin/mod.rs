@@ -116,7 +116,6 @@ const UNRESOLVED_EIGENVALUE_REASON: &str =
 const ZERO_ENERGY_ROTATION_REMARK: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
      pushes along it are tried";
 
-/// Remark where none is tried.
 const TIP_HELD_REMARK: &str = "the tip is held: a force on it moves nothing";
 
 /// Relaxes a leaf and finds how far it is from losing its stability, as

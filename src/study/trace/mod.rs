@@ -401,14 +401,12 @@ fn force_displacement_line(
     ForceDisplacementLine::fit(*axis, &points?)
 }
 
-/// Where a branch is entered.
 struct BranchEntrance {
     point: EquilibriumPoint,
     /// The indices of the branch and the point from which it was entered; none for the first.
     from: Option<[usize; 2]>,
 }
 
-/// Data common to all branches.
 struct BranchTracer<'r, 'p> {
     family: &'r LeafFamily<'r>,
     request: &'r TraceRequest,
