@@ -137,9 +137,9 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, point: FitPoint) -> GaussNewtonResult {
+    pub fn run(&mut self, mut point: FitPoint) -> GaussNewtonResult {
         let mut evaluations = 0;
-        let (point, outcome) = self.iterate(point, &mut evaluations);
+        let outcome = self.iterate(&mut point, &mut evaluations);
         GaussNewtonResult {
             point,
             outcome,
@@ -147,34 +147,30 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
         }
     }
 
-    fn iterate(
-        &mut self,
-        mut point: FitPoint,
-        evaluations: &mut usize,
-    ) -> (FitPoint, GaussNewtonOutcome) {
-        if let Err(lost) = self.model.differentiate_data(&mut point) {
-            return (point, GaussNewtonOutcome::Stuck(Some(lost)));
+    fn iterate(&mut self, point: &mut FitPoint, evaluations: &mut usize) -> GaussNewtonOutcome {
+        if let Err(lost) = self.model.differentiate_data(point) {
+            return GaussNewtonOutcome::Stuck(Some(lost));
         }
         let mut radius = GAUSS_NEWTON.initial_radius;
         let mut small = 0;
         for step in 0..self.most_steps {
-            let residuals = self.weighting.residuals(&point);
+            let residuals = self.weighting.residuals(point);
             let bound = self.weighting.huber_bound(&residuals);
             let sum = self.weighting.huber_sum(&residuals, bound);
             (self.progress)(step, sum);
-            let linear = self.linearize_residuals(&point, &residuals);
-            let variance = linear.datum_variance(&point, sum);
+            let linear = self.linearize_residuals(point, &residuals);
+            let variance = linear.datum_variance(point, sum);
             let longest = self.bounded_update(
                 &point.theta,
                 &linear.trust_region_step(LONGEST_COORDINATE_STEP),
             );
             let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
             if open < self.gain_tolerance * variance {
-                return (point, GaussNewtonOutcome::Converged);
+                return GaussNewtonOutcome::Converged;
             }
             let besides = self.excluded_minimum.as_ref();
             if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
-                return (point, GaussNewtonOutcome::Stuck(None));
+                return GaussNewtonOutcome::Stuck(None);
             }
             self.jumps.clear();
             let nearly = open < GAUSS_NEWTON.uncertain_gain * variance;
@@ -194,22 +190,23 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                     && predicted >= GAUSS_NEWTON.converged_gain * variance
                     && radius >= GAUSS_NEWTON.least_radius;
                 if !number || !worth {
-                    return (point, end(lost));
+                    return end(lost);
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, GaussNewtonOutcome::BudgetExhausted);
+                    return GaussNewtonOutcome::BudgetExhausted;
                 }
                 *evaluations += 1;
-                match self.model.continue_leaves(&point, &theta) {
+                match self.model.continue_leaves(point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
                         let gained = sum - self.weighting.huber_sum(&found, bound);
                         if self.reuses_derivatives
                             && gained > 0.0
-                            && self.is_minimum(&point, &theta, &found)
+                            && self.is_minimum(point, &theta, &found)
                         {
-                            trial.take_gradients(&mut point);
-                            return (trial, GaussNewtonOutcome::Converged);
+                            trial.take_gradients(point);
+                            *point = trial;
+                            return GaussNewtonOutcome::Converged;
                         }
                         if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
@@ -218,15 +215,15 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             } else if ratio > 0.75 {
                                 radius = radius.max(2.0 * size).min(LONGEST_COORDINATE_STEP);
                             }
-                            point = trial;
+                            *point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, GaussNewtonOutcome::Converged);
+                                return GaussNewtonOutcome::Converged;
                             }
                             break;
                         }
                         if nearly {
-                            return (point, GaussNewtonOutcome::Converged);
+                            return GaussNewtonOutcome::Converged;
                         }
                         lost = None;
                     }
@@ -240,7 +237,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, GaussNewtonOutcome::StepLimit)
+        GaussNewtonOutcome::StepLimit
     }
 
     /// The linearized residuals in the coordinates that may move.

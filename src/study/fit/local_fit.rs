@@ -13,7 +13,7 @@ use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_
 use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
-use crate::study::fit::model::{FitModel, FitPoint, Weighting, round_to_three_digits};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
@@ -104,7 +104,10 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<FitMinimum, FitError> {
         let (model, weighting) = (self.model, self.weighting);
-        let (mut coarse, mut point) = model.coarse_model(first, weighting)?;
+        let CoarseModel {
+            model: mut coarse,
+            mut point,
+        } = model.coarse_model(first, weighting)?;
         let mut work = FitWork::default();
         let mut attempts = 0;
         let mut jumps = 0;
@@ -145,7 +148,10 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             {
                 jumps += 1;
                 attempts -= 1;
-                (coarse, point) = model.coarse_model(&there, weighting)?;
+                CoarseModel {
+                    model: coarse,
+                    point,
+                } = model.coarse_model(&there, weighting)?;
                 continue;
             }
             let of_search =

@@ -10,7 +10,7 @@ use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
-use crate::study::fit::model::{FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
 use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
 use crate::study::fit::{
     Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
@@ -182,7 +182,11 @@ fn find_coarse_minimum(
     let Ok(first) = first.relax_leaves_within_steps(theta, MOST_RELAXATION_STEPS) else {
         return CoarseMinimum::NO_LEAVES;
     };
-    let Ok((coarse, point)) = model.coarse_model(&first, weighting) else {
+    let Ok(CoarseModel {
+        model: coarse,
+        point,
+    }) = model.coarse_model(&first, weighting)
+    else {
         return CoarseMinimum::NO_LEAVES;
     };
     let mut quietly = |_, _| {};

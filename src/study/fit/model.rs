@@ -126,6 +126,12 @@ fn is_scenario_linear(coordinates: &[FitCoordinate]) -> bool {
     })
 }
 
+/// A model on a few coarse grids, and its leaves there.
+pub(super) struct CoarseModel<'a> {
+    pub model: FitModel<'a>,
+    pub point: FitPoint,
+}
+
 impl<'a> FitModel<'a> {
     pub fn new(
         base: &'a BaseScenario,
@@ -471,7 +477,7 @@ impl<'a> FitModel<'a> {
         &self,
         accurate: &FitPoint,
         weighting: Weighting,
-    ) -> Result<(FitModel<'a>, FitPoint), FitError> {
+    ) -> Result<CoarseModel<'a>, FitError> {
         let length = self.base.scenario().scale().length;
         let sd = |component: &ScalarDatum| component.sd.unwrap_or(weighting.assumed_deviation);
         let in_lengths = |component: &ScalarDatum| match component.quantity.dimension() {
@@ -508,7 +514,7 @@ impl<'a> FitModel<'a> {
                 .map_err(lost)
         };
         let point = self.assemble_point(&accurate.theta, coarse)?;
-        Ok((model, point))
+        Ok(CoarseModel { model, point })
     }
 
     pub fn equilibrium_tolerance(&self) -> f64 {

@@ -496,11 +496,14 @@ fn split_cells(text: &str, separator: u8, up_to: usize) -> Vec<TableLine> {
     lines
 }
 
-/// The line with most columns that are known, and how many these are.
-fn header_with_known_columns(
-    lines: &[TableLine],
-    known: &dyn Fn(&str) -> bool,
-) -> Option<(usize, usize)> {
+/// A line that may be the header.
+struct HeaderCandidate {
+    line: usize,
+    known_columns: usize,
+}
+
+/// The line with most columns that are known, or else the one that looks most like a header.
+fn header_candidate(lines: &[TableLine], known: &dyn Fn(&str) -> bool) -> HeaderCandidate {
     let count = |line: &TableLine| line.cells().filter(|name| known(name)).count();
     let counts = lines
         .iter()
@@ -508,7 +511,12 @@ fn header_with_known_columns(
         .filter(|(_, line)| line.may_be_header());
     let counts = counts.map(|(at, line)| (at, count(line)));
     let counts = counts.filter(|(_, count)| *count > 0);
-    counts.rev().max_by_key(|(_, count)| *count)
+    let (line, known_columns) = (counts.rev().max_by_key(|(_, count)| *count))
+        .unwrap_or_else(|| (guess_header_line(lines), 0));
+    HeaderCandidate {
+        line,
+        known_columns,
+    }
 }
 
 /// Of the lines of words above a number the one with most of them; without such lines, the first.
@@ -536,8 +544,10 @@ impl TableLines {
             let Some(first) = lines.iter().find(|line| !line.is_blank()) else {
                 continue;
             };
-            let (at, count) =
-                header_with_known_columns(&lines, known).unwrap_or((guess_header_line(&lines), 0));
+            let HeaderCandidate {
+                line: at,
+                known_columns: count,
+            } = header_candidate(&lines, known);
             let width = lines[at].len();
             let fits = lines[at..].iter().all(|line| line.len() == width);
             // Where no name is known, the most cells.

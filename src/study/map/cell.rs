@@ -101,8 +101,8 @@ impl<'a> MapCell<'a> {
         })
         .result;
         if let Ok(relaxed) = &cell.relaxed_answer.result {
-            let (confidence, reference) = choose_reference(relaxed, shot.ok());
-            (cell.confidence, cell.reference) = (confidence, Some(reference));
+            let chosen = choose_reference(relaxed, shot.ok());
+            (cell.confidence, cell.reference) = (chosen.confidence, Some(chosen.solution));
         }
         cell
     }
@@ -385,22 +385,32 @@ pub fn relax_with_error_estimate(
     Ok(answer)
 }
 
+/// The solution against which the answers in a cell are judged.
+struct CellReference {
+    confidence: ReferenceConfidence,
+    solution: MethodSolution,
+}
+
 /// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
 /// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
 /// if not, only if that is stable.
-fn choose_reference(
-    relaxed: &MethodSolution,
-    shot: Option<MethodSolution>,
-) -> (ReferenceConfidence, MethodSolution) {
+fn choose_reference(relaxed: &MethodSolution, shot: Option<MethodSolution>) -> CellReference {
+    let unconfirmed = |solution: MethodSolution| CellReference {
+        confidence: ReferenceConfidence::Unconfirmed,
+        solution,
+    };
     let Some(shot) = shot else {
-        return (ReferenceConfidence::Unconfirmed, relaxed.clone());
+        return unconfirmed(relaxed.clone());
     };
     let distance = relaxed.largest_distance(&shot);
     let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&shot, distance));
     match (same && shot.index == relaxed.index, shot.index) {
-        (true, _) => (ReferenceConfidence::Confirmed, shot),
-        (false, Some(0)) => (ReferenceConfidence::Unconfirmed, shot),
-        (false, _) => (ReferenceConfidence::Unconfirmed, relaxed.clone()),
+        (true, _) => CellReference {
+            confidence: ReferenceConfidence::Confirmed,
+            solution: shot,
+        },
+        (false, Some(0)) => unconfirmed(shot),
+        (false, _) => unconfirmed(relaxed.clone()),
     }
 }
 

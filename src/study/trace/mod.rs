@@ -241,13 +241,20 @@ fn trace_with_points_from(
         .scenario_with_values(&[(keys, ends[1])])?
         .scenario;
     let bias_direction = total_load(&last) - total_load(&scenario);
-    let (rest, options) = match given {
-        Some((leaf, _)) => {
-            let options =
-                relaxation_options(request, tolerance, bias_direction, request.keep_unstable);
-            (leaf.clone(), options)
+    let options = Options {
+        limit: request.limit.clone(),
+        tolerance: Some(tolerance),
+        bias_direction,
+        method: SemiImplicit {
+            keep_unstable: request.keep_unstable,
+            ..SemiImplicit::default()
         }
-        None => first_equilibrium(request, &scenario, tolerance, bias_direction)?,
+        .into(),
+        ..Options::default()
+    };
+    let rest = match given {
+        Some((leaf, _)) => leaf.clone(),
+        None => first_equilibrium(&scenario, &options, request.keep_unstable)?,
     };
     let fraction = ParameterRange {
         ends,
@@ -325,41 +332,23 @@ fn total_load(scenario: &Scenario) -> DVec3 {
     scenario.total_load() + DVec3::from_array(scenario.tip_force)
 }
 
-/// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how
-/// it was found. Where it may turn to either side it turns to that to which the range pushes.
+/// The equilibrium at the start of the range, from Newton's method if it may be unstable. Where it
+/// may turn to either side it turns to that to which the range pushes.
 fn first_equilibrium(
-    request: &TraceRequest,
     scenario: &Scenario,
-    tolerance: f64,
-    bias_direction: DVec3,
-) -> Result<(Equilibrium, Options), RelaxError> {
-    let wanted = relaxation_options(request, tolerance, bias_direction, request.keep_unstable);
-    let mut rest = relax(scenario, &wanted, &mut |_| {})?;
-    if request.keep_unstable && !rest.outcome.is_at_rest() {
-        // Newton's method leads nowhere from this start.
-        let stable = relaxation_options(request, tolerance, bias_direction, false);
-        rest = relax(scenario, &stable, &mut |_| {})?;
-    }
-    Ok((rest, wanted))
-}
-
-fn relaxation_options(
-    request: &TraceRequest,
-    tolerance: f64,
-    bias_direction: DVec3,
+    options: &Options,
     keep_unstable: bool,
-) -> Options {
-    Options {
-        limit: request.limit.clone(),
-        tolerance: Some(tolerance),
-        bias_direction,
-        method: SemiImplicit {
-            keep_unstable,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..Options::default()
+) -> Result<Equilibrium, RelaxError> {
+    let rest = relax(scenario, options, &mut |_| {})?;
+    if !keep_unstable || rest.outcome.is_at_rest() {
+        return Ok(rest);
     }
+    // Newton's method leads nowhere from this start.
+    let stable = Options {
+        method: SemiImplicit::default().into(),
+        ..options.clone()
+    };
+    relax(scenario, &stable, &mut |_| {})
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
