@@ -148,8 +148,8 @@ impl DiscreteLeaf {
             discrete.grips = discrete.find_gripped_nodes(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
-                    true => discrete.strips(&natural),
-                    false => discrete.strips(&discrete.unstrained_state(false)),
+                    true => discrete.tissue_strips(&natural),
+                    false => discrete.tissue_strips(&discrete.unstrained_state(false)),
                 };
             }
         }

@@ -131,7 +131,7 @@ impl DiscreteLeaf {
     /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
     /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
     /// joint tip, where they resist rotations.
-    pub(super) fn strips(&self, natural: &State) -> Vec<TissueStrip> {
+    pub(super) fn tissue_strips(&self, natural: &State) -> Vec<TissueStrip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
             let stiffness = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);

@@ -91,7 +91,7 @@ fn option_advice(trace: &Trace) -> Vec<String> {
         advice.push("branches cross here that are not followed: --switch follows them".into());
     }
     if trace.until.is_none() {
-        let losses = trace.branches.iter().map(TraceBranch::destabilizations);
+        let losses = trace.branches.iter().map(TraceBranch::index_increase_count);
         let first = losses
             .enumerate()
             .find(|(_, losses)| *losses >= MANY_STABILITY_LOSSES);

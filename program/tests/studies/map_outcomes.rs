@@ -29,7 +29,7 @@ fn cell(
     let axis = |(key, value): &(&str, &str)| format!("{key}={value}..{value}:1");
     let axes = values.iter().map(|of| axis(of).parse().unwrap()).collect();
     let request = MapRequest::new(base, axes, Some(methods.to_vec()), None, seconds).unwrap();
-    request.solve(0, methods)
+    request.solve_cell(0, methods)
 }
 
 #[track_caller]

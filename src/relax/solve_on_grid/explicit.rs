@@ -30,7 +30,7 @@ const MIN_CONVEX_CHECKS: usize = 3;
 const SMALL_KINETIC_FRACTION: f64 = 1e-2;
 
 /// Time after which the descent begins in any case: soft modes take longer to decide.
-const LONGEST_MOTION: f64 = 100.0;
+const LONGEST_TIME_BEFORE_DESCENT: f64 = 100.0;
 
 /// Time step with fictitious masses, as a part of the stability limit.
 const STEP: f64 = 0.95;
@@ -112,7 +112,7 @@ fn find_valley(
     request: &mut GridRelaxation,
 ) -> Result<(), EquilibriumFailure> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
-    while motion.time() < LONGEST_MOTION {
+    while motion.time() < LONGEST_TIME_BEFORE_DESCENT {
         let now = move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SMALL_KINETIC_FRACTION * fastest;

@@ -273,7 +273,7 @@ const MOTION_ERROR: f64 = 1e-3;
 /// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
 const REST_CHECK_INTERVAL: f64 = 0.5;
 
-const LONGEST_MOTION: f64 = 400.0;
+const LONGEST_TIME_TO_REST: f64 = 400.0;
 
 /// Largest velocity (lengths or radians per unit of time) with which the leaf hardly moves, and the
 /// factor on it where Newton's method led elsewhere.
@@ -330,7 +330,7 @@ fn approach_rest_in_wind(
     let mut end = Err(EquilibriumFailure::StepLimit);
     // Where forces are balanced, as found before, and how far from there the leaf was.
     let mut before: Option<(State, f64)> = None;
-    while until < LONGEST_MOTION && !rest.limit.reached() {
+    while until < LONGEST_TIME_TO_REST && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
             end = Err(EquilibriumFailure::NoDescent);
             break;

@@ -57,7 +57,7 @@ impl FitModel<'_> {
         }
     }
 
-    /// The same for one leaf. Leaves that differ by loads only share their derivatives.
+    /// Computes the derivatives of the components of one leaf. Leaves that differ by loads only share their derivatives.
     fn differentiate_case<'s>(
         &'s self,
         case: usize,
