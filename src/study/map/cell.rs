@@ -437,7 +437,7 @@ pub fn solve_by_explicit_motion(
     let (most, why) = (stable.step * physics.time_unit, stable.limit);
     let note = format!("step {step:.3e}, stable up to {most:.3e} because of {why}");
     let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     while motion.time() < duration {
         let until = motion.time() + STEPS_PER_TIME_CHECK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
