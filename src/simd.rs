@@ -436,9 +436,9 @@ impl<S: Simd> Vectors<S> {
         Vectors::new(d1.dot(self), d2.dot(self), d3.dot(self))
     }
 
-    /// One vector in every lane, from the lane `part` on.
+    /// The vectors of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
-    pub fn gather(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
+    pub fn from_group_vectors(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
         let [a, b, c, d] = vectors;
         Vectors::new(
             Lanes::load_group(simd, &NumberGroup([a.x, b.x, c.x, d.x]), part),

@@ -23,12 +23,12 @@
 mod lanczos;
 
 use crate::leaf::{
-    DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,
-    displacement_part, hessian_at_constant_force, rotation_part,
+    DiagonalBlocks, DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State,
+    System, displacement_part, hessian_at_constant_force, rotation_part,
 };
 use crate::modes::lanczos::{Lanczos, NormalizedEigenvector, RitzBound};
 use crate::motion::Physics;
-use crate::rod::{Section, Segment};
+use crate::rod::{Section, Segment, Wrench};
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
 
@@ -444,12 +444,12 @@ impl MassMatrix {
             let inertia = physics.inertia(leaf, j, i);
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
             // Fixed components have no mass.
-            let [turns, shifts] = leaf.allows_rotation_and_displacement(j, i);
+            let free = leaf.node_freedom(j, i);
             NodeMassBlock {
                 index: (j, i),
                 unknowns: pattern.unknowns(j, i),
-                tensor: if turns { tensor } else { DMat3::ZERO },
-                mass: if shifts { inertia.mass } else { 0.0 },
+                tensor: if free.rotation { tensor } else { DMat3::ZERO },
+                mass: if free.displacement { inertia.mass } else { 0.0 },
             }
         };
         let nodes = leaf
@@ -478,8 +478,12 @@ impl MassMatrix {
     /// Adds `factor` M to the matrix of a system.
     pub fn add_to_system(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let ((j, i), none) = (node.index, (DVec3::ZERO, DVec3::ZERO));
-            system.add_to_node(j, i, (node.tensor * factor, node.mass * factor), none);
+            let (j, i) = node.index;
+            let stiffness = DiagonalBlocks {
+                rotary: node.tensor * factor,
+                translational: node.mass * factor,
+            };
+            system.add_to_node(j, i, stiffness, Wrench::default());
         }
     }
 }

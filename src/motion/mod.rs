@@ -291,8 +291,8 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
             energy += loads.tip_force.length_squared() / inertia.mass;
         }
     }
-    for (node, moment) in leaf.dead_moments_under(loads) {
-        energy += moment.length_squared() / physics.inertia(leaf, 0, node).transverse;
+    for it in leaf.dead_moments_under(loads) {
+        energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;
     }
     0.5 * h * h * energy
 }

@@ -19,7 +19,7 @@
 //! A motion begins from consistent conditions of a leaf at rest: its forces and accelerations and, where
 //! rigid segments are strained, as those of arcs with different chords, positions without such strains.
 
-use crate::leaf::{DiscreteLeaf, Loads, State, System};
+use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
 use crate::motion::constraint_projection::project_constraints;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
@@ -28,7 +28,7 @@ use crate::motion::{
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
-use crate::rod::Section;
+use crate::rod::{Section, Wrench};
 use crate::rotation;
 use glam::{DMat3, DVec3};
 
@@ -406,14 +406,16 @@ impl SemiImplicit {
     /// base or tip.
     fn increment(&self, k: usize) -> [DVec3; 2] {
         let nodes = self.leaf.segments() + 1;
-        let [turns, shifts] = self
-            .leaf
-            .allows_rotation_and_displacement(k / nodes, k % nodes);
+        let free = self.leaf.node_freedom(k / nodes, k % nodes);
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
         let shift = || self.trial.x[k] - self.state.x[k];
         [
-            if turns { turn() } else { DVec3::ZERO },
-            if shifts { shift() } else { DVec3::ZERO },
+            if free.rotation { turn() } else { DVec3::ZERO },
+            if free.displacement {
+                shift()
+            } else {
+                DVec3::ZERO
+            },
         ]
     }
 
@@ -463,14 +465,16 @@ impl SemiImplicit {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
-                (-moment, -inertia[k].mass * (m.w[1] + damping * m.v[1]))
+                Wrench {
+                    moment: -moment,
+                    force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
+                }
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return None;
             }
-            let (turn, shift) = self.system.largest_increment();
-            let size = larger(turn, shift);
+            let size = self.system.largest_increment().larger();
             if !size.is_finite() || size > before.max(SETTINGS.largest_rotation) {
                 return None;
             }
@@ -551,19 +555,19 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.rod_index_pairs(1..=n) {
             let k = self.state.base(j) + i;
-            let [_, shifts] = self.leaf.allows_rotation_and_displacement(j, i);
+            let moves = self.leaf.node_freedom(j, i).displacement;
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,
                 true => (force(j, i) + loads.tip_force) / mass,
                 false => force(j, i) / mass,
             };
-            if shifts {
+            if moves {
                 self.node_motions[k].a[1] += linear;
             }
         }
-        for (node, moment) in self.leaf.dead_moments_under(loads) {
-            if self.leaf.allows_rotation_and_displacement(0, node)[0] {
+        for NodalMoment { node, moment } in self.leaf.dead_moments_under(loads) {
+            if self.leaf.node_freedom(0, node).rotation {
                 let tensor = self.inertia[node].tensor(self.state.q[node]);
                 self.node_motions[node].a[0] += tensor.inverse() * moment;
             }
@@ -613,15 +617,18 @@ fn add_inertia(
     state: &State,
     inertia: &[Inertia],
     per_mass: f64,
-    load: impl Fn(usize, &DMat3) -> (DVec3, DVec3),
+    load: impl Fn(usize, &DMat3) -> Wrench,
 ) {
     let n = state.segments();
     for j in 0..state.rods() {
         for i in system.first()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
-            let matrix = (tensor * per_mass, inertia[k].mass * per_mass);
-            system.add_to_node(j, i, matrix, load(k, &tensor));
+            let stiffness = DiagonalBlocks {
+                rotary: tensor * per_mass,
+                translational: inertia[k].mass * per_mass,
+            };
+            system.add_to_node(j, i, stiffness, load(k, &tensor));
         }
     }
 }
@@ -692,7 +699,8 @@ impl SemiImplicit {
                     - bending(self.physics.rest_curvature_factor(from)));
         }
         for time in [from, to] {
-            for (node, moment) in self.leaf.dead_moments_under(self.physics.loads(time)) {
+            let moments = self.leaf.dead_moments_under(self.physics.loads(time));
+            for NodalMoment { node, moment } in moments {
                 let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
                 work += 0.5 * moment.dot(turn);
             }
@@ -758,14 +766,18 @@ impl SemiImplicit {
     fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
-        let moves = |j: usize, i: usize| leaf.allows_rotation_and_displacement(j, i)[1];
+        let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let (half, stiffness) = (0.5 * drag.force(), 0.25 * rate * drag.velocity_derivative());
+            let half = Wrench {
+                moment: DVec3::ZERO,
+                force: 0.5 * drag.force(),
+            };
+            let stiffness = 0.25 * rate * drag.velocity_derivative();
             let free = [moves(j, i), moves(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {
                 if free {
-                    system.add_load(j, node, [DVec3::ZERO, half]);
+                    system.add_load(j, node, half);
                     system.add_displacement_spring(j, node, stiffness);
                 }
             }
@@ -846,15 +858,15 @@ impl SemiImplicit {
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
-                (moment, -per_mass * inertia[k].mass * shift)
+                let force = -per_mass * inertia[k].mass * shift;
+                Wrench { moment, force }
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return false;
             }
             self.advance_trial();
-            let (turn, shift) = self.system.largest_increment();
-            if larger(turn, shift) < FIRST_STEP.iteration_error {
+            if self.system.largest_increment().larger() < FIRST_STEP.iteration_error {
                 break;
             }
         }
@@ -870,7 +882,7 @@ impl SemiImplicit {
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
         for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
             let k = self.state.base(j) + i;
-            let (moment, force) = self.system.unbalanced_node_load(j, i);
+            let Wrench { moment, force } = self.system.unbalanced_node_load(j, i);
             let Inertia { mass, .. } = self.inertia[k];
             let tensor = self.inertia[k].tensor(self.state.q[k]);
             if i == n {

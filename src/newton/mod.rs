@@ -15,8 +15,8 @@ mod force_progress;
 
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
 use crate::leaf::{
-    DirectError, DirectSolver, DiscreteLeaf, Increment, LinearSolveOutcome, MatrixFactors,
-    NodalField, State, System,
+    DirectError, DirectSolver, DiscreteLeaf, Increment, LinearSolveOutcome, MassLoad,
+    MatrixFactors, NodalField, State, System,
 };
 pub use crate::newton::force_progress::ForceConvergence;
 use crate::numbers::larger;
@@ -142,7 +142,7 @@ impl DefiniteSolver {
         &mut self,
         system: &mut System,
         shift: f64,
-        inertia: Option<(&[Vec<Increment>], f64)>,
+        inertia: Option<MassLoad>,
         tolerance: f64,
         work: &mut SolverCounts,
     ) -> Result<(), LinearSolveFailure> {
@@ -368,8 +368,7 @@ impl NewtonIteration<'_> {
 
 /// The largest rotation or displacement of the last solution.
 fn largest_increment(system: &System) -> f64 {
-    let (turn, shift) = system.largest_increment();
-    larger(turn, shift)
+    system.largest_increment().larger()
 }
 
 impl NewtonLinearSolver<'_> {
@@ -453,7 +452,10 @@ impl NewtonLinearSolver<'_> {
                 solver, at, rate, ..
             } => {
                 state.increments_to(at, system.first(), &mut self.return_increments);
-                let springs = Some((self.return_increments.as_slice(), *rate));
+                let springs = Some(MassLoad {
+                    field: &self.return_increments,
+                    factor: *rate,
+                });
                 let shift = self.neutral + *rate;
                 match solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work) {
                     Ok(()) => Ok(PROXIMAL_ACCURACY),

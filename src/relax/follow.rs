@@ -5,7 +5,9 @@
 //! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
 
 use crate::homotopy::Homotopy;
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State, Weighted,
+};
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
@@ -469,7 +471,11 @@ impl EquilibriumTracker {
         let near = near.unwrap_or_else(|| self.at.without_estimates());
         let found = match self.has_same_structure(&leaf) {
             true => {
-                let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
+                let terms = [(-1.0, &self.scenario), (1.0, &scenario)];
+                let terms = terms.map(|(weight, scenario)| Weighted {
+                    weight,
+                    term: Scenario::clone(scenario),
+                });
                 let rate = LeafParameterDerivative::new(&near.levels[0].leaf.leaf, &terms);
                 let mut responses = Vec::new();
                 for level in &near.levels {

@@ -107,7 +107,7 @@ fn named_parameters<'v>(
 fn decides_zero_energy_rotation(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| count_zero_energy_rotations(scenario) < turnings)
+        .any(|it| count_zero_energy_rotations(&it.term) < turnings)
 }
 
 fn count_zero_energy_rotations(scenario: &Scenario) -> usize {

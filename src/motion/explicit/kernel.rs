@@ -32,13 +32,12 @@
 //! values along d2 and the excess along d1 and d3. For round sections that are straight at
 //! rest d1 alone is left, which saves a quarter of the operations.
 
-use crate::leaf::Loads;
+use crate::leaf::{Loads, NodalMoment};
 use crate::motion::explicit::layout::{AlignedArray, BlockMaterial, NODES_PER_BLOCK, PackLayout};
 use crate::rotation::{HALF_ANGLE_POLYNOMIAL, Quaternions};
 use crate::simd::{
     ArraySpan, Lanes, MAX_LANES, Vectors, array_chunks, array_chunks_mut, slice, slice_mut,
 };
-use glam::DVec3;
 use pulp::Simd;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -138,8 +137,8 @@ pub struct PackStep<'a> {
     pub law: StepLaw,
     /// Loads without the force on a shared tip.
     pub loads: Loads,
-    /// Nodes and sizes of the dead moments on a single rod.
-    pub moments: &'a [(usize, DVec3)],
+    /// Dead moments on a single rod.
+    pub moments: &'a [NodalMoment],
     pub velocity_factor: f64,
     pub kick: f64,
     pub drift: f64,
@@ -206,7 +205,7 @@ impl pulp::WithSimd for PackStep<'_> {
                     }
                 }
             }
-            for (node, moment) in self.moments {
+            for NodalMoment { node, moment } in self.moments {
                 let node = node.wrapping_sub(start);
                 if node < count {
                     for c in 0..3 {

@@ -33,7 +33,7 @@ mod stable_step;
 #[cfg(test)]
 mod tests;
 
-use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, State};
+use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
 use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
 use crate::motion::explicit::packs::{NodeMomentum, Pack};
@@ -44,7 +44,7 @@ use crate::motion::{
     TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
 };
 use crate::numbers::largest;
-use crate::rod::RESOLVED_TURN;
+use crate::rod::{RESOLVED_TURN, Wrench};
 use crate::simd::widest_arch;
 use glam::{DQuat, DVec3};
 use pulp::Arch;
@@ -588,7 +588,7 @@ struct AppliedLoads {
     /// How sections at the tissue's strips are aligned at the start.
     alignments: Vec<bool>,
     /// Moments and forces, node by node.
-    nodes: Vec<[DVec3; 2]>,
+    nodes: Vec<Wrench>,
     /// Moments and forces, laid out as positions.
     loads: [[AlignedArray; 3]; 2],
     nodes_in_wind: Option<NodesInWind>,
@@ -620,7 +620,7 @@ impl AppliedLoads {
         let state = leaf.stress_free_state();
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
         Some(AppliedLoads {
-            nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
+            nodes: vec![Wrench::default(); state.x.len()],
             alignments: leaf.strip_alignments(start),
             loads: [vectors(), vectors()],
             nodes_in_wind: wind.map(|wind| NodesInWind {
@@ -664,7 +664,7 @@ impl AppliedLoads {
                 blown.velocity[k] = packs[pack].momentum(entry).velocity;
             }
         }
-        self.nodes.fill([DVec3::ZERO; 2]);
+        self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
@@ -672,12 +672,12 @@ impl AppliedLoads {
             let velocity = |k: usize| now[k] + air.extrapolation * (now[k] - earlier[k]);
             (blown.wind).set_forces(&self.state, air.velocity, velocity, &mut blown.forces);
             for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
-                node[1] += *force;
+                node.force += *force;
             }
         }
         for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
             let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
-            for (arrays, load) in self.loads.iter_mut().zip(node) {
+            for (arrays, load) in self.loads.iter_mut().zip([node.moment, node.force]) {
                 for (c, array) in arrays.iter_mut().enumerate() {
                     array[at] = load[c];
                 }
@@ -719,8 +719,7 @@ impl AppliedLoads {
 /// The dead moments on a single rod in a step.
 #[derive(Default)]
 struct StepDeadMoments {
-    /// Nodes and sizes.
-    nodal_moments: Vec<(usize, DVec3)>,
+    nodal_moments: Vec<NodalMoment>,
     /// Motions of these nodes before the step.
     spins_before: Vec<NodeSpin>,
 }
@@ -735,14 +734,14 @@ impl StepDeadMoments {
     /// Takes over the moments of a step that begins.
     fn begin_step(
         &mut self,
-        moments: impl Iterator<Item = (usize, DVec3)>,
+        moments: impl Iterator<Item = NodalMoment>,
         layout: PackLayout,
         packs: &[Pack],
     ) {
         self.nodal_moments.clear();
         self.nodal_moments.extend(moments);
-        let spins = self.nodal_moments.iter().map(|(node, _)| {
-            let PackPosition { pack, entry } = layout.pack_position(0, *node);
+        let spins = self.nodal_moments.iter().map(|it| {
+            let PackPosition { pack, entry } = layout.pack_position(0, it.node);
             NodeSpin {
                 rotation: packs[pack].rotation(entry),
                 angular_momentum: packs[pack].momentum(entry).angular,
@@ -755,7 +754,7 @@ impl StepDeadMoments {
     /// Power of the moments at the mean of the angular momenta before the step and of the present ones.
     fn power(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
         let nodes = self.nodal_moments.iter().zip(&self.spins_before);
-        let power = nodes.map(|((node, moment), before)| {
+        let power = nodes.map(|(NodalMoment { node, moment }, before)| {
             let PackPosition { pack, entry } = layout.pack_position(0, *node);
             let pack = &packs[pack];
             let momentum = 0.5 * (before.angular_momentum + pack.momentum(entry).angular);

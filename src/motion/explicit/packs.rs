@@ -1,6 +1,6 @@
 //! Packs of rods in motion: conversion of the leaf to the arrays of the explicit method, and back.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
 use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory};
 use crate::motion::explicit::layout::{
@@ -114,17 +114,17 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         load_length: leaf.grid.node_weight(i) * leaf.leaf.length(j),
         ..NodeData::default()
     };
-    let [turns, shifts] = match i == 0 && !physics.clamped() {
-        true => [true; 2],
-        false => leaf.allows_rotation_and_displacement(j, i),
+    let free = match i == 0 && !physics.clamped() {
+        true => NodeFreedom::FREE,
+        false => leaf.node_freedom(j, i),
     };
-    if turns || shifts {
+    if !free.is_fixed() {
         let inertia = physics.inertia(leaf, j, i);
-        if turns {
+        if free.rotation {
             node.inverse_inertia = 1.0 / inertia.transverse;
             node.inverse_spin_excess = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
         }
-        if shifts && (i < n || !joined) {
+        if free.displacement && (i < n || !joined) {
             node.mass = inertia.mass;
             node.inverse_mass = 1.0 / inertia.mass;
             let neighbours = [j > 0, j + 1 < leaf.rods()];

@@ -53,9 +53,9 @@ fn element_node_loads(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)>
         if i < leaf.segments() {
             let section = leaf.section(j, i);
             let segment = leaf.strained_segment(state, j, i);
-            let (x, a, b) = segment.gradient(section);
-            all[k] = (all[k].0 + x, all[k].1 - a);
-            all[k + 1] = (all[k + 1].0 - x, all[k + 1].1 - b);
+            let slopes = segment.gradient(section);
+            all[k] = (all[k].0 + slopes.x, all[k].1 - slopes.a);
+            all[k + 1] = (all[k + 1].0 - slopes.x, all[k + 1].1 - slopes.b);
         }
     }
     all

@@ -385,7 +385,7 @@ fn advice(
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
     let loads = problem.leaf.loads;
     let [weight, tip] = [loads.gravity, loads.tip_force].map(|load| load.length());
-    let moment = problem.leaf.dead_moments().map(|(_, moment)| moment);
+    let moment = problem.leaf.dead_moments().map(|it| it.moment);
     let moment = moment.max_by(|a, b| a.length().total_cmp(&b.length()));
     // Along the directors at the base a moment shows what it turns; forces turn by their arms.
     let base = level.state.q[level.state.base(vein)];

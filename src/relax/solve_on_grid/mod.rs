@@ -338,7 +338,7 @@ fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [O
     [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {
-            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().1),
+            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().displacement),
             _ => None,
         }
     })

@@ -27,7 +27,7 @@ use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegra
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
 use crate::relax::solve_on_grid::start::GridRelaxation;
-use crate::rod::{RESOLVED_TURN, Section};
+use crate::rod::{RESOLVED_TURN, Section, Wrench};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -397,7 +397,7 @@ struct SteadyWind {
 impl SteadyWind {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| leaf.allows_rotation_and_displacement(j, i)[1];
+        let free = |(j, i)| leaf.node_freedom(j, i).displacement;
         Some(SteadyWind {
             wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
@@ -426,7 +426,11 @@ impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
             for node in self.free_segment_ends(j, i) {
-                system.add_load(j, node, [DVec3::ZERO, 0.5 * drag.force()]);
+                let half = Wrench {
+                    moment: DVec3::ZERO,
+                    force: 0.5 * drag.force(),
+                };
+                system.add_load(j, node, half);
             }
         }
     }

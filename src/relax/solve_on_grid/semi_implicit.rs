@@ -14,7 +14,9 @@
 //! The damped motion of the semi-implicit method: its velocities, and the choice of the next
 //! time step by the energy.
 
-use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, Leaf, NodalField, State, System};
+use crate::leaf::{
+    AssemblyTotals, DiscreteLeaf, Increment, Leaf, MassLoad, NodalField, State, System,
+};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
@@ -239,7 +241,13 @@ impl GridRelaxation<'_> {
         }
         loop {
             let (shift, inertia) = match motion.mass_factors() {
-                Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
+                Some([shift, per_step]) => {
+                    let momentum = MassLoad {
+                        field: &motion.velocity,
+                        factor: per_step,
+                    };
+                    (shift, Some(momentum))
+                }
                 None => (leaf.neutral_shift(), None),
             };
             let (solver, work) = (&mut self.solver, &mut *self.work);
@@ -261,9 +269,9 @@ impl GridRelaxation<'_> {
 
 /// The size of the next step, and the part of it that is taken.
 fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
-    let (turn, shift) = system.largest_increment();
-    let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
-    (turn.max(shift), part.min(motion.largest_step_fraction()))
+    let size = system.largest_increment();
+    let part = (MAX_TURN / size.rotation).min(MAX_SHIFT / size.displacement);
+    (size.larger(), part.min(motion.largest_step_fraction()))
 }
 
 /// Assembles the equations in a state.

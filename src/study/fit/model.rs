@@ -4,7 +4,7 @@
 //! A leaf at rest under the conditions of its experiments, its predictions for the data, and
 //! their derivatives.
 
-use crate::leaf::{LeafParameterDerivative, LinearResponse, displacement_part};
+use crate::leaf::{LeafParameterDerivative, LinearResponse, Weighted, displacement_part};
 use crate::modes;
 use crate::motion::Physics;
 use crate::newton::SolverCounts;
@@ -28,7 +28,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
-pub(super) type ScenarioDerivative = Vec<(f64, Scenario)>;
+pub(super) type ScenarioDerivative = Vec<Weighted<Scenario>>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;
@@ -814,11 +814,12 @@ impl CaseSolution {
             MeasuredQuantity::Reaction(axis) => {
                 let force = self
                     .equilibrium
-                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).0);
+                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).force);
                 force[axis] * self.force_unit()
             }
             MeasuredQuantity::Grip(grip, axis) => {
-                let force = |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip][0];
+                let force =
+                    |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip].force;
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Frequency(mode) => {
