@@ -4,7 +4,7 @@
 //! times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
 use crate::numbers::format_two_digits;
 use crate::simulate::{Options, Scheme};
 use crate::words;
@@ -206,7 +206,7 @@ pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
 pub(super) fn explicit_cost(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     let steps = duration / method.longest_step();
     Cost {
         steps,
@@ -227,7 +227,7 @@ pub(super) fn semi_implicit_cost(
     tolerance: f64,
     most: f64,
 ) -> Cost {
-    let (duration, interval) = physics.duration_and_interval();
+    let MotionTimes { duration, interval } = physics.times();
     let error = (PILOT.error_ratio * tolerance)
         .min(PILOT.largest_error)
         .max(tolerance);
