@@ -12,23 +12,18 @@ use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
 use glam::DVec3;
 
-/// A dead moment on a point of a single rod.
+/// A dead moment on the point at the fraction `sigma` of a single rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct PointMoment {
-    /// Fraction of the length.
     pub sigma: f64,
-    /// Moment along the lab axes.
     pub moment: DVec3,
 }
 
-/// A dead force on a point of a rod.
+/// A dead force on the point at the fraction `sigma` of a rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct PointForce {
-    /// Number of the rod.
     pub rod: usize,
-    /// Fraction of its length.
     pub sigma: f64,
-    /// Force along the lab axes.
     pub force: DVec3,
 }
 
@@ -272,8 +267,7 @@ impl DiscreteLeaf {
         for (j, i) in self.rod_index_pairs(1..self.segments() + 1) {
             let force = self.own_load_on_node(j, i);
             energy -= force.dot(state.x[state.base(j) + i]);
-            let moment = DVec3::ZERO;
-            system.add_load(j, i, Wrench { moment, force });
+            system.add_load(j, i, Wrench::from_force(force));
         }
         energy
     }

@@ -21,17 +21,15 @@ use crate::simd::NumberGroup;
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// Which motions supports allow to a node.
+/// Whether supports allow a node to rotate, and to be displaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeFreedom {
-    /// Whether the node may rotate.
     pub rotation: bool,
-    /// Whether the node may be displaced.
     pub displacement: bool,
 }
 
 impl NodeFreedom {
-    /// No support.
+    /// The freedom of a node without support.
     pub const FREE: NodeFreedom = NodeFreedom {
         rotation: true,
         displacement: true,

@@ -39,12 +39,10 @@ pub struct AssemblyTotals {
     pub largest_turn: f64,
 }
 
-/// Rotation and displacement, each the largest of all nodes.
+/// The largest component of a rotation, in radians, and of a displacement of any node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncrementSize {
-    /// Largest rotation about an axis, in radians.
     pub rotation: f64,
-    /// Largest displacement along an axis.
     pub displacement: f64,
 }
 
@@ -68,9 +66,9 @@ pub struct MassLoad<'a> {
 /// A stiffness against motions of a node: the diagonal blocks of its matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct DiagonalBlocks {
-    /// Stiffness against rotations.
+    /// Against rotations.
     pub rotary: DMat3,
-    /// Stiffness against displacements, the same in all directions.
+    /// Against displacements, the same in all directions.
     pub translational: f64,
 }
 
@@ -473,13 +471,12 @@ impl System {
             .sum()
     }
 
-    /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
-    /// time `dt`.
-    pub fn write_velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+    /// Writes the velocity that corresponds to a fraction of the last solution in a time `dt`.
+    pub fn write_velocity(&self, fraction: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
         for (j, rod) in velocity.iter_mut().enumerate() {
             let at = rod_lane(j);
             for (v, d) in rod.iter_mut().zip(&self.groups[at.group].solution) {
-                *v = lane_increment(d, at.lane).map(|d| part * d / dt);
+                *v = lane_increment(d, at.lane).map(|d| fraction * d / dt);
             }
         }
     }

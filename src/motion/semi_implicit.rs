@@ -743,10 +743,7 @@ impl SemiImplicit {
         let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let half = Wrench {
-                moment: DVec3::ZERO,
-                force: 0.5 * drag.force(),
-            };
+            let half = Wrench::from_force(0.5 * drag.force());
             let stiffness = 0.25 * rate * drag.velocity_derivative();
             let free = [moves(j, i), moves(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {

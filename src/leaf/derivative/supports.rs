@@ -141,10 +141,7 @@ impl DiscreteLeaf {
             }
             let pull = self.node_coupling(g, i)
                 * (displacement_part(&both[1]) - displacement_part(&both[0]));
-            let mut loads = [pull, -pull].map(|force| Wrench {
-                moment: DVec3::ZERO,
-                force,
-            });
+            let mut loads = [pull, -pull].map(Wrench::from_force);
             if self.has_tissue() {
                 let tissue = self.tissue_response(state, g, i, &both);
                 for (load, tissue) in loads.iter_mut().zip(tissue) {

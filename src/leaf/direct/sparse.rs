@@ -59,7 +59,7 @@ impl Cholesky {
 }
 
 impl Symbolic {
-    /// Of a leaf's matrix with so many border rows after all unknowns.
+    /// The symbolic factorization of a leaf's matrix with so many border rows after all unknowns.
     pub fn new(
         system: &System,
         unknowns: &UnknownNumbering,
@@ -74,7 +74,7 @@ impl Symbolic {
             pairs.push([a.min(b), a.max(b)]);
         });
         let lower = lower_triangle(size, &pairs);
-        // With its ordering given, faer reads the pattern of the upper triangle.
+        // If an ordering is given, faer reads the pattern of the upper triangle.
         let upper = lower.pattern.transpose().to_col_major();
         let upper = upper.map_err(|_| DirectError::Memory)?;
         let params = CholeskySymbolicParams {

@@ -97,7 +97,7 @@ impl CondensedFactors {
         self.negative
     }
 
-    /// Solves in place, with these numbers of the unknowns. A step of iterative refinement makes the
+    /// Solves in place, with the unknowns numbered by `unknowns`. A step of iterative refinement makes the
     /// solution as accurate as one without inverse matrices.
     pub fn solve(&self, unknowns: &UnknownNumbering, b: &mut [f64]) {
         let mut x = b.to_vec();
@@ -767,7 +767,7 @@ fn is_growth_bounded(
     scale: &[f64],
     is_free: impl Fn(usize) -> bool,
 ) -> bool {
-    // By parts: those of a pivot that is not definite may cancel.
+    // Sizes of the three products: those of a pivot that is not definite may cancel.
     let change = |i: usize| (c0[i] * z0[i]).abs() + (c1[i] * z1[i]).abs() + (c2[i] * z2[i]).abs();
     (0..scale.len()).all(|i| is_free(i) || change(i) <= MAX_PIVOT_GROWTH * scale[i])
 }

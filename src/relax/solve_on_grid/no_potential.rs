@@ -426,11 +426,7 @@ impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
             for node in self.free_segment_ends(j, i) {
-                let half = Wrench {
-                    moment: DVec3::ZERO,
-                    force: 0.5 * drag.force(),
-                };
-                system.add_load(j, node, half);
+                system.add_load(j, node, Wrench::from_force(0.5 * drag.force()));
             }
         }
     }
