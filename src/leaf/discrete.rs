@@ -182,7 +182,8 @@ impl DiscreteLeaf {
     fn unstrained_state(&self, grown: bool) -> State {
         let (mut xs, mut qs) = (Vec::new(), Vec::new());
         for j in 0..self.rods() {
-            let (mut x, mut q) = self.leaf.base(j);
+            let base = self.leaf.base_pose(j);
+            let (mut x, mut q) = (base.position, base.rotation);
             xs.push(x);
             qs.push(q);
             for i in 0..self.segments() {

@@ -3,7 +3,7 @@
 //! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
 //! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
 //! that is limited, as larger ones lose the soft modes to rounding
-//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
+//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::limit_condensing_stiffness)): of a segment that is stiffer, C < 1/k,
 //! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
 //! determine the force that is next to nothing; where holders, or other rods, determine the strain,
 //! each solution gains only the part k/H of the force.

@@ -326,6 +326,14 @@ impl DiscreteLeaf {
 }
 
 impl Leaf {
+    /// Puts the bases where the leaf begins.
+    pub fn place_bases(&self, state: &mut State) {
+        for j in 0..self.rods() {
+            let (base, pose) = (state.base(j), self.base_pose(j));
+            (state.x[base], state.q[base]) = (pose.position, pose.rotation);
+        }
+    }
+
     /// Puts the tips where they are held, if they are.
     pub fn place_held_tips(&self, state: &mut State) {
         let Some(held) = &self.tip_support else {
@@ -456,7 +464,7 @@ impl DiscreteLeaf {
                 -segment.gradient(self.section(j, 0)).a
             };
             let begin = |j: usize| BaseRotations {
-                stress_free: self.leaf.base(j).1,
+                stress_free: self.leaf.base_pose(j).rotation,
                 now: state.q[state.base(j)],
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();

@@ -54,7 +54,7 @@ impl DiscreteLeaf {
         motion
     }
 
-    /// Adds the effect of holders that move and rotate by these increments of held nodes.
+    /// Adds the effect of supports that move by these increments of held nodes.
     pub(super) fn add_support_motion(
         &self,
         state: &State,
@@ -156,8 +156,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: of the loads,
-    /// of coupling and tissue, and of the forces in the segments on either side.
+    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: by loads,
+    /// coupling and tissue, and by the forces in the segments on either side.
     pub fn grip_force_rates(
         &self,
         state: &State,
@@ -169,7 +169,11 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.add_load_changes(state, j, rate, &mut loads);
         }
-        self.add_tissue_changes(state, &self.weighted_leaves_on_grid(rate), &mut loads);
+        self.add_tissue_and_own_load_changes(
+            state,
+            &self.weighted_leaves_on_grid(rate),
+            &mut loads,
+        );
         self.add_coupling_response(state, &response.nodes, &mut loads);
         let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
         for held in &self.grips {

@@ -303,7 +303,7 @@ const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 fn taut_span_remark(leaf: &DiscreteLeaf) -> Option<String> {
     let n = leaf.segments();
     let holders = |j: usize| {
-        let base = [("its base".to_owned(), 0, leaf.leaf.base(j).0)];
+        let base = [("its base".to_owned(), 0, leaf.leaf.base_pose(j).position)];
         let grips = leaf.rod_grips(j).map(|held| {
             let sigma = format_two_digits(leaf.grid.sigma()[held.node]);
             (

@@ -194,7 +194,7 @@ pub fn moment_curvature(leaf: &Leaf, segments: usize) -> Option<f64> {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
-    let (_, mut base) = leaf.leaf.base(0);
+    let mut base = leaf.leaf.base_pose(0).rotation;
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for (i, section) in leaf.sections.iter().enumerate() {
         turn = segment_turn(section, base, leaf.dead_moment_beyond(i), turn)?;
