@@ -130,7 +130,7 @@ impl DiscreteLeaf {
             .collect();
         let mut responses: Vec<LinearResponse> = Vec::new();
         let product = &mut |direction: &[f64]| {
-            let mut left: Vec<DVec3> = vectors(direction);
+            let mut left: Vec<DVec3> = vectors_from_numbers(direction);
             let mut forces = none.clone();
             self.condense_gaps(segments, &left, &mut forces);
             let nodes = solve(&forces)?;
@@ -151,7 +151,7 @@ impl DiscreteLeaf {
             response.add(*part, more);
         }
         if let Some(sum) = found.solution() {
-            gaps.copy_from_slice(&vectors(&sum));
+            gaps.copy_from_slice(&vectors_from_numbers(&sum));
         }
         true
     }
@@ -212,6 +212,6 @@ impl System {
     }
 }
 
-fn vectors(numbers: &[f64]) -> Vec<DVec3> {
+fn vectors_from_numbers(numbers: &[f64]) -> Vec<DVec3> {
     numbers.chunks_exact(3).map(DVec3::from_slice).collect()
 }

@@ -288,7 +288,7 @@ impl System {
     }
 
     /// The first node of a rod with equations; fields begin with it.
-    pub fn first(&self) -> usize {
+    pub fn first_node(&self) -> usize {
         self.first
     }
 

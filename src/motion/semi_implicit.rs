@@ -595,7 +595,7 @@ pub(super) fn add_inertia(
 ) {
     let n = state.segments();
     for j in 0..state.rods() {
-        for i in system.first()..=n {
+        for i in system.first_node()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
             let stiffness = DiagonalBlocks {

@@ -123,13 +123,13 @@ impl CondensedFactors {
                 let here = unknowns.node_numbers(j, i);
                 let own = here.map(|k| x[k]);
                 for (at, row) in here.iter().zip(&node.blocks.own) {
-                    b[*at] -= product(row, &own);
+                    b[*at] -= row_product(row, &own);
                 }
                 if i + 1 < vein.nodes.len() {
                     let ahead = unknowns.node_numbers(j, i + 1);
                     let next = ahead.map(|k| x[k]);
                     for (r, row) in node.blocks.next.iter().enumerate() {
-                        b[here[r]] -= product(row, &next);
+                        b[here[r]] -= row_product(row, &next);
                         for (at, value) in ahead.iter().zip(row) {
                             b[*at] -= value * own[r];
                         }
@@ -149,7 +149,7 @@ impl CondensedFactors {
 }
 
 /// A row times a column.
-fn product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
+fn row_product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
     row.iter().zip(values).map(|(a, b)| a * b).sum()
 }
 
