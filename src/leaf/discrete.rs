@@ -81,7 +81,7 @@ pub struct TipReaction {
 
 /// Mass of a node at unit density, or its mass per weight.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NodeMass {
+pub(super) struct NodeMass {
     /// Moment of inertia, the same about all axes.
     pub rotary: f64,
     pub translational: f64,
@@ -575,7 +575,7 @@ impl Grid {
     }
 
     /// The node nearest to a fraction of the length.
-    pub fn nearest(&self, sigma: f64) -> usize {
+    pub fn nearest_node(&self, sigma: f64) -> usize {
         let after = self
             .sigma
             .partition_point(|at| *at < sigma)
@@ -607,7 +607,7 @@ impl Grid {
 impl Leaf {
     /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
     /// ties the rods.
-    pub(crate) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
+    fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
         if !self.has_tissue() {
             return;
         }

@@ -55,7 +55,7 @@ impl DiscreteLeaf {
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
             let Grip { vein, at, .. } = *grip;
-            let [from, to] = at.map(|sigma| self.grid.nearest(sigma));
+            let [from, to] = at.map(|sigma| self.grid.nearest_node(sigma));
             let moved = DVec3::from_array(grip.displacement) / length;
             (from..=to).map(move |node| {
                 let k = natural.base(vein) + node;

@@ -90,7 +90,7 @@ pub(super) struct GroupCoupling {
 /// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
 /// and forces are zero.
 #[derive(Clone, Debug)]
-pub(crate) struct RodGroup {
+pub(super) struct RodGroup {
     pub matrix: BlockTridiagonal,
     /// One in lanes with a rod, zero in others.
     pub active_lanes: NumberGroup,
@@ -726,7 +726,7 @@ impl GroupKernel for DirectionUpdateKernel<'_> {
 
 /// The dead moments as of the last assembly, with the workspace of their equations.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct DeadMoments {
+pub(super) struct DeadMoments {
     /// The moments; nodes from the first with equations.
     on_nodes: Vec<NodalMoment>,
     /// The equations (1 + S C) x = S t, row after row, each with its right-hand side last.

@@ -136,7 +136,8 @@ impl Physics {
             true => of.at(sigma),
             false => of.at((0.5 * leaf.grid.node_weight(i) - sigma).abs()),
         };
-        let here = |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest(*at) == i;
+        let here =
+            |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest_node(*at) == i;
         let on_points = self
             .point_masses
             .iter()

@@ -275,7 +275,7 @@ impl DiscreteLeaf {
         let sigma = self.grid.sigma()[i];
         let on = |leaf: &Leaf| {
             let points = leaf.point_forces();
-            let here = points.filter(|it| (it.rod, self.grid.nearest(it.sigma)) == (j, i));
+            let here = points.filter(|it| (it.rod, self.grid.nearest_node(it.sigma)) == (j, i));
             let points: DVec3 = here.map(|it| it.force).sum();
             self.grid.node_weight(i) * leaf.own_load_density(j, sigma) + points
         };
@@ -355,7 +355,11 @@ impl DiscreteLeaf {
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {
             let nodes = forces.node_forces_mut(0, self.moving_nodes().len());
-            if let Some(i) = self.grid.nearest(it.sigma).checked_sub(self.first_node()) {
+            if let Some(i) = self
+                .grid
+                .nearest_node(it.sigma)
+                .checked_sub(self.first_node())
+            {
                 add_to_increment(&mut nodes[i], self.load_factor * it.moment, DVec3::ZERO);
             }
         }
