@@ -185,7 +185,7 @@ impl PlanarCurve {
         for segment in &segments {
             parts.push(parts[parts.len() - 1] + segment.length() / length);
         }
-        let base = leaf.leaf.base(j).1 * DVec3::X;
+        let base = leaf.leaf.base_pose(j).rotation * DVec3::X;
         PlanarCurve {
             angle: base.y.atan2(base.x),
             length,

@@ -153,7 +153,7 @@ impl Physics {
             true => of.at(sigma),
             false => of.at((0.5 * leaf.grid.node_weight(i) - sigma).abs()),
         };
-        let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest(it.sigma) == i;
+        let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         Inertia {

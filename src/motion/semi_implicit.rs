@@ -621,7 +621,7 @@ fn add_inertia(
 ) {
     let n = state.segments();
     for j in 0..state.rods() {
-        for i in system.first()..=n {
+        for i in system.first_node()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
             let stiffness = DiagonalBlocks {
@@ -769,10 +769,7 @@ impl SemiImplicit {
         let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let half = Wrench {
-                moment: DVec3::ZERO,
-                force: 0.5 * drag.force(),
-            };
+            let half = Wrench::from_force(0.5 * drag.force());
             let stiffness = 0.25 * rate * drag.velocity_derivative();
             let free = [moves(j, i), moves(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {

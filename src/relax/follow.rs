@@ -148,10 +148,7 @@ pub(super) fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) ->
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);
     state.n.iter_mut().for_each(|n| *n *= force);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.base(j);
-    }
+    leaf.place_bases(&mut state);
     state
 }
 
@@ -287,10 +284,7 @@ impl EquilibriumTracker {
         }
         let grid = Grid::from_stations(stations, leaf.kinks());
         let mut state = state_from_rod_shapes(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
-        for j in 0..leaf.rods() {
-            let base = state.base(j);
-            (state.x[base], state.q[base]) = leaf.base(j);
-        }
+        leaf.place_bases(&mut state);
         leaf.place_held_tips(&mut state);
         EquilibriumTracker::begin_from(scenario, options, (grid, state))
     }

@@ -334,7 +334,8 @@ pub fn set_fictitious_masses(
                 }
             }
             for strip in leaf.adjacent_strips(j, i) {
-                let (stiffness, arm) = (strip.stiffness, 0.5 * strip.width);
+                let stiffness = strip.stiffness.max_element();
+                let arm = 0.5 * strip.stress_free_gap.length();
                 mass += 2.0 * stiffness / (4.0 - ROTATION_FREQUENCY_FRACTION);
                 inertia += 2.0 * (strip.fold_stiffness + stiffness * arm * arm)
                     / ROTATION_FREQUENCY_FRACTION;

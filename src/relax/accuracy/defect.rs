@@ -494,7 +494,7 @@ impl<'a> Tangents<'a> {
         let solution = system.solution();
         for (rod, jumps) in solution.iter().zip(jumps) {
             // The ends of parts, without the bases.
-            let nodes = &rod[1 - system.first()..];
+            let nodes = &rod[1 - system.first_node()..];
             for (nodes, jump) in nodes.chunks(self.part).zip(jumps) {
                 let before = displacement_part(&nodes[self.part / 2 - 1]);
                 let middle = larger(before.length(), (before + jump.position).length());
@@ -504,7 +504,7 @@ impl<'a> Tangents<'a> {
         }
         Some(JumpResponse {
             solution,
-            first: system.first(),
+            first: system.first_node(),
             largest: [at_ends, between],
         })
     }

@@ -308,7 +308,7 @@ const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
-        let base = [(SpanHolder::Base, 0, leaf.leaf.base(j).0)];
+        let base = [(SpanHolder::Base, 0, leaf.leaf.base_pose(j).position)];
         let grips = leaf.rod_grips(j).map(|held| {
             let sigma = leaf.grid.sigma()[held.node];
             (SpanHolder::Grip(sigma), held.node, held.position)
