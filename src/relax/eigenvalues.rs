@@ -7,7 +7,7 @@ use crate::modes::{Eigenpair, ModeRequest};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::richardson::{BestColumn, Richardson};
+use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
 use crate::relax::plan::RelaxationProblem;
@@ -90,13 +90,20 @@ impl LowestModes {
 #[derive(Clone, Copy)]
 pub struct EigenvalueRequest {
     pub count: usize,
-    /// So many lower ones are left out, and the shift by which they are found to be lower: see
-    /// [`ModeRequest::above`].
-    pub omitted_lower: Option<(usize, f64)>,
+    /// Lower ones that are left out of the list.
+    pub omitted_lower: Option<OmittedEigenvalues>,
     /// Whether the stability of the leaf depends on them: then its size does not matter.
     pub decides_stability: bool,
     /// Whether more than their signs is needed: they are as accurate as requested ones.
     pub needs_values: bool,
+}
+
+/// Eigenvalues that are lower than those of a list.
+#[derive(Clone, Copy)]
+pub struct OmittedEigenvalues {
+    pub count: usize,
+    /// The shift by which they are found to be lower: see [`ModeRequest::modes_below`].
+    pub shift: f64,
 }
 
 impl EigenvalueRequest {
@@ -121,7 +128,7 @@ pub fn lowest(
 ) -> Option<LowestModes> {
     let EigenvalueRequest {
         count,
-        omitted_lower: above,
+        omitted_lower: omitted,
         ..
     } = list;
     let options = problem.options;
@@ -132,7 +139,7 @@ pub fn lowest(
         return None;
     }
     let physics = Physics::new(problem.leaf);
-    let requested = count <= options.modes && above.is_none();
+    let requested = count <= options.modes && omitted.is_none();
     let tolerance = if requested || list.needs_values {
         problem.tolerance
     } else {
@@ -141,7 +148,7 @@ pub fn lowest(
     let on = |level: &GridLevel, near: &[Vec<Increment>]| {
         let wanted = ModeRequest {
             count,
-            modes_below: above,
+            modes_below: omitted.map(|omitted| (omitted.count, omitted.shift)),
             accuracy: (ACCURACY * tolerance.sqrt())
                 .clamp(EIGENVECTOR_ACCURACY_BOUNDS.0, EIGENVECTOR_ACCURACY_BOUNDS.1),
             approximate_modes: near,
@@ -149,7 +156,7 @@ pub fn lowest(
         };
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
-    let left_out = above.map_or(0, |(others, _)| others);
+    let left_out = omitted.map_or(0, |omitted| omitted.count);
     let (wanted, most_unknowns) = match options.mode_shapes || list.needs_values {
         true => (tolerance, MAX_ADDED_GRID_UNKNOWNS),
         false => {
@@ -194,7 +201,7 @@ pub fn lowest(
     }
     nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        refine_eigenvalues(problem, &mut nested, most_unknowns, (on, enough));
+        refine_eigenvalues(problem, &mut nested, most_unknowns, on, enough);
     }
     let on = found.segments_of_estimate();
     let softening = (nested
@@ -209,12 +216,12 @@ pub fn lowest(
     };
     let unit = physics.time_unit.powi(-2);
     let mode = |it: ExtrapolatedEigenvalue| {
-        let (displacement, rotation) = shapes.get(it.number).cloned().unwrap_or_default();
+        let shape = shapes.get(it.number).cloned().unwrap_or_default();
         Mode {
             eigenvalue: it.value * unit,
             error: it.error.map(|error| error * unit),
-            displacement,
-            rotation,
+            displacement: shape.displacement,
+            rotation: shape.rotation,
         }
     };
     Some(LowestModes {
@@ -316,10 +323,8 @@ fn refine_eigenvalues(
     problem: &RelaxationProblem,
     nested: &mut NestedEigenvalues,
     most_unknowns: usize,
-    (on, enough): (
-        impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
-        impl Fn(&EigenvalueSeries) -> bool,
-    ),
+    on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    enough: impl Fn(&EigenvalueSeries) -> bool,
 ) -> Option<()> {
     for _ in 0..MORE_GRIDS {
         if enough(&nested.series) || problem.out_of_time() {
@@ -380,11 +385,15 @@ impl GridModes<'_> {
 /// of rotation alone.
 const PURE_ROTATION_DISPLACEMENT: f64 = 1e-6;
 
-/// Displacements and rotations of all nodes, rod by rod.
-pub(super) type NodalModeShape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
+/// The shape of a mode at all nodes, rod by rod.
+#[derive(Clone, Default)]
+struct NodalModeShape {
+    displacement: Vec<Vec<DVec3>>,
+    rotation: Vec<Vec<DVec3>>,
+}
 
-/// A shape in the scenario's unit of length, normalised.
-pub(super) fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape {
+/// A shape in the scenario's unit of length, normalized.
+fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape {
     let nodes = || shape.iter().flatten();
     let largest =
         |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
@@ -406,10 +415,10 @@ pub(super) fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> Nod
         shape.iter().map(rod).collect()
     };
     let unit = sign / size;
-    (
-        rods(displacement_part, unit * length),
-        rods(rotation_part, unit),
-    )
+    NodalModeShape {
+        displacement: rods(displacement_part, unit * length),
+        rotation: rods(rotation_part, unit),
+    }
 }
 
 /// Largest number of grids that are extrapolated.
@@ -487,7 +496,7 @@ impl EigenvalueSeries {
 
     /// The extrapolated value of the eigenvalue with this number, and a bound on its error by its own
     /// changes if there are at least two grids, in its unit.
-    fn extrapolate_eigenvalue(&self, k: usize) -> (f64, Option<f64>) {
+    fn extrapolate_eigenvalue(&self, k: usize) -> Extrapolated<f64> {
         // A coarse grid may have fewer modes.
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
         let all = values.clone().count();
@@ -513,7 +522,10 @@ impl EigenvalueSeries {
             };
             ERROR_SAFETY_FACTOR * best.error.max(least)
         };
-        (table.extrapolated()[0], table.best().map(error))
+        Extrapolated {
+            value: table.extrapolated()[0],
+            error: table.best().map(error),
+        }
     }
 
     /// The eigenvalue with this number on the grid before the finest, in its unit.
@@ -527,16 +539,16 @@ impl EigenvalueSeries {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.extrapolate_eigenvalue(k))
             .collect();
-        let largest = found.iter().filter_map(|(_, error)| *error);
+        let largest = found.iter().filter_map(|it| it.error);
         let largest = largest.fold(0.0, f64::max);
         let bound =
             |error: f64| (error * largest).sqrt() + ITERATION_ERROR_FRACTION * self.tolerance;
-        let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
+        let in_units = |(number, it): (usize, &Extrapolated<f64>)| {
             let unit = self.unit(number);
             ExtrapolatedEigenvalue {
-                value: value * unit,
+                value: it.value * unit,
                 // Zero on all grids is that of a turn without resistance, and exact.
-                error: error.map(|error| match *value == 0.0 {
+                error: it.error.map(|error| match it.value == 0.0 {
                     true => 0.0,
                     false => bound(error) * unit + self.rounding,
                 }),

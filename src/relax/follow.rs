@@ -6,13 +6,13 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearRespo
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::transfer::{GridLevel, transfer};
+use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
 use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
-use crate::relax::rest::{equilibrium_with_stability, relax_on_grids};
+use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
 use crate::relax::sensitivity::Linearized;
 use crate::relax::stability::state_from_rod_shapes;
@@ -89,10 +89,13 @@ impl NestedEquilibrium {
             .map(|(k, level)| {
                 let mut state = displaced_state(level, &leaf, &response[k]);
                 leaf.place_held_tips(&mut state);
-                (level.leaf.grid.clone(), state)
+                StateOnGrid {
+                    grid: level.leaf.grid.clone(),
+                    state,
+                }
             })
             .collect();
-        let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
+        let expected: Vec<State> = guesses.iter().map(|guess| guess.state.clone()).collect();
         let problem = RelaxationProblem {
             // As for a reduced leaf: it fails if the leaf would have to move far.
             whole_leaf: Some(&leaf),
@@ -131,7 +134,10 @@ fn relax_with_progress(
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
-    let (leaf, found) = relax_on_grids(scenario, options, false, progress)?;
+    let RelaxedLeaf {
+        result: leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, progress)?;
     if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
         let remark = leaf.remark.as_ref();
         let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
@@ -244,7 +250,10 @@ impl EquilibriumTracker {
         scenario: &Scenario,
         options: &Options,
     ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
-        let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
+        let RelaxedLeaf {
+            result: leaf,
+            on_grids: at,
+        } = relax_on_grids(scenario, options, false, &mut |_| {})?;
         let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
         let follower = EquilibriumTracker::new(Arc::new(scenario.clone()), options, at);
         Ok((leaf, rests.then_some(follower)))
@@ -290,14 +299,14 @@ impl EquilibriumTracker {
             (state.x[base], state.q[base]) = leaf.base(j);
         }
         leaf.place_held_tips(&mut state);
-        EquilibriumTracker::begin_from(scenario, options, (grid, state))
+        EquilibriumTracker::begin_from(scenario, options, StateOnGrid { grid, state })
     }
 
     /// The same from this state on a grid.
     fn begin_from(
         scenario: &Scenario,
         options: &Options,
-        (grid, state): (Grid, State),
+        guess: StateOnGrid,
     ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
         check_wind_options(scenario, options)?;
         let clock = Instant::now();
@@ -308,7 +317,7 @@ impl EquilibriumTracker {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        match arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort) {
+        match arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort) {
             Ok(found) if found.is_stable() => {
                 let (at, result) = decide(&problem, found, clock, &mut effort);
                 let follower = EquilibriumTracker::new(Arc::clone(&scenario), options, at);
@@ -433,14 +442,14 @@ impl EquilibriumTracker {
         let leaf = Leaf::with_scale(Arc::new(scenario.clone()), scenario.scale());
         let grid = self.grid(&leaf);
         let state = self.state_on(&leaf, &grid);
-        self.relax_from_state(scenario, (grid, state))
+        self.relax_from_state(scenario, StateOnGrid { grid, state })
     }
 
     /// The same from this state on a grid; where that leads nowhere, as a relaxation begins.
     pub(crate) fn relax_from_state(
         &mut self,
         scenario: &Scenario,
-        guess: (Grid, State),
+        guess: StateOnGrid,
     ) -> Result<Equilibrium, RelaxError> {
         let (result, follower) = EquilibriumTracker::begin_from(scenario, &self.options, guess)?;
         if let Some(follower) = follower {
@@ -521,11 +530,12 @@ impl EquilibriumTracker {
             whole_leaf: Some(leaf),
             ..RelaxationProblem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
         };
-        let guess = self.state_on(leaf, &grid);
+        let state = self.state_on(leaf, &grid);
+        let guess = StateOnGrid { grid, state };
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, guess)], &mut effort);
+        let found = arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort);
         Ok(found
             .map_err(|_| ContinuationFailure::OtherEquilibrium)?
             .with_work(effort.work))
@@ -578,6 +588,7 @@ fn decide(
     clock: Instant,
     effort: &mut WorkLog,
 ) -> (NestedEquilibrium, Equilibrium) {
-    let (result, at) = equilibrium_with_stability(problem, Ok(found), clock, effort);
-    (at, result)
+    let RelaxedLeaf { result, on_grids } =
+        equilibrium_with_stability(problem, Ok(found), clock, effort);
+    (on_grids, result)
 }

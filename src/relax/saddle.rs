@@ -53,31 +53,45 @@ pub fn index(
     shift: f64,
     work: &mut SolverCounts,
 ) -> Option<usize> {
-    count(leaf, state, system, (0.0, shift), work)
+    count(
+        leaf,
+        state,
+        system,
+        HessianShift { excess: 0.0, shift },
+        work,
+    )
 }
 
-/// Negative eigenvalues of the Hessian minus `excess` times the excess stiffness of the elements
-/// plus `shift` times the mass matrix. With an excess any number of them without coupling is
+/// What is added to the Hessian of the energy before its negative eigenvalues are counted.
+#[derive(Clone, Copy)]
+struct HessianShift {
+    /// So many times the excess stiffness of the elements is subtracted.
+    excess: f64,
+    /// So many times the mass matrix is added.
+    shift: f64,
+}
+
+/// Negative eigenvalues of the shifted Hessian. With an excess any number of them without coupling is
 /// `None`, too.
 fn count(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (excess, shift): (f64, f64),
+    shifted: HessianShift,
     work: &mut SolverCounts,
 ) -> Option<usize> {
     if system.has_tissue() {
-        return count_coupled(leaf, state, system, (excess, shift), work);
+        return count_coupled(leaf, state, system, shifted, work);
     }
-    assemble_minus_excess(leaf, state, system, excess, work);
-    // For most stable leaves one linear-time factorisation is enough.
-    if system.is_definite_without_coupling(shift) {
+    assemble_minus_excess(leaf, state, system, shifted.excess, work);
+    // For most stable leaves one linear-time factorization is enough.
+    if system.is_definite_without_coupling(shifted.shift) {
         return Some(0);
     }
-    if excess > 0.0 && !system.coupled() {
+    if shifted.excess > 0.0 && !system.coupled() {
         return None;
     }
-    count_coupled(leaf, state, system, (excess, shift), work)
+    count_coupled(leaf, state, system, shifted, work)
 }
 
 /// The matrix, minus `excess` times the excess stiffness of the elements.
@@ -97,12 +111,12 @@ fn assemble_minus_excess(
     work.factorizations += 1;
 }
 
-/// [`count`] by the factorisation of the whole matrix.
+/// Negative eigenvalues of the shifted Hessian, by the factorization of the whole matrix.
 fn count_coupled(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (excess, shift): (f64, f64),
+    HessianShift { excess, shift }: HessianShift,
     work: &mut SolverCounts,
 ) -> Option<usize> {
     assemble_minus_excess(leaf, state, system, excess, work);
@@ -129,10 +143,13 @@ pub fn bounds(
     work: &mut SolverCounts,
 ) -> Option<IndexBounds> {
     let close = CLEARLY_POSITIVE.max(leaf.neutral_shift());
-    let mut of = |excess, shift| count_coupled(leaf, state, system, (excess, shift), work);
-    let least = of(0.0, close)?;
-    let here = of(0.0, -close)?;
-    let finer = of(EXCESS_SAFETY, -close)?;
+    let mut count = |excess, shift| {
+        let shifted = HessianShift { excess, shift };
+        count_coupled(leaf, state, system, shifted, work)
+    };
+    let least = count(0.0, close)?;
+    let here = count(0.0, -close)?;
+    let finer = count(EXCESS_SAFETY, -close)?;
     Some(IndexBounds {
         least,
         here,
@@ -165,7 +182,11 @@ pub fn clearly_stable(
     work: &mut SolverCounts,
 ) -> bool {
     let least = CLEARLY_POSITIVE.max(leaf.neutral_shift());
-    count(leaf, state, system, (EXCESS_SAFETY, -least), work) == Some(0)
+    let shifted = HessianShift {
+        excess: EXCESS_SAFETY,
+        shift: -least,
+    };
+    count(leaf, state, system, shifted, work) == Some(0)
 }
 
 /// Newton's equations with pivots of any sign, and steps of bounded size.
@@ -276,20 +297,42 @@ const SAME_ENERGY: f64 = 1e-3;
 
 const IMAGES_APART: f64 = 0.05;
 
-/// Of the sides of a saddle to which a leaf turned, with their energies: that of less energy, or the
-/// first of two that are equal, and whether there is another one as good.
-pub fn lower_energy_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
+/// An equilibrium to which a leaf turned from a saddle.
+pub struct SideOfSaddle {
+    pub state: State,
+    /// The energy of the leaf there.
+    pub energy: f64,
+    /// Whether the other side has the same energy.
+    pub equally_open: bool,
+}
+
+impl SideOfSaddle {
+    pub fn new(leaf: &DiscreteLeaf, state: State) -> Self {
+        SideOfSaddle {
+            energy: leaf.energy(&state),
+            state,
+            equally_open: false,
+        }
+    }
+}
+
+/// Of the sides of a saddle to which a leaf turned that of less energy, or the first of two that are
+/// equal.
+pub fn lower_energy_side(sides: [Option<SideOfSaddle>; 2]) -> Option<SideOfSaddle> {
     match sides {
-        [Some((e1, one)), Some((e2, other))] => {
+        [Some(one), Some(other)] => {
+            let [e1, e2] = [one.energy, other.energy];
             let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
-            let apart = one.distance(&other) > IMAGES_APART;
+            let apart = one.state.distance(&other.state) > IMAGES_APART;
             match e1 <= e2 || same {
-                true => Some((one, same && apart)),
-                false => Some((other, false)),
+                true => Some(SideOfSaddle {
+                    equally_open: same && apart,
+                    ..one
+                }),
+                false => Some(other),
             }
         }
-        [Some((_, one)), None] | [None, Some((_, one))] => Some((one, false)),
-        [None, None] => None,
+        [one, other] => one.or(other),
     }
 }
 
@@ -302,9 +345,6 @@ pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddl
         tip: state.tip(0) * scale.length,
     }
 }
-
-/// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
-/// first, the rate below which there are no springs (beside a bifurcation a leaf moves slowly),
 
 /// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
 /// sign that has most in common with them; of several modes of one eigenvalue, as of veins that

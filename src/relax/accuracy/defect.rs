@@ -54,18 +54,63 @@ pub struct FactorizedLevel {
 }
 
 impl FactorizedLevel {
+    /// The equations of one of the `levels`, assembled anew at rest: those of the last Newton step
+    /// have the forces before it, which differ where rods are rigid.
+    fn new(
+        levels: &[GridLevel],
+        level_number: usize,
+        workspace: &mut EquationWorkspace,
+        work: &mut SolverCounts,
+    ) -> Option<Self> {
+        let GridLevel { leaf, state } = &levels[level_number];
+        let mut system = workspace.equations(leaf);
+        work.force_evaluations += 1;
+        work.factorizations += 1;
+        leaf.assemble(state, &mut system);
+        leaf.add_phase_conditions(state, &mut system);
+        let factors = match leaf.rods() {
+            1 => DefiniteFactors::indefinite_single_rod(&mut system)?,
+            _ => DefiniteFactors::new(&mut system, 0.0)?,
+        };
+        Some(FactorizedLevel {
+            level_number,
+            system,
+            factors,
+        })
+    }
+
     /// The number of the grid.
     pub fn grid(&self) -> usize {
         self.level_number
     }
 }
 
+/// The largest errors of positions, in lengths of the leaf.
+#[derive(Clone, Copy)]
+pub struct PositionErrors {
+    /// At the nodes from which the leaf was integrated.
+    pub at_nodes: f64,
+    /// On either side of the midpoints between them.
+    pub between: f64,
+}
+
+impl PositionErrors {
+    pub fn largest(self) -> f64 {
+        larger(self.at_nodes, self.between)
+    }
+
+    /// Both errors plus that of the integration.
+    fn increased(self, error: f64) -> Self {
+        PositionErrors {
+            at_nodes: self.at_nodes + error,
+            between: self.between + error,
+        }
+    }
+}
+
 /// A leaf on one grid or several, with its error estimated from the equilibrium equations.
 pub struct DefectEstimate {
-    /// The largest error of a position at the nodes from which the leaf was integrated.
-    pub at_nodes: f64,
-    /// The largest error on either side of the midpoints between them.
-    pub between: f64,
+    pub position_errors: PositionErrors,
     /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
     pub rods: Vec<Vec<RodFields>>,
     /// Its potential energy, dimensionless.
@@ -81,28 +126,30 @@ pub struct DefectEstimate {
     pub corrections: usize,
 }
 
-impl DefectEstimate {
-    /// The largest error of a position.
-    pub fn largest(&self) -> f64 {
-        larger(self.at_nodes, self.between)
-    }
+/// What corrections are to reach, and how many may be made.
+#[derive(Clone, Copy)]
+pub struct CorrectionGoal {
+    /// The estimated error of positions that is small enough, in lengths of the leaf.
+    pub error: f64,
+    pub most_corrections: usize,
 }
 
 /// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
-/// segments of the one before, with `columns` extrapolations. If the error is more than
-/// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
+/// segments of the one before, with `columns` extrapolations. If the error is more than that of the
+/// `goal` the leaf is corrected, provided that this reduces it below.
 /// `None` where grips hold veins, whose forces jump there, where the linear equations cannot be
-/// solved, where tissue is so stiff that integration
-/// along the veins is unstable, or where the segments of a single level
-/// are not pairs of equal ones. The equations are factorised, in the memory of the `workspace`, unless
-/// `linear` has them already.
+/// solved, where tissue is so stiff that integration along the veins is unstable, or where the
+/// segments of a single level are not pairs of equal ones. The equations are factorized, in the
+/// memory of the `workspace`, unless `linear` has them already.
 pub fn estimate(
     levels: &[GridLevel],
     columns: usize,
-    (enough, most): (f64, usize),
-    (linear, workspace): (&mut Option<FactorizedLevel>, &mut EquationWorkspace),
+    goal: CorrectionGoal,
+    linear: &mut Option<FactorizedLevel>,
+    workspace: &mut EquationWorkspace,
     work: &mut SolverCounts,
 ) -> Option<DefectEstimate> {
+    let (enough, most) = (goal.error, goal.most_corrections);
     let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
     // The linear equations need two segments between nodes.
     let (parts, grid) = match last {
@@ -122,17 +169,9 @@ pub fn estimate(
         .as_ref()
         .is_none_or(|linear| linear.level_number != grid)
     {
-        let (system, factors) = factorized(&levels[grid], workspace, work)?;
-        *linear = Some(FactorizedLevel {
-            level_number: grid,
-            system,
-            factors,
-        });
+        *linear = Some(FactorizedLevel::new(levels, grid, workspace, work)?);
     }
-    let level = &levels[grid];
-    let FactorizedLevel {
-        system, factors, ..
-    } = linear.as_mut()?;
+    let (level, linear) = (&levels[grid], linear.as_mut()?);
     let (finest, count) = (&levels[last].leaf.grid, parts.segments());
     let (mut known, mut flow) = (
         extrapolated_node_fields(levels, columns, count),
@@ -147,11 +186,11 @@ pub fn estimate(
     let mut steps = IntegrationSteps::new(finest.segments() / count / 2, last == 0);
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
-        let integrated = integrate_to_midpoints((first, &parts), &mut flow, &known, steps.count);
-        let Some(response) = tangents.response((system, factors), &integrated.jumps) else {
+        let integrated = integrate_to_midpoints(first, &parts, &mut flow, &known, steps.count);
+        let Some(response) = tangents.response(linear, &integrated.jumps) else {
             break;
         };
-        let largest = larger(response.largest[0], response.largest[1]);
+        let largest = response.position_errors.largest();
         steps.measure(largest);
         // With halved steps the error includes that of the longer ones: its ratio is no measure
         // of the contraction.
@@ -169,7 +208,8 @@ pub fn estimate(
         }
         let changes = tangents.changes(&response, &integrated.jumps);
         if corrections == 0 {
-            let estimate = integrated.estimate((first, finest), &known, &changes, response.largest);
+            let errors = response.position_errors;
+            let estimate = integrated.estimate(first, finest, &known, &changes, errors);
             if largest <= enough || out_of_reach {
                 return Some(estimate);
             }
@@ -181,7 +221,7 @@ pub fn estimate(
                 stress / FORCE_ERROR_MULTIPLE,
             ) <= enough
             {
-                let errors = response.largest.map(|error| error + steps.error);
+                let errors = response.position_errors.increased(steps.error);
                 let mut forces = known
                     .iter()
                     .flatten()
@@ -191,7 +231,7 @@ pub fn estimate(
                     corrections,
                     energy_error: energy_error(first, &changes, &integrated.jumps)
                         + steps.error * largest,
-                    ..integrated.estimate((first, finest), &known, &changes, errors)
+                    ..integrated.estimate(first, finest, &known, &changes, errors)
                 });
             }
         }
@@ -202,27 +242,8 @@ pub fn estimate(
     uncorrected
 }
 
-/// Assembled anew at rest: the equations of the last Newton step have the forces before it,
-/// which differ where rods are rigid.
-fn factorized(
-    level: &GridLevel,
-    workspace: &mut EquationWorkspace,
-    work: &mut SolverCounts,
-) -> Option<(System, DefiniteFactors)> {
-    let mut system = workspace.equations(&level.leaf);
-    work.force_evaluations += 1;
-    work.factorizations += 1;
-    level.leaf.assemble(&level.state, &mut system);
-    level.leaf.add_phase_conditions(&level.state, &mut system);
-    let factors = match level.leaf.rods() {
-        1 => DefiniteFactors::indefinite_single_rod(&mut system)?,
-        _ => DefiniteFactors::new(&mut system, 0.0)?,
-    };
-    Some((system, factors))
-}
-
-/// A leaf integrated along its rods.
-struct IntegratedLeaf {
+/// A leaf integrated from the ends of the parts of its rods to the midpoints between them.
+struct MidpointIntegration {
     /// After every step from the two ends of a part to its midpoint, part after part.
     slices: Vec<[Vec<StationFields>; 2]>,
     jumps: Vec<Vec<FieldJump>>,
@@ -232,11 +253,12 @@ struct IntegratedLeaf {
 /// The leaf `known` at the nodes of `parts`, integrated from there to the midpoints between
 /// them in `steps` steps, and the jumps there.
 fn integrate_to_midpoints(
-    (leaf, parts): (&DiscreteLeaf, &Grid),
+    leaf: &DiscreteLeaf,
+    parts: &Grid,
     flow: &mut RodIntegrator,
     known: &[Vec<RodFields>],
     steps: usize,
-) -> IntegratedLeaf {
+) -> MidpointIntegration {
     let n = parts.segments();
     let mut slices = vec![[(); 2].map(|()| vec![StationFields::default(); steps]); n];
     let mut jumps = vec![Vec::with_capacity(n); leaf.rods()];
@@ -265,7 +287,7 @@ fn integrate_to_midpoints(
         let work = nodes.map(|(&sigma, node)| leaf.point_force_at(j, sigma).dot(node.x));
         energy -= work.sum::<f64>();
     }
-    IntegratedLeaf {
+    MidpointIntegration {
         slices,
         jumps,
         energy,
@@ -278,15 +300,16 @@ fn at_midpoint(ends: &[Vec<StationFields>; 2], j: usize) -> [RodFields; 2] {
         .map(|slices| slices.last().expect("a step at least").rod(j))
 }
 
-impl IntegratedLeaf {
-    /// An uncorrected leaf with its largest errors at the nodes from which it was integrated and
-    /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
+impl MidpointIntegration {
+    /// An uncorrected leaf with these errors, on the `finest` grid or on the refined one that has the
+    /// ends of all steps.
     fn estimate(
         &self,
-        (leaf, finest): (&DiscreteLeaf, &Grid),
+        leaf: &DiscreteLeaf,
+        finest: &Grid,
         known: &[Vec<RodFields>],
         changes: &[Vec<FieldChange>],
-        [at_nodes, between]: [f64; 2],
+        position_errors: PositionErrors,
     ) -> DefectEstimate {
         let rods = self.rods(known);
         let mut grid = finest.clone();
@@ -294,8 +317,7 @@ impl IntegratedLeaf {
             grid = grid.refined();
         }
         DefectEstimate {
-            at_nodes,
-            between,
+            position_errors,
             rods,
             energy: self.energy,
             energy_error: energy_error(leaf, changes, &self.jumps),
@@ -442,7 +464,7 @@ pub struct JumpResponse {
     solution: NodalField,
     first: usize,
     /// The largest displacements at the ends of the parts, and on either side of the midpoints.
-    pub largest: [f64; 2],
+    position_errors: PositionErrors,
 }
 
 impl<'a> Tangents<'a> {
@@ -462,14 +484,16 @@ impl<'a> Tangents<'a> {
         }
     }
 
-    /// The response to `jumps`; `system` holds the equations and `factors` their factors. `None` where these
-    /// cannot be solved.
-    pub fn response(
+    /// The response of the `linear` equations to `jumps`. `None` where these cannot be solved.
+    fn response(
         &self,
-        (system, factors): (&mut System, &mut DefiniteFactors),
+        linear: &mut FactorizedLevel,
         jumps: &[Vec<FieldJump>],
     ) -> Option<JumpResponse> {
         let leaf = &self.level.leaf;
+        let FactorizedLevel {
+            system, factors, ..
+        } = linear;
         leaf.assemble_jump_correction(&self.behind, jumps, system);
         let LinearSolveOutcome::Converged(_) = factors.solve(system, ACCURACY) else {
             return None;
@@ -489,7 +513,10 @@ impl<'a> Tangents<'a> {
         Some(JumpResponse {
             solution,
             first: system.first(),
-            largest: [at_ends, between],
+            position_errors: PositionErrors {
+                at_nodes: at_ends,
+                between,
+            },
         })
     }
 
@@ -509,7 +536,7 @@ impl<'a> Tangents<'a> {
         }
         let moved = displace_state(state, response);
         let ends = |(j, jumps): (usize, &Vec<FieldJump>)| {
-            let end = |k: usize| self.change(response, &moved, (j, jumps), k);
+            let end = |k: usize| self.change(response, &moved, j, jumps, k);
             (0..=jumps.len()).map(end).collect()
         };
         jumps.iter().enumerate().map(ends).collect()
@@ -521,7 +548,8 @@ impl<'a> Tangents<'a> {
         &self,
         response: &JumpResponse,
         moved: &State,
-        (j, jumps): (usize, &[FieldJump]),
+        j: usize,
+        jumps: &[FieldJump],
         k: usize,
     ) -> FieldChange {
         let GridLevel { leaf, state } = self.level;
@@ -686,20 +714,26 @@ mod tests {
                 tolerance: Some(1e-3),
                 ..Options::default()
             };
-            let (_, found) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let relaxed = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let found = relaxed.on_grids;
             let (mut linear, mut work) = (None, SolverCounts::default());
-            let mut estimated = |enough, most| {
-                let systems = (&mut linear, &mut EquationWorkspace::default());
-                estimate(&found.levels, 1, (enough, most), systems, &mut work).unwrap()
+            let mut estimated = |error, most_corrections| {
+                let goal = CorrectionGoal {
+                    error,
+                    most_corrections,
+                };
+                let workspace = &mut EquationWorkspace::default();
+                estimate(&found.levels, 1, goal, &mut linear, workspace, &mut work).unwrap()
             };
-            let first = estimated(0.0, 0).largest();
+            let first = estimated(0.0, 0).position_errors.largest();
             // The last round only verifies.
             for most in 2..=4_usize {
                 let enough = first * 30.0_f64.powi(1 - most as i32);
                 let estimate = estimated(enough, most);
-                let what = format!("{axial}, {most}: {} of {first}", estimate.largest());
+                let largest = estimate.position_errors.largest();
+                let what = format!("{axial}, {most}: {largest} of {first}");
                 assert!((1..=most).contains(&estimate.corrections), "{what}");
-                assert!(estimate.largest() <= enough, "{what}");
+                assert!(largest <= enough, "{what}");
             }
             assert_eq!(work.factorizations, 1);
         }

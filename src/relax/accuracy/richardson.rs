@@ -40,6 +40,12 @@ pub struct BestColumn {
     pub error: f64,
 }
 
+/// An extrapolated value with a bound on its error, which is unknown on a single grid.
+pub struct Extrapolated<T> {
+    pub value: T,
+    pub error: Option<f64>,
+}
+
 /// Values on successively refined grids, extrapolated over the series in ds^2.
 #[derive(Clone, Debug, Default)]
 pub struct Richardson {

@@ -6,20 +6,21 @@ use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::numbers::largest;
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::accuracy::transfer::{
-    GridLevel, positions, predict_on_finer_grid, prolong, restrict, transfer,
+    GridLevel, StateOnGrid, positions, predict_on_finer_grid, prolong, restrict, transfer,
 };
 use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, RelaxationResult, result_with_path,
 };
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
-use crate::relax::path::{Event, Path, Stage};
+use crate::relax::path::{Event, Path, PathPosition, Stage};
 use crate::relax::plan::{BUDGET, RelaxationProblem};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::solve_on_grid::{
-    COARSEST_TURN, GridSolution, InitialGuess, check_stability, find_grid_equilibrium,
+    COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
+    find_grid_equilibrium,
 };
 
 /// Segments of the coarsest grid of a walk, and of the finest on which a lost stability is
@@ -82,12 +83,16 @@ pub fn load_slowly<'a>(
         grid = level.leaf.grid.refined();
         path = Some(walked);
         let mut begun = NestedEquilibrium::without_grids(problem);
-        let (on, state) = guess(problem, &mut begun.history, level, effort);
+        let StateOnGrid { grid: on, state } =
+            state_on_requested_grid(problem, &mut begun.history, level, effort);
         if let Some(half) = half
             && is_mirrored(half, &state)
         {
             let reduced = problem.reduced_to_half(Some(half));
-            let guesses = vec![(on.clone(), half_state(half, &state))];
+            let guesses = vec![StateOnGrid {
+                grid: on.clone(),
+                state: half_state(half, &state),
+            }];
             let found = solve_from_guesses(
                 &reduced,
                 NestedEquilibrium::without_grids(&reduced),
@@ -111,7 +116,8 @@ pub fn load_slowly<'a>(
             ..*problem
         };
         let segments = on.segments();
-        let followed = solve_from_guesses(&in_valley, begun, vec![(on, state)], effort);
+        let guesses = vec![StateOnGrid { grid: on, state }];
+        let followed = solve_from_guesses(&in_valley, begun, guesses, effort);
         let (given_up, out_of_time) = (last && problem.segments().is_none(), problem.out_of_time());
         let must_be_accurate = given_up || !out_of_time && !path_is_stable(&path);
         let end = end_of(&followed, |found| {
@@ -184,7 +190,7 @@ pub fn follow_load_path(
 ) -> Result<LoadPathEnd, Box<RelaxationFailure>> {
     let mut before: Option<GridLevel> = None;
     loop {
-        let (level, events, end) =
+        let LoadPathRun { level, events, end } =
             follow_path_on_grid(problem, grid.clone(), Stage::Joining, effort);
         let finer = grid.refined();
         let spent = remaining_loading_budget(effort) == 0 || problem.out_of_time();
@@ -239,26 +245,32 @@ fn has_same_energy(coarser: &GridLevel, level: &GridLevel, work: &mut SolverCoun
     index == Some(0) && (a - b).abs() <= SAME_ENERGY * a.abs().max(1.0)
 }
 
-/// The initial guess from where a walk arrived: on the grid of the walk, or on the requested
-/// one.
-pub fn guess(
+/// The state in which slow loading ended, on the grid where that was followed or, if a grid is
+/// requested, interpolated to that one.
+pub fn state_on_requested_grid(
     problem: &RelaxationProblem,
     history: &mut History,
     arrived: GridLevel,
     effort: &mut WorkLog,
-) -> (Grid, State) {
+) -> StateOnGrid {
     let Some(segments) = problem.segments() else {
-        return (arrived.leaf.grid, arrived.state);
+        return StateOnGrid {
+            grid: arrived.leaf.grid,
+            state: arrived.state,
+        };
     };
     let grid = Grid::new(segments, problem.leaf.kinks());
     let mut finest = arrived;
     while LARGEST_GRID_RATIO * finest.leaf.segments() < segments {
         let state = prolong(&finest.leaf, &finest.state);
-        let next = (finest.leaf.grid.refined(), InitialGuess::Coarser(state));
+        let next = GridGuess {
+            grid: finest.leaf.grid.refined(),
+            guess: InitialGuess::Coarser(state),
+        };
         finest = find_grid_equilibrium(problem, history, next, effort).level;
     }
     let state = transfer(&finest.leaf, &finest.state, &grid);
-    (grid, state)
+    StateOnGrid { grid, state }
 }
 
 /// Nodes times force evaluations that are left for walks.
@@ -278,9 +290,19 @@ pub fn takes_loads_stably(
         return true;
     }
     let grid = coarsest_grid(problem.leaf);
-    let (_, events, end) = follow_path_on_grid(problem, grid, Stage::LoadedLeaf, effort);
-    effort.farthest_stage = None;
-    end.is_ok() && events.is_empty()
+    let run = follow_path_on_grid(problem, grid, Stage::LoadedLeaf, effort);
+    effort.farthest_position = None;
+    run.end.is_ok() && run.events.is_empty()
+}
+
+/// Slow loading on one grid.
+struct LoadPathRun {
+    /// The last state.
+    level: GridLevel,
+    /// Where the path lost its stability.
+    events: Vec<Event>,
+    /// Whether it was followed to the end of its last stage.
+    end: Result<(), EquilibriumFailure>,
 }
 
 /// Walks on one grid to the end of a stage.
@@ -289,7 +311,7 @@ fn follow_path_on_grid(
     grid: Grid,
     last: Stage,
     effort: &mut WorkLog,
-) -> (GridLevel, Vec<Event>, Result<(), EquilibriumFailure>) {
+) -> LoadPathRun {
     let leaf =
         DiscreteLeaf::new(problem.leaf, grid).with_compliance_floor(SMALLEST_LOADING_COMPLIANCE);
     let (segments, left) = (leaf.segments(), remaining_loading_budget(effort));
@@ -312,7 +334,10 @@ fn follow_path_on_grid(
     walk.bias_direction = problem.options.bias_direction;
     let end = walk.run(last);
     let events = std::mem::take(&mut walk.events);
-    let reached = (walk.stage, walk.lambda);
+    let reached = PathPosition {
+        stage: walk.stage,
+        lambda: walk.lambda,
+    };
     let evaluations = walk.work.force_evaluations - before;
     // Walks on coarse grids are cheap, and yet not many.
     effort.loading_node_evaluations += evaluations * nodes.max(LOADING_BUDGET / MOST_EVALUATIONS);
@@ -321,8 +346,12 @@ fn follow_path_on_grid(
         state.join_tips();
     }
     leaf.rotate_to_representative(&mut state);
-    effort.farthest_stage = end.is_err().then_some(reached);
-    (GridLevel { leaf, state }, events, end)
+    effort.farthest_position = end.is_err().then_some(reached);
+    LoadPathRun {
+        level: GridLevel { leaf, state },
+        events,
+        end,
+    }
 }
 
 /// Distance of a state from its mirror image, lengths, that is rounding or unfinished iteration.
@@ -377,7 +406,7 @@ pub fn solve_from_start(
 pub fn solve_from_guesses(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
-    guesses: Vec<(Grid, State)>,
+    guesses: Vec<StateOnGrid>,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     let found = solve_on_given_grids(problem, begun, guesses, effort)?;
@@ -389,11 +418,12 @@ pub fn solve_from_guesses(
 pub fn solve_on_given_grids(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
-    guesses: Vec<(Grid, State)>,
+    guesses: Vec<StateOnGrid>,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    (guesses.into_iter()).try_fold(begun, |found, (grid, state)| {
-        solve_from_guess(problem, found, (grid, InitialGuess::Coarser(state)), effort)
+    (guesses.into_iter()).try_fold(begun, |found, StateOnGrid { grid, state }| {
+        let guess = InitialGuess::Coarser(state);
+        solve_from_guess(problem, found, GridGuess { grid, guess }, effort)
     })
 }
 
@@ -420,7 +450,7 @@ pub fn refine_to_tolerance(
         found = found.with_error_estimate(problem, &mut effort.workspace, &mut effort.work);
         let mut known = false;
         if found.is_accurate() {
-            (found, known) = check_stability(problem, found, false, effort)?;
+            StabilityCheck { found, known } = check_stability(problem, found, false, effort)?;
         }
         if known {
             let another = needs_another_grid(problem, &found);
@@ -433,7 +463,7 @@ pub fn refine_to_tolerance(
             return found.into_failure(EquilibriumFailure::StepLimit);
         }
         let Some(finer) = found.next_finer_grid() else {
-            (found, _) = check_stability(problem, found, true, effort)?;
+            let found = check_stability(problem, found, true, effort)?.found;
             return Ok(found.with_tolerance_kept(false));
         };
         found = predict_and_solve(problem, found, finer, effort)?;
@@ -447,7 +477,7 @@ fn needs_another_grid(problem: &RelaxationProblem, found: &NestedEquilibrium) ->
     if enough || found.added_for_nodes || found.next_finer_grid().is_none() {
         return false;
     }
-    found.finer_nodes(found.levels.len()).0 + 1 < found.levels.len()
+    found.finer_nodes(found.levels.len()).grid + 1 < found.levels.len()
 }
 
 /// Settles the leaf on the next finer grid, from a guess by the grids before.
@@ -466,14 +496,15 @@ fn predict_and_solve(
             InitialGuess::Predicted(state)
         }
     };
-    solve_from_guess(problem, found, (finer, guess), effort)
+    let next = GridGuess { grid: finer, guess };
+    solve_from_guess(problem, found, next, effort)
 }
 
 /// Settles the leaf on the next finer grid from this guess.
 fn solve_from_guess(
     problem: &RelaxationProblem,
     mut found: NestedEquilibrium,
-    next: (Grid, InitialGuess),
+    next: GridGuess,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     let GridSolution {
@@ -525,7 +556,10 @@ fn solve_first_grid(
     let mut before: Option<GridLevel> = None;
     let mut failed: Vec<Grid> = Vec::new();
     loop {
-        let from_start = (grid.clone(), InitialGuess::Start);
+        let from_start = GridGuess {
+            grid: grid.clone(),
+            guess: InitialGuess::Start,
+        };
         let settled = find_grid_equilibrium(problem, &mut found.history, from_start, effort);
         let GridSolution {
             level,
@@ -592,7 +626,10 @@ fn is_confirmed_on(
     grid: Grid,
     effort: &mut WorkLog,
 ) -> bool {
-    let from_start = (grid, InitialGuess::Start);
+    let from_start = GridGuess {
+        grid,
+        guess: InitialGuess::Start,
+    };
     let GridSolution {
         level: other,
         iteration_error: rest,
@@ -613,7 +650,10 @@ fn add_coarser_grids(
     for grid in grids.iter().rev().take(2) {
         let fine = &found.levels[0];
         let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
-        let restricted = (grid.clone(), InitialGuess::Coarser(guess));
+        let restricted = GridGuess {
+            grid: grid.clone(),
+            guess: InitialGuess::Coarser(guess),
+        };
         let settled = find_grid_equilibrium(problem, &mut found.history, restricted, effort);
         let there = distance(&positions(&settled.level, 1), &fine) < SAME_EQUILIBRIUM;
         if settled.iteration_error.is_err() || settled.left_convex_valley || !there {

@@ -130,7 +130,7 @@ impl GridRelaxation<'_> {
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
             self.solve_shortening_step(leaf, system, &mut motion, tolerance)?;
-            let (mut size, mut part) = step_size(system, &motion);
+            let MotionStep { mut size, mut part } = MotionStep::new(system, &motion);
             leaf.advance(&self.state, system, part, &mut trial);
             if forces.law_lags(leaf, &self.state, &trial) {
                 let solver = &mut self.solver;
@@ -138,7 +138,7 @@ impl GridRelaxation<'_> {
                     solver.solve_again(system, forces)
                 };
                 system.complete_law(leaf, &self.state, again);
-                (size, part) = step_size(system, &motion);
+                MotionStep { size, part } = MotionStep::new(system, &motion);
                 leaf.advance(&self.state, system, part, &mut trial);
             }
             forces.record_step(size, &self.state, &trial);
@@ -237,11 +237,23 @@ impl GridRelaxation<'_> {
     }
 }
 
-/// The size of the next step, and the part of it that is taken.
-fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
-    let (turn, shift) = system.largest_increment();
-    let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
-    (turn.max(shift), part.min(motion.largest_step_fraction()))
+/// The next step, as it solves the linear equations.
+struct MotionStep {
+    /// Largest rotation (radians) or displacement (lengths) of a node.
+    size: f64,
+    /// The part of the step that is taken.
+    part: f64,
+}
+
+impl MotionStep {
+    fn new(system: &System, motion: &Motion) -> Self {
+        let (turn, shift) = system.largest_increment();
+        let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
+        MotionStep {
+            size: turn.max(shift),
+            part: part.min(motion.largest_step_fraction()),
+        }
+    }
 }
 
 /// Assembles the equations in a state.

@@ -168,7 +168,8 @@ impl<'a> GridRelaxation<'a> {
     pub fn new(
         state: State,
         accuracy: f64,
-        (work, progress): (&'a mut SolverCounts, &'a mut dyn FnMut(usize, f64)),
+        work: &'a mut SolverCounts,
+        progress: &'a mut dyn FnMut(usize, f64),
         limit: &'a Limit,
     ) -> Self {
         GridRelaxation {
