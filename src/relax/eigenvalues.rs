@@ -10,22 +10,11 @@ use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
-use crate::relax::plan::RelaxationProblem;
+use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
 use crate::relax::request::Options;
 use crate::relax::result::Mode;
 use glam::DVec3;
 use std::borrow::Cow;
-
-/// Largest number of unknowns of the finest grid for which modes are computed without their
-/// shapes: about a second.
-const FEW_UNKNOWNS: usize = 20_000;
-
-/// Without their shapes the grids of a stable leaf with fewer unknowns than this suffice, if
-/// there are any: about as long as a relaxation.
-const QUICK_UNKNOWNS: usize = 4_000;
-
-/// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
-const MAX_ADDED_GRID_UNKNOWNS: usize = 200_000;
 
 /// Largest number of grids finer than those of the relaxation.
 const MORE_GRIDS: usize = 6;
@@ -133,8 +122,9 @@ pub fn lowest(
     } = list;
     let options = problem.options;
     let finest = found.levels.last()?;
-    let large =
-        unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides_stability;
+    let large = unknowns(&finest.leaf) > UNKNOWNS.without_shapes
+        && !options.mode_shapes
+        && !list.decides_stability;
     if count == 0 || !finest.leaf.leaf.has_potential() || large {
         return None;
     }
@@ -158,10 +148,10 @@ pub fn lowest(
     };
     let left_out = omitted.map_or(0, |omitted| omitted.count);
     let (wanted, most_unknowns) = match options.mode_shapes || list.needs_values {
-        true => (tolerance, MAX_ADDED_GRID_UNKNOWNS),
+        true => (tolerance, UNKNOWNS.added),
         false => {
             let listed = (LISTED_OVER_TOLERANCE * tolerance).min(LARGEST_LISTED);
-            (tolerance.max(listed), FEW_UNKNOWNS)
+            (tolerance.max(listed), UNKNOWNS.without_shapes)
         }
     };
     let mut nested = NestedEigenvalues {
@@ -179,7 +169,7 @@ pub fn lowest(
         segments: Vec::new(),
     };
     let sharp = requested || list.needs_values;
-    let compares = requested && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let compares = requested && 2 * unknowns(&finest.leaf) <= UNKNOWNS.without_shapes;
     let enough = |series: &EigenvalueSeries| {
         (!sharp || series.accurate()) && (!compares || series.grids.len() >= MIN_COMPARED_GRIDS)
     };
@@ -282,14 +272,14 @@ fn sufficient_grids(options: &Options, found: &NestedEquilibrium) -> usize {
     if options.mode_shapes || found.index != Some(0) {
         return found.levels.len();
     }
-    let few = |level: &&GridLevel| unknowns(&level.leaf) < QUICK_UNKNOWNS;
+    let few = |level: &&GridLevel| unknowns(&level.leaf) < UNKNOWNS.quick;
     let few = found.levels.iter().take_while(few).count();
     few.max(2).min(found.levels.len())
 }
 
 /// Whether the cost of modes on this grid is acceptable.
 fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
-    6 * leaf.rods() * grid.segments() <= MAX_ADDED_GRID_UNKNOWNS
+    6 * leaf.rods() * grid.segments() <= UNKNOWNS.added
 }
 
 /// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
@@ -309,7 +299,7 @@ pub fn affordable_next_grid(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
 ) -> Option<Grid> {
-    let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
+    let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= UNKNOWNS.without_shapes;
     (found.next_finer_grid()).filter(|grid| few(grid) && !problem.out_of_time())
 }
 

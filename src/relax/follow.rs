@@ -10,10 +10,11 @@ use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
-use crate::relax::plan::RelaxationProblem;
+use crate::relax::plan::{GRIDS, RelaxationProblem};
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
 use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
+use crate::relax::same_equilibrium::{is_near_prediction, is_same_beside_fold};
 use crate::relax::sensitivity::Linearized;
 use crate::relax::stability::state_from_rod_shapes;
 use crate::run::Instant;
@@ -21,12 +22,6 @@ use crate::scenario::Scenario;
 use crate::shape::RodShape;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
-/// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
-const LARGEST_PREDICTION_ERROR: f64 = 0.5;
-
-const DRIFT_LENGTH: f64 = 0.02;
 
 /// The grids on which an equilibrium is continued.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,11 +112,8 @@ impl NestedEquilibrium {
             _ => ContinuationFailure::OtherEquilibrium,
         })?;
         for ((level, expected), before) in found.levels.iter().zip(&expected).zip(&self.levels) {
-            let predicted = rescale_state(before, before.state.clone(), &leaf)
-                .largest_displacement_to(expected);
-            if level.state.largest_displacement_to(expected)
-                > LARGEST_PREDICTION_ERROR * predicted + DRIFT_LENGTH
-            {
+            let before = rescale_state(before, before.state.clone(), &leaf);
+            if !is_near_prediction(&before, expected, &level.state) {
                 return Err(ContinuationFailure::OtherEquilibrium);
             }
         }
@@ -185,14 +177,6 @@ enum FollowEnd<E> {
 
 /// Grids on which the next equilibrium is predicted.
 const MAX_PREDICTED_GRIDS: usize = 2;
-
-/// The finest of the grids that are tried where coarser ones have no equilibrium any more: folds lie
-/// elsewhere on each of them.
-const FINEST: usize = 128;
-
-/// Equilibria on two grids that are no farther apart, in lengths, are one: beside a fold, which lies
-/// elsewhere on each, that is far.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.1;
 
 /// A leaf at rest, which can follow.
 ///
@@ -381,7 +365,7 @@ impl EquilibriumTracker {
     /// enough.
     fn refine(&mut self) -> bool {
         if let [_, finer, ..] = &self.at.levels[..] {
-            let fine = finer.leaf.segments() <= FINEST;
+            let fine = finer.leaf.segments() <= GRIDS.finest_of_tracking;
             if fine {
                 let levels = self.at.levels[1..].to_vec();
                 self.at = self.at.without_estimates().with_levels(levels);
@@ -389,7 +373,8 @@ impl EquilibriumTracker {
             return fine;
         }
         let only = &self.at.levels[0].leaf;
-        only.segments() < FINEST && self.continue_on_grid(only.leaf.clone(), only.grid.refined())
+        only.segments() < GRIDS.finest_of_tracking
+            && self.continue_on_grid(only.leaf.clone(), only.grid.refined())
     }
 
     /// Whether it is in the same equilibrium on another grid, on which it then goes on.
@@ -401,8 +386,7 @@ impl EquilibriumTracker {
             return false;
         };
         let there = transfer(&own.leaf, &own.state, &other.leaf.grid);
-        let same = there.largest_displacement_to(&other.state) < SAME_EQUILIBRIUM_DISTANCE
-            && found.is_stable();
+        let same = is_same_beside_fold(&there, &other.state) && found.is_stable();
         if same {
             self.at = found;
         }

@@ -19,6 +19,7 @@ mod request;
 pub(crate) mod rest;
 mod result;
 mod saddle;
+mod same_equilibrium;
 mod sensitivity;
 mod shooting;
 pub(crate) mod solve_on_grid;

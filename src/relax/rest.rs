@@ -15,7 +15,7 @@ use crate::relax::loading::arrival::{
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
 use crate::relax::plan::{
-    Acceptance, COARSEST, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
+    Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
     WayFromStart, least_segments, may_solve_half, plan,
 };
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
@@ -60,7 +60,7 @@ pub(crate) fn relax_on_grids(
     let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
     // What a held leaf comes to depends on the way of its holders, which few segments would change.
     let least = match leaf.has_placed_supports() {
-        true => COARSEST,
+        true => GRIDS.coarsest,
         false => least_segments(method, tolerance, few),
     };
     let first = check_segments(&leaf, method.segments(), least)?;

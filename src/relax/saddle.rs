@@ -7,6 +7,7 @@ use crate::leaf::{
 };
 use crate::newton::{NewtonEquations, NewtonIteration, SolverCounts};
 use crate::numbers::larger;
+use crate::relax::same_equilibrium::{are_different_sides, are_equally_low, is_noticed_saddle};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -199,9 +200,6 @@ const POLISH_ITERATIONS: usize = 20;
 /// Accuracy of a converged saddle: rounding.
 const POLISH_ACCURACY: f64 = 1e-13;
 
-/// Largest distance of a saddle from the state at which it was noticed, in lengths.
-const POLISH_DISTANCE: f64 = 0.1;
-
 /// Converges a state near a saddle to rounding by Newton's method and counts its Morse index,
 /// a neutral mode not counting as negative. `None` if Newton's method leads elsewhere, with
 /// the state unchanged, or if the index is not known.
@@ -219,7 +217,7 @@ pub fn converge_saddle(
         progress: &mut |_, _| {},
     };
     let found = iteration.solve(leaf, &mut exact, system, INDEFINITE_NEWTON_EQUATIONS);
-    if found.is_err() || state.largest_displacement_to(&exact) >= POLISH_DISTANCE {
+    if found.is_err() || !is_noticed_saddle(state, &exact) {
         return None;
     }
     *state = exact;
@@ -291,12 +289,6 @@ pub fn escape_saddle(
     }
 }
 
-/// Energies of mirror images agree to this part, of the larger one or of one (A/L); images are
-/// farther apart than this (lengths, radians).
-const SAME_ENERGY: f64 = 1e-3;
-
-const IMAGES_APART: f64 = 0.05;
-
 /// An equilibrium to which a leaf turned from a saddle.
 pub struct SideOfSaddle {
     pub state: State,
@@ -321,12 +313,10 @@ impl SideOfSaddle {
 pub fn lower_energy_side(sides: [Option<SideOfSaddle>; 2]) -> Option<SideOfSaddle> {
     match sides {
         [Some(one), Some(other)] => {
-            let [e1, e2] = [one.energy, other.energy];
-            let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
-            let apart = one.state.distance(&other.state) > IMAGES_APART;
-            match e1 <= e2 || same {
+            let same = are_equally_low(one.energy, other.energy);
+            match one.energy <= other.energy || same {
                 true => Some(SideOfSaddle {
-                    equally_open: same && apart,
+                    equally_open: same && are_different_sides(&one.state, &other.state),
                     ..one
                 }),
                 false => Some(other),

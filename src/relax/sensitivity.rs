@@ -11,6 +11,7 @@ use crate::modes::Eigenpair;
 use crate::motion::Physics;
 use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::plan::UNKNOWNS;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
 use crate::rod::Segment;
@@ -22,10 +23,6 @@ use std::sync::Arc;
 /// Up to this many numbers the equations are solved for each, which gives all derivatives; for
 /// more of them adjoint solutions give those of tips and energy alone.
 const MAX_DIRECT_PARAMETERS: usize = 100;
-
-/// Grids with fewer unknowns than this have their eigenvalues differentiated, and the coarsest
-/// in any case.
-const FEW_UNKNOWNS: usize = 4_000;
 
 /// A number by which the results are differentiated, with the scenarios that differ in it.
 struct DifferentiatedParameter<'n, 'a> {
@@ -120,7 +117,7 @@ pub(crate) fn sensitivities(
     let mut eigenvalues = VectorSeries::default();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-        let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
+        let with_modes = k == 0 || unknowns < UNKNOWNS.quick;
         let grid = SensitivityGrid {
             level,
             tolerance,

@@ -12,9 +12,10 @@ use crate::relax::eigenvalues::{
 };
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::log::WorkLog;
-use crate::relax::plan::RelaxationProblem;
+use crate::relax::plan::{GRIDS, RelaxationProblem};
 use crate::relax::request::{MOST_MODES, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;
+use crate::relax::same_equilibrium::{is_given_within_errors, is_near_guess};
 use crate::relax::{eigenvalues, saddle};
 use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
@@ -294,20 +295,12 @@ fn count_with_more_eigenvalues(
     }
 }
 
-/// The finest grid on which an equilibrium is looked for first.
-const FINEST: usize = 1024;
+/// Largest tolerance of the grids on which the eigenvalues of a given equilibrium are compared.
+const LARGEST_TOLERANCE_FOR_INDEX: f64 = 1e-4;
 
-/// Largest and smallest tolerance of further grids, on which its eigenvalues are compared: on the
-/// grids that a smaller one needs, rounding hides the signs of soft ones.
-const TOLERANCE: f64 = 1e-4;
-
-const LEAST_TOLERANCE: f64 = 1e-5;
-
-/// Equilibria farther apart than this, in lengths, are different ones, and so are those that are
-/// farther apart than their errors times the second number.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.02;
-
-const SAME_EQUILIBRIUM_ERROR_MULTIPLE: f64 = 10.0;
+/// Smallest tolerance of these grids: on those that a smaller one needs, rounding hides the signs of
+/// soft eigenvalues.
+const SMALLEST_TOLERANCE_FOR_INDEX: f64 = 1e-5;
 
 /// Number of negative eigenvalues of the energy's Hessian at the equilibrium with the shape `rods`,
 /// given at the nodes of `grid` in the scenario's units within `error`, decided as that of a
@@ -330,7 +323,7 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
     };
     let mut ignored = |_: &Progress| {};
     let error = error / leaf.scale.length;
-    let tolerance = error.clamp(LEAST_TOLERANCE, TOLERANCE);
+    let tolerance = error.clamp(SMALLEST_TOLERANCE_FOR_INDEX, LARGEST_TOLERANCE_FOR_INDEX);
     let problem = RelaxationProblem::new(&leaf, &options, tolerance);
     let mut effort = WorkLog::new(&mut ignored);
     let discrete = DiscreteLeaf::new(&leaf, grid);
@@ -341,7 +334,7 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
     };
     let given = GivenEquilibrium { level, error };
     let mut guess = given.level.clone();
-    while guess.leaf.segments() <= FINEST {
+    while guess.leaf.segments() <= GRIDS.finest_of_given_equilibrium {
         let finer = GridLevel {
             leaf: DiscreteLeaf::new(&leaf, guess.leaf.grid.refined()),
             state: prolong(&guess.leaf, &guess.state),
@@ -379,22 +372,20 @@ fn index_from(
     let begun = state.clone();
     let index = saddle::converge_saddle(leaf, state, &mut system, &mut effort.work)?;
     if saddle::clearly_stable(leaf, state, &mut system, &mut effort.work) {
-        return (state.largest_displacement_to(&begun) < SAME_EQUILIBRIUM_DISTANCE)
-            .then_some(CountedIndex { index: Some(0) });
+        return is_near_guess(&begun, state).then_some(CountedIndex { index: Some(0) });
     }
     let counted = NestedEquilibrium::without_grids(problem).with_index(false, Some(index));
     let refined = refine_to_tolerance(problem, counted.with_finer_level(guess), effort).ok()?;
     // No other equilibrium is of interest.
     let Decision { found, verdict, .. } = decide(problem, refined, effort, &|_, _| None);
-    let allowed = SAME_EQUILIBRIUM_DISTANCE.min(
-        SAME_EQUILIBRIUM_ERROR_MULTIPLE * (given.error + found.error().unwrap_or(f64::INFINITY)),
-    );
+    let error = given.error + found.error().unwrap_or(f64::INFINITY);
+    let same = is_given_within_errors(distance_from_given(&found, &given.level), error);
     let index = match verdict {
         Verdict::AsCounted => found.index,
         Verdict::Index(index) => Some(index),
         Verdict::Undecided(_) | Verdict::Unknown => None,
     };
-    (distance_from_given(&found, &given.level) <= allowed).then_some(CountedIndex { index })
+    same.then_some(CountedIndex { index })
 }
 
 /// The largest distance of the extrapolated positions from those `given` on a grid whose repeated

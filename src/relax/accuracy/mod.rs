@@ -21,7 +21,7 @@ use crate::relax::accuracy::fields::{FieldsAtNodes, finer_nodes};
 use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
 use crate::relax::path::Path;
-use crate::relax::plan::{COARSEST, FINEST, RelaxationProblem, WayFromStart};
+use crate::relax::plan::{GRIDS, RelaxationProblem, WayFromStart};
 use crate::relax::request::MAX_NODES;
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
@@ -316,7 +316,7 @@ impl NestedEquilibrium {
         let grid = leaf.grid.refined();
         let (rods, segments) = (leaf.rods(), grid.segments());
         let allowed = !self.has_fixed_grid
-            && segments <= FINEST
+            && segments <= GRIDS.finest
             && rods * segments <= MAX_NODES
             && memory::check_grid_memory(rods, segments).is_ok()
             && !self.beyond_rounding(segments);
@@ -490,7 +490,7 @@ impl NestedEquilibrium {
         let best = self.convergence_table.best();
         let best = best.map(|best| larger(best.error, self.unresolved));
         let most = best.map_or(f64::INFINITY, |best| LARGEST_ESTIMATE_RATIO * best);
-        let too_coarse = !self.has_fixed_grid && segments[0] < COARSEST;
+        let too_coarse = !self.has_fixed_grid && segments[0] < GRIDS.coarsest;
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
@@ -587,7 +587,7 @@ impl NestedEquilibrium {
             }
         };
         let goal = CorrectionGoal {
-            error: self.tolerance / SAFETY - ROUNDING * COARSEST as f64,
+            error: self.tolerance / SAFETY - ROUNDING * GRIDS.coarsest as f64,
             most_corrections: most,
         };
         let (levels, linear) = (&self.levels, &mut self.factorized_level);

@@ -14,6 +14,7 @@
 use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::motion::{Explicit, Physics, Snapshot, Stopped, TimeIntegrator};
 use crate::newton::{EquilibriumFailure, SolverCounts};
+use crate::relax::plan::WORK;
 use crate::relax::request::RelaxError;
 use crate::relax::saddle;
 use crate::relax::solve_on_grid::start::GridRelaxation;
@@ -56,9 +57,6 @@ const STAGNATION: usize = 50;
 
 const LARGEST_STAGNANT_DISTANCE: f64 = 1e-6;
 
-/// Limit on nodes times steps: some ten seconds.
-const BUDGET: usize = 600_000_000;
-
 const RIGID_RODS_REFUSAL: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
 
@@ -91,7 +89,7 @@ pub fn relax_explicitly(
     let physics = Physics::for_relaxation(&leaf.leaf);
     let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
     let mut motion = motion.map_err(|_| EquilibriumFailure::NoDescent)?;
-    let most_steps = BUDGET / (leaf.rods() * leaf.segments());
+    let most_steps = WORK.explicit_node_steps / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
         true => Ok(()),
         false => find_valley(leaf, &mut motion, system, most_steps, request),

@@ -16,7 +16,7 @@ use crate::relax::accuracy::{
 };
 use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
-use crate::relax::plan::{BUDGET, FINEST, RelaxationProblem, WayFromStart};
+use crate::relax::plan::{GRIDS, RelaxationProblem, WORK, WayFromStart};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
@@ -36,29 +36,6 @@ const ITERATION_PART_ALONE: f64 = 5e-2;
 
 /// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
 const FIXED_ACCURACY: f64 = 1e-12;
-
-/// Force evaluations that any leaf may use on a grid, whatever was spent before.
-struct GuaranteedEvaluations {
-    /// On the coarse grids; on finer ones their number falls with that of the segments.
-    most: usize,
-    /// On any grid.
-    least: usize,
-    /// Segments of the finest of the coarse grids.
-    coarse_segments: usize,
-}
-
-/// Twice as many let a leaf whose motion lasts as long come to rest after the budget is spent.
-const GUARANTEED_EVALUATIONS: GuaranteedEvaluations = GuaranteedEvaluations {
-    most: 600,
-    least: 100,
-    coarse_segments: 64,
-};
-
-impl GuaranteedEvaluations {
-    fn on_grid(&self, segments: usize) -> usize {
-        (self.most * self.coarse_segments / segments).clamp(self.least, self.most)
-    }
-}
 
 /// Newton iterations towards an equilibrium of any kind.
 const MAX_ITERATIONS: usize = 200;
@@ -280,8 +257,12 @@ fn solve_semi_implicit(
         || problem.stays_in_valley
         || problem.too_coarse(leaf.segments());
     let nodes = leaf.rods() * leaf.segments();
-    let granted = GUARANTEED_EVALUATIONS.on_grid(leaf.segments());
-    let allowed = (BUDGET.saturating_sub(effort.node_evaluations) / nodes).max(granted);
+    let granted = (WORK.guaranteed * WORK.coarse_segments / leaf.segments())
+        .clamp(WORK.guaranteed_on_any_grid, WORK.guaranteed);
+    let left = WORK
+        .node_evaluations
+        .saturating_sub(effort.node_evaluations);
+    let allowed = (left / nodes).max(granted);
     let most_evaluations = effort.work.force_evaluations + allowed;
     let (work, limit) = (&mut effort.work, &problem.options.limit);
     let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
@@ -540,10 +521,6 @@ pub fn relax_from_state(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -
     check.found.levels.pop().map(|level| level.state)
 }
 
-/// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
-/// of 86 were too low by a factor of two.
-const COARSEST_BLADE_GRID: usize = 16;
-
 /// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
 /// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
 /// loose tolerance.
@@ -585,15 +562,15 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         let bending = moment / section.couple_stiffness.min_element();
         (section.rest_curvature.length() + bending) * leaf.length(j)
     };
-    let turn = match no_potential::moment_curvature(leaf, FINEST) {
+    let turn = match no_potential::moment_curvature(leaf, GRIDS.finest) {
         Some(rate) => rate * leaf.length(0),
         None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
     };
     let mut segments = match leaf.scenario().blade {
-        Some(_) => least.max(COARSEST_BLADE_GRID),
+        Some(_) => least.max(GRIDS.coarsest_of_blade),
         None => least,
     };
-    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
+    while (segments as f64) * COARSEST_TURN < turn && segments < GRIDS.finest {
         segments *= 2;
     }
     segments
