@@ -11,15 +11,26 @@ use crate::relax::same_equilibrium::{are_different_sides, are_equally_low, is_no
 use glam::DVec3;
 use serde::Serialize;
 
-/// Size of the push off a saddle: largest rotation (radians) or displacement
-/// (lengths) along the unstable mode.
-const SADDLE_ESCAPE_DISTANCE: f64 = 0.03;
+/// How a leaf is pushed off a saddle.
+struct SaddleEscape {
+    /// Largest rotation (radians) or displacement (lengths) of the push along the unstable mode. A much
+    /// shorter one costs steps until the leaf moves, a much longer one may lead over another saddle.
+    distance: f64,
+    /// Steps of inverse iteration for the mode: it must be unstable, not accurate.
+    mode_iterations: usize,
+    /// Relative accuracy of the linear solutions of these.
+    mode_accuracy: f64,
+    /// The first shift of the inverse iteration, with respect to the masses; doubled until the matrix is
+    /// positive definite.
+    first_shift: f64,
+}
 
-/// Steps of inverse iteration; the mode must be unstable, not accurate.
-const MODE_ITERATIONS: usize = 6;
-
-/// Largest rotation or displacement in a Newton step towards an equilibrium of any kind.
-const MAX_STEP: f64 = 0.5;
+const ESCAPE: SaddleEscape = SaddleEscape {
+    distance: 0.03,
+    mode_iterations: 6,
+    mode_accuracy: 1e-3,
+    first_shift: 1e-4,
+};
 
 /// Lower bound on the lowest eigenvalue (with respect to the masses; 12 for a clamped rod) on
 /// one grid of a leaf that counts as clearly stable: near a fold it changes with the shape.
@@ -190,15 +201,16 @@ pub fn clearly_stable(
     count(leaf, state, system, shifted, work) == Some(0)
 }
 
-/// Newton's equations with pivots of any sign, and steps of bounded size.
+/// Newton's equations with pivots of any sign, for steps to an equilibrium of any Morse index with
+/// rotations (radians) and displacements (lengths) of bounded size.
 pub const INDEFINITE_NEWTON_EQUATIONS: NewtonEquations =
-    NewtonEquations::Indefinite { largest: MAX_STEP };
+    NewtonEquations::Indefinite { largest: 0.5 };
 
-/// Newton iterations to converge at a saddle.
-const POLISH_ITERATIONS: usize = 20;
+/// Newton iterations that converge a saddle to rounding from where it was noticed.
+const CONVERGENCE_ITERATIONS: usize = 20;
 
-/// Accuracy of a converged saddle: rounding.
-const POLISH_ACCURACY: f64 = 1e-13;
+/// Accuracy of a converged saddle, in lengths and radians: rounding.
+const CONVERGED_ACCURACY: f64 = 1e-13;
 
 /// Converges a state near a saddle to rounding by Newton's method and counts its Morse index,
 /// a neutral mode not counting as negative. `None` if Newton's method leads elsewhere, with
@@ -211,8 +223,8 @@ pub fn converge_saddle(
 ) -> Option<usize> {
     let mut exact = state.clone();
     let iteration = NewtonIteration {
-        accuracy: POLISH_ACCURACY,
-        iterations: POLISH_ITERATIONS,
+        accuracy: CONVERGED_ACCURACY,
+        iterations: CONVERGENCE_ITERATIONS,
         work,
         progress: &mut |_, _| {},
     };
@@ -224,8 +236,7 @@ pub fn converge_saddle(
     index(leaf, state, system, leaf.neutral_shift(), work)
 }
 
-/// Finds the most unstable mode at a saddle, by inverse iteration with the first shift, doubled
-/// from 1e-4, that makes the matrix positive definite, from the [`symmetry_breaking_field`]. It is the solution
+/// Finds the most unstable mode at a saddle, by inverse iteration with the first shift that makes the matrix positive definite, from the [`symmetry_breaking_field`]. It is the solution
 /// of the system; false if there is none.
 pub fn find_unstable_mode(
     leaf: &DiscreteLeaf,
@@ -239,12 +250,12 @@ pub fn find_unstable_mode(
     work.force_evaluations += 1;
     let momentum = system.mass_product(&symmetry_breaking_field(leaf, state, leaning));
     system.set_rhs(&momentum);
-    let mut shift = 1e-4;
+    let mut shift = ESCAPE.first_shift;
     let mut factors = loop {
         work.factorizations += 1;
         if let Some(mut factors) = DefiniteFactors::new(system, shift)
             && matches!(
-                factors.solve(system, 1e-3),
+                factors.solve(system, ESCAPE.mode_accuracy),
                 LinearSolveOutcome::Converged(_)
             )
         {
@@ -255,10 +266,10 @@ pub fn find_unstable_mode(
             return false;
         }
     };
-    for _ in 0..MODE_ITERATIONS {
+    for _ in 0..ESCAPE.mode_iterations {
         system.iterate_inverse();
         if !matches!(
-            factors.solve(system, 1e-3),
+            factors.solve(system, ESCAPE.mode_accuracy),
             LinearSolveOutcome::Converged(_)
         ) {
             break;
@@ -271,7 +282,7 @@ pub fn find_unstable_mode(
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
     let (turn, displacement) = system.largest_increment();
     let mut pushed = state.clone();
-    let step = sign * SADDLE_ESCAPE_DISTANCE / larger(turn, displacement);
+    let step = sign * ESCAPE.distance / larger(turn, displacement);
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }
@@ -357,4 +368,4 @@ pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec
 }
 
 /// Weight of a given direction over that of the others.
-pub(super) const GIVEN_BIAS_WEIGHT: f64 = 10.0;
+const GIVEN_BIAS_WEIGHT: f64 = 10.0;

@@ -25,26 +25,41 @@ use crate::relax::accuracy::transfer::GridLevel;
 use crate::rotation;
 use glam::DVec3;
 
-/// The linear equations are those of the grid this many levels below the finest, but not of
-/// the coarsest.
-const LINEARIZATION_COARSENING_LEVELS: usize = 2;
+/// When and how far a leaf is corrected by its defect.
+struct DefectCorrection {
+    /// The linear equations are those of the grid so many levels below the finest, but not of the
+    /// coarsest. One less makes them four times as accurate, and twice as expensive.
+    levels_below_finest: usize,
+    /// The part of the error assumed to remain after a correction before it has been measured: on a
+    /// grid of n segments this number over n^2.
+    contraction_by_segments: f64,
+    /// The least part assumed.
+    least_contraction: f64,
+    /// The largest measured part with which corrections continue.
+    largest_contraction: f64,
+    /// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
+    /// jumps there tell nothing of the errors at the nodes.
+    largest_growth: f64,
+    /// Errors of rotations allowed in a corrected leaf, in multiples of that of the positions
+    /// (dimensionless): as they are in an extrapolated one.
+    rotation_errors: f64,
+    /// Errors of forces and moments allowed in a corrected leaf, in the same multiples.
+    force_errors: f64,
+    /// Relative accuracy, in the energy norm, of the response to the defect: in a stiff leaf most of
+    /// that norm is stretch, and displacements are a small part of it.
+    response_accuracy: f64,
+}
 
-/// The part of the error assumed to remain after a correction before it has been measured: on
-/// a grid of n segments the first number over n^2, but no less than the second; and the largest
-/// measured part with which corrections continue.
-const EXPECTED_CORRECTION_CONTRACTION: (f64, f64) = (0.64, 0.01);
-
-const LARGEST_CORRECTION_CONTRACTION: f64 = 0.2;
-
-/// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
-/// jumps there tell nothing of the errors at the nodes.
-const MAX_PERTURBATION_GROWTH: f64 = 2.0;
-
-/// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
-/// of that of the positions (dimensionless): as they are in an extrapolated one.
-const ROTATION_ERROR_MULTIPLE: f64 = 10.0;
-
-const FORCE_ERROR_MULTIPLE: f64 = 50.0;
+const CORRECTION: DefectCorrection = DefectCorrection {
+    levels_below_finest: 2,
+    contraction_by_segments: 0.64,
+    least_contraction: 0.01,
+    largest_contraction: 0.2,
+    largest_growth: 2.0,
+    rotation_errors: 10.0,
+    force_errors: 50.0,
+    response_accuracy: 1e-6,
+};
 
 /// The factorised equations of one of the grids.
 pub struct FactorizedLevel {
@@ -156,12 +171,12 @@ pub fn estimate(
         0 => (first.grid.coarsened()?, 0),
         _ => (
             first.grid.clone(),
-            last.saturating_sub(LINEARIZATION_COARSENING_LEVELS).max(1),
+            last.saturating_sub(CORRECTION.levels_below_finest).max(1),
         ),
     };
     let widths = (0..parts.segments()).map(|i| parts.segment_width(i));
     let unstable =
-        first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > MAX_PERTURBATION_GROWTH;
+        first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > CORRECTION.largest_growth;
     if unstable || first.has_grips() {
         return None;
     }
@@ -179,8 +194,7 @@ pub fn estimate(
     );
     let mut tangents = Tangents::new(level, count);
     let n = level.leaf.segments() as f64;
-    let assumed =
-        (EXPECTED_CORRECTION_CONTRACTION.0 / (n * n)).max(EXPECTED_CORRECTION_CONTRACTION.1);
+    let assumed = (CORRECTION.contraction_by_segments / (n * n)).max(CORRECTION.least_contraction);
     let mut uncorrected = None;
     let mut before = 0.0;
     let mut steps = IntegrationSteps::new(finest.segments() / count / 2, last == 0);
@@ -198,7 +212,7 @@ pub fn estimate(
             true => assumed,
             false => largest / before,
         };
-        if !largest.is_finite() || contraction > LARGEST_CORRECTION_CONTRACTION {
+        if !largest.is_finite() || contraction > CORRECTION.largest_contraction {
             break;
         }
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
@@ -217,8 +231,8 @@ pub fn estimate(
         } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(
-                turn / ROTATION_ERROR_MULTIPLE,
-                stress / FORCE_ERROR_MULTIPLE,
+                turn / CORRECTION.rotation_errors,
+                stress / CORRECTION.force_errors,
             ) <= enough
             {
                 let errors = response.position_errors.increased(steps.error);
@@ -440,10 +454,6 @@ fn mean(a: &RodFields, b: &RodFields) -> RodFields {
     }
 }
 
-/// Relative accuracy, in the energy norm, of the response: in a stiff leaf most of that
-/// norm is stretch, and displacements are a small part of it.
-const ACCURACY: f64 = 1e-6;
-
 /// Changes of position, rotation, force and moment.
 pub type FieldChange = [DVec3; 4];
 
@@ -495,7 +505,8 @@ impl<'a> Tangents<'a> {
             system, factors, ..
         } = linear;
         leaf.assemble_jump_correction(&self.behind, jumps, system);
-        let LinearSolveOutcome::Converged(_) = factors.solve(system, ACCURACY) else {
+        let LinearSolveOutcome::Converged(_) = factors.solve(system, CORRECTION.response_accuracy)
+        else {
             return None;
         };
         let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);

@@ -25,23 +25,32 @@ use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation, disturb,
 use crate::run::{Limit, RefusedOption};
 use glam::DVec3;
 
-/// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
-/// coarse, a looser one saves a step on the finest. On a grid that may be the only one it is
-/// estimated, and subtracted, with the error of the grid.
-const ITERATION_PART: f64 = 1e-3;
+/// Errors of positions and rotations that the iteration on a grid may leave. Half of any of them costs
+/// a step of Newton's method on some of the finest grids.
+struct IterationErrors {
+    /// As a part of the tolerance.
+    usual: f64,
+    /// The part where the first grid is very coarse: that saves a step on the finest.
+    from_coarse: f64,
+    /// The part on a grid that may be the only one, where the error of the iteration is estimated,
+    /// and subtracted, with that of the grid.
+    alone: f64,
+    /// The error on a fixed grid, whose results are meant for comparisons, in lengths and radians.
+    fixed_grid: f64,
+}
 
-const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+const ITERATION_ERRORS: IterationErrors = IterationErrors {
+    usual: 1e-3,
+    from_coarse: 5e-3,
+    alone: 5e-2,
+    fixed_grid: 1e-12,
+};
 
-const ITERATION_PART_ALONE: f64 = 5e-2;
-
-/// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
-const FIXED_ACCURACY: f64 = 1e-12;
-
-/// Newton iterations towards an equilibrium of any kind.
+/// Newton iterations towards an equilibrium of any Morse index, from a start that may be far from it.
 const MAX_ITERATIONS: usize = 200;
 
-/// Saddles that are left before the run fails.
-pub const MAX_SADDLES: i32 = 10;
+/// Saddles that a leaf leaves before its relaxation fails.
+const MAX_SADDLES: i32 = 10;
 
 /// Accuracy, in the energy norm, of the effects of shear and stretch: stretch dominates this
 /// norm, to which displacements contribute little.
@@ -232,14 +241,14 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
 fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf) -> f64 {
     let first = history.coarsest.unwrap_or(leaf.segments());
     match problem.segments() {
-        Some(_) => FIXED_ACCURACY,
+        Some(_) => ITERATION_ERRORS.fixed_grid,
         None if problem.too_coarse(first) => {
             match history.coarsest.is_none() && problem.may_use_single_grid() {
-                true => ITERATION_PART_ALONE * problem.tolerance,
-                false => ITERATION_PART_FROM_COARSE * problem.tolerance,
+                true => ITERATION_ERRORS.alone * problem.tolerance,
+                false => ITERATION_ERRORS.from_coarse * problem.tolerance,
             }
         }
-        None => ITERATION_PART * problem.tolerance,
+        None => ITERATION_ERRORS.usual * problem.tolerance,
     }
 }
 
@@ -494,8 +503,8 @@ pub fn check_stability(
     }
 }
 
-/// Accuracy of the equilibrium.
-const TOLERANCE: f64 = 1e-6;
+/// Tolerance of an equilibrium to which a leaf moves on its own on one grid.
+const MOVED_TO_TOLERANCE: f64 = 1e-6;
 
 /// The stable equilibrium that a leaf reaches from a state on a grid without initial velocity:
 /// saddles are left. `None` if it does not come to rest.
@@ -504,7 +513,7 @@ pub fn relax_from_state(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -
         limit: limit.clone(),
         ..Options::default()
     };
-    let problem = RelaxationProblem::new(leaf, &options, TOLERANCE);
+    let problem = RelaxationProblem::new(leaf, &options, MOVED_TO_TOLERANCE);
     let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
     let mut effort = WorkLog::new(ignored);
     let mut found = NestedEquilibrium::without_grids(&problem);
@@ -554,7 +563,7 @@ pub fn check_segments(
     Ok(segments)
 }
 
-/// Segments of the coarsest grid.
+/// Segments of the coarsest grid: `least`, or as many as resolve rest curvature and dead moments.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
     let moment = leaf.moment_integral_bound();
     let turn = |j: usize| {
