@@ -37,7 +37,7 @@ use crate::motion::{
 };
 use crate::newton::{NewtonIteration, SolverCounts};
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route,
+    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route, StateOnGrid,
     converge_saddle,
 };
 use crate::run::{Instant, Limit, RefusedOption};
@@ -144,7 +144,11 @@ impl Simulation {
         scenario: &Scenario,
     ) -> Result<Equilibrium, RelaxError> {
         let now = self.method.snapshot();
-        follower.relax_from_state(scenario, (self.grid.clone(), now.state))
+        let guess = StateOnGrid {
+            grid: self.grid.clone(),
+            state: now.state,
+        };
+        follower.relax_from_state(scenario, guess)
     }
 
     fn with_initial_state(
