@@ -466,6 +466,47 @@ fn draw_residuals(
     cell.opposite_corner().y + PAGE.panel_axis
 }
 
+/// A measured point of a vein, as a view shows it.
+struct MeasuredPoint {
+    /// Counted from 0.
+    rod: usize,
+    at: (f64, f64),
+}
+
+/// A leaf and its measured points along one of the axes, with axes that cover both.
+struct LeafView {
+    title: &'static str,
+    across: Axis,
+    up: Axis,
+    curves: Vec<Vec<(f64, f64)>>,
+    points: Vec<MeasuredPoint>,
+}
+
+impl LeafView {
+    fn of_leaf(view: PlaneView, leaf: &FitLeaf, units: &Units) -> Self {
+        let [right, upward] = view.axes;
+        let traced = leaf.traced.iter();
+        let points = traced.filter_map(|(rod, at)| {
+            let at = (at[right]?, at[upward]?);
+            Some(MeasuredPoint { rod: *rod, at })
+        });
+        let points: Vec<MeasuredPoint> = points.collect();
+        let flat = |point: &DVec3| (point[right], point[upward]);
+        let curves = leaf.curves.iter();
+        let curves = curves.map(|curve| curve.iter().map(flat).collect());
+        let curves: Vec<Vec<(f64, f64)>> = curves.collect();
+        let all = || (curves.iter().flatten()).chain(points.iter().map(|point| &point.at));
+        let name = |axis: usize| name_with_unit(COORDINATE_NAMES[axis], units.length.as_deref());
+        LeafView {
+            title: view.title,
+            across: Axis::linear_covering(&name(right), all().map(|point| point.0)),
+            up: Axis::linear_covering(&name(upward), all().map(|point| point.1)),
+            curves,
+            points,
+        }
+    }
+}
+
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
 fn draw_measured_veins(
@@ -494,25 +535,11 @@ fn draw_measured_veins(
         _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.views_gap),
     };
     let count = leaf.curves.len();
-    let panels: Vec<_> = (views.iter())
-        .map(|PlaneView { axes, .. }| {
-            let seen = |at: [Option<f64>; 3]| Some((at[axes[0]]?, at[axes[1]]?));
-            let traced = leaf.traced.iter();
-            let points = traced.filter_map(|(rod, at)| Some((*rod, seen(*at)?)));
-            let points: Vec<(usize, (f64, f64))> = points.collect();
-            let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
-            let curves = leaf.curves.iter();
-            let curves = curves.map(|curve| curve.iter().map(flat).collect());
-            let curves: Vec<Vec<(f64, f64)>> = curves.collect();
-            let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
-            let name =
-                |k: usize| name_with_unit(COORDINATE_NAMES[axes[k]], units.length.as_deref());
-            let across = Axis::linear_covering(&name(0), all().map(|p| p.0));
-            let up = Axis::linear_covering(&name(1), all().map(|p| p.1));
-            (across, up, curves, points)
-        })
+    let panels: Vec<LeafView> = (views.into_iter())
+        .map(|view| LeafView::of_leaf(view, leaf, units))
         .collect();
-    let tall = |(across, up, ..): &(Axis, Axis, _, _)| {
+    let tall = |panel: &LeafView| {
+        let LeafView { across, up, .. } = panel;
         width * (up.end - up.start) / (across.end - across.start)
     };
     let height = panels
@@ -526,7 +553,8 @@ fn draw_measured_veins(
     };
     let mut below =
         PageRectangle::left_of_legend(top + PAGE.panel_title, height, RESULT_LAYOUT.key);
-    for (k, (view, (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
+    let is_single = panels.len() == 1;
+    for (k, view) in panels.into_iter().enumerate() {
         let corner = DVec2::new(
             PAGE.left_margin + k as f64 * (width + RESULT_LAYOUT.views_gap),
             top + PAGE.panel_title,
@@ -534,20 +562,20 @@ fn draw_measured_veins(
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
         let what = format!("{experiment}, {}", view.title);
-        let (across, up) = equalize_axis_scales(across, up, cell.size);
+        let (across, up) = equalize_axis_scales(view.across, view.up, cell.size);
         let panel = PanelAxes::draw_titled(page, cell, [letter, &what], across, up);
-        for (rod, line) in curves.iter().enumerate() {
+        for (rod, line) in view.curves.iter().enumerate() {
             let drawn = panel.smooth_curve(line).into_iter().flatten().map(Some);
             let stroke = Stroke::new(color_of_vein(rod, count), 1.4);
             panel.draw_clipped_line(page, &drawn.collect::<Vec<_>>(), stroke);
         }
-        for (rod, point) in points {
-            if let Some(at) = panel.page_position(point) {
+        for MeasuredPoint { rod, at } in view.points {
+            if let Some(at) = panel.page_position(at) {
                 let rim = Stroke::new(color_of_vein(rod, count), 1.2);
                 page.draw_shape(circle_path(at, 2.6), WHITE, Some(rim));
             }
         }
-        if views.len() == 1 {
+        if is_single {
             let mut key = Legend::right_of(cell);
             key.add_line(page, "model", "each vein in its colour", MODEL_STROKE);
             key.add_entry(page, "traced points", "", |page, cell| {
