@@ -115,7 +115,7 @@ pub fn array_chunks_mut(
     ]
 }
 
-/// One number for each of several neighbouring nodes, or rods.
+/// One number for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
     pub(crate) simd: S,
@@ -316,7 +316,7 @@ impl From<Lanes<Scalar>> for f64 {
     }
 }
 
-/// A vector for each of several neighbouring nodes, or rods.
+/// A vector for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Vectors<S: Simd> {
     /// Along the first axis.
@@ -422,9 +422,9 @@ impl<S: Simd> Vectors<S> {
         Vectors::new(d1.dot(self), d2.dot(self), d3.dot(self))
     }
 
-    /// One vector in every lane, from the lane `part` on.
+    /// Packs the vectors of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
-    pub fn gather(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
+    pub fn from_group(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
         let [a, b, c, d] = vectors;
         Vectors::new(
             Lanes::load_group(simd, &NumberGroup([a.x, b.x, c.x, d.x]), part),

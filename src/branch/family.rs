@@ -444,12 +444,12 @@ pub fn state_after_step(
     let mut increments = scale_field(increments, step);
     let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
     for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
-        let [turns, shifts] = leaf.allows_rotation_and_displacement(j, i);
+        let free = leaf.node_freedom(j, i);
         let increment = &mut increments[j][i - leaf.first_node()];
-        if !shifts {
+        if !free.displacement {
             increment[3..].fill(0.0);
         }
-        if !turns {
+        if !free.rotation {
             increment[..3].fill(0.0);
         }
     }

@@ -7,7 +7,7 @@
 //! stretched.
 
 use crate::leaf::Leaf;
-use crate::leaf::rod_ode::RodFields;
+use crate::leaf::rod_ode::{FieldChange, RodFields};
 use crate::leaf::state::State;
 use crate::scenario::{Profile, Rod, Scenario, SupportKind};
 use crate::shape::{NodeState, RodShape};
@@ -163,15 +163,13 @@ pub fn whole_leaf_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodF
     })
 }
 
-/// Changes of position, rotation, force and moment of the rods of the whole leaf, from those of its half.
-pub fn whole_leaf_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
-    whole_rods(half, rods, |&[x, turn, n, m], image, share| {
-        [
-            reflect_vector(x, image),
-            reflect_axial(turn, image),
-            reflect_vector(n / share, image),
-            reflect_axial(m / share, image),
-        ]
+/// Changes of the fields of the rods of the whole leaf, from those of its half.
+pub fn whole_leaf_changes(half: &Leaf, rods: Vec<Vec<FieldChange>>) -> Vec<Vec<FieldChange>> {
+    whole_rods(half, rods, |node, image, share| FieldChange {
+        position: reflect_vector(node.position, image),
+        rotation: reflect_axial(node.rotation, image),
+        force: reflect_vector(node.force / share, image),
+        moment: reflect_axial(node.moment / share, image),
     })
 }
 

@@ -119,7 +119,7 @@ pub enum Stopped {
         /// Segments per rod.
         segments: usize,
     },
-    /// Sections of neighbouring veins passed half a turn against each other.
+    /// Sections of neighboring veins passed half a turn against each other.
     #[error("at t = {time:.6e} {}; the motion cannot be followed beyond: end it before", half_turn.sentence())]
     HalfTurn {
         /// Time.
@@ -253,8 +253,8 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
             energy += loads.tip_force.length_squared() / inertia.mass;
         }
     }
-    for (node, moment) in leaf.dead_moments_under(loads) {
-        energy += moment.length_squared() / physics.inertia(leaf, 0, node).transverse;
+    for it in leaf.dead_moments_under(loads) {
+        energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;
     }
     0.5 * h * h * energy
 }

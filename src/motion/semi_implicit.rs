@@ -1,4 +1,4 @@
-//! The semi-implicit method: the generalised-alpha method of Chung and Hulbert
+//! The semi-implicit method: the generalized-alpha method of Chung and Hulbert
 //! (J. Appl. Mech. 60, 1993) on rotations (Bruls, Cardona, Arnold, Mech. Mach.
 //! Theory 48, 2012).
 //!
@@ -25,7 +25,7 @@
 //! Consistent initial conditions of a leaf at rest: its forces and accelerations and, where rigid
 //! segments are strained, as those of arcs with different chords, positions without such strains.
 
-use crate::leaf::{DiscreteLeaf, Loads, State, System};
+use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
 use crate::motion::constraint_projection::project_constraints;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
@@ -33,7 +33,7 @@ use crate::motion::{
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
-use crate::rod::Section;
+use crate::rod::{Section, Wrench};
 use crate::rotation;
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
@@ -153,7 +153,7 @@ pub struct SemiImplicit {
     longest_taken: f64,
     time: f64,
     count: usize,
-    /// Number of factorisations.
+    /// Number of factorizations.
     pub factorizations: usize,
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
@@ -201,7 +201,7 @@ impl SemiImplicit {
             leaf,
             physics,
         };
-        motion.initialise();
+        motion.initialize();
         motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
@@ -356,7 +356,7 @@ const MAX_NODE_ROTATION: f64 = 0.5;
 const CONDENSING_INERTIA_RATIO: f64 = 1e3;
 
 impl SemiImplicit {
-    /// Factorises and solves; false if the matrix is not positive definite.
+    /// Factorizes and solves; false if the matrix is not positive definite.
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;
         let mut uncounted = SolverCounts::default();
@@ -380,14 +380,16 @@ impl SemiImplicit {
     /// base or tip.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
         let nodes = self.leaf.segments() + 1;
-        let [turns, shifts] = self
-            .leaf
-            .allows_rotation_and_displacement(k / nodes, k % nodes);
+        let free = self.leaf.node_freedom(k / nodes, k % nodes);
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
         let shift = || self.trial.x[k] - self.state.x[k];
         [
-            if turns { turn() } else { DVec3::ZERO },
-            if shifts { shift() } else { DVec3::ZERO },
+            if free.rotation { turn() } else { DVec3::ZERO },
+            if free.displacement {
+                shift()
+            } else {
+                DVec3::ZERO
+            },
         ]
     }
 
@@ -437,14 +439,16 @@ impl SemiImplicit {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
-                (-moment, -inertia[k].mass * (m.w[1] + damping * m.v[1]))
+                Wrench {
+                    moment: -moment,
+                    force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
+                }
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return None;
             }
-            let (turn, shift) = self.system.largest_increment();
-            let size = larger(turn, shift);
+            let size = self.system.largest_increment().larger();
             if !size.is_finite() || size > before.max(MAX_NODE_ROTATION) {
                 return None;
             }
@@ -525,19 +529,19 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.rod_index_pairs(1..=n) {
             let k = self.state.base(j) + i;
-            let [_, shifts] = self.leaf.allows_rotation_and_displacement(j, i);
+            let moves = self.leaf.node_freedom(j, i).displacement;
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,
                 true => (force(j, i) + loads.tip_force) / mass,
                 false => force(j, i) / mass,
             };
-            if shifts {
+            if moves {
                 self.node_motions[k].a[1] += linear;
             }
         }
-        for (node, moment) in self.leaf.dead_moments_under(loads) {
-            if self.leaf.allows_rotation_and_displacement(0, node)[0] {
+        for NodalMoment { node, moment } in self.leaf.dead_moments_under(loads) {
+            if self.leaf.node_freedom(0, node).rotation {
                 let tensor = self.inertia[node].tensor(self.state.q[node]);
                 self.node_motions[node].a[0] += tensor.inverse() * moment;
             }
@@ -587,15 +591,18 @@ pub(super) fn add_inertia(
     state: &State,
     inertia: &[Inertia],
     per_mass: f64,
-    load: impl Fn(usize, &DMat3) -> (DVec3, DVec3),
+    load: impl Fn(usize, &DMat3) -> Wrench,
 ) {
     let n = state.segments();
     for j in 0..state.rods() {
         for i in system.first()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
-            let matrix = (tensor * per_mass, inertia[k].mass * per_mass);
-            system.add_to_node(j, i, matrix, load(k, &tensor));
+            let stiffness = DiagonalBlocks {
+                rotary: tensor * per_mass,
+                translational: inertia[k].mass * per_mass,
+            };
+            system.add_to_node(j, i, stiffness, load(k, &tensor));
         }
     }
 }
@@ -666,7 +673,8 @@ impl SemiImplicit {
                     - bending(self.physics.rest_curvature_factor(from)));
         }
         for time in [from, to] {
-            for (node, moment) in self.leaf.dead_moments_under(self.physics.loads(time)) {
+            let moments = self.leaf.dead_moments_under(self.physics.loads(time));
+            for NodalMoment { node, moment } in moments {
                 let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
                 work += 0.5 * moment.dot(turn);
             }
@@ -732,14 +740,18 @@ impl SemiImplicit {
     pub(super) fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
-        let moves = |j: usize, i: usize| leaf.allows_rotation_and_displacement(j, i)[1];
+        let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let (half, stiffness) = (0.5 * drag.force(), 0.25 * rate * drag.velocity_derivative());
+            let half = Wrench {
+                moment: DVec3::ZERO,
+                force: 0.5 * drag.force(),
+            };
+            let stiffness = 0.25 * rate * drag.velocity_derivative();
             let free = [moves(j, i), moves(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {
                 if free {
-                    system.add_load(j, node, [DVec3::ZERO, half]);
+                    system.add_load(j, node, half);
                     system.add_displacement_spring(j, node, stiffness);
                 }
             }
@@ -783,8 +795,8 @@ const RIGID_STRAIN_ROUNDING: f64 = 1e-12;
 const INCONSISTENT_RIGID_STRAIN: f64 = 1e-8;
 
 impl SemiImplicit {
-    /// Initialises the forces of the segments and the accelerations of the nodes.
-    pub(super) fn initialise(&mut self) {
+    /// Initializes the forces of the segments and the accelerations of the nodes.
+    pub(super) fn initialize(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP_INVERSE_SQUARE);
         let violation = self.leaf.strain_forces(&mut self.state);
         if self.leaf.least_compliance() > 0.0 {
@@ -836,15 +848,15 @@ impl SemiImplicit {
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
-                (moment, -per_mass * inertia[k].mass * shift)
+                let force = -per_mass * inertia[k].mass * shift;
+                Wrench { moment, force }
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return false;
             }
             self.advance_trial();
-            let (turn, shift) = self.system.largest_increment();
-            if larger(turn, shift) < INITIAL_ITERATION_ERROR {
+            if self.system.largest_increment().larger() < INITIAL_ITERATION_ERROR {
                 break;
             }
         }
@@ -860,7 +872,7 @@ impl SemiImplicit {
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
         for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
             let k = self.state.base(j) + i;
-            let (moment, force) = self.system.unbalanced_node_load(j, i);
+            let Wrench { moment, force } = self.system.unbalanced_node_load(j, i);
             let Inertia { mass, .. } = self.inertia[k];
             let tensor = self.inertia[k].tensor(self.state.q[k]);
             if i == n {

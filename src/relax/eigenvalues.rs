@@ -1,9 +1,5 @@
-//! The modes of the settled leaf, extrapolated over nested grids, in the units of the
-//! scenario.
-//!
-//! Normalised shapes of modes.
-//!
-//! Eigenvalues on nested grids, and what their extrapolation tells.
+//! The lowest eigenvalues and modes of a leaf at rest: on nested grids, extrapolated, with their bars,
+//! in the units of the scenario.
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
@@ -14,7 +10,7 @@ use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{BestColumn, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::Options;
 use crate::relax::result::Mode;
 use glam::DVec3;

@@ -1,11 +1,10 @@
-//! Continuation of an equilibrium under a small change of its scenario, on the same grids,
-//! without jumps to another equilibrium.
-//!
-//! A leaf at rest that follows its scenario, as numbers of it change by little or much: along its
-//! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
+//! A leaf at rest that follows its scenario as numbers of it change: along its branch of equilibria, on
+//! the same grids, as long as they are stable, and elsewhere only where it is told so.
 
-use crate::homotopy::Homotopy;
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
+use crate::homotopy::{StepEnd, StepSizes};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State, Weighted,
+};
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
@@ -13,7 +12,7 @@ use crate::relax::accuracy::transfer::{GridLevel, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
 use crate::relax::rest::{equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
@@ -136,8 +135,8 @@ fn relax_with_progress(
 ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
     let (leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
-        let remark = leaf.remark.clone();
-        let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
+        let remark = leaf.remark.as_ref();
+        let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
         return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
     Ok(Ok(found))
@@ -163,11 +162,22 @@ fn displaced_state(level: &GridLevel, leaf: &Leaf, response: &LinearResponse) ->
     rescale_state(level, state, leaf)
 }
 
-/// The shortest step of the way, as a part of it.
-const SHORTEST: f64 = 1.0 / 4096.0;
+/// Steps from one scenario to another.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1.0 / 4096.0,
+    longest: 1.0,
+    growth: 2.0,
+    failure: 0.25,
+};
 
-/// How much shorter a step is made that fails.
-const FAILED_STEP_FACTOR: f64 = 0.25;
+/// Why a leaf does not follow its scenario to the end.
+enum FollowEnd<E> {
+    /// Its branch cannot be followed beyond this part of the way.
+    Lost(f64),
+    /// A scenario on the way cannot be met.
+    Refused(E),
+}
 
 /// Grids on which the next equilibrium is predicted.
 const MAX_PREDICTED_GRIDS: usize = 2;
@@ -329,25 +339,34 @@ impl EquilibriumTracker {
         along: &dyn Fn(f64) -> Result<Scenario, E>,
     ) -> Result<TrackOutcome, E> {
         let clock = Instant::now();
-        let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
-        loop {
-            let scenario = Arc::new(along(way.next_lambda())?);
-            check_wind_options(&scenario, &self.options)?;
-            let last = way.next_lambda() == 1.0;
-            match self.step(Arc::clone(&scenario), last) {
+        let end = STEPS.follow(|step| {
+            let scenario = match along(step.to) {
+                Ok(scenario) => Arc::new(scenario),
+                Err(refused) => return StepEnd::Ended(FollowEnd::Refused(refused)),
+            };
+            if let Err(refused) = check_wind_options(&scenario, &self.options) {
+                return StepEnd::Ended(FollowEnd::Refused(E::from(refused)));
+            }
+            match self.step(Arc::clone(&scenario), step.to == 1.0) {
                 Ok(found) => {
                     (self.at, self.scenario) = (found, scenario);
-                    if last {
-                        self.coarsen();
-                        self.choose_cheaper_grid();
-                        return Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))));
+                    StepEnd::Made {
+                        growth: STEPS.growth,
                     }
-                    way.advance(2.0 * way.next_step_length());
                 }
-                Err(_) if way.shorten(FAILED_STEP_FACTOR) => {}
-                Err(_) if self.refine() => {}
-                Err(_) => return Ok(TrackOutcome::BranchEnded { part: way.lambda }),
+                Err(_) if !step.is_shortest => StepEnd::TooLong(FollowEnd::Lost(step.from)),
+                Err(_) if self.refine() => StepEnd::Again,
+                Err(_) => StepEnd::Ended(FollowEnd::Lost(step.from)),
             }
+        });
+        match end {
+            Ok(()) => {
+                self.coarsen();
+                self.choose_cheaper_grid();
+                Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))))
+            }
+            Err(FollowEnd::Lost(part)) => Ok(TrackOutcome::BranchEnded { part }),
+            Err(FollowEnd::Refused(refused)) => Err(refused),
         }
     }
 
@@ -469,7 +488,11 @@ impl EquilibriumTracker {
         let near = near.unwrap_or_else(|| self.at.without_estimates());
         let found = match self.has_same_structure(&leaf) {
             true => {
-                let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
+                let terms = [(-1.0, &self.scenario), (1.0, &scenario)];
+                let terms = terms.map(|(weight, scenario)| Weighted {
+                    weight,
+                    term: Scenario::clone(scenario),
+                });
                 let rate = LeafParameterDerivative::new(&near.levels[0].leaf.leaf, &terms);
                 let mut responses = Vec::new();
                 for level in &near.levels {

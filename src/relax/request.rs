@@ -1,8 +1,5 @@
-//! What is asked of a relaxation: the method, the options, and the leaf on nested grids.
-//!
-//! The methods by which a leaf is brought to rest, each with its own options.
-//!
-//! Options of a relaxation, and the errors of requests that cannot be met.
+//! What is asked of a relaxation: the methods with their options, and the errors of requests that cannot
+//! be met.
 
 use crate::memory::TooMuch;
 use crate::relax::path::Route;

@@ -1,9 +1,5 @@
-//! From a scenario to rest on nested grids: the problem, the start, rest on one grid, finer ones,
-//! the decision on stability, and the result.
-//!
-//! What is asked of nested grids: which leaf is to come to rest, and how accurately.
-//!
-//! What the way to rest has cost so far, and what it leaves for reuse.
+//! From a scenario to its equilibrium: the attempts of the plan, the decision on stability, and the
+//! result; and a relaxation that begins with a given shape.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::newton::EquilibriumFailure;
@@ -17,8 +13,10 @@ use crate::relax::loading::arrival::{
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
-use crate::relax::plan::{Acceptance, PlannedAttempt, plan};
-use crate::relax::problem::{COARSEST, RelaxationProblem, least_segments, may_solve_half};
+use crate::relax::plan::{
+    Acceptance, COARSEST, PlannedAttempt, RelaxationProblem, least_segments, may_solve_half, plan,
+};
+use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
@@ -218,11 +216,12 @@ pub(super) fn equilibrium_with_stability(
         leaf.path = None;
     }
     leaf.doubts = report::implausible_properties(problem.leaf.scenario(), &leaf);
-    let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
+    let doubt = (leaf.path.as_ref())
+        .and_then(|path| EquilibriumDoubt::about_path(path, problem.options.route));
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
     leaf.doubts.extend(doubt);
     leaf.doubts
-        .extend(unconfirmed.then(|| UNCONFIRMED_EQUILIBRIUM_REMARK.to_owned()));
+        .extend(unconfirmed.then_some(EquilibriumDoubt::UnconfirmedEquilibrium));
     leaf.apply_stability_verdict(decision.verdict);
     let modes = decision.modes.or_else(|| {
         let list = EigenvalueRequest::requested(problem);
@@ -242,15 +241,15 @@ impl Equilibrium {
             Verdict::Undecided(certain)
                 if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
             {
-                self.doubts.push(MINIMUM_INDEX_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedIndex);
                 certain
             }
             Verdict::Undecided(_) => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 return;
             }
             Verdict::Unknown => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 self.stability.negative_eigenvalues = None;
                 return;
             }
@@ -262,33 +261,13 @@ impl Equilibrium {
         }
         if index > 0 {
             self.outcome = Outcome::Saddle;
-            self.remark = Some(BESIDE_BIFURCATION_REMARK.to_owned());
+            self.remark = Some(EquilibriumRemark::BeyondBifurcation);
         } else if unknown {
             // It said so.
             self.remark = None;
         }
     }
 }
-
-/// Remark on a leaf that two grids never bring to the same equilibrium.
-const UNCONFIRMED_EQUILIBRIUM_REMARK: &str = "from its start the leaf moves to different equilibria on different grids: \
-     this is one in which it can rest; relax with --all looks for the others";
-
-/// Remark on a leaf with an eigenvalue that may have either sign.
-const UNDECIDED_SIGN_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     whether the leaf is stable is not certain";
-
-/// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
-const MINIMUM_INDEX_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     the index is the number of those that are certainly negative, or larger";
-
-/// Remark on a leaf at rest on all grids that is at a saddle.
-const BESIDE_BIFURCATION_REMARK: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
-     still stable; a load that is a little larger, or a small disturbance, shows where it goes";
-
-/// Remark on a leaf that did not come to rest from the given shape.
-pub(super) const RELAXED_ANEW_REMARK: &str =
-    "from the given start the leaf does not come to rest: it was relaxed as without one";
 
 /// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
 /// in the valley in which that lies, where a relaxation may find another. Where that leads nowhere it
@@ -347,7 +326,7 @@ pub fn relax_from(
     let given = effort.attempts;
     let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
     leaf.attempts.splice(0..0, given);
-    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
+    leaf.doubts.push(EquilibriumDoubt::RelaxedAnew);
     Ok(leaf)
 }
 

@@ -1,19 +1,11 @@
-//! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
-//!
-//! Where the path loses its stability: the leaf moves on, down its energy, to another equilibrium
-//! under the same part of the loading.
-//!
-//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
-//! each solved to convergence, so that segments carry the forces of their strains however stiff
-//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
-//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
-//! is Newton's method.
+//! Saddles of the energy: their Morse index, their refinement by Newton's method, and the side on which
+//! a leaf leaves them: the same on all grids, in all units, and in whichever order its veins are
+//! numbered.
 
 use crate::leaf::{
     DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, NodalField, State, System,
 };
 use crate::newton::{NewtonEquations, NewtonIteration, SolverCounts};
-use crate::numbers::larger;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -257,9 +249,8 @@ pub fn find_unstable_mode(
 
 /// Displaces a state along the mode that was found, to the side of this sign.
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
-    let (turn, displacement) = system.largest_increment();
     let mut pushed = state.clone();
-    let step = sign * SADDLE_ESCAPE_DISTANCE / larger(turn, displacement);
+    let step = sign * SADDLE_ESCAPE_DISTANCE / system.largest_increment().larger();
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }

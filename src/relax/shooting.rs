@@ -2,6 +2,7 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::newton::SolverCounts;
+use crate::relax::remark::EquilibriumRemark;
 use crate::relax::request::{
     MAX_INTERVALS, Options, Progress, RelaxError, SemiImplicit, ShootingVariant,
 };
@@ -266,38 +267,35 @@ fn outcome_of_solution(
     solution: &ShootingSolution,
     index: Option<usize>,
     tolerance: f64,
-) -> (Outcome, Option<String>) {
+) -> (Outcome, Option<EquilibriumRemark>) {
     let (outcome, remark) = match index {
         _ if solution.error.position > tolerance * longest(&scenario.rods) => (
             Outcome::ToleranceNotReached,
             Some(match &solution.unsharpened {
-                Some(reason) => format!("this is the best solution found; with smaller local errors {reason}"),
-                None => "double precision does not carry more through this leaf: ask for a larger tolerance".into(),
+                Some(reason) => EquilibriumRemark::NotSharpened(reason.clone()),
+                None => EquilibriumRemark::DoublePrecision,
             }),
         ),
-        Some(1..) => (
-            Outcome::Saddle,
-            Some("shooting finds equilibria, stable or not: the method semi-implicit finds a stable one".into()),
-        ),
+        Some(1..) => (Outcome::Saddle, Some(EquilibriumRemark::ShotSaddle)),
         Some(0) => (Outcome::Converged, None),
         None => (
             Outcome::Converged,
-            Some("the number of negative eigenvalues is not known: a dead moment has no energy, the leaf is too fine to count them, or one may have either sign".into()),
+            Some(EquilibriumRemark::ShotIndexUnknown),
         ),
     };
-    let neutral = solution.neutral.as_ref().map(|neutral| neutral.to_string());
-    (outcome, remark.or(neutral))
+    let neutral = || (solution.neutral.clone()).map(EquilibriumRemark::NeutralDirection);
+    (outcome, remark.or_else(neutral))
 }
 
 /// The outcome of a failure: how far the continuation came, and why it ended.
-fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<String>) {
-    let way = match failure.lambda {
-        part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
-        _ => String::new(),
-    };
+fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<EquilibriumRemark>) {
     let outcome = match failure.reason {
         ShootingFailureReason::Singular(_) => Outcome::Singular,
         _ => Outcome::NotAtRest,
     };
-    (outcome, Some(format!("{}{way}", failure.reason)))
+    let remark = EquilibriumRemark::ShootingFailed {
+        reason: failure.reason.clone(),
+        part: failure.lambda,
+    };
+    (outcome, Some(remark))
 }

@@ -1,9 +1,6 @@
-//! Whether a leaf at rest is stable: counts of negative eigenvalues, and the eigenvalues that decide.
-//!
-//! The decision on the stability of a leaf at rest: its Morse index is that on a grid only where
-//! no eigenvalue is so close to zero that other grids may tell another sign.
-//!
-//! The Morse index of an equilibrium that was not found by relaxation.
+//! Whether a leaf at rest is stable: its Morse index is that on a grid only where no eigenvalue is so
+//! close to zero that other grids may tell another sign; elsewhere extrapolated eigenvalues decide. Also
+//! the Morse index of an equilibrium that was not found by relaxation.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::SolverCounts;
@@ -15,7 +12,7 @@ use crate::relax::eigenvalues::{
 };
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::log::WorkLog;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::request::{MOST_MODES, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;
 use crate::relax::{eigenvalues, saddle};

@@ -23,6 +23,7 @@
 mod choice;
 mod record;
 mod refinement;
+mod remark;
 
 pub use crate::leaf::HalfTurn;
 use crate::leaf::{
@@ -35,7 +36,6 @@ use crate::motion::{
     TimeIntegrator, project_constraints,
 };
 use crate::newton::{NewtonIteration, SolverCounts};
-use crate::numbers::format_two_digits;
 use crate::relax::{
     Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route,
     converge_saddle,
@@ -44,10 +44,11 @@ use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{MotionStart, Scenario, Schedule, plausibility_warnings};
 pub use crate::simulate::choice::{Choice, Cost, SchemeReason};
 pub use crate::simulate::record::{
-    Frame, Imbalance, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
+    Frame, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
 };
 use crate::simulate::refinement::{Comparison, Trajectory, compared_points};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
+pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
 use crate::{relax, words};
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -94,7 +95,7 @@ pub struct Simulation {
     grid: Grid,
     physics: Physics,
     choice: Choice,
-    doubts: Vec<String>,
+    doubts: Vec<MotionDoubt>,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn TimeIntegrator + Send>,
@@ -217,12 +218,13 @@ impl Simulation {
         };
         method.set_limit(options.limit.clone());
         let (duration, interval) = physics.duration_and_interval();
+        let warnings = plausibility_warnings(scenario).into_iter();
         let simulation = Simulation {
             leaf,
             choice,
             doubts: doubt
                 .into_iter()
-                .chain(plausibility_warnings(scenario))
+                .chain(warnings.map(MotionDoubt::Implausible))
                 .collect(),
             stable,
             step,
@@ -363,8 +365,8 @@ impl Simulation {
         self.choice
     }
 
-    /// What makes the motion doubtful from its beginning: one sentence each.
-    pub fn doubts(&self) -> &[String] {
+    /// What makes the motion doubtful.
+    pub fn doubts(&self) -> &[MotionDoubt] {
         &self.doubts
     }
 
@@ -680,13 +682,13 @@ const UNSTABLE_START: UnstableStartTest = UnstableStartTest {
     mode_accuracy: 1e-9,
 };
 
-/// A sentence on a start at an unstable equilibrium, or beside one but without a deviation along
+/// The doubt about a start at an unstable equilibrium, or beside one but without a deviation along
 /// its unstable modes, such as that of a straight column under its weight.
 pub(super) fn unstable_start_doubt(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     start: &State,
-) -> Option<String> {
+) -> Option<MotionDoubt> {
     let mut leaf = leaf.clone();
     leaf.loads = physics.loads(0.0);
     if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
@@ -718,12 +720,10 @@ pub(super) fn unstable_start_doubt(
     if modes.iter().any(deviates) {
         return None;
     }
-    let time = format_two_digits(physics.time_unit / fastest.sqrt());
-    Some(format!(
-        "the motion starts at an unstable equilibrium (negative eigenvalues: {index}), and nothing displaces the leaf \
-         the way it would leave: a deviation grows by e in {time}, and rounding decides when and to which side; \
-         give it a small push, such as a short dynamics.tip_force"
-    ))
+    Some(MotionDoubt::UnstableStart {
+        index,
+        growth_time: physics.time_unit / fastest.sqrt(),
+    })
 }
 
 /// Whether the first step of Newton's method is short enough for an equilibrium nearby.

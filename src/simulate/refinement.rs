@@ -11,10 +11,11 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
-use crate::numbers::{format_two_digits, larger, largest};
+use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
 use crate::shape::interpolation_weights;
 use crate::simulate::record::CUBIC;
+use crate::simulate::remark::MotionDoubt;
 use crate::simulate::{
     Choice, DEFAULT_TIP_ERROR, Frame, Options, Scheme, Simulation, SimulationError,
 };
@@ -221,7 +222,15 @@ impl Refinement {
             && !met
             && stopped.is_none()
         {
-            let doubt = missed_accuracy_doubt(simulation, aim, self.refines());
+            let doubt = match (simulation.error_bar(), simulation.known_until()) {
+                (Some(error), _) => MotionDoubt::Inaccurate {
+                    error,
+                    aim,
+                    refined_within: self.refines().then_some(REFINEMENT_SECONDS),
+                },
+                (None, Some(from)) => MotionDoubt::RunsPart { from },
+                (None, None) => MotionDoubt::NotCompared,
+            };
             simulation.doubts.push(doubt);
         }
     }
@@ -402,30 +411,6 @@ impl Refinement {
         let coarser = self.coarser.clone()?;
         next.halve_coarser_steps(&coarser.trajectory);
         Some(Comparison::new(next.segments(), coarser, self.length))
-    }
-}
-
-/// A sentence on a motion that is not as accurate as it was to be.
-fn missed_accuracy_doubt(simulation: &Simulation, aim: f64, refined: bool) -> String {
-    let aim = format_two_digits(aim);
-    let why = match refined {
-        true => format!(
-            "finer grids would take more than {REFINEMENT_SECONDS} seconds, or cannot be followed; give more segments"
-        ),
-        false => "give more segments and shorter steps, or leave both out".into(),
-    };
-    match (simulation.error_bar(), simulation.known_until()) {
-        (Some(bar), _) => format!(
-            "the error of the tips may be {}, and {aim} was aimed at: {why}",
-            format_two_digits(bar)
-        ),
-        (None, Some(until)) => format!(
-            "from t = {} on runs on two grids part, as where a leaf snaps: how accurate the tips are is known until then",
-            format_two_digits(until)
-        ),
-        (None, None) => {
-            "how accurate the tips are is not known: there is no second run to compare with".into()
-        }
     }
 }
 

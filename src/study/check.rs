@@ -3,7 +3,8 @@
 
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, serialize_index,
+    Equilibrium, EquilibriumRemark, Options, Outcome, Progress, RelaxError, SemiImplicit,
+    serialize_index, serialize_remark,
 };
 use crate::run::Limit;
 use crate::scenario::Scenario;
@@ -13,6 +14,7 @@ use crate::study::judge::{
     Timed, common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near,
     rod_differences, run_timed,
 };
+use crate::study::remark::CheckReason;
 use crate::{relax, shooting, words};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
@@ -50,10 +52,10 @@ pub enum CheckVerdict {
     /// They do not.
     Differ,
     /// There are not two solutions to compare, with the reason.
-    NotCompared(String),
+    NotCompared(CheckReason),
     /// Shooting finds no solution of its own, only that nothing it can resolve contradicts the relaxed
     /// leaf, with the reason.
-    NotIndependent(String),
+    NotIndependent(CheckReason),
 }
 
 words! {
@@ -160,14 +162,11 @@ impl Check {
     fn reach_verdict(&self) -> CheckVerdict {
         let solution = match self.shot.as_ref().map(|shot| &shot.found) {
             None => {
-                let why = (self.relaxed.remark.as_ref()).map(|remark| format!(": {remark}"));
-                let why = why.unwrap_or_default();
-                return CheckVerdict::NotCompared(format!(
-                    "the relaxation did not come to rest{why}"
-                ));
+                let remark = self.relaxed.remark.clone();
+                return CheckVerdict::NotCompared(CheckReason::NotAtRest { remark });
             }
             Some(Err(failure)) => {
-                let why = failure.reason.to_string();
+                let why = CheckReason::ShootingFailed(failure.reason.clone());
                 return match failure.reason {
                     ShootingFailureReason::Rounding { .. }
                     | ShootingFailureReason::Unbounded { fixed: false, .. } => {
@@ -179,10 +178,8 @@ impl Check {
             Some(Ok(solution)) => solution,
         };
         if solution.error.position > self.allowed() {
-            return CheckVerdict::NotCompared(format!(
-                "the boundary-value solution is only known within {:.1e}: ask for a larger tolerance",
-                solution.error.position
-            ));
+            let error = solution.error.position;
+            return CheckVerdict::NotCompared(CheckReason::Inaccurate { error });
         }
         let [force, moment] = self.allowed_resultants();
         let same = |found: Difference| {
@@ -364,8 +361,8 @@ pub fn serialize_relaxation<S: Serializer>(
     #[derive(Serialize)]
     struct Keys<'a> {
         outcome: &'static str,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        remark: Option<&'a str>,
+        #[serde(flatten, serialize_with = "serialize_remark")]
+        remark: &'a Option<EquilibriumRemark>,
         segments: &'a [usize],
         error_estimate: Option<f64>,
         residual: Option<f64>,
@@ -378,7 +375,7 @@ pub fn serialize_relaxation<S: Serializer>(
     }
     Keys {
         outcome: leaf.outcome.word(),
-        remark: leaf.remark.as_deref(),
+        remark: &leaf.remark,
         segments: &leaf.accuracy.segments,
         error_estimate: leaf.accuracy.error_estimate,
         residual: leaf.accuracy.residual,

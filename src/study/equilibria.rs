@@ -1,13 +1,13 @@
 //! Equilibria of a leaf, as far as many starts find them.
 
-use crate::numbers::format_error_bound;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
 };
-use crate::run::{Instant, Limit};
+use crate::run::{Instant, Limit, join_remarks};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 use crate::study::judge::{common_stations, rod_differences};
+use crate::study::remark::EquilibriaRemark;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
@@ -49,8 +49,10 @@ pub struct Equilibria {
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
     pub found: Vec<FoundEquilibrium>,
-    /// A remark if a stable one has less energy than the one in which a relaxation ends.
-    pub remark: Option<String>,
+    /// Whether a stable one has less energy than that in which a relaxation ends, and whether the
+    /// search was stopped.
+    #[serde(rename = "remark", serialize_with = "serialize_remarks")]
+    pub remarks: Vec<EquilibriaRemark>,
     /// Total time, in seconds.
     pub wall_seconds: f64,
 }
@@ -116,7 +118,7 @@ pub fn equilibria(
         found: Vec::new(),
         starts: 0,
         failed: 0,
-        remark: None,
+        remarks: Vec::new(),
         wall_seconds: 0.0,
     };
     let find = |how: SemiImplicit| {
@@ -168,11 +170,10 @@ pub fn equilibria(
         let [a, b] = [a, b].map(|found| found.equilibrium.energy.unwrap_or(f64::NAN));
         a.total_cmp(&b)
     });
-    all.remark = all.lower_energy_remark();
+    all.remarks.extend(all.lower_energy_remark());
     if limit.reached() {
-        let stopped = format!("the search was stopped after {} starts", all.starts);
-        let both = all.remark.take().into_iter().chain([stopped]);
-        all.remark = Some(both.collect::<Vec<_>>().join("; "));
+        let starts = all.starts;
+        all.remarks.push(EquilibriaRemark::Stopped { starts });
     }
     all.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(all)
@@ -201,24 +202,33 @@ impl Equilibria {
 }
 
 impl Equilibria {
+    /// Its remarks in one sentence, if there are any.
+    pub fn remark(&self) -> Option<String> {
+        join_remarks(&self.remarks)
+    }
+
     /// The stable equilibrium with less energy than that of the unperturbed start, if any.
-    fn lower_energy_remark(&self) -> Option<String> {
+    fn lower_energy_remark(&self) -> Option<EquilibriaRemark> {
         let plain = self.found.iter().position(|found| found.plain)?;
         let stable = |found: &FoundEquilibrium| found.equilibrium.stable() == Some(true);
         let lowest = self.found.iter().position(stable)?;
         let [least, energy] = [lowest, plain].map(|k| self.found[k].equilibrium.energy);
         let (least, energy) = (least?, energy?);
         // Mirror images differ by rounding only.
-        let less = energy - least;
-        (less > SEARCH.same_energy * energy.abs()).then(|| {
-            format!(
-                "a relaxation ends in equilibrium {}, but number {} is stable, too, and has less energy, by {}",
-                plain + 1,
-                lowest + 1,
-                format_error_bound(less)
-            )
+        let difference = energy - least;
+        (difference > SEARCH.same_energy * energy.abs()).then_some(EquilibriaRemark::LowerEnergy {
+            plain,
+            lowest,
+            difference,
         })
     }
+}
+
+fn serialize_remarks<S: Serializer>(
+    remarks: &[EquilibriaRemark],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    join_remarks(remarks).serialize(serializer)
 }
 
 fn is_same_equilibrium(a: &Equilibrium, b: &Equilibrium) -> bool {

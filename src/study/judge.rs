@@ -10,6 +10,7 @@ use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape, Undulation};
 use crate::shooting::{ShootingSolution, ShootingStart};
+use crate::study::remark::SolutionRemark;
 
 /// Stations closer than this are the same.
 pub const SAME_STATION_DISTANCE: f64 = 1e-9;
@@ -26,7 +27,7 @@ pub struct MethodSolution {
     /// How the run ended.
     pub outcome: Outcome,
     /// Why it did not succeed, or another remark of the method.
-    pub remark: Option<String>,
+    pub remark: Option<SolutionRemark>,
     /// Fractions of the length at which the shape is known, ascending.
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
@@ -46,7 +47,7 @@ impl From<Equilibrium> for MethodSolution {
     fn from(leaf: Equilibrium) -> Self {
         MethodSolution {
             outcome: leaf.outcome,
-            remark: leaf.remark,
+            remark: leaf.remark.map(SolutionRemark::Equilibrium),
             stations: leaf.shape.stations,
             rods: leaf.shape.rods,
             energy: leaf.energy.unwrap_or(f64::NAN),

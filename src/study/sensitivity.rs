@@ -4,8 +4,8 @@
 
 use crate::numbers::largest;
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, FewerVeins, Options, Parameter, Progress, RelaxError,
-    Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
+    Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Options, Parameter, Progress,
+    RelaxError, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
 use crate::study::judge::SAME_STATION_DISTANCE;
@@ -50,7 +50,7 @@ pub fn relax_with_sensitivities(
         at_rest && turns && decides_zero_energy_rotation(number, turnings)
     });
     leaf.doubts
-        .extend(none.iter().map(|(key, _)| no_derivative_remark(key)));
+        .extend((none.into_iter()).map(|(key, _)| EquilibriumDoubt::NoDerivative { key }));
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(
             &found.levels,
@@ -108,7 +108,7 @@ fn named_parameters<'v>(
 fn decides_zero_energy_rotation(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| count_zero_energy_rotations(scenario) < turnings)
+        .any(|it| count_zero_energy_rotations(&it.term) < turnings)
 }
 
 fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
@@ -117,13 +117,6 @@ fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
         .iter()
         .filter(|it| it.includes_bent_veins)
         .count()
-}
-
-fn no_derivative_remark(key: &str) -> String {
-    format!(
-        "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
-         change of this number decides where it turns to"
-    )
 }
 
 /// Tolerance of the blades that a blade is compared with.

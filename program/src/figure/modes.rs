@@ -1,13 +1,13 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
-use crate::figure::drawing::labels::{
-    HEADER, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels, new_page,
+use crate::figure::drawing::labels::new_page;
+use crate::figure::drawing::space::{
+    FRONT_VIEW, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, ViewAngles,
 };
-use crate::figure::drawing::space::{FRONT, OBLIQUE_VIEW, ViewAngles};
+use crate::figure::drawing::veins::{DrawnVeins, vein_tips};
 use crate::figure::drawing::{
-    Color, Drawing, FRAME_COLOR, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke,
+    Color, Drawing, FRAME_COLOR, NOTE_COLOR, PAGE, PanelCaption, SECOND_SOLUTION_COLOR, Stroke,
 };
-use crate::figure::leaf::{DrawnVeins, vein_tips};
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_four_digits;
 use crate::report::relaxation_verdict;
@@ -18,7 +18,7 @@ use leafdyn::scenario::Scenario;
 const MOST_MODES_DRAWN: usize = 12;
 
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT];
+const VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT_VIEW];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
@@ -36,7 +36,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
     let panels =
-        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, HEADER);
+        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, PAGE.header);
     let mut notes = vec![
         format!("N = {}", rest.count),
         relaxation_verdict(equilibrium),
@@ -47,18 +47,26 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     });
     notes.push("grey: at rest".into());
     notes.extend(rest.leaf_notes(&setting));
-    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, Some(&rest));
+    let mut drawing = new_page(PAGE.side_margin, &name, &notes, Some(&rest));
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
-            let (number, (text, color)) = ((index + 1).to_string(), mode_caption(mode));
+            let (number, text) = ((index + 1).to_string(), mode_text(mode));
             let captions = [
-                (&*number, &*text, color),
-                ("", "from the front", NOTE_COLOR),
+                PanelCaption {
+                    letter: &number,
+                    text: &text,
+                    color: mode_color(mode),
+                },
+                PanelCaption {
+                    letter: "",
+                    text: "from the front",
+                    color: NOTE_COLOR,
+                },
             ];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let scene =
-                    panels.draw_empty_panel(page, (VIEWS.len() * index + k, 0.0), view, caption);
+                let place = VIEWS.len() * index + k;
+                let scene = panels.draw_empty_panel(page, place, 0.0, view, caption);
                 let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
                 for vein in &rest.veins {
                     let path = vein.projected_path(|point| scene.project_point(point));
@@ -71,18 +79,23 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// The frequency of a mode or, if it is unstable, its growth rate in red.
-fn mode_caption(mode: &Mode) -> (String, Color) {
+/// The frequency of a mode or, if it is unstable, its growth rate.
+fn mode_text(mode: &Mode) -> String {
     match (mode.is_neutral(), mode.growth()) {
-        (true, _) => ("neutral: ω = 0".into(), NOTE_COLOR),
+        (true, _) => "neutral: ω = 0".into(),
         (_, None) => {
             let frequency = format_four_digits(mode.frequency().unwrap_or_default());
-            (format!("ω = {frequency}"), NOTE_COLOR)
+            format!("ω = {frequency}")
         }
-        (_, Some(growth)) => (
-            format!("unstable: grows at {}", format_four_digits(growth)),
-            SECOND_SOLUTION_COLOR,
-        ),
+        (_, Some(growth)) => format!("unstable: grows at {}", format_four_digits(growth)),
+    }
+}
+
+/// Unstable modes are red.
+fn mode_color(mode: &Mode) -> Color {
+    match mode.growth() {
+        Some(_) if !mode.is_neutral() => SECOND_SOLUTION_COLOR,
+        _ => NOTE_COLOR,
     }
 }
 

@@ -189,7 +189,7 @@ pub struct DirectionArrow {
 /// Names of the axes as fractions of L, with what they mean.
 const FRACTION_AXIS_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
 
-const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
+pub const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl FigureSetting {
     pub fn from_scenario(scenario: &Scenario) -> Self {
@@ -413,6 +413,13 @@ impl QuantityLabel {
     }
 }
 
+/// How the number of a key is called.
+#[derive(Clone, Copy)]
+struct KeyWords {
+    words: &'static str,
+    entries: ListEntryOwner,
+}
+
 /// A key as it is written: `scale:load.point[0].force[2]`, `rest.bend_2.value[1]`.
 struct KeyPart<'t> {
     text: &'t str,
@@ -421,7 +428,7 @@ struct KeyPart<'t> {
     row: Option<usize>,
     list: Option<&'t str>,
     indices: Vec<usize>,
-    named: Option<(&'static str, ListEntryOwner)>,
+    named: Option<KeyWords>,
 }
 
 impl<'t> KeyPart<'t> {
@@ -445,7 +452,7 @@ impl<'t> KeyPart<'t> {
         };
         let named = |path: &str| {
             let found = WORDS.iter().find(|row| row.0 == path);
-            found.map(|row| (row.1, row.2))
+            found.map(|&(_, words, entries)| KeyWords { words, entries })
         };
         let last = pieces.len().saturating_sub(1);
         let list = match named(&joined(&pieces)) {
@@ -470,7 +477,7 @@ impl<'t> KeyPart<'t> {
     }
 
     fn words(&self) -> String {
-        let Some((words, entries)) = self.named else {
+        let Some(KeyWords { words, entries }) = self.named else {
             return self.text.into();
         };
         let mut words = words.to_string();
@@ -481,7 +488,7 @@ impl<'t> KeyPart<'t> {
         };
         if let (Along | About, Some((&axis, veins))) = (entries, indices.split_last()) {
             let by = if entries == Along { "along" } else { "about" };
-            words += &format!(" {by} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?"));
+            words += &format!(" {by} {}", COORDINATE_NAMES.get(axis).unwrap_or(&"?"));
             indices = veins;
         }
         match (entries, indices) {
@@ -512,7 +519,7 @@ impl<'t> KeyPart<'t> {
 /// One number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
 fn words_for_several_veins(parts: &[KeyPart]) -> Option<String> {
     let first = parts.first().filter(|_| parts.len() > 1)?;
-    let (words, entries) = first.named?;
+    let KeyWords { words, entries } = first.named?;
     let alike = |part: &KeyPart| {
         let plain = part.list.is_none() && part.indices.len() == 1;
         plain && part.path == first.path && part.scale == first.scale

@@ -164,7 +164,7 @@ impl Default for FileSelection {
 /// Names of the files of a result, of every kind.
 pub fn result_file_names<R: WrittenResult>(result: &R) -> Vec<&'static str> {
     let files = result.files_of_kinds(&FileKind::ALL).into_iter();
-    let others = files.map(|(name, _)| name);
+    let others = files.map(|file| file.name);
     R::JSON.into_iter().chain(others).collect()
 }
 
@@ -190,8 +190,8 @@ pub fn result_file_contents<R: WrittenResult>(
         return Some(bytes);
     }
     let mut files = document.result.files_of_kinds(&FileKind::ALL).into_iter();
-    let (_, format) = files.find(|(file, _)| *file == name)?;
-    format.write_file(name, document, &mut bytes).ok()?;
+    let file = files.find(|file| file.name == name)?;
+    file.format.write_file(name, document, &mut bytes).ok()?;
     Some(bytes)
 }
 
@@ -218,7 +218,7 @@ pub fn write_result_files<R: WrittenResult>(
         || -> Vec<_> {
             let files = files.par_iter();
             files
-                .map(|(name, format)| {
+                .map(|ResultFile { name, format }| {
                     if let FileFormat::Shapes(list, shapes) = format {
                         write_shapes(folder, list, &shapes(result), &document.input.radii)?;
                     }
@@ -322,6 +322,14 @@ impl<R> FileFormat<R> {
     }
 }
 
+/// A file of a result. A figure is two files of one format.
+pub struct ResultFile<R: 'static> {
+    /// Its name in the folder of the result.
+    pub name: &'static str,
+    /// How it is written.
+    pub format: &'static FileFormat<R>,
+}
+
 /// A result that is written to a folder.
 pub trait WrittenResult: Serialize + Sync + Sized + 'static {
     /// Name of its JSON file, which is also printed on request.
@@ -358,15 +366,17 @@ pub trait WrittenResult: Serialize + Sync + Sized + 'static {
         names.chain(more.copied()).collect()
     }
 
-    /// Its files of these kinds but JSON: their names and formats.
-    fn files_of_kinds(&self, kinds: &[FileKind]) -> Vec<(&'static str, &'static FileFormat<Self>)> {
+    /// Its files of these kinds but JSON.
+    fn files_of_kinds(&self, kinds: &[FileKind]) -> Vec<ResultFile<Self>> {
         let more = Self::MORE.iter();
         let more = more.filter(|format| self.has_more(format.file_names()[0]));
         let formats = Self::FORMATS.iter().chain(more);
-        let files =
-            formats.flat_map(|format| format.file_names().iter().map(move |&it| (it, format)));
+        let files = formats.flat_map(|format| {
+            let names = format.file_names().iter();
+            names.map(move |&name| ResultFile { name, format })
+        });
         files
-            .filter(|(name, _)| kinds.contains(&FileKind::from_file_name(name)))
+            .filter(|file| kinds.contains(&FileKind::from_file_name(file.name)))
             .collect()
     }
 }

@@ -1,7 +1,7 @@
 //! The data of the page: results, thinned to what is visible, with large arrays as
 //! base64 of little-endian numbers.
 
-use crate::figure::leaf::{node_stride, replace_undrawable_points};
+use crate::figure::drawing::veins::{node_stride, replace_undrawable_points};
 use crate::figure::scenario::{DirectionArrow, LoadMark, SupportMark};
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;

@@ -24,9 +24,9 @@ mod results;
 pub mod vtk;
 
 use crate::figure::FigureFunction;
-use crate::figure::drawing::formats::hex_color;
-use crate::figure::drawing::{Drawing, color_of_vein, formats};
-use crate::figure::leaf::is_vein_drawn;
+use crate::figure::drawing::formats::{escape_xml, hex_color, write_svg};
+use crate::figure::drawing::veins::is_vein_drawn;
+use crate::figure::drawing::{Drawing, color_of_vein};
 use crate::figure::scenario::{FigureSetting, LoadMark, load_marks, support_marks};
 pub use crate::page::data::{PageData, PageLeaf};
 use crate::report;
@@ -183,13 +183,13 @@ fn assemble_html(view: &PageData, still: &Drawing) -> String {
     let (mut data, mut figure) = (Vec::new(), Vec::new());
     // Writing to memory cannot fail.
     let _ = report::write_json(view, &mut data);
-    let _ = formats::write_svg(still, &mut figure);
+    let _ = write_svg(still, &mut figure);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     let figure = String::from_utf8_lossy(&figure).into_owned();
     let scripts = PAGE_SCRIPTS.concat();
     let parts = [
-        ("TITLE", formats::escape_xml(&view.title)),
+        ("TITLE", escape_xml(&view.title)),
         ("STYLE", PAGE_CSS.into()),
         ("FIGURE", figure),
         ("DATA", data),

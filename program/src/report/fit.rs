@@ -57,7 +57,7 @@ impl ReportedResult for Fit {
             .map(|candidate| {
                 let (bits, part) = (candidate.bits, candidate.shrinks);
                 let text = match &candidate.remark {
-                    Some(remark) => remark.clone(),
+                    Some(remark) => remark.to_string(),
                     None => {
                         format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it")
                     }
@@ -76,7 +76,7 @@ impl ReportedResult for Fit {
     }
 
     fn remarks(&self) -> LabelledLines {
-        label_first_line("remark", self.remarks.clone())
+        label_first_line("remark", self.remarks.iter().map(ToString::to_string))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::report::numbers::{
 use crate::report::table::{LabelledLines, append_csv_rows, label_first_line, text_cell};
 use crate::report::{ReportedResult, map_title};
 use leafdyn::scenario::Units;
-use leafdyn::study::{Map, MapOutcome, MapRow};
+use leafdyn::study::{Map, MapOutcome, MapRemark};
 use std::fmt::Write as _;
 use std::io;
 use std::io::Write;
@@ -112,11 +112,11 @@ pub fn write_map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
     append_csv_rows([header], out)?;
     // The columns of the axes, then those of the row.
     let rows = map.rows.iter().map(|row| {
-        let detail = text_cell(&row.detail).into();
-        let row = MapRow {
-            detail,
-            ..row.clone()
-        };
+        let mut row = row.clone();
+        if let Some(MapRemark::Refused(why)) = &mut row.remark {
+            // In words of the user, too.
+            *why = text_cell(why.trim_start()).into();
+        }
         (request.texts(row.cell), row)
     });
     append_csv_rows(rows, out)

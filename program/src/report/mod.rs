@@ -19,6 +19,7 @@ mod trace;
 pub use crate::report::chart::{write_chart_table, write_scaling_table};
 pub use crate::report::fit::{write_fit_table, write_fitted_scenario};
 pub use crate::report::map::{ReportedMap, write_map_table};
+pub use crate::report::relax::doubt_with_option;
 use crate::report::table::{LabelledLines, label_first_line};
 pub use crate::report::table::{write_centerlines, write_modes_table, write_sensitivity_table};
 pub use crate::report::trace::{

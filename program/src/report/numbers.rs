@@ -179,17 +179,25 @@ pub fn format_ten_digits(value: f64) -> String {
     format!("{value:.*}", (DIGITS_WITHOUT_ERROR - exponent) as usize)
 }
 
-/// The digits of a finite number with `decimals` decimals after the first, and their power of ten:
-/// rounding may raise it.
-fn digits_and_exponent(value: f64, decimals: usize) -> (String, i32) {
+/// A number in scientific notation.
+struct ScientificNumber {
+    mantissa: String,
+    exponent: i32,
+}
+
+/// A finite number with `decimals` decimals after the first digit; rounding may raise the power of ten.
+fn round_scientific(value: f64, decimals: usize) -> ScientificNumber {
     let digits = format!("{value:.decimals$e}");
     let (mantissa, power) = digits.split_once('e').unwrap_or((&digits, "0"));
-    (mantissa.into(), power.parse().unwrap_or(0))
+    ScientificNumber {
+        mantissa: mantissa.into(),
+        exponent: power.parse().unwrap_or(0),
+    }
 }
 
 /// The power of ten of a number rounded likewise.
 fn rounded_exponent(value: f64, decimals: usize) -> i32 {
-    digits_and_exponent(value, decimals).1
+    round_scientific(value, decimals).exponent
 }
 
 /// A number with at most five digits.
@@ -219,7 +227,7 @@ pub fn format_four_digits(value: f64) -> String {
     }
     let exponent = rounded_exponent(size, 3);
     if !(-3..6).contains(&exponent) {
-        let (mantissa, exponent) = digits_and_exponent(size, 2);
+        let ScientificNumber { mantissa, exponent } = round_scientific(size, 2);
         return format!("{minus}{mantissa}×10{}", superscript(exponent));
     }
     let decimals = (3 - exponent).max(0) as usize;

@@ -17,8 +17,8 @@ use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, st
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
-    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event,
-    InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
+    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
+    Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
     COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
@@ -65,14 +65,14 @@ impl ReportedResult for Equilibrium {
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
-            let sizes = (reaction.force, moments(&reaction.moments));
-            let force = reaction_text(self, sizes, reaction.error);
+            let moment = moments(&reaction.moments);
+            let force = reaction_text(self, reaction.force, moment, reaction.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
-            let sizes = (grip.force, grip.moment.map_or(0.0, DVec3::length));
-            let force = reaction_text(self, sizes, grip.error);
+            let moment = grip.moment.map_or(0.0, DVec3::length);
+            let force = reaction_text(self, grip.force, moment, grip.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             let grip = format!("{force} on the holder of grip {}", number + 1);
             lines.push(("grip", grip));
@@ -102,8 +102,19 @@ impl ReportedResult for Equilibrium {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
+        let doubts = self.doubts.iter().map(doubt_with_option);
+        [remark, label_first_line("doubtful", doubts)].concat()
+    }
+}
+
+/// A doubt on an equilibrium, with the option that helps.
+pub fn doubt_with_option(doubt: &EquilibriumDoubt) -> String {
+    match doubt {
+        EquilibriumDoubt::UnconfirmedPath | EquilibriumDoubt::UnconfirmedEquilibrium => {
+            format!("{doubt}; relax with --all looks for the others")
+        }
+        _ => doubt.to_string(),
     }
 }
 
@@ -167,7 +178,8 @@ const FORCE_ERROR_FACTOR: f64 = 20.0;
 /// accurate it is.
 fn reaction_text(
     equilibrium: &Equilibrium,
-    (force, moment): (DVec3, f64),
+    force: DVec3,
+    moment: f64,
     error: Option<f64>,
 ) -> String {
     if let Some(error) = error {
@@ -454,7 +466,7 @@ impl ReportedResult for Equilibria {
 
     fn remarks(&self) -> LabelledLines {
         let more = "there may be more: no number of starts proves that these are all";
-        let remark = label_first_line("remark", self.remark.clone());
+        let remark = label_first_line("remark", self.remark());
         [remark, label_first_line("remark", Some(more.into()))].concat()
     }
 }
@@ -493,13 +505,14 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| critical_tip_force_line((margin, push), length, units))
+        .map(|push| critical_tip_force_line(margin, push, length, units))
         .collect();
     lines.extend(stable_directions_line(margin, units));
     let unknown = margin.pushes.iter();
     let unknown = unknown.filter(|push| push.kind == InstabilityKind::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
-        let why = push.remark.as_deref().unwrap_or_default();
+        let why = push.remark.as_ref().map(ToString::to_string);
+        let why = why.unwrap_or_default();
         let which = direction_text(margin, push);
         match push.more_than.filter(|least| *least > 0.0) {
             Some(least) => {
@@ -519,13 +532,14 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
         }
         None => {}
     }
-    lines.extend(margin.remark.clone());
+    lines.extend(margin.remark.as_ref().map(ToString::to_string));
     lines
 }
 
 /// A push under which stability is lost.
 fn critical_tip_force_line(
-    (margin, push): (&Margin, &CriticalTipForce),
+    margin: &Margin,
+    push: &CriticalTipForce,
     length: f64,
     units: &Units,
 ) -> String {

@@ -44,8 +44,9 @@ impl ReportedResult for Record {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark().map(|it| it.to_string()));
+        let doubts = self.doubts.iter().map(ToString::to_string);
+        [remark, label_first_line("doubtful", doubts)].concat()
     }
 }
 

@@ -69,11 +69,11 @@ impl ReportedResult for Trace {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
         let advice = label_first_line("advice", option_advice(self));
         [
             remark,
-            label_first_line("doubtful", self.doubts.clone()),
+            label_first_line("doubtful", self.doubts.iter().map(ToString::to_string)),
             advice,
         ]
         .concat()
@@ -129,7 +129,7 @@ fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<Strin
     }
     let last = branch.points.last();
     lines.extend(last.map(|point| format!("  to {}", point_values_text(trace, point))));
-    lines.extend(branch.remark.iter().map(|remark| format!("  {remark}")));
+    lines.extend(branch.remark().map(|remark| format!("  {remark}")));
     lines
 }
 
@@ -300,8 +300,12 @@ impl ReportedResult for StabilityBoundary {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
+        [
+            remark,
+            label_first_line("doubtful", self.doubts.iter().map(ToString::to_string)),
+        ]
+        .concat()
     }
 }
 

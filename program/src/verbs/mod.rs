@@ -16,7 +16,7 @@ use crate::{files, report};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
 use leafdyn::memory::TooMuch;
-use leafdyn::relax::{Limit, RefusedOption};
+use leafdyn::relax::{Limit, RefusedOption, UnmodelledFeature};
 use leafdyn::scenario::{ScenarioError, printable};
 use std::error::Error;
 use std::ffi::OsString;
@@ -98,6 +98,13 @@ fn refusal_with_option_names(refusal: Refusal) -> Refusal {
     }
     if let Some(error) = find_cause::<ScenarioError>(&refusal) {
         return error.message_with_option("--set").into();
+    }
+    if let Some(wind @ UnmodelledFeature::Wind { what }) = find_cause(&refusal) {
+        let with_options = format!(
+            "[wind]: {what} does not take wind into account: simulate does, and relax --path release in a steady one; leave it out"
+        );
+        let message = refusal.to_string();
+        return message.replace(&wind.to_string(), &with_options).into();
     }
     match find_cause::<TooMuch>(&refusal) {
         Some(too_much) => format!("{too_much}, or raise the limit with --memory").into(),

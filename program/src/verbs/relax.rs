@@ -1,6 +1,7 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
 use crate::files::{FileKind, LIVE_PAGE_FILE};
+use crate::report::doubt_with_option;
 use crate::report::numbers::format_five_digits;
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
@@ -119,7 +120,7 @@ impl RelaxArguments {
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.print_remark(equilibrium.remark.as_ref());
         for doubt in &equilibrium.doubts {
-            job.print_remark(Some(doubt));
+            job.print_remark(Some(doubt_with_option(doubt)));
         }
         let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
         let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;

@@ -4,7 +4,7 @@
 //! One scenario of a request, and the delivery of its result.
 
 use crate::files::{FileKind, FileSelection, ResultDocument, WrittenResult};
-use crate::report::table::{file_list_text, table_of_json_results};
+use crate::report::table::{ScenarioOutput, file_list_text, table_of_json_results};
 use crate::report::{RefusalDocument, ReportedResult};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
@@ -137,7 +137,7 @@ impl ScenarioArguments {
             true => limit_until_interrupt(),
             false => Limit::default(),
         };
-        let job = |file: &Path| self.open_job::<R>(file, traits, (&selection, &limit));
+        let job = |file: &Path| self.open_job::<R>(file, traits, &selection, &limit);
         if let [file] = self.scenarios.as_slice() {
             let done = run_catching_panics(&job(file)?, &run);
             let done = done.map_err(|refusal| self.refusal_with_option(traits, refusal))?;
@@ -171,7 +171,10 @@ impl ScenarioArguments {
             });
             let done = done.map_err(|refusal| {
                 let status = ExitStatus::from_refusal(&refusal);
-                (refusal_with_option_names(refusal).to_string(), status)
+                UnsolvedScenario {
+                    refusal: refusal_with_option_names(refusal).to_string(),
+                    status,
+                }
             });
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.runs_in_parallel, line.lock()) {
@@ -217,7 +220,7 @@ impl ScenarioArguments {
             return Err("standard input can be read only once: name one - and files".into());
         }
         if !self.is_single_scenario() && selection.kinds.contains(&FileKind::Csv) {
-            let (folder, name) = self.table_location::<R>();
+            let (folder, name) = (self.table_folder(), Self::table_name::<R>());
             files::check_inputs(folder, &[&name], self.input_files(traits))?;
             if self.out.is_none() {
                 files::check_table(&folder.join(name), &self.scenarios)?;
@@ -231,20 +234,24 @@ impl ScenarioArguments {
         self.scenarios.iter().chain(traits.input_files)
     }
 
-    /// The folder and the name of the table of several scenarios.
-    fn table_location<R: WrittenResult>(&self) -> (&Path, String) {
-        let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
+    /// The folder of the table of several scenarios.
+    fn table_folder(&self) -> &Path {
+        self.out.as_deref().unwrap_or(Path::new("out"))
+    }
+
+    /// The file name of a table of several results.
+    fn table_name<R: WrittenResult>() -> String {
+        match R::JSON.and_then(|name| name.strip_suffix(".json")) {
             None | Some("summary") => "table.csv".to_string(),
             Some(verb) => format!("{verb}_table.csv"),
-        };
-        (self.out.as_deref().unwrap_or(Path::new("out")), name)
+        }
     }
 
     /// Outputs the results of several scenarios, and writes their table.
     fn output_results<R: WrittenResult>(
         &self,
         selection: &FileSelection,
-        all: Vec<Result<DeliveredResult, (String, ExitStatus)>>,
+        all: Vec<Result<DeliveredResult, UnsolvedScenario>>,
     ) -> Result<ExitStatus, Refusal> {
         let mut status = ExitStatus::Success;
         let (mut documents, mut errors) = (Vec::new(), Vec::new());
@@ -257,12 +264,13 @@ impl ScenarioArguments {
                     }
                     (done.status, done.error, done.json)
                 }
-                Err((error, this)) => {
+                Err(UnsolvedScenario { refusal, status }) => {
                     let mut json = Vec::new();
-                    report::write_json(&RefusalDocument::new(&error, this.exit_code()), &mut json)?;
-                    unsolved += usize::from(this == ExitStatus::Interrupted);
-                    let told = (this != ExitStatus::Interrupted).then_some(error);
-                    (this, told, json)
+                    let document = RefusalDocument::new(&refusal, status.exit_code());
+                    report::write_json(&document, &mut json)?;
+                    unsolved += usize::from(status == ExitStatus::Interrupted);
+                    let told = (status != ExitStatus::Interrupted).then_some(refusal);
+                    (status, told, json)
                 }
             };
             status = status.max(this);
@@ -270,7 +278,11 @@ impl ScenarioArguments {
                 status = status.max(ExitStatus::Refused);
             }
             errors.extend(error);
-            documents.push((file.display().to_string(), this.exit_code(), json));
+            documents.push(ScenarioOutput {
+                file: file.display().to_string(),
+                exit_status: this.exit_code(),
+                json,
+            });
         }
         for error in errors {
             print_note(&format!("error: {error}"));
@@ -283,7 +295,7 @@ impl ScenarioArguments {
             ));
         }
         if selection.kinds.contains(&FileKind::Csv) {
-            let (out, name) = self.table_location::<R>();
+            let (out, name) = (self.table_folder(), Self::table_name::<R>());
             let rows = table_of_json_results(&documents)?;
             let file = files::write_table(out, &name, &rows)?;
             if !self.json {
@@ -291,7 +303,7 @@ impl ScenarioArguments {
             }
         }
         if self.json {
-            let texts = documents.iter().map(|(_, _, json)| json.trim_ascii());
+            let texts = documents.iter().map(|output| output.json.trim_ascii());
             let texts: Vec<_> = texts.collect();
             write_standard_output(
                 &[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat(),
@@ -331,7 +343,8 @@ impl ScenarioArguments {
         &self,
         path: &Path,
         traits: VerbTraits,
-        (selection, limit): (&FileSelection, &Limit),
+        selection: &FileSelection,
+        limit: &Limit,
     ) -> Result<ScenarioJob, Refusal> {
         let (file, text) = match path.to_str() {
             Some("-") => ("standard input".into(), read_standard_input()?),
@@ -432,6 +445,12 @@ pub struct DeliveredResult {
     pub(super) json: Vec<u8>,
     /// Why its files could not be written.
     pub(super) error: Option<String>,
+}
+
+/// One of several scenarios without a result: why it was refused, or that the run was stopped.
+struct UnsolvedScenario {
+    refusal: String,
+    status: ExitStatus,
 }
 
 /// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.

@@ -55,6 +55,14 @@ pub struct SimulateArguments {
     resume: bool,
 }
 
+/// A simulation that has ended, with what was recorded of it.
+struct RecordedRun {
+    simulation: Simulation,
+    recording: MotionRecording,
+    /// Why it ended early.
+    stopped: Option<Stopped>,
+}
+
 impl SimulateArguments {
     pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
@@ -88,20 +96,18 @@ impl SimulateArguments {
             show_progress(&mut line, run);
             true
         }) {
-            let (simulation, recording, stopped) = self.run_and_record(run, &mut line, job)?;
-            if job.is_interrupted() && (last.is_some() || simulation.frames().1 == 0) {
+            let run = self.run_and_record(run, &mut line, job)?;
+            if job.is_interrupted() && (last.is_some() || run.simulation.frames().1 == 0) {
                 // A run on a coarser grid is whole.
                 break;
             }
-            let (simulation, _, stopped) = last.insert((simulation, recording, stopped));
-            motion.end_run(simulation, *stopped);
+            let run = last.insert(run);
+            motion.end_run(&mut run.simulation, run.stopped);
             announce_duration(&motion, job, FINER_GRID_ANNOUNCED_SECONDS);
         }
         drop(line);
         match last {
-            Some((simulation, mut recording, stopped)) => {
-                self.deliver(&simulation, &mut recording, stopped, job)
-            }
+            Some(run) => self.deliver(run, job),
             None if job.is_interrupted() => Err(NOT_MOVED.into()),
             None => Err("the motion was not followed".into()),
         }
@@ -113,7 +119,7 @@ impl SimulateArguments {
         mut simulation: Simulation,
         line: &mut ProgressLine,
         job: &ScenarioJob,
-    ) -> Result<(Simulation, MotionRecording, Option<Stopped>), Refusal> {
+    ) -> Result<RecordedRun, Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
         let mut recording = MotionRecording::begin(folder, &mut simulation, selection)?;
         let bytes = recording.expected_bytes(&simulation);
@@ -131,17 +137,16 @@ impl SimulateArguments {
                 }
             }
         }
-        Ok((simulation, recording, stopped))
+        Ok(RecordedRun {
+            simulation,
+            recording,
+            stopped,
+        })
     }
 
-    fn deliver(
-        &self,
-        simulation: &Simulation,
-        recording: &mut MotionRecording,
-        stopped: Option<Stopped>,
-        job: &ScenarioJob,
-    ) -> Result<DeliveredResult, Refusal> {
-        let record = recording.finished_record(simulation, stopped)?;
+    fn deliver(&self, mut run: RecordedRun, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let (recording, stopped) = (&mut run.recording, run.stopped);
+        let record = recording.finished_record(&run.simulation, stopped)?;
         job.print_remark(record.remark());
         for doubt in &record.doubts {
             job.print_remark(Some(doubt));

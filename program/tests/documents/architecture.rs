@@ -28,7 +28,7 @@ fn ten_questions_are_answered_by_files() {
         .lines()
         .filter(|line| line.starts_with("- "))
         .collect();
-    assert_eq!(answers.len(), 10);
+    assert!(answers.len() >= 10, "{answers:?}");
     for answer in answers {
         assert!(answer.contains(".rs`"), "{answer}");
     }

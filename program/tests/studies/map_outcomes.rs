@@ -35,7 +35,7 @@ fn cell(
 #[track_caller]
 fn expect(rows: &[MapRow], expected: &[MapOutcome]) {
     let found: Vec<MapOutcome> = rows.iter().map(|row| row.outcome).collect();
-    let details: Vec<_> = rows.iter().map(|row| (row.method, &row.detail)).collect();
+    let details: Vec<_> = rows.iter().map(|row| (row.method, row.detail())).collect();
     assert_eq!(found, expected, "{details:#?}");
 }
 
@@ -63,7 +63,8 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
         let values = [(H, h), ("method.step", step)];
         let rows = cell("fig04", set, &values, &[EXPLICIT_MOTION], LONG);
         expect(&rows, &[outcome]);
-        assert!(rows[0].detail.contains(says), "{}", rows[0].detail);
+        let detail = rows[0].detail();
+        assert!(detail.contains(says), "{detail}");
         assert_eq!(rows[0].reference, ReferenceConfidence::Confirmed);
     }
 }

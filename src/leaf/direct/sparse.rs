@@ -1,28 +1,29 @@
-//! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
+//! Sparse factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
+//! ones, also bordered, and definite ones without a search for pivots.
 
 use crate::leaf::direct::unknowns::{
-    DirectError, UnknownNumbering, for_each_matrix_entry, lower_triangle,
+    DirectError, TrianglePattern, UnknownNumbering, for_each_matrix_entry, lower_triangle,
 };
 use crate::leaf::state::NodalField;
 use crate::leaf::system::System;
 use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
 
-/// The symbolic factorisation of a leaf's matrix, bordered or not.
+/// The symbolic factorization of a leaf's matrix, bordered or not.
 pub struct Symbolic {
     factors: SymbolicCholesky<usize>,
-    /// Pattern of the lower triangle, and the position in it of each of the [`entries`].
-    lower: SymbolicSparseColMat<usize>,
-    places: Vec<usize>,
+    /// The lower triangle, summed from the entries of [`for_each_matrix_entry`] in their order.
+    lower: TrianglePattern,
+    /// Number of unknowns, with those of the border.
     size: usize,
 }
 
@@ -72,9 +73,9 @@ impl Symbolic {
         for_each_matrix_entry(system, unknowns, &ones, border, 0.0, |a, b, _| {
             pairs.push([a.min(b), a.max(b)]);
         });
-        let (lower, places) = lower_triangle(size, &pairs);
+        let lower = lower_triangle(size, &pairs);
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let upper = lower.transpose().to_col_major();
+        let upper = lower.pattern.transpose().to_col_major();
         let upper = upper.map_err(|_| DirectError::Memory)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -90,7 +91,6 @@ impl Symbolic {
         let symbolic = Symbolic {
             factors,
             lower,
-            places,
             size,
         };
         memory::check_factor_memory(symbolic.factor_entry_count())
@@ -119,8 +119,8 @@ impl Symbolic {
         shift: f64,
         border: &[NodalField],
     ) -> Vec<f64> {
-        let mut values = vec![0.0; self.lower.compute_nnz()];
-        let mut places = self.places.iter();
+        let mut values = vec![0.0; self.lower.pattern.compute_nnz()];
+        let mut places = self.lower.places.iter();
         let first_border = unknowns.count;
         for_each_matrix_entry(
             system,
@@ -137,7 +137,7 @@ impl Symbolic {
         values
     }
 
-    /// Factorises the matrix plus `shift` times the mass matrix if it is positive definite, without
+    /// Factorizes the matrix plus `shift` times the mass matrix if it is positive definite, without
     /// a search for pivots. `None` if it is not.
     pub fn factorize_definite(
         self: &Arc<Self>,
@@ -160,7 +160,7 @@ impl Symbolic {
         };
         let done = supernodal::factorize_supernodal_numeric_llt(
             &mut factor.values,
-            SparseColMatRef::new(self.lower.as_ref(), &entries),
+            SparseColMatRef::new(self.lower.pattern.as_ref(), &entries),
             Default::default(),
             symbolic,
             Par::Seq,
@@ -170,7 +170,7 @@ impl Symbolic {
         Ok(done.is_ok().then_some(factor))
     }
 
-    /// Factorises the matrix assembled in `system` plus `shift` times the mass matrix, bordered
+    /// Factorizes the matrix assembled in `system` plus `shift` times the mass matrix, bordered
     /// with a zero corner block.
     pub fn factorize(
         self: &Arc<Self>,
@@ -201,7 +201,7 @@ impl Symbolic {
             &mut factor.subdiagonal,
             &mut factor.forward,
             &mut factor.inverse,
-            SparseColMatRef::new(self.lower.as_ref(), &values),
+            SparseColMatRef::new(self.lower.pattern.as_ref(), &values),
             symbolic,
             Par::Seq,
             MemStack::new(&mut factor.memory),

@@ -5,7 +5,7 @@
 //! ([`segments`]) stay in the innermost caches until its nodes have
 //! moved ([`nodes`]). Nodes that have moved are not read again: the force of the segment before
 //! the next block's first node is carried over from the previous block, and
-//! the new positions are written to other arrays, since neighbouring rods are coupled
+//! the new positions are written to other arrays, since neighboring rods are coupled
 //! to the old ones.
 //!
 //! The motion of nodes: a kick by all forces, then a drift free of them.
@@ -55,7 +55,7 @@ pub const NODES_PER_BLOCK: usize = 224;
 /// What moves besides the positions: arrays of a pack.
 #[derive(Clone, Debug)]
 pub struct PackMotion {
-    /// Rotations as quaternions, normalised up to rounding and the truncation error of [`nodes`].
+    /// Rotations as quaternions, normalized up to rounding and the truncation error of [`nodes`].
     pub q: [AlignedArray; 4],
     /// Velocities, half a step behind or ahead.
     pub v: [AlignedArray; 3],
@@ -152,9 +152,9 @@ pub struct PackStep<'a> {
     pub velocity_factor: f64,
     pub kick: f64,
     pub drift: f64,
-    /// Whether quaternions are normalised; rounding and truncated series slowly change their
+    /// Whether quaternions are normalized; rounding and truncated series slowly change their
     /// length.
-    pub normalise: bool,
+    pub normalize: bool,
     pub block: &'a mut BlockForces,
 }
 
@@ -304,7 +304,7 @@ impl PackStep<'_> {
             (Some(coupling), None) => self.translate_nodes::<S, true, false>(simd, range, coupling),
             (None, None) => self.translate_nodes::<S, false, false>(simd, range, none),
         };
-        let turning = match self.normalise {
+        let turning = match self.normalize {
             true => self.rotate_nodes::<S, true>(simd, range),
             false => self.rotate_nodes::<S, false>(simd, range),
         };
@@ -399,7 +399,7 @@ impl PackStep<'_> {
 
     /// Angular momenta and rotations.
     #[inline(always)]
-    fn rotate_nodes<S: Simd, const NORMALISE: bool>(
+    fn rotate_nodes<S: Simd, const NORMALIZE: bool>(
         &mut self,
         simd: S,
         range: (usize, usize),
@@ -453,7 +453,7 @@ impl PackStep<'_> {
             let b = d1.dot(after) * (half_step * per_spin);
             let squared = b * b;
             let (mut c, mut s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
-            if NORMALISE {
+            if NORMALIZE {
                 // Newton's iteration for the length, which is nearly one.
                 let scale = half.neg_mul_add(r.dot(r) + w * w, three_halves);
                 (c, s) = (c * scale, s * scale);

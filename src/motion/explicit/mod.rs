@@ -20,7 +20,7 @@
 //! Motion to a given time, and snapshots.
 //!
 //! Moments and forces on the nodes besides those of segments, coupling and dead loads: of the
-//! tissue between neighbouring rods, of loads of single rods, and of wind.
+//! tissue between neighboring rods, of loads of single rods, and of wind.
 //!
 //! Drag depends on the velocities at the time of the positions. Known are those half a step before,
 //! and half a step before the last step: it takes their linear extrapolation, so that the method
@@ -52,7 +52,7 @@ use crate::motion::{
     measure, rate_weights,
 };
 use crate::numbers::largest;
-use crate::rod::RESOLVED_TURN;
+use crate::rod::{RESOLVED_TURN, Wrench};
 use crate::run::Limit;
 use crate::simd::widest_arch;
 use glam::{DQuat, DVec3};
@@ -62,8 +62,8 @@ use rayon::prelude::*;
 /// Part of the stable time step used.
 const STABLE_STEP_FRACTION: f64 = 0.9;
 
-/// Steps between normalisations of the quaternions.
-const NORMALISATION_INTERVAL: usize = 8;
+/// Steps between normalizations of the quaternions.
+const NORMALIZATION_INTERVAL: usize = 8;
 
 /// Number of segments from which rods are distributed to threads. Measured: below
 /// it waking the threads costs more than it saves.
@@ -276,7 +276,7 @@ impl Explicit {
         let last = self.leaf.segments();
         let before = self.moving(0, last).0;
         (self.moments).begin_step(
-            self.leaf.dead_moments_under(loads),
+            (self.leaf.dead_moments_under(loads)).map(|it| (it.node, it.moment)),
             self.layout,
             &self.packs,
         );
@@ -360,7 +360,7 @@ impl Explicit {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
-        let normalise = self.steps.is_multiple_of(NORMALISATION_INTERVAL);
+        let normalize = self.steps.is_multiple_of(NORMALIZATION_INTERVAL);
         let (positions, leaf, moments) =
             (&self.positions, &self.leaf, self.moments.nodal_moments());
         let applied = self.applied.as_ref().map(AppliedLoads::loads);
@@ -386,7 +386,7 @@ impl Explicit {
                 velocity_factor: keep,
                 kick,
                 drift,
-                normalise,
+                normalize,
                 block,
             };
             pack.totals = arch.dispatch(step);
@@ -556,7 +556,7 @@ pub struct AppliedLoads {
     state: State,
     /// Those of the tissue's strips at the start.
     alignments: Vec<bool>,
-    nodes: Vec<[DVec3; 2]>,
+    nodes: Vec<Wrench>,
     /// Moments and forces, laid out as positions.
     loads: [[AlignedArray; 3]; 2],
     nodes_in_wind: Option<NodesInWind>,
@@ -588,7 +588,7 @@ impl AppliedLoads {
         let state = leaf.stress_free_state();
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
         Some(AppliedLoads {
-            nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
+            nodes: vec![Wrench::default(); state.x.len()],
             alignments: leaf.strip_alignments(start),
             loads: [vectors(), vectors()],
             nodes_in_wind: wind.map(|wind| NodesInWind {
@@ -631,7 +631,7 @@ impl AppliedLoads {
                 blown.velocity[k] = packs[p].moving(at).0;
             }
         }
-        self.nodes.fill([DVec3::ZERO; 2]);
+        self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
@@ -639,12 +639,12 @@ impl AppliedLoads {
             let velocity = |k: usize| now[k] + ahead * (now[k] - earlier[k]);
             (blown.wind).set_forces(&self.state, air, velocity, &mut blown.forces);
             for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
-                node[1] += *force;
+                node.force += *force;
             }
         }
         for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
             let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
-            for (arrays, load) in self.loads.iter_mut().zip(node) {
+            for (arrays, load) in self.loads.iter_mut().zip([node.moment, node.force]) {
                 for (c, array) in arrays.iter_mut().enumerate() {
                     array[at] = load[c];
                 }

@@ -4,7 +4,7 @@
 //!
 //! Conversion of the leaf to the arrays of the explicit method, and back.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
 use crate::motion::explicit::kernel::{
     BlockMaterial, NODES_PER_BLOCK, NodeData, PackMotion, StepTotals, StrainHistory,
@@ -94,7 +94,7 @@ pub struct PackLayout {
 }
 
 impl PackLayout {
-    /// `alike`: whether all neighbours are coupled in the same way, as in a pack they must be.
+    /// `alike`: whether all neighbors are coupled in the same way, as in a pack they must be.
     pub fn new(rods: usize, segments: usize, alike: bool) -> Self {
         let stride = (segments + 2).next_multiple_of(MAX_LANES / 2);
         // An even number, so that packs begin at multiples of the width.
@@ -139,7 +139,7 @@ impl PackLayout {
         self.front_padding() + j * self.stride + i
     }
 
-    /// Entries before the first node: the first rod reads those of a neighbour there.
+    /// Entries before the first node: the first rod reads those of a neighbor there.
     pub fn front_padding(&self) -> usize {
         self.stride.next_multiple_of(MAX_LANES)
     }
@@ -154,7 +154,7 @@ impl PackLayout {
     }
 }
 
-/// The arrays of a pack of rods, except its positions, which its neighbours read.
+/// The arrays of a pack of rods, except its positions, which its neighbors read.
 #[derive(Clone, Debug)]
 pub struct Pack {
     pub motion: PackMotion,
@@ -209,7 +209,7 @@ pub fn packs_at_rest(
             let mut last = DQuat::IDENTITY;
             for i in 0..=leaf.segments() {
                 let q = state.q[state.base(j) + i];
-                // Signs of neighbouring quaternions are aligned once, and remain so.
+                // Signs of neighboring quaternions are aligned once, and remain so.
                 let flipped = i > 0 && last.dot(q) < 0.0;
                 last = if flipped { -q } else { q };
                 let at = layout.pack_position(j, i).1;
@@ -258,17 +258,17 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         load_length: leaf.grid.node_weight(i) * leaf.leaf.length(j),
         ..NodeData::default()
     };
-    let [turns, shifts] = match i == 0 && !physics.clamped() {
-        true => [true; 2],
-        false => leaf.allows_rotation_and_displacement(j, i),
+    let free = match i == 0 && !physics.clamped() {
+        true => NodeFreedom::FREE,
+        false => leaf.node_freedom(j, i),
     };
-    if turns || shifts {
+    if !free.is_fixed() {
         let inertia = physics.inertia(leaf, j, i);
-        if turns {
+        if free.rotation {
             node.inverse_inertia = 1.0 / inertia.transverse;
             node.inverse_spin_excess = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
         }
-        if shifts && (i < n || !joined) {
+        if free.displacement && (i < n || !joined) {
             node.mass = inertia.mass;
             node.inverse_mass = 1.0 / inertia.mass;
             let neighbours = [j > 0, j + 1 < leaf.rods()];
@@ -310,7 +310,7 @@ impl Pack {
         p * material.inverse_inertia[i] + d1 * (d1.dot(p) * material.inverse_spin_excess[i])
     }
 
-    /// The quaternion of a node, normalised at intervals only.
+    /// The quaternion of a node, normalized at intervals only.
     pub fn quaternion(&self, at: usize) -> DQuat {
         DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at]))
     }

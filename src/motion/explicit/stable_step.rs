@@ -27,13 +27,13 @@
 //! Masses with which a leaf comes to rest fastest.
 //!
 //! If only the equilibrium matters, masses are arbitrary. With these, the
-//! fastest motion of every single segment and of every coupling between neighbours,
+//! fastest motion of every single segment and of every coupling between neighbors,
 //! alone with its share of the masses, has the frequency 2: that bounds the frequencies of
 //! the leaf, the longest stable time step is one, and slow motions are as fast relative
 //! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::explicit::kernel::{NodeData, PackLayout};
 use crate::motion::explicit::packs::{Pack, materials, node_data};
 use crate::motion::physics::{Physics, WindDrag};
@@ -122,10 +122,10 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
         // Inverse square root of the masses of an end, along the lab axes.
         let root = |end: usize| {
             let free = match i + end == 0 && physics.clamped() {
-                true => leaf.allows_rotation_and_displacement(j, 0),
-                false => [true; 2],
+                true => leaf.node_freedom(j, 0),
+                false => NodeFreedom::FREE,
             };
-            if free == [false; 2] {
+            if free.is_fixed() {
                 return [DMat3::ZERO; 2];
             }
             let node = state.base(j) + i + end;
@@ -138,7 +138,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
             let (j1, j2) = (inertia.polar(), inertia.transverse);
             let turning = DVec3::new(j1, j2, j2) * turn / held[node][1];
             let frame = DMat3::from_quat(state.q[node]);
-            [(moving, free[1]), (turning, free[0])].map(|(mass, free)| match free {
+            [(moving, free.displacement), (turning, free.rotation)].map(|(mass, free)| match free {
                 true => {
                     let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
                     frame * root * frame.transpose()
@@ -237,23 +237,28 @@ fn coupling_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
 /// strip, half of the masses of a node belonging to either of its two gaps.
 fn tissue_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
     let mut largest = 0.0_f64;
-    for (g, i, stiffness) in leaf.tissue_stiffness(state) {
+    for strip in leaf.tissue_stiffness(state) {
+        let (g, i) = (strip.gap, strip.node);
         let inverse = |rod: usize| {
             let inertia = physics.inertia(leaf, rod, i);
             let ends = [0, leaf.rods() - 1].contains(&rod);
             let share = if ends { 1.0 } else { 0.5 };
             // Bases that are held do not move.
-            let [turns, shifts] = match i == 0 && physics.clamped() {
-                true => leaf.allows_rotation_and_displacement(rod, 0),
-                false => [true; 2],
+            let free = match i == 0 && physics.clamped() {
+                true => leaf.node_freedom(rod, 0),
+                false => NodeFreedom::FREE,
             };
             let part = |free: bool| if free { 1.0 / share } else { 0.0 };
             let turning = inertia.polar().min(inertia.transverse);
-            [part(turns) / turning, part(shifts) / inertia.mass].map(f64::sqrt)
+            [
+                part(free.rotation) / turning,
+                part(free.displacement) / inertia.mass,
+            ]
+            .map(f64::sqrt)
         };
         let (a, b) = (inverse(g), inverse(g + 1));
         let roots = [a[0], a[1], b[0], b[1]];
-        let scaled = |r: usize, c: usize| roots[r / 3] * stiffness[(r, c)] * roots[c / 3];
+        let scaled = |r: usize, c: usize| roots[r / 3] * strip.matrix[(r, c)] * roots[c / 3];
         let matrix = SMatrix::<f64, 12, 12>::from_fn(scaled);
         largest = largest.max(matrix.symmetric_eigenvalues().max());
     }
@@ -295,7 +300,7 @@ pub fn set_fictitious_masses(
                 inertia += 2.0 * (bend + stretch * arm * arm) / ROTATION_FREQUENCY_FRACTION;
             }
             let node = &mut new[i];
-            // Both neighbours pull on a node, and may move as much as it does.
+            // Both neighbors pull on a node, and may move as much as it does.
             for (gap, coupled) in [j.wrapping_sub(1), j]
                 .into_iter()
                 .zip(node.coupling_weights)
@@ -304,10 +309,11 @@ pub fn set_fictitious_masses(
                     mass += 0.5 * (leaf.leaf.coupling(gap) * coupled).max_element();
                 }
             }
-            for (stiffness, fold, width) in leaf.adjacent_tissue_stiffness(j, i) {
-                let arm = 0.5 * width;
+            for strip in leaf.adjacent_strips(j, i) {
+                let (stiffness, arm) = (strip.stiffness, 0.5 * strip.width);
                 mass += 2.0 * stiffness / (4.0 - ROTATION_FREQUENCY_FRACTION);
-                inertia += 2.0 * (fold + stiffness * arm * arm) / ROTATION_FREQUENCY_FRACTION;
+                inertia += 2.0 * (strip.fold_stiffness + stiffness * arm * arm)
+                    / ROTATION_FREQUENCY_FRACTION;
             }
             if i == n {
                 tip += mass;

@@ -54,16 +54,16 @@ fn element_node_loads(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)>
         if i < leaf.segments() {
             let section = leaf.section(j, i);
             let segment = leaf.strained_segment(state, j, i);
-            let (x, a, b) = segment.gradient(section);
-            all[k] = (all[k].0 + x, all[k].1 - a);
-            all[k + 1] = (all[k + 1].0 - x, all[k + 1].1 - b);
+            let slopes = segment.gradient(section);
+            all[k] = (all[k].0 + slopes.x, all[k].1 - slopes.a);
+            all[k + 1] = (all[k + 1].0 - slopes.x, all[k + 1].1 - slopes.b);
         }
     }
     all
 }
 
 /// The forces of the loops are the gradient of the energy that the relaxation
-/// minimises, with all instruction sets of the processor.
+/// minimizes, with all instruction sets of the processor.
 #[test]
 fn forces_are_those_of_the_element() {
     // Several rods at a time, and their sections round and straight at rest.
@@ -154,7 +154,7 @@ fn like_blocks_are_shared() {
     };
     // The clamped end, the middle and the tip.
     assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 5));
-    // Four rods at a time: the first and the last have one neighbour.
+    // Four rods at a time: the first and the last have one neighbor.
     assert_eq!(distinct("rods = 13, length = 1.0", 50), (3, 4));
     assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (3, 3));
 }

@@ -1,8 +1,5 @@
-//! The leaf at the nodes of its grids, extrapolated over them.
-//!
-//! A leaf between two stations where it is known: the equilibrium equations integrated from both.
-//!
-//! A leaf at rest at other stations.
+//! The fields of a leaf between the nodes of its grids: extrapolated over these grids at common nodes,
+//! and by integration of the equilibrium equations between two stations where they are known.
 
 use crate::leaf::{DiscreteLeaf, RodFields, RodIntegrator, StationFields};
 use crate::numbers::larger;

@@ -1,16 +1,9 @@
-//! How accurate a leaf at rest is: extrapolation, defects, and the leaf between its nodes.
+//! How accurate a leaf at rest is: the leaf on nested grids, their extrapolation, and the error bar from
+//! the extrapolation and from the defect of the equations.
 //!
-//! An equilibrium on nested grids: the leaf on each of them, their extrapolation with its bar, and
-//! the Morse index.
-//!
-//! It is a value: on a finer grid another one takes its place. Whoever needs the leaf more
-//! accurately, or surer of its index, asks [`grids`](crate::relax::grids) for that.
-//!
-//! The error of an equilibrium on nested grids, from these and from the defect on them.
-//!
-//! A leaf on one grid, and from grid to grid: prolongation and prediction.
-//!
-//! A leaf at rest on one grid.
+//! An equilibrium on nested grids is a value: on a finer grid another one takes its place. Whoever
+//! needs the leaf more accurately, or is not sure of its index, asks
+//! [`arrival`](crate::relax::loading::arrival) for that.
 
 pub(crate) mod defect;
 pub(crate) mod fields;
@@ -28,7 +21,7 @@ use crate::relax::accuracy::fields::finer_nodes;
 use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
 use crate::relax::path::Path;
-use crate::relax::problem::{COARSEST, FINEST, RelaxationProblem};
+use crate::relax::plan::{COARSEST, FINEST, RelaxationProblem};
 use crate::relax::request::MAX_NODES;
 use crate::relax::saddle::Saddle;
 use glam::DVec3;

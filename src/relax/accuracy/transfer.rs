@@ -1,10 +1,6 @@
-//! Prediction of the leaf at rest on a finer grid from those on nested coarser grids.
-//!
-//! Prolongation to the grid with all segments halved or to any other, and restriction.
-//!
-//! Polynomials through the nodes of a grid that are nearest to a point.
-//!
-//! Strains and stress resultants at the nodes of a state.
+//! A leaf at rest on one grid, and its transfer to others: prolongation to the grid with all segments
+//! halved or to any other, restriction, and prediction on a finer grid from several coarser ones by
+//! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
 use crate::rotation;
@@ -505,7 +501,7 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
     };
     let (force, moment) = if i == 0 {
         let load = leaf.load(state, j, 0);
-        (carried(0) + load.force, load.moment - segment(0).1)
+        (carried(0) + load.force, load.moment - segment(0).a)
     } else {
         // The part of the nodal load that belongs to the left half-cell.
         let left = leaf.grid.segment_width(i - 1);
@@ -521,7 +517,7 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         };
         let before = left / (left + right);
         let force = carried(i - 1) - before * load.force;
-        (force, segment(i - 1).2 - before * load.moment)
+        (force, segment(i - 1).b - before * load.moment)
     };
     [force, moment].map(|vector| to_directors * vector)
 }

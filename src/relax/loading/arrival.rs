@@ -1,6 +1,5 @@
-//! The end of the path, reached on one grid or, where stability was lost, on two that agree.
-//!
-//! Nested grids: as fine as the tolerance needs, with an error estimate.
+//! The end of the path of slow loading, reached on one grid or, where stability was lost, on two that
+//! agree; and rest on nested grids, as fine as the tolerance needs, from there or from arcs.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_state, whole_state};
 use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
@@ -15,7 +14,7 @@ use crate::relax::accuracy::{
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::{Event, Path, Stage};
-use crate::relax::problem::{BUDGET, RelaxationProblem};
+use crate::relax::plan::{BUDGET, RelaxationProblem};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;

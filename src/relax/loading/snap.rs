@@ -1,4 +1,11 @@
-//! A leaf whose stability is lost while it is loaded slowly: down its energy to the next equilibrium.
+//! Where the path of slow loading loses its stability: the leaf moves on, down its energy, to another
+//! equilibrium under the same part of its loading.
+//!
+//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
+//! each solved to convergence, so that segments carry the forces of their strains however stiff
+//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
+//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
+//! is Newton's method.
 
 use crate::leaf::State;
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};

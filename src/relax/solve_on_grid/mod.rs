@@ -1,15 +1,5 @@
-//! How a leaf comes to rest on one grid: the start, held tips that are moved to their places, the
-//! methods, and pushes off saddles.
-//!
-//! The iteration to equilibrium on one grid.
-//!
-//! The count of negative eigenvalues of a leaf at rest, and pushes off saddles.
-//!
-//! The equilibrium that a leaf reaches from a given state, on one grid.
-//!
-//! Segments of the coarsest grid, as requested or as needed.
-//!
-//! The solution methods, each on one grid or without a grid.
+//! How a leaf comes to rest on one grid: from its start or a guess, by the method of the request, off
+//! saddles, with the count of its negative eigenvalues; and how many segments the coarsest grid needs.
 
 pub(crate) mod explicit;
 pub(crate) mod grips;
@@ -24,12 +14,11 @@ use crate::relax::accuracy::transfer::{GridLevel, mirror_level};
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationFailure, is_large};
 use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
-use crate::relax::problem::{BUDGET, FINEST, RelaxationProblem};
+use crate::relax::plan::{BUDGET, FINEST, RelaxationProblem};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
-pub use crate::relax::solve_on_grid::semi_implicit::softens;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation, disturb, initial_state};
 use crate::run::{Limit, RefusedOption};
 use glam::DVec3;
@@ -335,7 +324,7 @@ fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [O
     [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {
-            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().1),
+            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().displacement),
             _ => None,
         }
     })

@@ -1,25 +1,18 @@
-//! A single rod under dead moments, at its tip or along it.
+//! Loads without a potential: neither energy nor signs of pivots can guide a relaxation.
 //!
-//! A moment fixed in space has no potential in three dimensions, so that
-//! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
-//! quasi-statically instead: all loads grow together from zero, in steps of
-//! about one radian of tip rotation, each followed by Newton's method with the
-//! exact, unsymmetric tangent.
+//! Dead moments on a single rod (at its tip or along it): all loads grow together from zero, in
+//! steps of about one radian of tip rotation, each followed by Newton's method with the exact,
+//! unsymmetric tangent. Where that would take too many steps, the other loads grow from the shape under
+//! the moments alone, which is computed segment by segment from the clamp: a free rod carries at every
+//! place the sum of the moments beyond it. Where the path ends at a fold, the moments are applied before
+//! the other loads, or after them. A rod that is held elsewhere than at its base is brought there under
+//! the other loads, by their energy, before the moments are applied.
 //!
-//! Where that would take too many steps, the other loads grow from the shape under the moments
-//! alone. A free rod carries at every place the sum of those beyond it, so that this shape can be
-//! computed segment by segment from the clamp.
-//!
-//! Where the path ends at a fold, the moments are applied before the other loads, or after them. A
-//! rod that is held elsewhere than at its base is brought there under the other loads, by their
-//! energy, before the moments are applied.
-//!
-//! A leaf in steady wind, which has no potential: neither energy nor signs of pivots guide it. It
-//! moves, damped as in a relaxation, until it hardly moves any more; then Newton's method with the
-//! exact, unsymmetric matrix finds the balance of all forces with the drag. Where it rests is thus
-//! stable as that motion is.
+//! Steady wind: the leaf moves, damped as in a relaxation, until it hardly moves any more; then
+//! Newton's method with the exact, unsymmetric matrix finds the balance of all forces with the drag.
+//! Where it rests is thus stable as that motion is.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{
     DiscreteLeaf, Grid, Leaf, Loads, NodalField, State, System, add_to_increment, displacement_part,
 };
@@ -27,7 +20,7 @@ use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegra
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
 use crate::relax::solve_on_grid::start::GridRelaxation;
-use crate::rod::{RESOLVED_TURN, Section};
+use crate::rod::{RESOLVED_TURN, Section, Wrench};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -40,8 +33,14 @@ const MAX_ITERATIONS: usize = 15;
 /// Accuracy of all load steps but the last.
 const STEP_ACCURACY: f64 = 1e-3;
 
-/// Smallest load step, as a part of the load.
-const SMALLEST_STEP: f64 = 1e-6;
+/// Load steps, of which the first depends on the load.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1e-6,
+    longest: 1.0,
+    growth: 1.0,
+    failure: 0.5,
+};
 
 /// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
 /// grid.
@@ -138,45 +137,52 @@ fn apply_loads(
     (step, mut steps): (f64, usize),
 ) -> Result<f64, EquilibriumFailure> {
     let loads = leaf.loads;
-    let mut path = Homotopy::new(step, [SMALLEST_STEP, 1.0]);
+    let sizes = StepSizes {
+        first: step,
+        ..STEPS
+    };
     let mut before = rod.state.clone();
-    let end = loop {
+    let mut error = 0.0;
+    let end = sizes.follow(|step| {
         if steps == 0 || rod.limit.reached() {
-            break Err(EquilibriumFailure::StepLimit);
+            return StepEnd::Ended(EquilibriumFailure::StepLimit);
         }
         steps -= 1;
-        let part = path.next_lambda();
-        let [moments, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        let [moments, others] = order(step.to).map(|part| part.clamp(0.0, 1.0));
         leaf.loads = Loads {
             tip_moment: moments * loads.tip_moment,
             dead_moment_factor: moments * loads.dead_moment_factor,
             ..loads * others
         };
-        let wanted = match part < 1.0 {
+        let wanted = match step.to < 1.0 {
             true => STEP_ACCURACY,
             false => rod.accuracy,
         };
         match newton(leaf, system, rod, wanted) {
-            Ok(remaining) if part == 1.0 => break Ok(remaining),
-            Ok(_) => {
-                path.advance(path.next_step_length());
+            Ok(remaining) => {
+                error = remaining;
                 before.clone_from(&rod.state);
+                StepEnd::Made {
+                    growth: STEPS.growth,
+                }
             }
             Err(stop) => {
                 rod.state.clone_from(&before);
                 let mut coarse =
                     || leaf.assemble(&before, system).largest_turn > COARSE_SEGMENT_BENDING;
-                if !path.shorten(0.5) || stop == EquilibriumFailure::Unresolved && coarse() {
-                    break Err(match coarse() {
-                        true => EquilibriumFailure::Unresolved,
-                        false => EquilibriumFailure::NoDescent,
-                    });
+                let unresolved = stop == EquilibriumFailure::Unresolved;
+                if !step.is_shortest && !(unresolved && coarse()) {
+                    return StepEnd::TooLong(stop);
                 }
+                StepEnd::Ended(match coarse() {
+                    true => EquilibriumFailure::Unresolved,
+                    false => EquilibriumFailure::NoDescent,
+                })
             }
         }
-    };
+    });
     leaf.loads = loads;
-    end
+    end.map(|()| error)
 }
 
 /// Whether moments turn the tip of a free rod so far (at most, as if only the softest stiffness
@@ -397,7 +403,7 @@ struct SteadyWind {
 impl SteadyWind {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| leaf.allows_rotation_and_displacement(j, i)[1];
+        let free = |(j, i)| leaf.node_freedom(j, i).displacement;
         Some(SteadyWind {
             wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
@@ -426,7 +432,11 @@ impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
             for node in self.free_segment_ends(j, i) {
-                system.add_load(j, node, [DVec3::ZERO, 0.5 * drag.force()]);
+                let half = Wrench {
+                    moment: DVec3::ZERO,
+                    force: 0.5 * drag.force(),
+                };
+                system.add_load(j, node, half);
             }
         }
     }

@@ -10,15 +10,13 @@
 //! positive definite the leaf is in the valley (basin of attraction) of its equilibrium, and
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
-//!
-//! The damped motion of the semi-implicit method: its velocities, and the choice of the next
-//! time step by the energy.
 
-use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, Leaf, NodalField, State, System};
+use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
 };
+use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
 
@@ -35,14 +33,6 @@ const NEGLIGIBLE_NEWTON_STEP: f64 = 1e-3;
 /// Largest number of steps on one grid.
 const MAX_STEPS: usize = 2000;
 
-/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
-/// one is first settled with this compliance, which also gives its segment forces, and then
-/// with its own.
-const MOVING_COMPLIANCE: f64 = 2e-3;
-
-/// Approximate largest stretch of a softened leaf by its load.
-const MOVING_STRETCH: f64 = 0.05;
-
 /// Accuracy to which a softened leaf is settled.
 const SOFT_ACCURACY: f64 = 1e-1;
 
@@ -54,18 +44,6 @@ const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
 /// Newton iterations of a stiff leaf before it is stiffened in steps.
 const STIFF_ITERATIONS: usize = 12;
-
-/// The least compliance of a leaf that moves after so many pushes off saddles.
-fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
-    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
-    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
-}
-
-/// Whether a leaf is so stiff that it is softened while it moves.
-pub fn softens(leaf: &Leaf) -> bool {
-    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
-    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
-}
 
 impl GridRelaxation<'_> {
     /// Lets the leaf come to rest.
@@ -239,7 +217,13 @@ impl GridRelaxation<'_> {
         }
         loop {
             let (shift, inertia) = match motion.mass_factors() {
-                Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
+                Some([shift, per_step]) => {
+                    let momentum = MassLoad {
+                        field: &motion.velocity,
+                        factor: per_step,
+                    };
+                    (shift, Some(momentum))
+                }
                 None => (leaf.neutral_shift(), None),
             };
             let (solver, work) = (&mut self.solver, &mut *self.work);
@@ -261,9 +245,9 @@ impl GridRelaxation<'_> {
 
 /// The size of the next step, and the part of it that is taken.
 fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
-    let (turn, shift) = system.largest_increment();
-    let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
-    (turn.max(shift), part.min(motion.largest_step_fraction()))
+    let size = system.largest_increment();
+    let part = (MAX_TURN / size.rotation).min(MAX_SHIFT / size.displacement);
+    (size.larger(), part.min(motion.largest_step_fraction()))
 }
 
 /// Assembles the equations in a state.

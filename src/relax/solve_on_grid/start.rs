@@ -1,9 +1,5 @@
-//! The initial state of a relaxation.
-//!
-//! A relaxation that begins where another leaf is.
-//!
-//! The side to which a leaf turns from a saddle, the same on all grids, in all units, and in
-//! whichever order its veins are numbered.
+//! Where the iteration on a grid begins: the natural leaf with its tips joined along circular arcs,
+//! disturbed on request; and the state and limits of an iteration.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::newton::{DefiniteSolver, SolverCounts};

@@ -10,14 +10,13 @@ use crate::branch::boundary::{
     CodimensionTwoKind, ConfirmedEquilibrium, TwoParameterProblem, TwoParameterState,
     VerifiedBoundaryPoint, coarsened, leaves_beside_boundary, refine_on_path,
 };
-use crate::branch::{
-    BranchEnd, CorrectorFailure, CriticalKind, ParameterRange, boundary, value_at_fraction,
-};
+use crate::branch::{BranchEnd, CriticalKind, ParameterRange, boundary, value_at_fraction};
 use crate::run::{Instant, RefusedOption};
-use crate::scenario::Scenario;
+use crate::scenario::{PlausibilityWarning, Scenario};
 use crate::shape::serialize_tips;
 use crate::study::ParameterKeys;
 use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
+use crate::study::remark::BoundaryRemark;
 use crate::study::trace::{
     PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest, trace_with_points,
 };
@@ -153,7 +152,7 @@ pub fn trace_stability_boundary(
     }
     add_leaves_beside_curves(plane, &run.known_curves, &mut boundary);
     if plane.limit.reached() && boundary.remark.is_none() {
-        boundary.remark = Some(CorrectorFailure::Stopped.to_string());
+        boundary.remark = Some(BoundaryRemark::Stopped);
     }
     set_completeness(&mut boundary, begun.trace.complete);
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
@@ -186,7 +185,7 @@ fn boundary_without_curves(
         joined: trace.joined,
         tolerance: trace.tolerance,
         complete: false,
-        remark: trace.remark.clone(),
+        remark: trace.remark.clone().map(BoundaryRemark::Trace),
         doubts: trace.doubts.clone(),
         curves: Vec::new(),
         map: None,
@@ -214,18 +213,16 @@ fn set_completeness(boundary: &mut StabilityBoundary, traced: bool) {
     let curves = &boundary.curves;
     let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(BranchEnd::is_complete);
     if curves.is_empty() && boundary.remark.is_none() {
-        let [vary, across] = &boundary.keys;
-        let at = across.text(boundary.start);
-        let why = format!("along {vary} the index changes nowhere at {across} = {at}");
-        boundary.remark = Some(why);
+        let [vary, across] = boundary.keys.clone();
+        boundary.remark = Some(BoundaryRemark::NoIndexChange {
+            vary,
+            across,
+            start: boundary.start,
+        });
     }
     boundary.complete = whole && traced && boundary.remark.is_none();
     if !traced && boundary.remark.is_none() {
-        boundary.remark = Some(
-            "not all branches along the first number are followed to \
-                 their ends: see a trace of it alone"
-                .into(),
-        );
+        boundary.remark = Some(BoundaryRemark::BranchesIncomplete);
     }
 }
 
@@ -253,7 +250,8 @@ impl BoundaryTracer<'_, '_> {
             return;
         }
         if self.seeds_tried == MOST_CURVES {
-            boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
+            let most = MOST_CURVES;
+            boundary.remark = Some(BoundaryRemark::TooManyCurves { most });
             return;
         }
         self.seeds_tried += 1;
@@ -430,10 +428,10 @@ pub struct StabilityBoundary {
     pub complete: bool,
     /// Why there is no curve, or fewer than there may be.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<BoundaryRemark>,
     /// What in the scenario is probably not what was intended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<PlausibilityWarning>,
     /// The curves.
     pub curves: Vec<BoundaryCurve>,
     /// The map under them, if requested.

@@ -3,6 +3,7 @@
 //!
 //! All settings take turns, so that a varying load of the machine affects them equally.
 
+mod remark;
 mod result;
 
 use crate::relax::{
@@ -11,12 +12,14 @@ use crate::relax::{
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
 use crate::shooting::ShootingFailureReason;
+pub use crate::study::chart::remark::{ChartRemark, ChartRowRemark};
 pub use crate::study::chart::result::{
     Chart, ChartOutcome, ChartRow, FastestByAccuracy, PeerMeasurement, PeerProgram,
     ReferenceSolution,
 };
 use crate::study::chart::result::{FoundReference, PeerRows};
 use crate::study::judge::{MethodSolution, Timed, run_timed};
+use crate::study::remark::SolutionRemark;
 use crate::{read_and_write, shooting};
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -312,7 +315,7 @@ fn shoot_from_relaxed_leaf(
                 ShootingFailureReason::Singular(_) => Outcome::Singular,
                 _ => Outcome::NotAtRest,
             },
-            remark: Some(failure.reason.to_string()),
+            remark: Some(SolutionRemark::ShootingFailed(failure.reason)),
             error_estimate: None,
             work: rest.work + failure.work.into(),
             ..rest
@@ -670,11 +673,10 @@ fn coarsest_accurate_grid(
 fn row_without_grid(scenario: &Scenario, contender: SolverConfig) -> ScalingRow {
     let finest = CHARTED_SEGMENTS[CHARTED_SEGMENTS.len() - 1];
     let ending = ChartOutcome::Ended(Outcome::ToleranceNotReached);
-    let why = format!("no grid of up to {finest} segments is accurate enough");
     ScalingRow {
         rods: scenario.rods.len(),
         row: ChartRow {
-            remark: Some(why),
+            remark: Some(ChartRowRemark::NoAccurateGrid { finest }),
             ..ChartRow::without_result(contender, AccuracySetting::Segments(finest), ending)
         },
     }

@@ -7,6 +7,7 @@ use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
 use crate::shooting;
 use crate::shooting::ShootingStart;
+use crate::study::chart::remark::{ChartRemark, ChartRowRemark};
 use crate::study::chart::{
     AccuracySetting, RepeatedRuns, ScalingStudy, SolverConfig, TimingSpread, pareto_front,
     serialize_spread,
@@ -79,9 +80,9 @@ pub struct ChartRow {
     /// How it ended.
     #[serde(rename = "outcome")]
     pub ending: ChartOutcome,
-    /// Why it did not succeed, in a sentence.
+    /// Why it did not succeed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<ChartRowRemark>,
     /// Whether it is on the Pareto front; `None` where no front is drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pareto: Option<bool>,
@@ -132,8 +133,8 @@ pub struct Chart {
     pub rounds: usize,
     /// The reference for errors; `None` if no equilibrium was found.
     pub reference: Option<ReferenceSolution>,
-    /// Remarks on the measurement: one sentence each.
-    pub remarks: Vec<String>,
+    /// Remarks on the measurement.
+    pub remarks: Vec<ChartRemark>,
     /// All settings of all contenders.
     #[serde(rename = "runs")]
     pub rows: Vec<ChartRow>,
@@ -322,7 +323,7 @@ fn chart_row(runs: &RepeatedRuns, error: Option<f64>, elsewhere: bool) -> ChartR
         Some(Err(refusal)) => {
             return ChartRow {
                 ending: ChartOutcome::Refused,
-                remark: Some(refusal.to_string()),
+                remark: Some(ChartRowRemark::Refused(refusal.clone())),
                 ..blank
             };
         }
@@ -342,7 +343,9 @@ fn chart_row(runs: &RepeatedRuns, error: Option<f64>, elsewhere: bool) -> ChartR
         error_estimate: run.error_estimate.map(|estimate| estimate / unit),
         ending,
         // An unknown number of negative eigenvalues is not a failure.
-        remark: run.remark.clone().filter(|_| !ending.is_success()),
+        remark: (run.remark.clone())
+            .filter(|_| !ending.is_success())
+            .map(ChartRowRemark::Solution),
         ..blank
     }
 }
@@ -352,20 +355,15 @@ pub fn chart_remarks(
     rows: &[ChartRow],
     contenders: &[SolverConfig],
     reference: Option<&ReferenceSolution>,
-) -> Vec<String> {
+) -> Vec<ChartRemark> {
     let floor = reference.map_or(0.0, |found| found.known_within);
     let neutral = reference.and_then(|found| found.neutral.as_ref());
     let mut remarks = Vec::new();
     if contenders.iter().any(|it| it.method.is_explicit()) {
-        let step = "it takes the longest stable one";
-        remarks.push(format!(
-            "explicit relaxation has no knob for its time step: {step}"
-        ));
+        remarks.push(ChartRemark::ExplicitStep);
     }
     if let Some(neutral) = neutral {
-        remarks.push(format!(
-            "errors tell little: {neutral}, and runs come to rest in different places"
-        ));
+        remarks.push(ChartRemark::NeutralDirection(neutral.clone()));
     }
     for &contender in contenders {
         remarks.extend(contender_remarks(contender, rows, floor, neutral.is_some()));
@@ -378,29 +376,31 @@ fn contender_remarks(
     rows: &[ChartRow],
     floor: f64,
     neutral: bool,
-) -> Vec<String> {
+) -> Vec<ChartRemark> {
     let mut remarks = Vec::new();
     let of_it = || rows.iter().filter(|row| row.contender == contender);
-    let word = contender.word();
     if of_it().all(|row| row.ending == ChartOutcome::Refused)
         && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
     {
-        remarks.push(format!("{word} is not charted: {why}"));
+        remarks.push(ChartRemark::NotCharted {
+            contender,
+            why: why.clone(),
+        });
     }
     if let Some(first) = of_it().find(|row| row.ending == ChartOutcome::NotRun) {
-        let why = "the run before took too long; allow more seconds";
-        remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
+        remarks.push(ChartRemark::NotRun {
+            contender,
+            from: first.knob,
+        });
     }
     // Estimates that are smaller than the true error are reported here.
     let too_small = |row: &&ChartRow| {
         let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
         row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
     };
-    let knobs = of_it().filter(too_small).map(|row| row.knob.to_string());
-    let knobs: Vec<String> = knobs.collect();
-    if !knobs.is_empty() && !neutral {
-        let knobs = knobs.join(", ");
-        remarks.push(format!("{word} underestimates its error at {knobs}"));
+    let at: Vec<AccuracySetting> = of_it().filter(too_small).map(|row| row.knob).collect();
+    if !at.is_empty() && !neutral {
+        remarks.push(ChartRemark::Underestimated { contender, at });
     }
     remarks
 }
@@ -618,7 +618,7 @@ pub struct PeerRows {
     /// Rows with equal settings are combined; errors are relative to the longest rod.
     pub peers: Vec<PeerProgram>,
     /// On the rows that are left out.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<ChartRemark>,
 }
 
 /// The rows for a leaf of this name and number of rods.
@@ -671,19 +671,12 @@ pub fn combine_peer_measurements(
         seconds.sort_by(f64::total_cmp);
         peer.seconds = TimingSpread::from_sorted(seconds).unwrap_or_default();
     }
-    let rows = |count: usize| match count {
-        1 => "1 row of --peers is".to_string(),
-        count => format!("{count} rows of --peers are"),
-    };
-    let mut remarks = Vec::new();
-    if other > 0 {
-        remarks.push(format!("{} about another leaf, and left out", rows(other)));
+    let of_another_leaf = (other > 0).then_some(ChartRemark::PeersOfAnotherLeaf { rows: other });
+    let without_error = (silent > 0).then_some(ChartRemark::PeersWithoutError { rows: silent });
+    PeerRows {
+        peers,
+        remarks: of_another_leaf.into_iter().chain(without_error).collect(),
     }
-    if silent > 0 {
-        let what = "without the error of a leaf at rest, and left out";
-        remarks.push(format!("{} {what}", rows(silent)));
-    }
-    PeerRows { peers, remarks }
 }
 
 #[cfg(test)]
@@ -693,6 +686,7 @@ mod tests {
     use super::*;
     use crate::scenario::Scenario;
     use crate::study::judge::tests::rod;
+    use crate::study::remark::SolutionRemark;
 
     const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
@@ -710,7 +704,7 @@ mod tests {
     fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> MethodSolution {
         MethodSolution {
             outcome,
-            remark: Some("why".into()),
+            remark: Some(SolutionRemark::LeftSaddle { index: 1 }),
             error_estimate: estimate.map(|estimate| 2.0 * estimate),
             ..rod(&STATIONS, 2.0, |sigma| {
                 DVec3::new(2.0 * sigma, 0.0, shift * sigma)
@@ -772,7 +766,8 @@ mod tests {
         assert_eq!((rows[1].true_error, rows[3].true_error), (Some(0.25), None));
         // Remarks are for failures.
         assert_eq!(rows[0].remark, None);
-        assert_eq!(rows[3].remark.as_deref(), Some("why"));
+        let why = SolutionRemark::LeftSaddle { index: 1 };
+        assert_eq!(rows[3].remark, Some(ChartRowRemark::Solution(why)));
     }
 
     /// A coarse grid may have a large error because it is coarse, unless the next grid has
@@ -808,13 +803,16 @@ mod tests {
         };
         let contenders = [SolverConfig::ALL[0]];
         let told = chart_remarks(&rows, &contenders, Some(&reference));
-        assert!(told[0].starts_with("semi-implicit is not run from tolerance=1e-3 on"));
+        let from = AccuracySetting::Tolerance(1e-3);
+        let [contender] = contenders;
+        assert_eq!(told[0], ChartRemark::NotRun { contender, from });
         let wrong = "semi-implicit underestimates its error at tolerance=1e-1";
-        assert_eq!(told[1..], [wrong]);
+        assert_eq!(told[1].to_string(), wrong);
+        assert_eq!(told.len(), 2, "{told:?}");
         // Along a neutral direction no estimate can be wrong.
         reference.neutral = Some("the leaf can move".into());
         let told = chart_remarks(&rows, &contenders, Some(&reference));
-        assert!(told[0].starts_with("errors tell little: the leaf can move"));
+        assert_eq!(told[0].code(), "neutral-direction");
         assert_eq!(told.len(), 2, "{told:?}");
     }
 
@@ -916,9 +914,10 @@ mod peers_tests {
         assert_eq!(peers[0].true_error, Some(2e-3));
         assert_eq!(peers[2].true_error, None);
         let wanted = [
-            "3 rows of --peers are about another leaf, and left out",
-            "2 rows of --peers are without the error of a leaf at rest, and left out",
+            "3 rows of peers are about another leaf, and left out",
+            "2 rows of peers are without the error of a leaf at rest, and left out",
         ];
+        let remarks: Vec<String> = remarks.iter().map(ToString::to_string).collect();
         assert_eq!(remarks, wanted);
     }
 }

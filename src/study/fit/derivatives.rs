@@ -147,7 +147,7 @@ fn leaf_rates<'c>(
 fn photo_rates(changes: &[ScenarioDerivative]) -> Vec<PhotoParameterDerivative> {
     let rate = |change: &ScenarioDerivative| {
         let photos = change.iter();
-        let photos = photos.filter_map(|(weight, it)| Some((*weight, it.photo.as_ref()?)));
+        let photos = photos.filter_map(|it| Some((it.weight, it.term.photo.as_ref()?)));
         PhotoParameterDerivative::from_terms(photos)
     };
     changes.iter().map(rate).collect()

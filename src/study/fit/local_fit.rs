@@ -15,6 +15,7 @@ use crate::study::fit::least_squares::{
 };
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
+use crate::study::fit::remark::FitRemark;
 use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
 };
@@ -43,10 +44,6 @@ const LOCAL_SEARCH: LocalSearchLimits = LocalSearchLimits {
     most_jumps_relaxed: 3,
     consistent_deviation: 1.05,
 };
-
-/// Remark if a leaf did not stay on its branch.
-const EQUILIBRIUM_JUMP_REMARK: &str = "on the way a leaf jumped to another equilibrium, that to which it \
-    relaxes from the start: compare with a fit that starts from the values found";
 
 /// A minimum, or where the search for it ended.
 pub(super) struct FitMinimum {
@@ -196,7 +193,7 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             };
         };
         if jumps > 0 {
-            found.fit.remarks.push(EQUILIBRIUM_JUMP_REMARK.into());
+            found.fit.remarks.push(FitRemark::JumpedOnTheWay);
         }
         Ok(found)
     }
@@ -302,7 +299,7 @@ pub(super) fn assemble_fit(
     let candidates = match statistics::rank_candidate_experiments(stats, wanted) {
         Ok(candidates) => candidates,
         Err(refused) => {
-            remarks.push(format!("candidates: {refused}"));
+            remarks.push(FitRemark::Candidates(refused.to_string()));
             Vec::new()
         }
     };
@@ -351,52 +348,48 @@ pub(super) fn assemble_fit(
     }
 }
 
-fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<String> {
+fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<FitRemark> {
     let mut remarks = Vec::new();
     match end {
         GaussNewtonOutcome::Converged => {}
         // The used-up budget is told once, by the search for the best minimum.
         GaussNewtonOutcome::BudgetExhausted => {}
-        GaussNewtonOutcome::StepLimit => remarks.push(
-            "the step limit came before the minimum: start from values nearer to it".into(),
-        ),
-        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => remarks.push(
-            "the way to smaller residuals ends where a leaf jumps to another equilibrium, and is not \
-             followed there: start from other values, or leave out experiments beyond the jump"
-                .into(),
-        ),
-        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::NotAtRest(why))) => {
-            remarks.push(format!("the way to smaller residuals ends: {why}"));
+        GaussNewtonOutcome::StepLimit => remarks.push(FitRemark::StepLimit),
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => {
+            remarks.push(FitRemark::EndsAtJump);
         }
-        GaussNewtonOutcome::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::NotAtRest(why))) => {
+            remarks.push(FitRemark::EndsWithoutEquilibrium(why.clone()));
+        }
+        GaussNewtonOutcome::Stuck(None) => remarks.push(FitRemark::NoSmallerResiduals),
     }
     for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
         if let Some(bound) = free.active_bound(*theta) {
-            let (number, bound) = (&free.number, free.inverse_transform(bound));
+            let (number, value) = (free.number.to_string(), free.inverse_transform(bound));
             remarks.push(match free.has_given_bounds {
-                true => format!("{number} is at its bound {bound}"),
-                false => format!("{number} went as far as {bound:.3e}, and was let no farther"),
+                true => FitRemark::AtBound {
+                    number,
+                    bound: value,
+                },
+                false => FitRemark::WentFar { number, value },
             });
         }
     }
     remarks.extend(unit_mismatch_remarks(stats));
     if stats.degrees_of_freedom == 0 {
-        remarks
-            .push("there are as many numbers as data: nothing is left to judge the fit by".into());
+        remarks.push(FitRemark::NoFreedom);
     }
     if stats.has_known_deviations && stats.has_excessive_residuals() {
-        remarks.push(format!(
-            "chi squared is {:.3e} for {} degrees of freedom: the standard deviations are not \
-             those of these data, or the model is not that of this leaf, or this minimum is not the lowest",
-            stats.residuals.norm_squared(),
-            stats.degrees_of_freedom
-        ));
+        remarks.push(FitRemark::ExcessiveResiduals {
+            chi_squared: stats.residuals.norm_squared(),
+            degrees_of_freedom: stats.degrees_of_freedom,
+        });
     }
     remarks
 }
 
 /// Data that are probably in other units than the scenario.
-fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
+fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<FitRemark> {
     let base = stats.model.base;
     let longest = longest(&base.scenario().rods);
     let (mut beyond, mut missed) = (0, 0);
@@ -411,20 +404,14 @@ fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
     let frequencies =
         components.any(|component| component.quantity.dimension() == DatumDimension::Frequency);
     let mut remarks = Vec::new();
-    let are = |count: usize| if count == 1 { "is" } else { "are" };
+    let length = longest;
     if beyond > 0 {
-        remarks.push(format!(
-            "{beyond} of the coordinates {} far from any leaf of this length ({longest}): are the data in the \
-             scenario's unit of length?",
-            are(beyond)
-        ));
+        let count = beyond;
+        remarks.push(FitRemark::FarFromAnyLeaf { count, length });
     }
     if missed > 0 {
-        remarks.push(format!(
-            "{missed} of the coordinates {} more than half of the leaf's length ({longest}) from the fitted leaf: \
-             are lengths and forces in the scenario's units?",
-            are(missed)
-        ));
+        let count = missed;
+        remarks.push(FitRemark::FarFromFittedLeaf { count, length });
     }
     let given = |key: &str| {
         let keys = key.parse::<ParameterKeys>();
@@ -435,11 +422,7 @@ fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
             .into_iter()
             .any(given)
     {
-        remarks.push(
-            "frequencies are compared, but the scenario has no dynamics.density: its unit of time is then \
-             sqrt(rho L^4/A), which changes with the bending stiffness A: give the density"
-                .into(),
-        );
+        remarks.push(FitRemark::NoDensity);
     }
     remarks
 }

@@ -11,6 +11,7 @@ use crate::study::fit::least_squares::{
 };
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
+use crate::study::fit::remark::FitRemark;
 use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
 use crate::study::fit::{
     Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
@@ -51,7 +52,7 @@ pub(super) struct FitStart {
     /// The values of the scenario, if it does not begin there although all leaves come to rest.
     initial: Option<FitPoint>,
     /// Why it does not begin at the values of the scenario, or what was tried.
-    remark: Option<String>,
+    remark: Option<FitRemark>,
     /// How often the leaves were relaxed to find it.
     evaluations: usize,
 }
@@ -126,30 +127,22 @@ impl FitStart {
         match (better, initial, refused) {
             (Some(point), initial, refused) => {
                 let values = model.values_in_words(&point.theta);
-                let why = refused.unwrap_or_else(|| {
-                    "with the numbers of the scenario the leaf is far from the data".into()
-                });
-                let remark = Some(format!("{why}; the search began with {values}"));
                 Ok(FitStart {
                     point,
                     initial,
-                    remark,
+                    remark: Some(FitRemark::BeganElsewhere {
+                        refusal: refused,
+                        values,
+                    }),
                     evaluations,
                 })
             }
-            (None, Some(point), _) => {
-                let remark = Some(
-                    "with the numbers of the scenario the leaf is far from the data, and no other \
-                     decade of them is nearer"
-                        .into(),
-                );
-                Ok(FitStart {
-                    point,
-                    initial: None,
-                    remark,
-                    evaluations,
-                })
-            }
+            (None, Some(point), _) => Ok(FitStart {
+                point,
+                initial: None,
+                remark: Some(FitRemark::NoDecadeNearer),
+                evaluations,
+            }),
             (None, None, refused) => Err(FitError::NoEquilibrium(refused.unwrap_or_default())),
         }
     }
@@ -297,14 +290,9 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
         if budget.is_used_up() {
-            fit.remarks.insert(
-                0,
-                format!(
-                    "the budget of {} evaluations was used up: this is the best that was found so far; allow more, \
-                     free fewer numbers, or begin nearer",
-                    budget.limit()
-                ),
-            );
+            let evaluations = budget.limit();
+            fit.remarks
+                .insert(0, FitRemark::BudgetUsedUp { evaluations });
         }
         fit.work.evaluations = began.evaluations + self.evaluations.get();
         Ok(fit)

@@ -15,13 +15,14 @@ mod local_fit;
 mod minima;
 mod model;
 mod prediction;
+mod remark;
 mod statistics;
 mod table;
 
 use crate::newton::SolverCounts;
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use crate::run::{Instant, Limit};
-use crate::scenario::format::units::LENGTH;
+use crate::scenario::units::LENGTH;
 
 pub use crate::study::fit::columns::{
     ComparisonOperator, DataFileOptions, MeasuredColumn, MeasuredQuantity, RowCondition, RowFilter,
@@ -33,6 +34,7 @@ use crate::study::fit::minima::{FitStart, GlobalFitSearch};
 use crate::study::fit::model::{
     ASSUMED_DEVIATION_PER_LENGTH, EvaluationBudget, FitModel, Weighting,
 };
+pub use crate::study::fit::remark::{FitCandidateRemark, FitRemark};
 use crate::study::{BaseScenario, ParameterKeys, VariableTarget, VaryError};
 use crate::words;
 use serde::Serialize;
@@ -163,17 +165,11 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     Ok(found)
 }
 
-/// How many lines among the rows of data were left out.
-fn comment_lines_remark(files: &[DataFile]) -> Option<String> {
+/// The files of which lines among the rows were left out, if there are any.
+fn comment_lines_remark(files: &[DataFile]) -> Option<FitRemark> {
     let left_out = files.iter().filter(|file| file.comments_among_rows > 0);
-    let left_out = left_out.map(|file| format!("{} of {}", file.comments_among_rows, file.file));
-    let left_out: Vec<String> = left_out.collect();
-    (!left_out.is_empty()).then(|| {
-        format!(
-            "lines among the rows that begin with # were left out as comments: {}",
-            left_out.join(", ")
-        )
-    })
+    let left_out: Vec<DataFile> = left_out.cloned().collect();
+    (!left_out.is_empty()).then_some(FitRemark::CommentLines { files: left_out })
 }
 
 /// The coordinates of the free numbers, checked to be distinct.
@@ -341,7 +337,7 @@ pub struct FitCandidate {
     pub shrinks: f64,
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<FitCandidateRemark>,
 }
 
 /// Other values of the free numbers that fit the data as well.
@@ -398,7 +394,7 @@ pub struct Fit {
     /// How it ended.
     pub outcome: FitOutcome,
     /// Why it did not converge; other remarks.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<FitRemark>,
     /// The free numbers.
     pub parameters: Vec<FitParameter>,
     /// Correlations of their coordinates (logarithms of positive numbers); null if

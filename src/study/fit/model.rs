@@ -4,6 +4,7 @@
 //! A search uses leaves that are only as accurate as its data, on a few coarse grids; the last steps
 //! use all grids. [`Weighting`] makes residuals of predictions and data.
 
+use crate::leaf::Weighted;
 use crate::newton::SolverCounts;
 use crate::relax::{
     ContinuationFailure, GridPolicy, LARGEST_TOLERANCE, NestedEquilibrium, Options,
@@ -22,7 +23,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
-pub(super) type ScenarioDerivative = Vec<(f64, Scenario)>;
+pub(super) type ScenarioDerivative = Vec<Weighted<Scenario>>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;

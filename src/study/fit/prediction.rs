@@ -184,11 +184,12 @@ impl CaseSolution {
             MeasuredQuantity::Reaction(axis) => {
                 let force = self
                     .equilibrium
-                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).0);
+                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).force);
                 force[axis] * self.force_unit()
             }
             MeasuredQuantity::Grip(grip, axis) => {
-                let force = |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip][0];
+                let force =
+                    |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip].force;
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Frequency(mode) => {

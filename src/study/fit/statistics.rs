@@ -10,6 +10,7 @@ use crate::study::fit::model::{
     EvaluationBudget, FitModel, FitPoint, WeightedDerivatives, Weighting,
 };
 use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
+use crate::study::fit::remark::FitCandidateRemark;
 use crate::study::fit::{FitCandidate, FitError};
 use nalgebra::{DMatrix, DVector};
 
@@ -350,12 +351,15 @@ pub(super) fn rank_candidate_experiments(
     Ok(found)
 }
 
-fn information_added(stats: &FitStatistics, model: &FitModel) -> Result<DMatrix<f64>, String> {
+fn information_added(
+    stats: &FitStatistics,
+    model: &FitModel,
+) -> Result<DMatrix<f64>, FitCandidateRemark> {
+    let refused = |why: FitError| FitCandidateRemark::Refused(why.to_string());
     let found = model.relax_leaves(&stats.point.theta);
-    let mut point = found.map_err(|refused| refused.to_string())?;
-    (model.check_weights(&point)).map_err(|refused| refused.to_string())?;
-    (model.differentiate_data(&mut point))
-        .map_err(|_| "its equilibrium is singular".to_string())?;
+    let mut point = found.map_err(refused)?;
+    (model.check_weights(&point)).map_err(refused)?;
+    (model.differentiate_data(&mut point)).map_err(|_| FitCandidateRemark::Singular)?;
     let sd = |component: &ScalarDatum| match component.quantity {
         DatumQuantity::Result(quantity) => component
             .sd
@@ -363,7 +367,7 @@ fn information_added(stats: &FitStatistics, model: &FitModel) -> Result<DMatrix<
         DatumQuantity::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();
-    let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;
+    let sd = sd.ok_or(FitCandidateRemark::NoDeviation)?;
     let rows: Vec<&Vec<f64>> = point.gradients().collect();
     let jacobian = DMatrix::from_fn(rows.len(), stats.singular_values.len(), |i, k| {
         rows[i][k] / sd[i]

@@ -25,9 +25,11 @@ use crate::study::judge::{
     LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, Timed, eigenvalue_grid,
     morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
+use crate::study::map::remark::{MapMotionFailure, MapRemark};
 use crate::study::map::{
     CellSolution, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
 };
+use crate::study::remark::SolutionRemark;
 use crate::study::vary::{SolverSettings, VariedScenario};
 use crate::{relax, shooting};
 use glam::DVec3;
@@ -122,10 +124,10 @@ impl<'a> MapCell<'a> {
         };
         let answer = match found {
             Ok(answer) => answer,
-            Err((outcome, detail)) => {
+            Err((outcome, remark)) => {
                 return MapRow {
                     outcome,
-                    detail: join_lines(&detail),
+                    remark,
                     ..blank
                 };
             }
@@ -133,12 +135,12 @@ impl<'a> MapCell<'a> {
         let length = longest(&self.scenario.rods);
         let reference = self.reference.as_ref();
         let distance = reference.and_then(|it| it.largest_distance(&answer));
-        let (outcome, detail) = self.judge_solution(&answer, distance);
+        let (outcome, remark) = self.judge_solution(&answer, distance);
         let margin = answer.undulation.margin();
         let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
         MapRow {
             outcome,
-            detail: join_lines(&detail),
+            remark,
             index: answer.index,
             tip_x: tip.map(|node| node.position.x),
             tip_y: tip.map(|node| node.position.y),
@@ -221,27 +223,22 @@ impl<'a> MapCell<'a> {
                 ShootingFailureReason::OutOfTime => MapOutcome::OutOfTime,
                 _ => MapOutcome::NotConverged,
             };
-            let way = match failure.lambda {
-                part if part < 1.0 => format!(" (at {part:.4} of the way from arcs)"),
-                _ => String::new(),
+            let remark = MapRemark::ShootingFailed {
+                reason: failure.reason,
+                part: failure.lambda,
             };
-            (outcome, format!("{}{way}", failure.reason))
+            (outcome, Some(remark))
         })?;
-        let intervals = match solution.intervals.len() - 1 {
-            1 => "1 interval".into(),
-            count => format!("{count} intervals"),
+        let remark = SolutionRemark::Shot {
+            intervals: solution.intervals.len() - 1,
+            growth: solution.growth,
+            neutral: solution.neutral.clone(),
         };
-        let neutral = solution.neutral.as_ref();
-        let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
-        let growth = solution.growth;
-        let note = format!("over {intervals}, growth 10^{growth:.1}{neutral}");
         let answer = MethodSolution::from_shooting(self.scenario, solution, accuracy);
         if !answer.outcome.is_success() {
-            let known = format!(
-                "the solution is only known within {:.1e}",
-                answer.error_bound()
-            );
-            return Err((MapOutcome::NotConverged, known));
+            let error = answer.error_bound();
+            let known = MapRemark::Inaccurate { error };
+            return Err((MapOutcome::NotConverged, Some(known)));
         }
         Ok(MethodSolution {
             index: morse_index_near(
@@ -251,7 +248,7 @@ impl<'a> MapCell<'a> {
                 &answer.rods,
                 answer.error_bound(),
             ),
-            remark: Some(note),
+            remark: Some(remark),
             ..answer
         })
     }
@@ -260,8 +257,8 @@ impl<'a> MapCell<'a> {
         match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
             Err((outcome, why)) => {
-                let why = format!("the leaf to start from is not at rest: {why}");
-                Err((*outcome, why))
+                let why = why.clone().map(Box::new);
+                Err((*outcome, Some(MapRemark::NoStart { why })))
             }
         }
     }
@@ -271,28 +268,28 @@ impl<'a> MapCell<'a> {
         &self,
         answer: &MethodSolution,
         distance: Option<f64>,
-    ) -> (MapOutcome, String) {
-        let note = answer.remark.as_deref().unwrap_or_default();
+    ) -> (MapOutcome, Option<MapRemark>) {
+        let remark = answer.remark.clone();
         if let Some(index @ 1..) = answer.index {
-            return (MapOutcome::Saddle, format!("index {index}; {note}"));
+            let saddle = MapRemark::Saddle { index, remark };
+            return (MapOutcome::Saddle, Some(saddle));
         }
         let (Some(reference), Some(distance)) = (&self.reference, distance) else {
-            let text = format!("stable, with nothing to compare with; {note}");
-            return (MapOutcome::Right, text);
+            return (MapOutcome::Right, Some(MapRemark::Uncompared { remark }));
         };
         if answer.agrees_within_errors(reference, distance) {
-            return (MapOutcome::Right, note.into());
+            return (MapOutcome::Right, remark.map(MapRemark::Solution));
         }
-        let lower = match answer.energy - reference.energy {
-            lower if lower < 0.0 => format!("energy lower by {:.1e}", -lower),
-            higher => format!("energy higher by {higher:.1e}"),
+        let elsewhere = MapRemark::Elsewhere {
+            distance: distance / longest(&self.scenario.rods),
+            energy: answer.energy - reference.energy,
+            remark,
         };
-        let apart = distance / longest(&self.scenario.rods);
-        let text = format!("{apart:.1e} lengths from the reference, {lower}; {note}");
-        match self.is_other_equilibrium(answer, reference, distance) {
-            true => (MapOutcome::OtherEquilibrium, text),
-            false => (MapOutcome::Inaccurate, text),
-        }
+        let outcome = match self.is_other_equilibrium(answer, reference, distance) {
+            true => MapOutcome::OtherEquilibrium,
+            false => MapOutcome::Inaccurate,
+        };
+        (outcome, Some(elsewhere))
     }
 
     /// Whether the equilibrium near an answer is another than the reference.
@@ -316,11 +313,11 @@ impl<'a> MapCell<'a> {
 
 /// The outcome on a grid that takes longer than the limit in any case.
 fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<Timed<CellSolution>> {
-    let (nodes, limit) = (segments.saturating_mul(rods), limit.as_secs_f64());
-    let late = nodes as f64 * LEAST_SECONDS_PER_NODE > limit;
-    let why = || format!("{nodes} nodes take longer than {limit} s");
-    late.then(|| Timed {
-        result: Err((MapOutcome::OutOfTime, why())),
+    let (nodes, seconds) = (segments.saturating_mul(rods), limit.as_secs_f64());
+    let late = nodes as f64 * LEAST_SECONDS_PER_NODE > seconds;
+    let why = Some(MapRemark::TooManyNodes { nodes, seconds });
+    late.then_some(Timed {
+        result: Err((MapOutcome::OutOfTime, why)),
         seconds: 0.0,
     })
 }
@@ -337,10 +334,10 @@ fn run_within_limit(
         ..all.clone()
     };
     let mut found = run_timed(|| run(&until));
-    let limit = limit.as_secs_f64();
-    if found.seconds > limit {
-        let late = format!("no answer within {limit} s");
-        found.result = Err((MapOutcome::OutOfTime, late));
+    let allowed = limit.as_secs_f64();
+    if found.seconds > allowed {
+        let late = MapRemark::OutOfTime { seconds: allowed };
+        found.result = Err((MapOutcome::OutOfTime, Some(late)));
     }
     found
 }
@@ -359,7 +356,10 @@ pub fn relax_with_error_estimate(
         ..Options::default()
     };
     let leaf = relax::relax(scenario, &options, &mut |_| {});
-    let leaf = leaf.map_err(|refused| (MapOutcome::Refused, refused.to_string()))?;
+    let leaf = leaf.map_err(|refused| {
+        let refused = MapRemark::Refused(refused.to_string());
+        (MapOutcome::Refused, Some(refused))
+    })?;
     let saddle = leaf.stability.saddle;
     let saddle = saddle.map(|saddle| saddle.negative_eigenvalues);
     let mut answer = MethodSolution::from(leaf);
@@ -368,19 +368,18 @@ pub fn relax_with_error_estimate(
             Outcome::Diverged => MapOutcome::Diverged,
             _ => MapOutcome::NotConverged,
         };
-        return Err((outcome, answer.remark.unwrap_or_default()));
+        return Err((outcome, answer.remark.map(MapRemark::Solution)));
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();
         let error = segments.and_then(|n| single_grid_error(scenario, n, tolerance, limit));
         let Some(error) = error else {
-            let why = "the error of the grid cannot be told: a finer one finds no rest";
-            return Err((MapOutcome::NotConverged, why.into()));
+            return Err((MapOutcome::NotConverged, Some(MapRemark::UnknownError)));
         };
         answer.error_estimate = Some(error + tolerance);
     }
     if let Some(index) = saddle {
-        answer.remark = Some(format!("left a saddle of index {index}"));
+        answer.remark = Some(SolutionRemark::LeftSaddle { index });
     }
     Ok(answer)
 }
@@ -414,11 +413,6 @@ fn choose_reference(relaxed: &MethodSolution, shot: Option<MethodSolution>) -> C
     }
 }
 
-/// Puts a text on one line, as tables require.
-pub fn join_lines(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
 /// Largest number of stations at which answers are compared.
 const MOST_COMPARED_STATIONS: usize = 4096;
 
@@ -433,29 +427,35 @@ pub fn solve_by_explicit_motion(
     tolerance: f64,
     limit: &Limit,
 ) -> CellSolution {
-    let refused = |why: String| Err((MapOutcome::Refused, why));
+    let refused = |why: MapRemark| Err((MapOutcome::Refused, Some(why)));
     let Some(step) = knobs.step else {
-        return refused("explicit motion needs method.step".into());
+        return refused(MapRemark::NoTimeStep);
     };
     let leaf = Leaf::new(scenario);
     let grid = match motion_grid(&leaf, knobs) {
         Ok(grid) => grid,
-        Err(error) => return refused(error.to_string()),
+        Err(error) => return refused(MapRemark::Refused(error.to_string())),
     };
     let physics = Physics::new(&leaf);
     if !physics.clamped() {
-        return refused("a free leaf has no place to rest in".into());
+        return refused(MapRemark::FreeLeaf);
     }
     let discrete = DiscreteLeaf::new(&leaf, grid.clone());
     let state = initial_state(&discrete);
     let h = step / physics.time_unit;
     let Ok(mut motion) = Explicit::new(discrete, physics.clone(), &state, Some(h)) else {
-        return refused("no time step is stable for rigid rods (a stiffness is inf)".into());
+        return refused(MapRemark::RigidRods);
     };
     let stable = motion.stable_step();
-    let (most, why) = (stable.step * physics.time_unit, stable.limit);
-    let note = format!("step {step:.3e}, stable up to {most:.3e} because of {why}");
-    let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
+    let stepped = SolutionRemark::Stepped {
+        step,
+        stable: stable.step * physics.time_unit,
+        limit: stable.limit,
+    };
+    let failed = |outcome, motion: MapMotionFailure| {
+        let step = stepped.clone();
+        Err((outcome, Some(MapRemark::MotionFailed { motion, step })))
+    };
     let (duration, _) = physics.duration_and_interval();
     while motion.time() < duration {
         let until = motion.time() + STEPS_PER_TIME_CHECK * h;
@@ -465,22 +465,24 @@ pub fn solve_by_explicit_motion(
             | Stopped::Diverged { time, .. }
             | Stopped::StepTooShort { time, .. }
             | Stopped::Interrupted { time }) = stopped;
-            let at = format!("at t = {:.3e}", time * physics.time_unit);
+            let time = time * physics.time_unit;
             return match stopped {
-                Stopped::Unresolved { turn, .. } => {
-                    let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
-                    failed(MapOutcome::NotConverged, format!("{at} {bent}"))
-                }
-                Stopped::HalfTurn { half_turn, .. } => failed(
+                Stopped::Unresolved { turn, .. } => failed(
                     MapOutcome::NotConverged,
-                    format!("{at} {}", half_turn.sentence()),
+                    MapMotionFailure::Unresolved { time, turn },
                 ),
-                _ => failed(MapOutcome::Diverged, format!("numerical instability {at}")),
+                Stopped::HalfTurn {
+                    half_turn: place, ..
+                } => failed(
+                    MapOutcome::NotConverged,
+                    MapMotionFailure::HalfTurn { time, place },
+                ),
+                _ => failed(MapOutcome::Diverged, MapMotionFailure::Unstable { time }),
             };
         }
         if limit.reached() {
             // Past the limit it counts as out of time, whatever is returned here.
-            return failed(MapOutcome::OutOfTime, "still moving".into());
+            return failed(MapOutcome::OutOfTime, MapMotionFailure::OutOfTime);
         }
     }
     let end = motion.snapshot();
@@ -490,7 +492,7 @@ pub fn solve_by_explicit_motion(
         .map(|v| [v.linear, v.angular].map(DVec3::length));
     let fastest = largest(speeds.flatten());
     if fastest > tolerance {
-        let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
+        let moves = MapMotionFailure::StillMoving { speed: fastest };
         return failed(MapOutcome::NotConverged, moves);
     }
     let rods = rod_shapes(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
@@ -501,14 +503,14 @@ pub fn solve_by_explicit_motion(
         SAME_LEAF_DISTANCE * leaf.scale.length,
     );
     if index.is_none() && !leaf.loads.has_moments() {
-        return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
+        return failed(MapOutcome::NotConverged, MapMotionFailure::NotAtRest);
     }
     let length = leaf.scale.length;
     let error = single_grid_error(scenario, grid.segments(), tolerance, limit);
     let estimate = error.unwrap_or(SAME_LEAF_DISTANCE * length) + tolerance * length;
     Ok(MethodSolution {
         outcome: Outcome::Converged,
-        remark: Some(note),
+        remark: Some(stepped),
         undulation: Undulation::at_stations(scenario, grid.sigma(), &rods, Some(estimate)),
         stations: grid.sigma().to_vec(),
         rods,

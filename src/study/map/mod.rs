@@ -7,13 +7,15 @@
 //! reference is confirmed. All answers are measured against it.
 
 mod cell;
+mod remark;
 
 use crate::memory::TooMuch;
 use crate::relax::{Method, RelaxError, check_tolerance, without_wind};
 use crate::run::{Limit, RefusedOption};
 use crate::study::judge::MethodSolution;
+use crate::study::map::cell::MapCell;
 pub use crate::study::map::cell::MapJump;
-use crate::study::map::cell::{MapCell, join_lines};
+pub use crate::study::map::remark::{MapMotionFailure, MapRemark};
 use crate::study::vary::{BaseScenario, ParameterKeys, ParameterSweep, SolverSetting, VaryError};
 use crate::{memory, read_and_write, words};
 use serde::{Serialize, Serializer};
@@ -314,9 +316,9 @@ impl MapRequest {
         let varied = match self.base.scenario_with_values(&self.values(cell)) {
             Ok(varied) => varied,
             Err(refused) => {
-                let detail = join_lines(&refused.to_string());
+                let remark = Some(MapRemark::Refused(refused.to_string()));
                 let refused = |&method: &MapMethod| MapRow {
-                    detail: detail.clone(),
+                    remark: remark.clone(),
                     cell,
                     method,
                     ..MapRow::default()
@@ -450,9 +452,9 @@ words! {
     }
 }
 
-/// An answer at rest within the tolerance, or an outcome and a sentence that say why there
+/// An answer at rest within the tolerance, or an outcome and a remark that say why there
 /// is none.
-pub type CellSolution = Result<MethodSolution, (MapOutcome, String)>;
+pub type CellSolution = Result<MethodSolution, (MapOutcome, Option<MapRemark>)>;
 
 words! {
     /// Reliability of the reference.
@@ -493,8 +495,9 @@ pub struct MapRow {
     pub method: MapMethod,
     /// The outcome.
     pub outcome: MapOutcome,
-    /// Further information, on one line.
-    pub detail: String,
+    /// Further information.
+    #[serde(rename = "detail", serialize_with = "serialize_on_one_line")]
+    pub remark: Option<MapRemark>,
     /// Negative eigenvalues of the equilibrium found.
     pub index: Option<usize>,
     /// The shared tip, or the first rod's.
@@ -531,6 +534,18 @@ pub struct MapRow {
     pub reference: ReferenceConfidence,
 }
 
+impl MapRow {
+    /// Further information on one line, as tables require.
+    pub fn detail(&self) -> String {
+        on_one_line(self.remark.as_ref())
+    }
+}
+
+fn on_one_line(remark: Option<&MapRemark>) -> String {
+    let text = remark.map(ToString::to_string).unwrap_or_default();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Numbers as Rust writes them, from which every bit can be read.
 fn serialize_exact_number<S: Serializer>(
     value: &Option<f64>,
@@ -541,6 +556,13 @@ fn serialize_exact_number<S: Serializer>(
         Some(value) => serializer.collect_str(&format_args!("{:?}", value + 0.0)),
         None => serializer.serialize_none(),
     }
+}
+
+fn serialize_on_one_line<S: Serializer>(
+    remark: &Option<MapRemark>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&on_one_line(remark.as_ref()))
 }
 
 fn serialize_microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,4 +1,4 @@
-//! `relax --margin`: how far a stable leaf is from losing its stability.
+//! How far a stable leaf is from losing its stability.
 //!
 //! A force on the tip is increased along each axis, both ways, and the leaf followed until it becomes
 //! unstable; saddles are sought from there and along the softest modes, and the lowest is the barrier to
@@ -13,11 +13,11 @@ use crate::branch::{
 };
 use crate::leaf::{Grid, NodalField, State, are_mirror_symmetric, is_mirrored};
 use crate::memory;
-use crate::numbers::format_error_bound;
 use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
-    AxisDirection, CriticalTipForce, Equilibrium, GridLevel, InstabilityKind, Margin, Neighbour,
-    Options, PostcriticalBehavior, Progress, RelaxError, relax_on_grids, without_wind,
+    AxisDirection, CriticalTipForce, CriticalTipForceRemark, Equilibrium, GridLevel,
+    InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, Progress,
+    RelaxError, relax_on_grids, without_wind,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
@@ -108,16 +108,6 @@ const EIGENVALUE_AGREEMENT: f64 = 0.25;
 /// Nodes of the finest grid in that search.
 const MOST_CONTINUATION_NODES: usize = 5_000;
 
-/// Why there is no margin if no grid satisfies it.
-const UNRESOLVED_EIGENVALUE_REASON: &str =
-    "its softest eigenvalue cannot be told from zero on any grid tried";
-
-/// Remark on pushes that are not tried.
-const ZERO_ENERGY_ROTATION_REMARK: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
-     pushes along it are tried";
-
-const TIP_HELD_REMARK: &str = "the tip is held: a force on it moves nothing";
-
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
 pub fn relax_with_margin(
@@ -137,8 +127,8 @@ pub fn relax_with_margin(
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
         (true, Some(true)) => stability_margin(scenario, &leaf, &found.levels, options, progress)?,
-        (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
-        _ => Margin::none("only a leaf at rest whose stability is known has a margin"),
+        (true, Some(false)) => Margin::none(MarginRemark::Unstable),
+        _ => Margin::none(MarginRemark::StabilityUnknown),
     });
     Ok(leaf)
 }
@@ -199,7 +189,7 @@ fn stability_margin(
     let clock = Instant::now();
     let make = |_: [f64; 1]| Ok(scenario.clone());
     let Ok(family) = LeafFamily::new(&make, [0.0, 1.0], false) else {
-        return Ok(Margin::none(UNRESOLVED_EIGENVALUE_REASON));
+        return Ok(Margin::none(MarginRemark::UnresolvedEigenvalue));
     };
     let LeafOnGrid { grid, point, .. } = match continuation_grid(&family, levels) {
         Ok(found) => found,
@@ -247,10 +237,10 @@ fn stability_margin(
         barrier::lowest_energy_barrier(&stable, starts, weight);
     let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
-        true => Some("the time allowed was over before all was tried".into()),
-        false if held => Some(TIP_HELD_REMARK.into()),
+        true => Some(MarginRemark::OutOfTime),
+        false if held => Some(MarginRemark::TipHeld),
         false => {
-            (rest.stability.neutral_directions > 0).then(|| ZERO_ENERGY_ROTATION_REMARK.into())
+            (rest.stability.neutral_directions > 0).then_some(MarginRemark::ZeroEnergyRotation)
         }
     };
     Ok(Margin {
@@ -308,7 +298,7 @@ fn is_softest_eigenvalue_resolved(grids: &[LeafOnGrid]) -> bool {
 fn continuation_grid(
     family: &LeafFamily,
     levels: &[GridLevel],
-) -> Result<LeafOnGrid, &'static str> {
+) -> Result<LeafOnGrid, MarginRemark> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
@@ -320,13 +310,13 @@ fn continuation_grid(
         Ok::<_, CorrectorFailure>((equations, point))
     };
     let (mut equations, mut point) =
-        on_level(&levels[0]).map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
+        on_level(&levels[0]).map_err(|_| MarginRemark::UnresolvedEigenvalue)?;
     nested.next();
     let mut grids: Vec<LeafOnGrid> = Vec::new();
     loop {
         grids.push(
             LeafOnGrid::from_point(&mut equations, &point)
-                .map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?,
+                .map_err(|_| MarginRemark::UnresolvedEigenvalue)?,
         );
         for first in [2, 3]
             .into_iter()
@@ -339,15 +329,15 @@ fn continuation_grid(
         if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_CONTINUATION_NODES
         {
             return Err(match point.index {
-                0 => UNRESOLVED_EIGENVALUE_REASON,
-                _ => "the leaf is unstable on grids finer than those of its relaxation",
+                0 => MarginRemark::UnresolvedEigenvalue,
+                _ => MarginRemark::UnstableOnFinerGrids,
             });
         }
         let finer = match nested.next() {
             Some(level) => on_level(level),
             None => on_finer(&mut equations, &point),
         };
-        (equations, point) = finer.map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
+        (equations, point) = finer.map_err(|_| MarginRemark::UnresolvedEigenvalue)?;
     }
 }
 
@@ -458,19 +448,19 @@ fn find_critical_tip_force(
         direction,
         ..CriticalTipForce::default()
     };
-    let failed = |why: String| CriticalTipForce {
+    let failed = |why: CriticalTipForceRemark| CriticalTipForce {
         more_than: Some(0.0),
         remark: Some(why),
         ..unknown.clone()
     };
     let family = match LeafFamily::new(&make, [0.0, stable.largest_force], false) {
         Ok(family) => family,
-        Err(out) => return (failed(out.to_string()), Vec::new()),
+        Err(out) => return (failed(branch_lost(&out)), Vec::new()),
     };
     let mut grids = NestedBranchEquations::new(&family, stable.grid.clone());
     let followed = match continue_to_stability_loss(stable, direction, &mut grids) {
         Ok(followed) => followed,
-        Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
+        Err(stuck) => return (failed(branch_lost(&stuck)), Vec::new()),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
     let lost = |critical: &CriticalPoint| critical.indices[0] == 0 && critical.indices[1] > 0;
@@ -486,9 +476,8 @@ fn find_critical_tip_force(
     let error =
         refined.fraction_error * stable.largest_force + force_rounding_error(stable, force, weight);
     if 2.0 * error >= force {
-        let below = format_error_bound(force + error);
-        let unknown = failed(format!("its loss, below {below}, cannot be told from zero"));
-        return (unknown, starts);
+        let below = force + error;
+        return (failed(CriticalTipForceRemark::NearZero { below }), starts);
     }
     let push = CriticalTipForce {
         kind: match critical.kind {
@@ -564,19 +553,23 @@ fn force_without_stability_loss(
         more_than: Some(furthest * stable.largest_force),
         remark: match &followed.end {
             BranchEnd::RangeEndReached => None,
-            _ if stable.limit.reached() => Some("the time allowed was over".into()),
-            BranchEnd::StepFailed(stuck) => Some(stuck.to_string()),
-            BranchEnd::PointUnverified(doubt) => Some(doubt.to_string()),
+            _ if stable.limit.reached() => Some(CriticalTipForceRemark::OutOfTime),
+            BranchEnd::StepFailed(stuck) => Some(branch_lost(stuck)),
+            BranchEnd::PointUnverified(doubt) => Some(branch_lost(doubt)),
             BranchEnd::LoopClosed
             | BranchEnd::RangeStartReached
             | BranchEnd::KnownBoundaryMet
             | BranchEnd::PointLimitReached
             | BranchEnd::StopCriterionMet
             | BranchEnd::StabilityLost
-            | BranchEnd::RunLimitReached => Some("the branch could not be followed further".into()),
+            | BranchEnd::RunLimitReached => Some(CriticalTipForceRemark::NotFollowed),
         },
         ..unknown
     }
+}
+
+fn branch_lost(why: &impl ToString) -> CriticalTipForceRemark {
+    CriticalTipForceRemark::BranchLost(why.to_string())
 }
 
 /// What the leaf does at a critical point: if a stable branch crosses, it continues

@@ -20,6 +20,7 @@ use crate::relax::{
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{EntryPath, Key, Scenario, plausibility_warnings};
 use crate::shape::Undulation;
+use crate::study::remark::{BranchRemark, TraceRemark};
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
 use crate::study::vary::{BaseScenario, ParameterSweep};
 use crate::study::{UnknownWord, VariableTarget, VaryError};
@@ -287,9 +288,18 @@ fn trace_with_points_from(
         wall_seconds: 0.0,
     };
     let began = match rest.stability.negative_eigenvalues {
-        Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted)
-            .map_err(|stuck| stuck.to_string()),
-        None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
+        Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted).map_err(|why| {
+            TraceRemark::NoFirstPoint {
+                keys: keys.clone(),
+                value,
+                why,
+            }
+        }),
+        None => Err(TraceRemark::NoEquilibrium {
+            keys: keys.clone(),
+            value,
+            remark: rest.remark,
+        }),
     };
     let (mut first, mut critical) = (None, Vec::new());
     match began {
@@ -307,11 +317,7 @@ fn trace_with_points_from(
             run.trace_all_branches(point, given.is_some(), &mut trace);
             (first, critical) = (run.first, run.critical);
         }
-        Err(why) => {
-            let at = keys.text(value);
-            let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
-            trace.remark = Some(remark);
-        }
+        Err(remark) => trace.remark = Some(remark),
     }
     let branches = &trace.branches;
     trace.complete =
@@ -446,7 +452,8 @@ impl BranchTracer<'_, '_> {
         while let Some(BranchEntrance { point, from }) = entrances.pop_front() {
             let number = trace.branches.len();
             if number == MOST_BRANCHES {
-                trace.remark = Some(format!("there are more than {MOST_BRANCHES} branches"));
+                let most = MOST_BRANCHES;
+                trace.remark = Some(TraceRemark::TooManyBranches { most });
                 break;
             }
             let (family, progress) = (self.family, &mut *self.progress);
@@ -468,17 +475,15 @@ impl BranchTracer<'_, '_> {
             });
             self.first = self.first.take().or(begun);
             let missing = self.record_crossings(&followed, number, &mut entrances);
-            trace.branches[number].add_remarks(missing);
+            trace.branches[number].remarks.extend(missing);
             let left = followed.end == BranchEnd::RunLimitReached
                 || !entrances.is_empty()
                 || self.stopped_before_crossings;
             if left && self.family.limit.reached() {
                 trace.remark = Some(
                     match self.stopped_before_crossings || !entrances.is_empty() {
-                        true => {
-                            "the run was stopped: branches that cross are not all followed".into()
-                        }
-                        false => "the run was stopped".into(),
+                        true => TraceRemark::StoppedBeforeCrossings,
+                        false => TraceRemark::Stopped,
                     },
                 );
                 break;
@@ -495,7 +500,7 @@ impl BranchTracer<'_, '_> {
         followed: &VerifiedBranch,
         number: usize,
         entrances: &mut VecDeque<BranchEntrance>,
-    ) -> Vec<String> {
+    ) -> Vec<BranchRemark> {
         let mut missing = Vec::new();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
@@ -520,10 +525,8 @@ impl BranchTracer<'_, '_> {
                 let value = self.family.value(refined.fraction);
                 // As many digits as tell one crossing from the next.
                 let value = format!("{value:.8e}").parse().unwrap_or(value);
-                missing.push(format!(
-                    "the branches that cross at {} are not followed: none was found within the range",
-                    self.request.vary.keys.text(value)
-                ));
+                let value = self.request.vary.keys.text(value);
+                missing.push(BranchRemark::CrossingNotFollowed { value });
             }
             self.stopped_before_crossings |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
@@ -558,28 +561,23 @@ impl BranchTracer<'_, '_> {
             from,
             points,
             end: followed.end.clone(),
-            remark: self.branch_remark(followed),
+            remarks: self.branch_remarks(followed),
         }
     }
 
     /// Why a branch ended, and where it met no branch that must cross it.
-    fn branch_remark(&self, followed: &VerifiedBranch) -> Option<String> {
+    fn branch_remarks(&self, followed: &VerifiedBranch) -> Vec<BranchRemark> {
         let near = |after: &usize| {
             let near = &followed.points[*after];
             let keys = &self.request.vary.keys;
             let value = keys.text(self.family.value(near.fraction));
-            format!(
-                "it turns back beyond {value} where another branch must cross it, which was not found"
-            )
+            BranchRemark::CrossingNotFound { value }
         };
-        let mut remarks: Vec<String> = followed
-            .branch
-            .unmatched_vertices
-            .iter()
+        let vertices = followed.branch.unmatched_vertices.iter();
+        vertices
             .map(near)
-            .collect();
-        remarks.extend(followed.end.failure_remark());
-        (!remarks.is_empty()).then(|| remarks.join("; "))
+            .chain(followed.end.failure_remark())
+            .collect()
     }
 
     /// Waves and twist of the leaf at a point, on its finest grid.

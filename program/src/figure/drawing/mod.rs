@@ -1,15 +1,12 @@
-//! Elements of a picture: shapes and labels on a page, and their colours. The unit
-//! is 1/96 inch, x points to the right and y down.
-//!
-//! Smooth curves through points on the page.
-//!
-//! Points of curves: which of them can be drawn, and where fractions of the length are.
+//! A page with its elements, shapes and labels, on which every figure is drawn: sizes, panels,
+//! colours, and smooth curves. The unit is 1/96 inch, x points to the right and y down.
 
 pub(super) mod axes;
 pub(crate) mod formats;
 pub(super) mod labels;
 pub(super) mod markers;
 pub(super) mod space;
+pub(crate) mod veins;
 
 use glam::{DVec2, DVec3};
 
@@ -240,6 +237,145 @@ pub fn circle_path(center: DVec2, radius: f64) -> DrawingPath {
         PathStep::Cubic(point(q, -1.0), point(1.0, -q), point(1.0, 0.0)),
         PathStep::Close,
     ]
+}
+
+/// Sizes of a page, in pixels.
+pub struct PageSizes {
+    pub width: f64,
+    pub left_margin: f64,
+    pub right_margin: f64,
+    /// Margins to the left and right of panels without labels.
+    pub side_margin: f64,
+    /// Base lines of the title and of the notes below it.
+    pub title_base_line: f64,
+    pub notes_base_line: f64,
+    /// Height of the header, below which panels may begin.
+    pub header: f64,
+    /// Room above a panel, for its title, and below, for its axis.
+    pub panel_title: f64,
+    pub panel_axis: f64,
+    /// Below the last panel.
+    pub bottom_margin: f64,
+}
+
+pub const PAGE: PageSizes = PageSizes {
+    width: 900.0,
+    left_margin: 64.0,
+    right_margin: 22.0,
+    side_margin: 22.0,
+    title_base_line: 38.0,
+    notes_base_line: 60.0,
+    header: 74.0,
+    panel_title: 24.0,
+    panel_axis: 48.0,
+    bottom_margin: 4.0,
+};
+
+/// Sizes of letters, in pixels: of a page's title, of text, and of the labels of ticks and points.
+pub struct FontSizes {
+    pub title: f64,
+    pub text: f64,
+    pub tick: f64,
+}
+
+pub const FONT_SIZE: FontSizes = FontSizes {
+    title: 19.0,
+    text: 12.0,
+    tick: 10.5,
+};
+
+#[derive(Clone, Copy)]
+pub struct PageRectangle {
+    pub corner: DVec2,
+    pub size: DVec2,
+}
+
+impl PageRectangle {
+    pub fn new(corner: DVec2, size: DVec2) -> Self {
+        PageRectangle { corner, size }
+    }
+
+    /// A panel across the page that leaves this width on the right for a key.
+    pub fn left_of_legend(top: f64, height: f64, key: f64) -> Self {
+        PageRectangle::new(
+            DVec2::new(PAGE.left_margin, top),
+            DVec2::new(
+                PAGE.width - PAGE.left_margin - PAGE.right_margin - key,
+                height,
+            ),
+        )
+    }
+
+    pub fn opposite_corner(&self) -> DVec2 {
+        self.corner + self.size
+    }
+
+    /// Of the four points at this inset from its corners, the one farthest from all points
+    /// `taken`.
+    pub fn emptiest_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
+        let (low, high) = (self.corner + inset, self.opposite_corner() - inset);
+        let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
+        let mut free = [f64::INFINITY; 4];
+        for point in taken {
+            for (free, place) in free.iter_mut().zip(places) {
+                *free = free.min(place.distance_squared(point));
+            }
+        }
+        // The first of equally free ones, up to rounding.
+        let freer = |k: usize, best: usize| free[k] > (1.0 + 1e-9) * free[best];
+        places[(0..4).fold(0, |best, k| if freer(k, best) { k } else { best })]
+    }
+
+    pub fn middle(&self) -> DVec2 {
+        self.corner + 0.5 * self.size
+    }
+
+    /// The ends of the line from left to right through its middle.
+    pub fn midline(&self) -> [DVec2; 2] {
+        let half = DVec2::new(0.5 * self.size.x, 0.0);
+        [self.middle() - half, self.middle() + half]
+    }
+
+    pub fn draw_midline(&self, page: &mut Drawing, stroke: Stroke) {
+        let [from, to] = self.midline();
+        page.draw_line(from, to, stroke);
+    }
+}
+
+/// A panel's title: its letter, and a text in a colour.
+#[derive(Clone, Copy)]
+pub struct PanelCaption<'t> {
+    pub letter: &'t str,
+    pub text: &'t str,
+    pub color: Color,
+}
+
+impl PanelCaption<'_> {
+    /// Draws the title above the frame whose upper left corner is given.
+    pub fn draw(self, page: &mut Drawing, corner: DVec2) {
+        let base = corner - DVec2::new(0.0, 8.0);
+        let mut label = |at: DVec2, text: &str, color: Color| {
+            page.draw_label(at, text, FONT_SIZE.text, TextAnchor::Start, color);
+        };
+        label(base, self.letter, TEXT_COLOR);
+        label(base + DVec2::new(24.0, 0.0), self.text, self.color);
+    }
+}
+
+/// Draws a panel's title above its frame.
+pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
+    let color = NOTE_COLOR;
+    PanelCaption {
+        letter,
+        text,
+        color,
+    }
+    .draw(page, corner);
+}
+
+/// Letters of panels: `(a)`, `(b)`, ...
+pub fn panel_letters() -> impl Iterator<Item = String> + Clone {
+    (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
