@@ -21,6 +21,7 @@ use crate::newton::{
 };
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
+use crate::scenario::CLAMPED_ROD_FREQUENCY;
 
 /// Largest rotation of a node in one step, radians.
 const MAX_TURN: f64 = 1.0;
@@ -277,9 +278,8 @@ fn assembled(
     leaf.assemble(state, system)
 }
 
-/// Damping c: critical for the lowest bending mode of a single rod, whose
-/// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
-const DAMPING: f64 = 2.0 * 3.516;
+/// Damping c: critical for the lowest bending mode of a single rod.
+const DAMPING: f64 = 2.0 * CLAMPED_ROD_FREQUENCY;
 
 /// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
 const FIRST_STEP: f64 = 0.06;
