@@ -19,6 +19,7 @@ use crate::newton::{
 use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
+use crate::scenario::CLAMPED_ROD_FREQUENCY;
 
 /// Limits on the steps of the motion.
 struct MotionStepLimits {
@@ -291,8 +292,7 @@ fn assembled(
 
 /// The time steps of the damped motion, in units of sqrt(rho L^4/A).
 struct DampedTimeSteps {
-    /// Damping c: critical for the lowest bending mode of a single rod, whose frequency is 3.516
-    /// (canonical value beta_1^2 of the clamped-free beam).
+    /// Damping c: critical for the lowest bending mode of a single rod.
     damping: f64,
     /// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
     /// Twice as long a one may carry the leaf into another valley.
@@ -310,7 +310,7 @@ struct DampedTimeSteps {
 }
 
 const TIME_STEPS: DampedTimeSteps = DampedTimeSteps {
-    damping: 2.0 * 3.516,
+    damping: 2.0 * CLAMPED_ROD_FREQUENCY,
     first: 0.06,
     shortest: 1e-7,
     longest: 1e3,
