@@ -310,10 +310,10 @@ pub fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.place_held_nodes(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
-        let (x, q) = leaf.leaf.base(j);
-        state.x[base] = x;
+        let pose = leaf.leaf.base_pose(j);
+        state.x[base] = pose.position;
         if !leaf.leaf.hinged() {
-            state.q[base] = q;
+            state.q[base] = pose.rotation;
         }
     }
 }

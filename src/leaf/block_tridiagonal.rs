@@ -61,9 +61,7 @@ pub struct NodeBlocks {
 /// Masses of the rods of a group, per weight of their nodes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GroupMasses {
-    /// Moments of inertia.
     pub rotary: NumberGroup,
-    /// Masses in translation.
     pub translational: NumberGroup,
 }
 
@@ -244,16 +242,14 @@ impl TipFactor {
     }
 }
 
-/// Where the numbers of a rod are.
+/// The group of a rod, and its lane within the group.
 #[derive(Clone, Copy)]
 pub struct RodLane {
-    /// Number of the group of rods.
     pub group: usize,
-    /// Lane within the group.
     pub lane: usize,
 }
 
-/// Group and lane of rod `j`.
+/// Where rod `j` is.
 pub fn rod_lane(j: usize) -> RodLane {
     RodLane {
         group: j / GROUP,

@@ -26,6 +26,14 @@ use std::ops::Range;
 /// vein rotates with its strip of blade.
 const RADIUS_OF_GYRATION: f64 = 0.1;
 
+/// Smallest shift of the matrix, as a squared frequency, that keeps neutral modes from moving: far below
+/// the squared frequency of any bending mode.
+const LEAST_NEUTRAL_SHIFT: f64 = 1e-7;
+
+/// Largest difference between stations of a shape and nodes of a grid by rounding, in fractions of the
+/// length.
+const STATION_ROUNDING: f64 = 1e-9;
+
 /// A leaf on a grid.
 #[derive(Clone, Debug)]
 pub struct DiscreteLeaf {
@@ -55,12 +63,10 @@ pub struct DiscreteLeaf {
     pub loads: Loads,
 }
 
-/// A dead moment on a node of a single rod.
+/// A dead moment on a node of a single rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct NodalMoment {
-    /// Number of the node.
     pub node: usize,
-    /// Moment along the lab axes.
     pub moment: DVec3,
 }
 
@@ -75,10 +81,9 @@ pub struct TipReaction {
 
 /// Mass of a node at unit density, or its mass per weight.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NodeMass {
+pub(super) struct NodeMass {
     /// Moment of inertia, the same about all axes.
     pub rotary: f64,
-    /// Mass in translation.
     pub translational: f64,
 }
 
@@ -99,7 +104,7 @@ impl NodeMass {
 pub struct NodeWeights {
     /// Weight in dead loads.
     pub load: f64,
-    /// Weight in the coupling, which is zero at a joint tip.
+    /// Weight in the coupling: zero at a joint tip, which all rods share.
     pub coupling: f64,
 }
 
@@ -177,7 +182,8 @@ impl DiscreteLeaf {
     fn unstrained_state(&self, grown: bool) -> State {
         let (mut xs, mut qs) = (Vec::new(), Vec::new());
         for j in 0..self.rods() {
-            let (mut x, mut q) = self.leaf.base(j);
+            let base = self.leaf.base_pose(j);
+            let (mut x, mut q) = (base.position, base.rotation);
             xs.push(x);
             qs.push(q);
             for i in 0..self.segments() {
@@ -251,11 +257,10 @@ impl DiscreteLeaf {
         (0..self.rods()).all(|j| open(j) <= within)
     }
 
-    /// A shift of the matrix (times the mass matrix) that is far below the squared frequency
-    /// of any bending mode, and above the error of a neutral mode's zero eigenvalue by
-    /// rounding and unfinished iterations.
+    /// A shift of the matrix (times the mass matrix) above the error of a neutral mode's zero
+    /// eigenvalue by rounding and unfinished iterations.
     pub fn neutral_shift(&self) -> f64 {
-        1e-7 + 4.0 * self.eigenvalue_rounding()
+        LEAST_NEUTRAL_SHIFT + 4.0 * self.eigenvalue_rounding()
     }
 
     /// Rounding error of the eigenvalues of the matrix.
@@ -511,7 +516,10 @@ impl Grid {
         let grid = Grid::new(segments, kinks);
         let apart = |grid: &Grid| {
             let pairs = grid.sigma.iter().zip(stations);
-            grid.segments() != segments || pairs.into_iter().any(|(a, b)| (a - b).abs() > 1e-9)
+            grid.segments() != segments
+                || pairs
+                    .into_iter()
+                    .any(|(a, b)| (a - b).abs() > STATION_ROUNDING)
         };
         let mut nested = grid.clone();
         let mut halvings = 0;
@@ -567,7 +575,7 @@ impl Grid {
     }
 
     /// The node nearest to a fraction of the length.
-    pub fn nearest(&self, sigma: f64) -> usize {
+    pub fn nearest_node(&self, sigma: f64) -> usize {
         let after = self
             .sigma
             .partition_point(|at| *at < sigma)
@@ -599,7 +607,7 @@ impl Grid {
 impl Leaf {
     /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
     /// ties the rods.
-    pub(crate) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
+    fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
         if !self.has_tissue() {
             return;
         }
@@ -636,11 +644,9 @@ pub struct RodLoad {
     pub dead: DVec3,
     /// Force on the tip, whole.
     pub tip: DVec3,
-    /// Coupling with the previous rod.
+    /// Coupling with the previous rod, with the next, and with the rod's own mirror image.
     pub previous: DVec3,
-    /// Coupling with the next rod.
     pub next: DVec3,
-    /// Coupling with the rod's own mirror image.
     pub image: DVec3,
 }
 
@@ -695,12 +701,11 @@ pub struct LaneRodLoads<S: Simd> {
     image: Vectors<S>,
 }
 
-/// Forces of dead loads and coupling on a node of several rods, with their share of the potential energy.
+/// Forces of dead loads and coupling on a node of several rods.
 #[derive(Clone, Copy)]
 pub struct LaneNodeForces<S: Simd> {
-    /// Forces.
     pub force: Vectors<S>,
-    /// Energies; that of a gap belongs to its lower rod.
+    /// Potential energy; that of a gap belongs to its lower rod.
     pub energy: Lanes<S>,
 }
 

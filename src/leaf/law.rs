@@ -3,7 +3,7 @@
 //! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
 //! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
 //! that is limited, as larger ones lose the soft modes to rounding
-//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
+//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::limit_condensing_stiffness)): of a segment that is stiffer, C < 1/k,
 //! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
 //! determine the force that is next to nothing; where holders, or other rods, determine the strain,
 //! each solution gains only the part k/H of the force.
@@ -130,7 +130,7 @@ impl DiscreteLeaf {
             .collect();
         let mut responses: Vec<LinearResponse> = Vec::new();
         let product = &mut |direction: &[f64]| {
-            let mut left: Vec<DVec3> = vectors(direction);
+            let mut left: Vec<DVec3> = vectors_from_numbers(direction);
             let mut forces = none.clone();
             self.condense_gaps(segments, &left, &mut forces);
             let nodes = solve(&forces)?;
@@ -151,7 +151,7 @@ impl DiscreteLeaf {
             response.add(*part, more);
         }
         if let Some(sum) = found.solution() {
-            gaps.copy_from_slice(&vectors(&sum));
+            gaps.copy_from_slice(&vectors_from_numbers(&sum));
         }
         true
     }
@@ -212,6 +212,6 @@ impl System {
     }
 }
 
-fn vectors(numbers: &[f64]) -> Vec<DVec3> {
+fn vectors_from_numbers(numbers: &[f64]) -> Vec<DVec3> {
     numbers.chunks_exact(3).map(DVec3::from_slice).collect()
 }

@@ -12,23 +12,18 @@ use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
 use glam::DVec3;
 
-/// A dead moment on a point of a single rod.
+/// A dead moment on the point at the fraction `sigma` of a single rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct PointMoment {
-    /// Fraction of the length.
     pub sigma: f64,
-    /// Moment along the lab axes.
     pub moment: DVec3,
 }
 
-/// A dead force on a point of a rod.
+/// A dead force on the point at the fraction `sigma` of a rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct PointForce {
-    /// Number of the rod.
     pub rod: usize,
-    /// Fraction of its length.
     pub sigma: f64,
-    /// Force along the lab axes.
     pub force: DVec3,
 }
 
@@ -89,7 +84,7 @@ impl DiscreteLeaf {
         let points = self.leaf.point_dead_moments();
         let some = points.filter(|it| it.moment != DVec3::ZERO);
         some.map(|it| NodalMoment {
-            node: self.grid.nearest(it.sigma),
+            node: self.grid.nearest_node(it.sigma),
             moment: it.moment,
         })
         .filter(|it| it.node >= self.first_node())
@@ -184,7 +179,7 @@ impl DiscreteLeaf {
 }
 
 /// Largest distance, in fractions of the length, of a load from the node on which it acts.
-pub(crate) const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
+const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
 
 impl Leaf {
     /// Load of rod `j` alone at `sigma`, its weight and load along it, per unit of sigma; without
@@ -211,7 +206,7 @@ impl Leaf {
 
 impl DiscreteLeaf {
     /// Loads of single veins on all nodes, rod after rod; empty if there are none.
-    pub(crate) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
+    pub(super) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
         if leaf.loads.rod_load_factor == 0.0 {
             return Vec::new();
         }
@@ -219,13 +214,13 @@ impl DiscreteLeaf {
         let node = |(j, i)| self.grid.node_weight(i) * leaf.own_load_density(j, sigma[i]);
         let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
         for PointForce { rod, sigma, force } in leaf.point_forces() {
-            loads[rod * (n + 1) + self.grid.nearest(sigma)] += force;
+            loads[rod * (n + 1) + self.grid.nearest_node(sigma)] += force;
         }
         loads
     }
 
     /// Factor of the loads of single veins.
-    pub(crate) fn rod_load_factor(&self) -> f64 {
+    pub(super) fn rod_load_factor(&self) -> f64 {
         self.load_factor * self.loads.rod_load_factor
     }
 
@@ -264,7 +259,7 @@ impl DiscreteLeaf {
 
     /// Adds the loads of single veins to the right-hand side of an assembled system; returns their
     /// potential energy, without that of loads on bases.
-    pub(crate) fn add_own_loads(&self, state: &State, system: &mut System) -> f64 {
+    pub(super) fn add_own_loads(&self, state: &State, system: &mut System) -> f64 {
         if self.own_loads.is_empty() {
             return 0.0;
         }
@@ -272,8 +267,7 @@ impl DiscreteLeaf {
         for (j, i) in self.rod_index_pairs(1..self.segments() + 1) {
             let force = self.own_load_on_node(j, i);
             energy -= force.dot(state.x[state.base(j) + i]);
-            let moment = DVec3::ZERO;
-            system.add_load(j, i, Wrench { moment, force });
+            system.add_load(j, i, Wrench::from_force(force));
         }
         energy
     }

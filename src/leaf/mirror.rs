@@ -38,8 +38,9 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         dynamics,
         ..
     } = scenario;
-    // Their images are not looked for yet; on hinges a leaf may swing out of its plane.
-    let other = distributed.is_some()
+    // Images of loads and supports of single veins are not looked for; a leaf on hinges may swing out
+    // of its mirror plane.
+    let unmatched = distributed.is_some()
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
         || *base_held != SupportKind::Clamped;
@@ -49,7 +50,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
     };
     let masses = |(a, b): (usize, usize)| dynamics.density[a] == dynamics.density[b];
     let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
-    !other
+    !unmatched
         && pairs(rods.len()).all(weights)
         && (scenario.g == [0.0; 3] || scenario.g[1] == 0.0 && pairs(rods.len()).all(masses))
         && tip_force[1] == 0.0

@@ -90,6 +90,13 @@ pub struct Leaf {
     softest_couple_stiffness: f64,
 }
 
+/// Position and rotation of the base of a rod.
+#[derive(Clone, Copy, Debug)]
+pub struct BasePose {
+    pub position: DVec3,
+    pub rotation: DQuat,
+}
+
 /// The holder of the tips.
 #[derive(Clone, Debug)]
 pub struct TipSupport {
@@ -327,14 +334,17 @@ impl Leaf {
         self.length(j) * self.rod(j).rest_stretch.integral(sigma)
     }
 
-    /// Position and rotation of the base of rod `j` (paper, section 2.4 (a) and (c)).
-    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+    /// Where the base of rod `j` is held (paper, section 2.4 (a) and (c)).
+    pub fn base_pose(&self, j: usize) -> BasePose {
         let (rod, length) = (self.rod(j), self.scale.length);
         let rotation = match rod.elevation == 0.0 && rod.roll == 0.0 {
             true => rotation::exp(rod.angle * DVec3::Z),
             false => rod.base_rotation(),
         };
-        (rod.base_position() / length, rotation)
+        BasePose {
+            position: rod.base_position() / length,
+            rotation,
+        }
     }
 
     /// Whether sections are the same all along each rod.

@@ -36,13 +36,10 @@ pub struct RodFields {
 /// A change of the [`RodFields`] of a point, to first order, or a jump of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FieldChange {
-    /// Displacement.
     pub position: DVec3,
-    /// Spatial rotation.
+    /// Spatial rotation vector.
     pub rotation: DVec3,
-    /// Change of the force.
     pub force: DVec3,
-    /// Change of the moment.
     pub moment: DVec3,
 }
 
@@ -96,7 +93,7 @@ struct RungeKuttaStage {
 }
 
 impl<'a> RodIntegrator<'a> {
-    /// For the rods of `leaf`, on any grid.
+    /// An integrator for the rods of `leaf`; its grid does not matter.
     pub fn new(leaf: &'a DiscreteLeaf) -> Self {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);

@@ -31,9 +31,8 @@ pub type Increment = [f64; 6];
 /// An [`Increment`], or a rate of one, as vectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeIncrement {
-    /// Spatial rotation.
+    /// Spatial rotation vector.
     pub rotation: DVec3,
-    /// Displacement.
     pub displacement: DVec3,
 }
 
@@ -71,7 +70,7 @@ pub fn add_to_increment(increment: &mut Increment, turn: DVec3, shift: DVec3) {
 }
 
 impl State {
-    /// From nodal positions and rotations, without forces.
+    /// A state of these nodal positions and rotations, without forces.
     pub fn new(segments: usize, x: Vec<DVec3>, q: Vec<DQuat>) -> Self {
         let rods = x.len() / (segments + 1);
         State {

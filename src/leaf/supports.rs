@@ -21,17 +21,15 @@ use crate::simd::NumberGroup;
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// Which motions supports allow to a node.
+/// Whether supports allow a node to rotate, and to be displaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeFreedom {
-    /// Whether the node may rotate.
     pub rotation: bool,
-    /// Whether the node may be displaced.
     pub displacement: bool,
 }
 
 impl NodeFreedom {
-    /// No support.
+    /// The freedom of a node without support.
     pub const FREE: NodeFreedom = NodeFreedom {
         rotation: true,
         displacement: true,
@@ -57,7 +55,7 @@ impl DiscreteLeaf {
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
             let Grip { vein, at, .. } = *grip;
-            let [from, to] = at.map(|sigma| self.grid.nearest(sigma));
+            let [from, to] = at.map(|sigma| self.grid.nearest_node(sigma));
             let moved = DVec3::from_array(grip.displacement) / length;
             (from..=to).map(move |node| {
                 let k = natural.base(vein) + node;
@@ -328,6 +326,14 @@ impl DiscreteLeaf {
 }
 
 impl Leaf {
+    /// Puts the bases where the leaf begins.
+    pub fn place_bases(&self, state: &mut State) {
+        for j in 0..self.rods() {
+            let (base, pose) = (state.base(j), self.base_pose(j));
+            (state.x[base], state.q[base]) = (pose.position, pose.rotation);
+        }
+    }
+
     /// Puts the tips where they are held, if they are.
     pub fn place_held_tips(&self, state: &mut State) {
         let Some(held) = &self.tip_support else {
@@ -458,7 +464,7 @@ impl DiscreteLeaf {
                 -segment.gradient(self.section(j, 0)).a
             };
             let begin = |j: usize| BaseRotations {
-                stress_free: self.leaf.base(j).1,
+                stress_free: self.leaf.base_pose(j).rotation,
                 now: state.q[state.base(j)],
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();

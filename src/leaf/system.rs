@@ -39,12 +39,10 @@ pub struct AssemblyTotals {
     pub largest_turn: f64,
 }
 
-/// Rotation and displacement, each the largest of all nodes.
+/// The largest component of a rotation, in radians, and of a displacement of any node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncrementSize {
-    /// Largest rotation about an axis, in radians.
     pub rotation: f64,
-    /// Largest displacement along an axis.
     pub displacement: f64,
 }
 
@@ -68,9 +66,9 @@ pub struct MassLoad<'a> {
 /// A stiffness against motions of a node: the diagonal blocks of its matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct DiagonalBlocks {
-    /// Stiffness against rotations.
+    /// Against rotations.
     pub rotary: DMat3,
-    /// Stiffness against displacements, the same in all directions.
+    /// Against displacements, the same in all directions.
     pub translational: f64,
 }
 
@@ -92,7 +90,7 @@ pub(super) struct GroupCoupling {
 /// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
 /// and forces are zero.
 #[derive(Clone, Debug)]
-pub(crate) struct RodGroup {
+pub(super) struct RodGroup {
     pub matrix: BlockTridiagonal,
     /// One in lanes with a rod, zero in others.
     pub active_lanes: NumberGroup,
@@ -290,7 +288,7 @@ impl System {
     }
 
     /// The first node of a rod with equations; fields begin with it.
-    pub fn first(&self) -> usize {
+    pub fn first_node(&self) -> usize {
         self.first
     }
 
@@ -473,13 +471,12 @@ impl System {
             .sum()
     }
 
-    /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
-    /// time `dt`.
-    pub fn write_velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+    /// Writes the velocity that corresponds to a fraction of the last solution in a time `dt`.
+    pub fn write_velocity(&self, fraction: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
         for (j, rod) in velocity.iter_mut().enumerate() {
             let at = rod_lane(j);
             for (v, d) in rod.iter_mut().zip(&self.groups[at.group].solution) {
-                *v = lane_increment(d, at.lane).map(|d| part * d / dt);
+                *v = lane_increment(d, at.lane).map(|d| fraction * d / dt);
             }
         }
     }
@@ -729,7 +726,7 @@ impl GroupKernel for DirectionUpdateKernel<'_> {
 
 /// The dead moments as of the last assembly, with the workspace of their equations.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct DeadMoments {
+pub(super) struct DeadMoments {
     /// The moments; nodes from the first with equations.
     on_nodes: Vec<NodalMoment>,
     /// The equations (1 + S C) x = S t, row after row, each with its right-hand side last.

@@ -42,9 +42,8 @@ const HALF_TURN_TOLERANCE: f64 = 0.01;
 /// A strip of a leaf, with its place.
 #[derive(Clone, Copy)]
 struct PlacedStrip<'a> {
-    /// Number of its gap: the first of both rods.
+    /// The gap after rod `gap`.
     gap: usize,
-    /// Number of its node on both rods.
     node: usize,
     strip: &'a TissueStrip,
 }
@@ -74,23 +73,10 @@ impl PlacedStrip<'_> {
 
 /// The second derivatives of the energy of a strip of a leaf.
 pub struct StripStiffness {
-    /// Number of the gap: the first of both rods.
     pub gap: usize,
-    /// Number of the node on both rods.
     pub node: usize,
-    /// Matrix of the unknowns (rotation, displacement) of both nodes.
+    /// By the unknowns (rotation, displacement) of both nodes.
     pub matrix: SMatrix<f64, 12, 12>,
-}
-
-/// What of a strip limits the frequency of its nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct AdjacentStrip {
-    /// Largest stiffness against displacements.
-    pub stiffness: f64,
-    /// Stiffness against a fold along the veins.
-    pub fold_stiffness: f64,
-    /// Width in the stress-free leaf.
-    pub width: f64,
 }
 
 impl DiscreteLeaf {
@@ -324,17 +310,10 @@ impl DiscreteLeaf {
     }
 
     /// The strips on either side of node `i` of rod `j`.
-    pub fn adjacent_strips(&self, j: usize, i: usize) -> impl Iterator<Item = AdjacentStrip> {
+    pub fn adjacent_strips(&self, j: usize, i: usize) -> impl Iterator<Item = &TissueStrip> {
         let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
         let gaps = gaps.filter(|g| self.has_tissue() && g + 1 < self.rods());
-        gaps.map(move |g| {
-            let strip = self.strip(g, i);
-            AdjacentStrip {
-                stiffness: strip.stiffness.max_element(),
-                fold_stiffness: strip.fold_stiffness,
-                width: strip.stress_free_gap.length(),
-            }
-        })
+        gaps.map(move |g| self.strip(g, i))
     }
 
     /// The changes of energy and loads of the strip of node `i` in gap `g` by a change of the strip.

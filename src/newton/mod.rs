@@ -451,7 +451,7 @@ impl NewtonLinearSolver<'_> {
             NewtonEquations::Proximal {
                 solver, at, rate, ..
             } => {
-                state.increments_to(at, system.first(), &mut self.return_increments);
+                state.increments_to(at, system.first_node(), &mut self.return_increments);
                 let springs = Some(MassLoad {
                     field: &self.return_increments,
                     factor: *rate,

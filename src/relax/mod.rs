@@ -19,6 +19,7 @@ mod request;
 pub(crate) mod rest;
 mod result;
 mod saddle;
+mod same_equilibrium;
 mod sensitivity;
 mod shooting;
 pub(crate) mod solve_on_grid;
@@ -27,11 +28,11 @@ pub(crate) mod stability;
 use crate::memory;
 pub use crate::newton::{EquilibriumFailure, SolverCounts};
 pub(crate) use crate::relax::accuracy::NestedEquilibrium;
-pub(crate) use crate::relax::accuracy::transfer::{GridLevel, Stencil, rod_shapes};
+pub(crate) use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, Stencil, rod_shapes};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
 pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
-pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
+pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{
     CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
@@ -43,7 +44,7 @@ pub use crate::relax::request::{
     check_tolerance, without_wind,
 };
 pub use crate::relax::rest::relax_from;
-pub(crate) use crate::relax::rest::relax_on_grids;
+pub(crate) use crate::relax::rest::{RelaxedLeaf, relax_on_grids};
 pub use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 pub(crate) use crate::relax::result::serialize_index;
 pub use crate::relax::result::{
@@ -244,7 +245,7 @@ fn relax_once(
         return shooting::relax(scenario, options, tolerance, progress);
     }
     let shape_alone = options.modes == 0;
-    relax_on_grids(scenario, options, shape_alone, progress).map(|(found, _)| found)
+    relax_on_grids(scenario, options, shape_alone, progress).map(|leaf| leaf.result)
 }
 
 crate::renamed! {

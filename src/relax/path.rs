@@ -43,6 +43,15 @@ words! {
     }
 }
 
+/// A place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathPosition {
+    /// The stage.
+    pub stage: Stage,
+    /// The part of the stage, from 0 to 1.
+    pub lambda: f64,
+}
+
 /// Where the stability of the path was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Event {

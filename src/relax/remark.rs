@@ -3,7 +3,7 @@
 
 use crate::leaf::HalfTurn;
 use crate::numbers::{format_error_bound, format_two_digits};
-use crate::relax::path::{Path, Route, Stage};
+use crate::relax::path::{Path, PathPosition, Route};
 use crate::run::remarks;
 use crate::scenario::PlausibilityWarning;
 use crate::shooting::{NeutralDirection, ShootingFailureReason};
@@ -181,8 +181,8 @@ remarks! {
             if *.may_shoot { ", or try the method shooting" } else { "" }
         )]
         Loads {
-            /// Up to where the leaf came to rest on its path, as a part of a stage, if it has one.
-            reached: Option<(Stage, f64)>,
+            /// Up to where the leaf came to rest on its path, if it has one.
+            reached: Option<PathPosition>,
             /// Keys of the largest loads; none of a leaf without loads.
             loads: Vec<&'static str>,
             /// Key of the softest stiffness, in its table.
@@ -371,10 +371,11 @@ fn obstacle_text(obstacle: &Option<RestObstacle>) -> String {
         .unwrap_or_default()
 }
 
-fn reached_text(reached: Option<(Stage, f64)>) -> String {
+fn reached_text(reached: Option<PathPosition>) -> String {
     match reached {
-        Some((stage, part)) if part > 0.0 => {
-            format!(" (it came to rest up to {:.2} % of {stage})", 100.0 * part)
+        Some(PathPosition { stage, lambda }) if lambda > 0.0 => {
+            let percent = 100.0 * lambda;
+            format!(" (it came to rest up to {percent:.2} % of {stage})")
         }
         _ => String::new(),
     }
@@ -417,6 +418,7 @@ pub(crate) fn serialize_remark<S: Serializer>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relax::path::Stage;
 
     /// Words that stay, and that the documents explain.
     #[test]
@@ -434,7 +436,10 @@ mod tests {
         let mut remark = EquilibriumRemark::StepLimit {
             segments: 8,
             obstacle: Some(RestObstacle::Loads {
-                reached: Some((Stage::Joining, 0.5)),
+                reached: Some(PathPosition {
+                    stage: Stage::Joining,
+                    lambda: 0.5,
+                }),
                 loads: vec!["load.gravity", "load.tip_force"],
                 stiffness: "torsion",
                 vein: 2,

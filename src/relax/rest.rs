@@ -3,18 +3,20 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::newton::EquilibriumFailure;
+use crate::relax::accuracy::transfer::StateOnGrid;
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
 use crate::relax::eigenvalues;
 use crate::relax::eigenvalues::EigenvalueRequest;
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{
-    LoadingEnd, follow_load_path, grid_of, guess, load_slowly, solve_from_guesses,
-    solve_from_start, takes_loads_stably,
+    LoadingEnd, follow_load_path, grid_of, load_slowly, solve_from_guesses, solve_from_start,
+    state_on_requested_grid, takes_loads_stably,
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
 use crate::relax::plan::{
-    Acceptance, COARSEST, PlannedAttempt, RelaxationProblem, least_segments, may_solve_half, plan,
+    Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
+    WayFromStart, least_segments, may_solve_half, plan,
 };
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
@@ -29,20 +31,21 @@ use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
-/// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
-/// steps of Newton's method without softened rods, rests where slow loading leads, stably if its veins
-/// take their loads stably: so did all of 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
-/// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
-const FIRST_VALLEY_BOUNDS: (f64, usize) = (2.0, 8);
+/// A relaxed leaf.
+pub(crate) struct RelaxedLeaf {
+    /// The leaf in the units of the scenario.
+    pub result: Equilibrium,
+    /// The leaf on the grids from which the result was extrapolated.
+    pub on_grids: NestedEquilibrium,
+}
 
-/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
-/// also returns the leaf on these grids.
+/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
     shape_alone: bool,
     progress: &mut dyn FnMut(&Progress),
-) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
+) -> Result<RelaxedLeaf, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     check_wind_options(scenario, options)?;
@@ -57,7 +60,7 @@ pub(crate) fn relax_on_grids(
     let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
     // What a held leaf comes to depends on the way of its holders, which few segments would change.
     let least = match leaf.has_placed_supports() {
-        true => COARSEST,
+        true => GRIDS.coarsest,
         false => least_segments(method, tolerance, few),
     };
     let first = check_segments(&leaf, method.segments(), least)?;
@@ -163,8 +166,9 @@ fn acceptance_of(
 /// Whether Newton's method alone came to rest from the start, so near that this is where
 /// slow loading leads.
 fn is_in_first_valley(history: &History) -> bool {
-    let near = |(distance, steps): (f64, usize)| {
-        distance < FIRST_VALLEY_BOUNDS.0 && steps <= FIRST_VALLEY_BOUNDS.1
+    let near = |way: WayFromStart| {
+        way.distance < LONGEST_WAY_IN_FIRST_VALLEY.distance
+            && way.steps <= LONGEST_WAY_IN_FIRST_VALLEY.steps
     };
     history.from_start.is_some_and(near) && history.saddle.is_none()
 }
@@ -183,7 +187,7 @@ fn find_rest_on_grid(
     }
     let arrived = follow_load_path(problem, grid, effort).ok()?;
     let mut begun = NestedEquilibrium::without_grids(problem).with_path(Some(arrived.path));
-    let guess = guess(problem, &mut begun.history, arrived.level, effort);
+    let guess = state_on_requested_grid(problem, &mut begun.history, arrived.level, effort);
     solve_from_guesses(problem, begun, vec![guess], effort).ok()
 }
 
@@ -194,7 +198,7 @@ pub(super) fn equilibrium_with_stability(
     found: RelaxationResult,
     clock: Instant,
     effort: &mut WorkLog,
-) -> (Equilibrium, NestedEquilibrium) {
+) -> RelaxedLeaf {
     let requested = problem.options.modes;
     let before = clock.elapsed().as_secs_f64();
     let (decision, stopped) = match found {
@@ -209,7 +213,7 @@ pub(super) fn equilibrium_with_stability(
         false => before,
     };
     let found = decision.found.with_work(effort.work);
-    let outcome = report::outcome(problem, &found, stopped, effort.farthest_stage);
+    let outcome = report::outcome(problem, &found, stopped, effort.farthest_position);
     let mut leaf = report::equilibrium(problem, &found, outcome, wall);
     if matches!(leaf.path, Some(Path::Held { .. })) && !leaf.outcome.is_at_rest() {
         // What the way was like, it did not end where the leaf is held.
@@ -229,7 +233,10 @@ pub(super) fn equilibrium_with_stability(
     });
     leaf.stability.modes = modes.map(|it| it.modes);
     leaf.attempts = std::mem::take(&mut effort.attempts);
-    (leaf, found)
+    RelaxedLeaf {
+        result: leaf,
+        on_grids: found,
+    }
 }
 
 impl Equilibrium {
@@ -306,14 +313,12 @@ pub fn relax_from(
         .map(|rod| interpolate_rod_shape(stations, rod, grid.sigma()))
         .collect::<Vec<_>>();
     let mut state = state_from_rod_shapes(&leaf, &discrete, &there);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.base(j);
-    }
+    leaf.place_bases(&mut state);
     leaf.place_held_tips(&mut state);
     let mut effort = WorkLog::new(progress);
     let begun = NestedEquilibrium::without_grids(&problem);
-    let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
+    let guesses = vec![StateOnGrid { grid, state }];
+    let found = arrival::solve_from_guesses(&problem, begun, guesses, &mut effort);
     let (settled, end) = match &found {
         Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
         Ok(_) => (false, AttemptEnd::Unstable),
@@ -321,10 +326,10 @@ pub fn relax_from(
     };
     effort.log(Strategy::GivenShape, Extent::Whole, segments, end);
     if settled {
-        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
+        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).result);
     }
     let given = effort.attempts;
-    let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
+    let mut leaf = relax_on_grids(scenario, options, false, progress)?.result;
     leaf.attempts.splice(0..0, given);
     leaf.doubts.push(EquilibriumDoubt::RelaxedAnew);
     Ok(leaf)

@@ -2,13 +2,14 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::newton::SolverCounts;
+use crate::relax::accuracy::StrainEffects;
 use crate::relax::remark::EquilibriumRemark;
 use crate::relax::request::{
     MAX_INTERVALS, Options, Progress, RelaxError, SemiImplicit, ShootingVariant,
 };
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::forces::{Reaction, Stresses};
-use crate::relax::result::report::neutral_directions;
+use crate::relax::result::report::{RunEnd, neutral_directions};
 use crate::relax::result::{
     Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability, report,
 };
@@ -105,10 +106,12 @@ pub fn relax(
         }
         other => RelaxError::from(other),
     })?;
-    let how = (intervals, tolerance);
     let mut found = match from_rest {
-        true => relax_from_rest(scenario, options, how, progress)?,
-        false => shoot(scenario, options, how, ShootingStart::Arcs, progress),
+        true => relax_from_rest(scenario, options, intervals, tolerance, progress)?,
+        false => {
+            let start = ShootingStart::Arcs;
+            shoot(scenario, options, intervals, tolerance, start, progress)
+        }
     };
     found.doubts = report::implausible_properties(scenario, &found);
     Ok(found)
@@ -119,7 +122,8 @@ pub fn relax(
 fn relax_from_rest(
     scenario: &Scenario,
     options: &Options,
-    how: (Option<usize>, f64),
+    intervals: Option<usize>,
+    tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let relaxation = Options {
@@ -129,7 +133,7 @@ fn relax_from_rest(
         stations: None,
         ..options.clone()
     };
-    let (rest, _) = relax_on_grids(scenario, &relaxation, true, progress)?;
+    let rest = relax_on_grids(scenario, &relaxation, true, progress)?.result;
     if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
         return Ok(Equilibrium {
             method: options.method,
@@ -140,7 +144,7 @@ fn relax_from_rest(
         stations: &rest.shape.stations,
         rods: &rest.shape.rods,
     };
-    let mut found = shoot(scenario, options, how, start, progress);
+    let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
     found.stability.saddle = rest.stability.saddle;
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
@@ -164,7 +168,8 @@ impl From<shooting::ShootingCounts> for SolverCounts {
 fn shoot(
     scenario: &Scenario,
     options: &Options,
-    (intervals, tolerance): (Option<usize>, f64),
+    intervals: Option<usize>,
+    tolerance: f64,
     start: ShootingStart,
     progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {
@@ -193,7 +198,7 @@ fn shoot(
         energy_error: None,
     };
     let (mut energy, mut index, mut errors) = (None, None, None);
-    let ((outcome, remark), work, rods) = match found {
+    let (end, work, rods) = match found {
         Ok(solution) => {
             accuracy.intervals = Some(solution.intervals.len() - 1);
             accuracy.residual = Some(solution.defect);
@@ -202,8 +207,8 @@ fn shoot(
             errors = Some(solution.error);
             let rods = rods_at_stations(&own, &stations, &solution.rods);
             index = index_near(scenario, grid, &rods, solution.error.position);
-            let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
-            (outcome, solution.work, solution.rods)
+            let end = outcome_of_solution(scenario, &solution, index, tolerance);
+            (end, solution.work, solution.rods)
         }
         Err(failure) => (outcome_of_failure(&failure), failure.work, failure.rods),
     };
@@ -214,8 +219,8 @@ fn shoot(
     Equilibrium {
         scenario: scenario.name.clone(),
         method: options.method,
-        outcome,
-        remark,
+        outcome: end.outcome,
+        remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
         energy,
@@ -247,7 +252,7 @@ fn shoot(
         }),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
-        model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
+        model: Model::new(rods.len(), rods.len(), false, &[], StrainEffects::default()),
         attempts: Vec::new(),
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
@@ -267,28 +272,25 @@ fn outcome_of_solution(
     solution: &ShootingSolution,
     index: Option<usize>,
     tolerance: f64,
-) -> (Outcome, Option<EquilibriumRemark>) {
-    let (outcome, remark) = match index {
-        _ if solution.error.position > tolerance * longest(&scenario.rods) => (
+) -> RunEnd {
+    let end = match index {
+        _ if solution.error.position > tolerance * longest(&scenario.rods) => RunEnd::new(
             Outcome::ToleranceNotReached,
-            Some(match &solution.unsharpened {
+            match &solution.unsharpened {
                 Some(reason) => EquilibriumRemark::NotSharpened(reason.clone()),
                 None => EquilibriumRemark::DoublePrecision,
-            }),
+            },
         ),
-        Some(1..) => (Outcome::Saddle, Some(EquilibriumRemark::ShotSaddle)),
-        Some(0) => (Outcome::Converged, None),
-        None => (
-            Outcome::Converged,
-            Some(EquilibriumRemark::ShotIndexUnknown),
-        ),
+        Some(1..) => RunEnd::new(Outcome::Saddle, EquilibriumRemark::ShotSaddle),
+        Some(0) => RunEnd::new(Outcome::Converged, None),
+        None => RunEnd::new(Outcome::Converged, EquilibriumRemark::ShotIndexUnknown),
     };
     let neutral = || (solution.neutral.clone()).map(EquilibriumRemark::NeutralDirection);
-    (outcome, remark.or_else(neutral))
+    RunEnd::new(end.outcome, end.remark.or_else(neutral))
 }
 
 /// The outcome of a failure: how far the continuation came, and why it ended.
-fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<EquilibriumRemark>) {
+fn outcome_of_failure(failure: &shooting::ShootingFailure) -> RunEnd {
     let outcome = match failure.reason {
         ShootingFailureReason::Singular(_) => Outcome::Singular,
         _ => Outcome::NotAtRest,
@@ -297,5 +299,5 @@ fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<E
         reason: failure.reason.clone(),
         part: failure.lambda,
     };
-    (outcome, Some(remark))
+    RunEnd::new(outcome, remark)
 }

@@ -12,10 +12,16 @@ use pulp::{Scalar, Simd};
 /// Moment and force on a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// Moment.
     pub moment: DVec3,
-    /// Force.
     pub force: DVec3,
+}
+
+impl Wrench {
+    /// A force without a moment.
+    pub fn from_force(force: DVec3) -> Self {
+        let moment = DVec3::ZERO;
+        Wrench { moment, force }
+    }
 }
 
 /// The two nodes of a segment.
@@ -82,15 +88,12 @@ pub struct Segment {
     relative: RelativeRotation<Scalar>,
 }
 
-/// First derivatives with respect to (x1 - x0) and the spatial rotation increments a, b of the two
+/// First derivatives with respect to x = x1 - x0 and the spatial rotation increments a, b of the two
 /// nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentGradient {
-    /// d/dx
     pub x: DVec3,
-    /// d/da
     pub a: DVec3,
-    /// d/db
     pub b: DVec3,
 }
 

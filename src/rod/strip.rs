@@ -49,9 +49,7 @@ pub struct StripHessian {
 /// parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct StripLoads {
-    /// Energy.
     pub energy: f64,
-    /// Moments and forces on the nodes.
     pub on_nodes: [Wrench; 2],
 }
 

@@ -4,7 +4,7 @@
 //! times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
 use crate::numbers::format_two_digits;
 use crate::simulate::{Options, Scheme};
 use crate::words;
@@ -210,7 +210,7 @@ pub(super) fn explicit_cost(
     physics: &Physics,
     method: &Explicit,
 ) -> MotionCost {
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     let steps = duration / method.longest_step();
     MotionCost {
         steps,
@@ -231,7 +231,7 @@ pub(super) fn semi_implicit_cost(
     tolerance: f64,
     most: f64,
 ) -> MotionCost {
-    let (duration, interval) = physics.duration_and_interval();
+    let MotionTimes { duration, interval } = physics.times();
     let error = (PILOT.error_ratio * tolerance)
         .min(PILOT.largest_error)
         .max(tolerance);

@@ -32,12 +32,12 @@ use crate::leaf::{
 use crate::modes::{Eigenpair, ModeRequest, lowest};
 pub use crate::motion::{Energy, Stopped};
 use crate::motion::{
-    Explicit, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
+    Explicit, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
     TimeIntegrator, project_constraints,
 };
 use crate::newton::{NewtonIteration, SolverCounts};
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route,
+    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route, StateOnGrid,
     converge_saddle,
 };
 use crate::run::{Instant, Limit, RefusedOption};
@@ -145,7 +145,11 @@ impl Simulation {
         scenario: &Scenario,
     ) -> Result<Equilibrium, RelaxError> {
         let now = self.method.snapshot();
-        follower.relax_from_state(scenario, (self.grid.clone(), now.state))
+        let guess = StateOnGrid {
+            grid: self.grid.clone(),
+            state: now.state,
+        };
+        follower.relax_from_state(scenario, guess)
     }
 
     fn with_initial_state(
@@ -218,7 +222,7 @@ impl Simulation {
             }
         };
         method.set_limit(options.limit.clone());
-        let (duration, interval) = physics.duration_and_interval();
+        let MotionTimes { duration, interval } = physics.times();
         let warnings = plausibility_warnings(scenario).into_iter();
         let simulation = Simulation {
             leaf,
@@ -260,7 +264,7 @@ impl Simulation {
     /// Steps from here to the end, and the approximate number of seconds they take on one core
     /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
-        let (duration, _) = self.physics.duration_and_interval();
+        let duration = self.physics.times().duration;
         let left = (duration * self.physics.time_unit - self.time()).max(0.0);
         let steps = match (self.step, self.choice.costs) {
             (Some(step), _) => left / step,
@@ -326,7 +330,7 @@ impl Simulation {
 
     /// Bounds the steps to half of the time between outputs.
     fn halve_outputs(&mut self) {
-        let (_, interval) = self.physics.duration_and_interval();
+        let interval = self.physics.times().interval;
         self.longest_steps = vec![0.5 * interval; self.outputs];
     }
 
@@ -462,7 +466,7 @@ impl Simulation {
 
     /// The time of an output, in the method's unit.
     fn output_time(&self, number: usize) -> f64 {
-        let (duration, interval) = self.physics.duration_and_interval();
+        let MotionTimes { duration, interval } = self.physics.times();
         match number >= self.outputs {
             true => duration,
             false => interval * number as f64,

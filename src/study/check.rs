@@ -285,7 +285,7 @@ pub fn check(
         ..Options::default()
     };
     // Forces are compared as well: not the shape alone.
-    let (relaxed, _) = relax::relax_on_grids(scenario, &asked, false, progress)?;
+    let relaxed = relax::relax_on_grids(scenario, &asked, false, progress)?.result;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| solve_by_shooting(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))

@@ -5,7 +5,7 @@
 use crate::numbers::largest;
 use crate::relax::{
     Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Options, Parameter, Progress,
-    RelaxError, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
+    RelaxError, RelaxedLeaf, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
 use crate::study::judge::SAME_STATION_DISTANCE;
@@ -42,7 +42,10 @@ pub fn relax_with_sensitivities(
     without_wind(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
-    let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
+    let RelaxedLeaf {
+        result: mut leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
     let turnings = count_zero_energy_rotations(scenario);

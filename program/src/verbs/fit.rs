@@ -1,8 +1,8 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
+use crate::verbs::exit::{ExitStatus, Refusal, print_note};
 use crate::verbs::progress::{completed_fraction, format_duration};
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
-use crate::verbs::{ExitStatus, Refusal, print_note};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
@@ -78,7 +78,6 @@ fn announce_budget(name: &str, budget: FitCostLimit) {
     }
 }
 
-/// Parses the distance of rows.
 fn parse_row_stride(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number from 1")
 }

@@ -54,12 +54,13 @@ impl DiscreteLeaf {
             }
         }
         self.add_moment_changes(rate, &mut forces);
-        self.add_tissue_changes(state, &neighbours, &mut forces);
+        self.add_tissue_and_own_load_changes(state, &neighbours, &mut forces);
         let motion = self.support_motion_increments(rate, &neighbours);
         self.add_support_motion(state, segments, motion, &mut forces);
         forces
     }
 
+    /// Adds the effect of changes of the sections of rod `j`.
     fn add_section_changes(
         &self,
         segments: &[Segment],
@@ -96,7 +97,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
+    /// Adds the changes of loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
     fn add_load_changes(
         &self,
         state: &State,
@@ -138,8 +139,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The work of forces on a response to others: by symmetry also that of the
-    /// others on the response to these.
+    /// The work of forces in the response to other forces: by symmetry also the work of the other
+    /// forces in the response to these.
     pub fn mutual_work(
         &self,
         segments: &[Segment],
@@ -257,7 +258,7 @@ fn section_rate(
 }
 
 impl DiscreteLeaf {
-    /// The weighted leaves of a rate on this grid.
+    /// The leaves that differ in the number, on this grid.
     fn weighted_leaves_on_grid(
         &self,
         rate: &LeafParameterDerivative,
@@ -269,12 +270,12 @@ impl DiscreteLeaf {
         leaves.collect()
     }
 
-    /// The change of the loads that rod `j` has of its own on its node `i`.
+    /// The change of the loads of rod `j` alone on its node `i`.
     fn own_load_rate(&self, rate: &LeafParameterDerivative, j: usize, i: usize) -> DVec3 {
         let sigma = self.grid.sigma()[i];
         let on = |leaf: &Leaf| {
             let points = leaf.point_forces();
-            let here = points.filter(|it| (it.rod, self.grid.nearest(it.sigma)) == (j, i));
+            let here = points.filter(|it| (it.rod, self.grid.nearest_node(it.sigma)) == (j, i));
             let points: DVec3 = here.map(|it| it.force).sum();
             self.grid.node_weight(i) * leaf.own_load_density(j, sigma) + points
         };
@@ -284,8 +285,7 @@ impl DiscreteLeaf {
             .sum()
     }
 
-    /// Adds the changes of the loads that veins have of their own, from the weighted leaves of
-    /// which they are the sum.
+    /// Adds the effect of changes of the loads of single veins: weighted sums over leaves that differ.
     fn add_own_load_changes(
         &self,
         state: &State,
@@ -309,9 +309,9 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Adds the effect of the changes of the tissue, and of its natural state, and of loads of
-    /// single veins: from the weighted leaves of which they are the sum.
-    fn add_tissue_changes(
+    /// Adds the effect of changes of the tissue, of its stress-free state, and of loads of single
+    /// veins: weighted sums over leaves that differ.
+    fn add_tissue_and_own_load_changes(
         &self,
         state: &State,
         each: &[Weighted<DiscreteLeaf>],
@@ -351,11 +351,15 @@ impl LeafParameterDerivative<'_> {
 }
 
 impl DiscreteLeaf {
-    /// Adds the changes of dead moments.
+    /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {
             let nodes = forces.node_forces_mut(0, self.moving_nodes().len());
-            if let Some(i) = self.grid.nearest(it.sigma).checked_sub(self.first_node()) {
+            if let Some(i) = self
+                .grid
+                .nearest_node(it.sigma)
+                .checked_sub(self.first_node())
+            {
                 add_to_increment(&mut nodes[i], self.load_factor * it.moment, DVec3::ZERO);
             }
         }

@@ -15,9 +15,7 @@ use std::sync::Arc;
 /// A term of a weighted sum, such as a derivative by finite differences.
 #[derive(Clone, Copy, Debug)]
 pub struct Weighted<T> {
-    /// Weight in the sum.
     pub weight: f64,
-    /// What is summed.
     pub term: T,
 }
 
@@ -25,13 +23,13 @@ pub struct Weighted<T> {
 /// weights that add up to zero.
 pub struct LeafParameterDerivative<'s> {
     pub(super) rods: Vec<RodParameterDerivative<'s>>,
-    /// Of the coupling of every gap, per unit of sigma.
+    /// Rates of the coupling of every gap, per unit of sigma.
     pub(super) coupling: Vec<DVec3>,
     pub(super) gravity: DVec3,
     pub(super) tip_force: DVec3,
-    /// Of the dead moments on a single rod; only those that change.
+    /// Rates of the dead moments that change.
     pub(super) moments: Vec<PointMoment>,
-    /// Of the place of the tips' holder, if that moves.
+    /// Rate of the place of the tips' holder, if that moves.
     pub(super) held: Option<TipSupportDerivative>,
     /// The leaves that differ in the number, if they have tissue, loads of single veins, or grips.
     pub(super) weighted_leaves: Vec<Weighted<Leaf>>,
@@ -40,9 +38,9 @@ pub struct LeafParameterDerivative<'s> {
 /// The derivative of a rod, in the leaf's units.
 pub(super) struct RodParameterDerivative<'s> {
     pub(super) length: f64,
-    /// Of the place of a clamped base; zero for a hinged one.
+    /// Rate of the place of a clamped base; zero for a hinged one.
     pub(super) base: NodeIncrement,
-    /// Of the position of a hinge; zero for a clamped base.
+    /// Rate of the position of a hinge; zero for a clamped base.
     hinge: DVec3,
     couple_stiffness: [ProfileDerivative<'s>; 3],
     force_stiffness: [ProfileDerivative<'s>; 3],

@@ -54,7 +54,7 @@ impl DiscreteLeaf {
         motion
     }
 
-    /// Adds the effect of holders that move and rotate by these increments of held nodes.
+    /// Adds the effect of supports that move by these increments of held nodes.
     pub(super) fn add_support_motion(
         &self,
         state: &State,
@@ -141,10 +141,7 @@ impl DiscreteLeaf {
             }
             let pull = self.node_coupling(g, i)
                 * (displacement_part(&both[1]) - displacement_part(&both[0]));
-            let mut loads = [pull, -pull].map(|force| Wrench {
-                moment: DVec3::ZERO,
-                force,
-            });
+            let mut loads = [pull, -pull].map(Wrench::from_force);
             if self.has_tissue() {
                 let tissue = self.tissue_response(state, g, i, &both);
                 for (load, tissue) in loads.iter_mut().zip(tissue) {
@@ -159,8 +156,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: of the loads,
-    /// of coupling and tissue, and of the forces in the segments on either side.
+    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: by loads,
+    /// coupling and tissue, and by the forces in the segments on either side.
     pub fn grip_force_rates(
         &self,
         state: &State,
@@ -172,7 +169,11 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.add_load_changes(state, j, rate, &mut loads);
         }
-        self.add_tissue_changes(state, &self.weighted_leaves_on_grid(rate), &mut loads);
+        self.add_tissue_and_own_load_changes(
+            state,
+            &self.weighted_leaves_on_grid(rate),
+            &mut loads,
+        );
         self.add_coupling_response(state, &response.nodes, &mut loads);
         let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
         for held in &self.grips {

@@ -8,7 +8,7 @@ mod tests;
 pub(super) mod unknowns;
 mod veinwise;
 
-use crate::leaf::direct::sparse::{Cholesky, Sparse, Symbolic};
+use crate::leaf::direct::sparse::{BunchKaufmanFactors, CholeskyFactors, SymbolicFactorization};
 use crate::leaf::direct::unknowns::{DirectError, UnknownNumbering, for_each_matrix_entry};
 use crate::leaf::direct::veinwise::CondensedFactors;
 use crate::leaf::state::NodalField;
@@ -29,7 +29,7 @@ pub struct DirectSolver {
     first: usize,
     /// Whether the matrix is factorized vein after vein, if its pivots allow it.
     uses_condensation: bool,
-    symbolic: OnceLock<Result<Arc<Symbolic>, DirectError>>,
+    symbolic: OnceLock<Result<Arc<SymbolicFactorization>, DirectError>>,
     /// Number of border rows, which follow all unknowns.
     border: usize,
 }
@@ -52,8 +52,8 @@ pub struct MatrixFactors {
 
 enum FactorizationKind {
     Condensed(CondensedFactors),
-    Sparse(Sparse),
-    Cholesky(Cholesky),
+    Sparse(BunchKaufmanFactors),
+    Cholesky(CholeskyFactors),
 }
 
 impl DirectSolver {
@@ -84,7 +84,7 @@ impl DirectSolver {
         let (rods, n) = (system.rods(), system.nodes());
         let solver = DirectSolver {
             unknowns: Arc::new(UnknownNumbering::new(system, coupled)),
-            first: system.first(),
+            first: system.first_node(),
             uses_condensation: border == 0
                 && coupled != [false; 6]
                 && !system.has_tissue()
@@ -99,8 +99,9 @@ impl DirectSolver {
         Ok(solver)
     }
 
-    fn symbolic(&self, system: &System) -> Result<&Arc<Symbolic>, DirectError> {
-        let symbolic = || Symbolic::new(system, &self.unknowns, self.border).map(Arc::new);
+    fn symbolic(&self, system: &System) -> Result<&Arc<SymbolicFactorization>, DirectError> {
+        let symbolic =
+            || SymbolicFactorization::new(system, &self.unknowns, self.border).map(Arc::new);
         self.symbolic
             .get_or_init(symbolic)
             .as_ref()

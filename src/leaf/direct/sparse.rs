@@ -1,4 +1,4 @@
-//! Sparse factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
+//! BunchKaufmanFactors factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
 //! ones, also bordered, and definite ones without a search for pivots.
 
 use crate::leaf::direct::unknowns::{
@@ -19,7 +19,7 @@ use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
 
 /// The symbolic factorization of a leaf's matrix, bordered or not.
-pub struct Symbolic {
+pub struct SymbolicFactorization {
     factors: SymbolicCholesky<usize>,
     /// The lower triangle, summed from the entries of [`for_each_matrix_entry`] in their order.
     lower: TrianglePattern,
@@ -28,8 +28,8 @@ pub struct Symbolic {
 }
 
 /// L B L^T by Bunch and Kaufman within supernodes.
-pub struct Sparse {
-    symbolic: Arc<Symbolic>,
+pub struct BunchKaufmanFactors {
+    symbolic: Arc<SymbolicFactorization>,
     values: Vec<f64>,
     subdiagonal: Vec<f64>,
     forward: Vec<usize>,
@@ -38,13 +38,13 @@ pub struct Sparse {
 }
 
 /// L L^T of a positive definite matrix.
-pub struct Cholesky {
-    symbolic: Arc<Symbolic>,
+pub struct CholeskyFactors {
+    symbolic: Arc<SymbolicFactorization>,
     values: Vec<f64>,
     memory: MemBuffer,
 }
 
-impl Cholesky {
+impl CholeskyFactors {
     /// Solves in place.
     pub fn solve(&mut self, b: &mut [f64]) {
         let size = b.len();
@@ -58,8 +58,8 @@ impl Cholesky {
     }
 }
 
-impl Symbolic {
-    /// Of a leaf's matrix with so many border rows after all unknowns.
+impl SymbolicFactorization {
+    /// The symbolic factorization of a leaf's matrix with so many border rows after all unknowns.
     pub fn new(
         system: &System,
         unknowns: &UnknownNumbering,
@@ -74,7 +74,7 @@ impl Symbolic {
             pairs.push([a.min(b), a.max(b)]);
         });
         let lower = lower_triangle(size, &pairs);
-        // With its ordering given, faer reads the pattern of the upper triangle.
+        // If an ordering is given, faer reads the pattern of the upper triangle.
         let upper = lower.pattern.transpose().to_col_major();
         let upper = upper.map_err(|_| DirectError::Memory)?;
         let params = CholeskySymbolicParams {
@@ -88,7 +88,7 @@ impl Symbolic {
             params,
         )
         .map_err(|_| DirectError::Memory)?;
-        let symbolic = Symbolic {
+        let symbolic = SymbolicFactorization {
             factors,
             lower,
             size,
@@ -144,7 +144,7 @@ impl Symbolic {
         system: &System,
         unknowns: &UnknownNumbering,
         shift: f64,
-    ) -> Result<Option<Cholesky>, DirectError> {
+    ) -> Result<Option<CholeskyFactors>, DirectError> {
         let symbolic = self.supernodes();
         let entries = self.matrix_entries(system, unknowns, shift, &[]);
         let scratch = supernodal::factorize_supernodal_numeric_llt_scratch::<usize, f64>(
@@ -153,7 +153,7 @@ impl Symbolic {
             Default::default(),
         )
         .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let mut factor = Cholesky {
+        let mut factor = CholeskyFactors {
             symbolic: self.clone(),
             values: vec![0.0; symbolic.len_val()],
             memory: MemBuffer::try_new(scratch).map_err(|_| DirectError::Memory)?,
@@ -178,7 +178,7 @@ impl Symbolic {
         unknowns: &UnknownNumbering,
         shift: f64,
         border: &[NodalField],
-    ) -> Result<Sparse, DirectError> {
+    ) -> Result<BunchKaufmanFactors, DirectError> {
         let symbolic = self.supernodes();
         let values = self.matrix_entries(system, unknowns, shift, border);
         let scratch =
@@ -188,7 +188,7 @@ impl Symbolic {
                 Default::default(),
             )
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let mut factor = Sparse {
+        let mut factor = BunchKaufmanFactors {
             symbolic: self.clone(),
             values: vec![0.0; symbolic.len_val()],
             subdiagonal: vec![0.0; self.size],
@@ -212,7 +212,7 @@ impl Symbolic {
     }
 }
 
-impl Sparse {
+impl BunchKaufmanFactors {
     fn factor_view(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
         let symbolic = self.symbolic.supernodes();
         let perm = PermRef::new_checked(&self.forward, &self.inverse, self.symbolic.size);

@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Why a matrix could not be factorized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DirectError {
-    /// It is too large for the memory that is allowed.
+    /// The factors are too large for the memory that is allowed.
     Memory,
     /// A pivot is not a finite number: it has no sign.
     NotFinite,

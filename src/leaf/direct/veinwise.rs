@@ -97,7 +97,7 @@ impl CondensedFactors {
         self.negative
     }
 
-    /// Solves in place, with these numbers of the unknowns. A step of iterative refinement makes the
+    /// Solves in place, with the unknowns numbered by `unknowns`. A step of iterative refinement makes the
     /// solution as accurate as one without inverse matrices.
     pub fn solve(&self, unknowns: &UnknownNumbering, b: &mut [f64]) {
         let mut x = b.to_vec();
@@ -123,13 +123,13 @@ impl CondensedFactors {
                 let here = unknowns.node_numbers(j, i);
                 let own = here.map(|k| x[k]);
                 for (at, row) in here.iter().zip(&node.blocks.own) {
-                    b[*at] -= product(row, &own);
+                    b[*at] -= row_product(row, &own);
                 }
                 if i + 1 < vein.nodes.len() {
                     let ahead = unknowns.node_numbers(j, i + 1);
                     let next = ahead.map(|k| x[k]);
                     for (r, row) in node.blocks.next.iter().enumerate() {
-                        b[here[r]] -= product(row, &next);
+                        b[here[r]] -= row_product(row, &next);
                         for (at, value) in ahead.iter().zip(row) {
                             b[*at] -= value * own[r];
                         }
@@ -149,7 +149,7 @@ impl CondensedFactors {
 }
 
 /// A row times a column.
-fn product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
+fn row_product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
     row.iter().zip(values).map(|(a, b)| a * b).sum()
 }
 
@@ -767,7 +767,7 @@ fn is_growth_bounded(
     scale: &[f64],
     is_free: impl Fn(usize) -> bool,
 ) -> bool {
-    // By parts: those of a pivot that is not definite may cancel.
+    // Sizes of the three products: those of a pivot that is not definite may cancel.
     let change = |i: usize| (c0[i] * z0[i]).abs() + (c1[i] * z1[i]).abs() + (c2[i] * z2[i]).abs();
     (0..scale.len()).all(|i| is_free(i) || change(i) <= MAX_PIVOT_GROWTH * scale[i])
 }

@@ -1,5 +1,4 @@
 use crate::leaf::{Grid, Leaf};
-use crate::motion::check_resolution;
 use crate::motion::explicit::*;
 use crate::relax::initial_state;
 use crate::scenario::Scenario;
@@ -115,20 +114,24 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
         explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
         for (j, i) in leaf.rod_index_pairs(1..=n) {
-            let (v, p) = explicit.moving(j, i);
+            let NodeMomentum {
+                velocity: v,
+                angular: p,
+            } = explicit.momentum(j, i);
             let (force, moment) = expected[state.base(j) + i];
             let moment_error = (p / (0.5 * h) - moment).length();
             assert!(moment_error < allowed, "{j} {i}: {moment_error}");
             if i == n {
                 tip += force;
             } else {
-                let (pack, at) = explicit.layout.pack_position(j, i);
-                let (material, at) = explicit.packs[pack].node_material(at);
-                let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
+                let PackPosition { pack, entry } = explicit.layout.pack_position(j, i);
+                let material = explicit.packs[pack].node_material(entry);
+                let mass = material.block.mass[material.node];
+                let error = (v * (mass / (0.5 * h)) - force).length();
                 assert!(error < allowed, "{j} {i}: {error}");
             }
         }
-        let v = explicit.moving(2, n).0;
+        let v = explicit.momentum(2, n).velocity;
         let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
         assert!(error < allowed, "tip: {error}");
         // Clamped ends do not move.

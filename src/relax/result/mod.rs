@@ -5,6 +5,7 @@ pub(super) mod forces;
 pub(super) mod report;
 
 use crate::newton::SolverCounts;
+use crate::relax::accuracy::StrainEffects;
 use crate::relax::log::Attempt;
 use crate::relax::path::Path;
 use crate::relax::remark::{
@@ -77,13 +78,14 @@ pub struct Model {
 }
 
 impl Model {
-    /// Of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
-    /// of these `segments`; the effects are those of shear and stretch.
-    pub fn new(
+    /// The model of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
+    /// of these `segments`.
+    pub(in crate::relax) fn new(
         veins: usize,
-        (rods, planar): (usize, bool),
+        rods: usize,
+        planar: bool,
         segments: &[usize],
-        [shear_effect, stretch_effect]: [Option<f64>; 2],
+        strain_effects: StrainEffects,
     ) -> Self {
         let mirrored = rods < veins;
         let mut phrases = vec![match mirrored {
@@ -108,8 +110,8 @@ impl Model {
             rods,
             planar,
             description: phrases.join("; "),
-            shear_effect,
-            stretch_effect,
+            shear_effect: strain_effects.shear,
+            stretch_effect: strain_effects.stretch,
         }
     }
 }

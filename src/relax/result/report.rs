@@ -5,11 +5,12 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator};
 use crate::newton::EquilibriumFailure;
 use crate::numbers::larger;
 use crate::relax::accuracy::fields::{
-    LeafSection, align_quaternion_sign, integrate_between_stations, weighted_mean_section,
+    KnownSection, LeafSection, SectionsBetween, align_quaternion_sign, integrate_between_stations,
+    weighted_mean_section,
 };
-use crate::relax::accuracy::transfer::{GridLevel, is_planar_level};
-use crate::relax::accuracy::{NestedEquilibrium, transfer};
-use crate::relax::path::{Event, Path, StabilityLoss, Stage};
+use crate::relax::accuracy::transfer::{GridLevel, VeinStation, is_planar_level};
+use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
+use crate::relax::path::{Event, Path, PathPosition, StabilityLoss, Stage};
 use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
@@ -19,14 +20,32 @@ use crate::scenario::{
     LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
 };
-use crate::shape::{Centerline, RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
+use crate::shape::{
+    Centerline, NodeState, RodShape, STATION_TOLERANCE, Undulation, equally_spaced,
+};
 use glam::DVec3;
+
+/// How a run ended.
+pub struct RunEnd {
+    pub outcome: Outcome,
+    /// What is to be said of it.
+    pub remark: Option<EquilibriumRemark>,
+}
+
+impl RunEnd {
+    pub fn new(outcome: Outcome, remark: impl Into<Option<EquilibriumRemark>>) -> Self {
+        RunEnd {
+            outcome,
+            remark: remark.into(),
+        }
+    }
+}
 
 /// Assembles the result.
 pub fn equilibrium(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    (outcome, remark): (Outcome, Option<EquilibriumRemark>),
+    end: RunEnd,
     wall_seconds: f64,
 ) -> Equilibrium {
     let finest = found
@@ -35,14 +54,18 @@ pub fn equilibrium(
         .expect("the grid it failed on, at least");
     let (scenario, scale) = (problem.leaf.scenario(), problem.leaf.scale);
     let error = found.error();
-    let (stations, rods, between) = station_fields(problem, found, error.unwrap_or(0.0));
+    let ResultStations {
+        stations,
+        rods,
+        added_error,
+    } = stations_of_result(problem, found, error.unwrap_or(0.0));
     let joined = problem.leaf.joined();
     debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
-    let error_estimate = error.map(|error| (error + between) * scale.length);
-    let (grid, lines) = centerlines(found, finest);
-    let (energy, energy_error) = found.energy();
+    let error_estimate = error.map(|error| (error + added_error) * scale.length);
+    let DrawnCenterlines { grid, lines } = centerlines(found, finest);
+    let energy = found.energy();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = found
         .levels
@@ -52,12 +75,12 @@ pub fn equilibrium(
     Equilibrium {
         scenario: scenario.name.clone(),
         method: problem.options.method,
-        outcome,
-        remark,
+        outcome: end.outcome,
+        remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
         // Wind has no potential.
-        energy: (!problem.leaf.in_wind()).then_some(energy * scale.moment()),
+        energy: (!problem.leaf.in_wind()).then_some(energy.value * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: found.reaction(),
@@ -84,13 +107,10 @@ pub fn equilibrium(
         ),
         model: Model::new(
             rods.len(),
-            (
-                found.solved_rods,
-                problem.planar && found.index == Some(0) && is_planar_level(finest),
-            ),
+            found.solved_rods,
+            problem.planar && found.index == Some(0) && is_planar_level(finest),
             &segments,
-            (found.history.shear_stretch_effects)
-                .map(|effect| effect.map(|effect| effect * scale.length)),
+            found.history.strain_effects.scaled(scale.length),
         ),
         accuracy: Accuracy {
             segments,
@@ -98,7 +118,7 @@ pub fn equilibrium(
             tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
-            energy_error: (energy_error.filter(|_| !problem.leaf.in_wind()))
+            energy_error: (energy.error.filter(|_| !problem.leaf.in_wind()))
                 .map(|error| error * scale.moment()),
         },
         attempts: Vec::new(),
@@ -146,23 +166,36 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
 /// Segments of the coarsest grid from which on its nodes are enough stations.
 const STATIONS: usize = 8;
 
-/// Stations, the rods there in the scenario's units, and the error of the positions in addition
-/// to `error`, that at the nodes of the coarsest grid. The stations are these nodes or, if they
-/// are few, those of the next grid, and all if every node is requested: of a leaf that was
-/// integrated to the tolerance those of the integration, otherwise those of the finest grid that
-/// keeps the tolerance between the nodes of the coarsest.
-fn station_fields(
+/// The leaf at the stations of its result.
+struct ResultStations {
+    /// Fractions of the length.
+    stations: Vec<f64>,
+    /// The rods there, in the units of the scenario.
+    rods: Vec<RodShape>,
+    /// The error of the positions in addition to that at the nodes of the coarsest grid, in lengths
+    /// of the leaf.
+    added_error: f64,
+}
+
+/// The leaf at the stations of its result, with this `error` at the nodes of the coarsest grid. The
+/// stations are these nodes or, if they are few, those of the next grid, and all if every node is
+/// requested: of a leaf that was integrated to the tolerance those of the integration, otherwise those
+/// of the finest grid that keeps the tolerance between the nodes of the coarsest.
+fn stations_of_result(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     error: f64,
-) -> (Vec<f64>, Vec<RodShape>, f64) {
+) -> ResultStations {
     let (first, finest) = (
         &found.levels[0].leaf.grid,
         &found.levels[found.levels.len() - 1],
     );
     let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
-    let (grid, rods, between) = match found.integrated_leaf() {
-        Some((estimate, integrated)) => {
+    let (grid, rods, added_error) = match found.integrated_leaf() {
+        Some(IntegratedLeaf {
+            estimate,
+            error: integrated,
+        }) => {
             let grid = match every_node {
                 true => estimate.grid.clone(),
                 false if few && estimate.grid != *first => first.refined(),
@@ -189,30 +222,40 @@ fn station_fields(
                 true => found.levels.len(),
                 false => found.levels.len().min(1 + usize::from(few)),
             };
-            let (reached, rods, between) = found.finer_nodes(wanted);
-            (found.levels[reached].leaf.grid.clone(), rods, between)
+            let reached = found.finer_nodes(wanted);
+            let grid = found.levels[reached.grid].leaf.grid.clone();
+            (grid, reached.rods, reached.added_error)
         }
     };
     let leaf = problem.leaf;
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let nodes = rod.iter().zip(grid.sigma());
-        let nodes = nodes
-            .map(|(fields, sigma)| transfer::node_state_from_fields(leaf, (j, *sigma), fields));
+        let nodes = nodes.map(|(fields, &sigma)| {
+            transfer::node_state_from_fields(leaf, VeinStation { vein: j, sigma }, fields)
+        });
         RodShape {
             length: leaf.length(j) * leaf.scale.length,
             nodes: nodes.collect(),
         }
     };
     let rods = rods.iter().enumerate().map(rod).collect();
-    (grid.sigma().to_vec(), rods, between)
+    ResultStations {
+        stations: grid.sigma().to_vec(),
+        rods,
+        added_error,
+    }
+}
+
+/// The centerlines that figures show, in the units of the scenario.
+struct DrawnCenterlines<'f> {
+    /// The grid at whose nodes they are given.
+    grid: &'f Grid,
+    lines: Vec<Centerline>,
 }
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
-/// the integration, in units of the scenario.
-fn centerlines<'f>(
-    found: &'f NestedEquilibrium,
-    finest: &'f GridLevel,
-) -> (&'f Grid, Vec<Centerline>) {
+/// the integration.
+fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f GridLevel) -> DrawnCenterlines<'f> {
     let length = finest.leaf.leaf.scale.length;
     if let Some(estimate) = found.corrected_estimate() {
         let pose = |fields: &RodFields| Pose {
@@ -220,7 +263,10 @@ fn centerlines<'f>(
             rotation: fields.q,
         };
         let line = |rod: &Vec<RodFields>| rod.iter().map(pose).collect();
-        return (&estimate.grid, estimate.rods.iter().map(line).collect());
+        return DrawnCenterlines {
+            grid: &estimate.grid,
+            lines: estimate.rods.iter().map(line).collect(),
+        };
     }
     let n = finest.leaf.segments();
     let node = |k: usize| Pose {
@@ -229,22 +275,25 @@ fn centerlines<'f>(
     };
     let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
     let lines = bases.map(|base| (base..=base + n).map(node).collect());
-    (&finest.leaf.grid, lines.collect())
+    DrawnCenterlines {
+        grid: &finest.leaf.grid,
+        lines: lines.collect(),
+    }
 }
 
-/// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a remark
+/// The end of a run, at rest (to the tolerance or not) or stopped before, with a remark
 /// where one helps.
 pub fn outcome(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     stopped: Option<EquilibriumFailure>,
-    reached: Option<(Stage, f64)>,
-) -> (Outcome, Option<EquilibriumRemark>) {
+    reached: Option<PathPosition>,
+) -> RunEnd {
     let obstacle = || obstacle_to_rest(problem, found, reached);
     let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
     let explicit = problem.options.method.is_explicit();
     match stopped {
-        None if found.keeps_tolerance => (
+        None if found.keeps_tolerance => RunEnd::new(
             match (found.index, found.history.saddle) {
                 (Some(1..), _) => Outcome::Saddle,
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
@@ -259,23 +308,23 @@ pub fn outcome(
                     false => EquilibriumRemark::MomentWithoutPotential,
                 }),
         ),
-        None => (
+        None => RunEnd::new(
             Outcome::ToleranceNotReached,
-            Some(match found.beyond_rounding(2 * segments) {
+            match found.beyond_rounding(2 * segments) {
                 true => EquilibriumRemark::ToleranceBelowRounding,
                 false => EquilibriumRemark::ToleranceBeyondFinestGrid { segments },
-            }),
+            },
         ),
-        Some(EquilibriumFailure::NoDescent) => (
+        Some(EquilibriumFailure::NoDescent) => RunEnd::new(
             Outcome::Diverged,
-            Some(EquilibriumRemark::NoDescent {
+            EquilibriumRemark::NoDescent {
                 segments,
                 obstacle: obstacle(),
-            }),
+            },
         ),
-        Some(stop) => (
+        Some(stop) => RunEnd::new(
             Outcome::NotAtRest,
-            Some(match stop {
+            match stop {
                 EquilibriumFailure::StepLimit if problem.out_of_time() => {
                     EquilibriumRemark::OutOfTime { segments }
                 }
@@ -294,7 +343,7 @@ pub fn outcome(
                     segments,
                     obstacle: obstacle(),
                 },
-            }),
+            },
         ),
     }
 }
@@ -308,7 +357,7 @@ const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
-        let base = [(SpanHolder::Base, 0, leaf.leaf.base(j).0)];
+        let base = [(SpanHolder::Base, 0, leaf.leaf.base_pose(j).position)];
         let grips = leaf.rod_grips(j).map(|held| {
             let sigma = leaf.grid.sigma()[held.node];
             (SpanHolder::Grip(sigma), held.node, held.position)
@@ -344,7 +393,7 @@ const NAMED_LOAD_FRACTION: f64 = 0.1;
 fn obstacle_to_rest(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    reached: Option<(Stage, f64)>,
+    reached: Option<PathPosition>,
 ) -> Option<RestObstacle> {
     if let Some(slip) = probable_obstacle_to_rest(problem.leaf.scenario()) {
         return Some(RestObstacle::Implausible(slip));
@@ -406,31 +455,30 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
     let warnings = plausibility_warnings(scenario).into_iter();
     let mut all: Vec<_> = warnings.map(EquilibriumDoubt::Implausible).collect();
     if held_tip_out_of_reach(scenario).is_none() {
-        let strained = || stretch_doubt(excess_stretches(scenario, rods, stations));
+        let strained = || stretch_doubt(scenario, rods, stations);
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
     all
 }
 
-/// Relative stretch beyond the rest stretch, with the vein and the fraction of its length.
-fn excess_stretches<'l>(
-    scenario: &'l Scenario,
-    rods: &'l [RodShape],
-    stations: &'l [f64],
-) -> impl Iterator<Item = (f64, usize, f64)> + 'l {
-    let of = move |(j, rod): (usize, &'l RodShape)| {
-        let rest = &scenario.rods[j].rest_stretch;
-        let nodes = rod.nodes.iter().zip(stations);
-        nodes.map(move |(node, at)| (node.v.x / rest.at(*at) - 1.0, j, *at))
+/// The doubt about a vein that is stretched far beyond its rest stretch.
+fn stretch_doubt(
+    scenario: &Scenario,
+    rods: &[RodShape],
+    stations: &[f64],
+) -> Option<EquilibriumDoubt> {
+    let excess = |at: &VeinStation, node: &NodeState| {
+        node.v.x / scenario.rods[at.vein].rest_stretch.at(at.sigma) - 1.0
     };
-    rods.iter().enumerate().flat_map(of)
-}
-
-fn stretch_doubt(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<EquilibriumDoubt> {
-    let (stretch, vein, station) = strains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let veins = rods.iter().enumerate().flat_map(|(vein, rod)| {
+        let nodes = rod.nodes.iter().zip(stations);
+        nodes.map(move |(node, &sigma)| (VeinStation { vein, sigma }, node))
+    });
+    let stretches = veins.map(|(at, node)| (at, excess(&at, node)));
+    let (at, stretch) = stretches.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
     (stretch > LARGEST_PLAUSIBLE_STRETCH).then_some(EquilibriumDoubt::Stretched {
-        vein,
-        station,
+        vein: at.vein,
+        station: at.sigma,
         stretch,
     })
 }
@@ -532,20 +580,24 @@ impl Equilibrium {
             }
             let [begin, end] = [i, i + 1].map(section);
             let ends = [(station, &begin), (next, &end)];
+            let ends = ends.map(|(sigma, section)| KnownSection { sigma, section });
             let found = match at_rest {
                 true => integrate_between_stations(&mut flow, leaf.kinks(), ends, points),
                 false => None,
             };
-            let (sections, error) = found.unwrap_or_else(|| {
+            let found = found.unwrap_or_else(|| {
                 let weight = |at: &f64| (at - station) / (next - station);
                 let mean = |at: &f64| weighted_mean_section([&begin, &end], weight(at));
-                let error = if at_rest { next - station } else { 0.0 };
-                (points.iter().map(mean).collect(), error)
+                SectionsBetween {
+                    sections: points.iter().map(mean).collect(),
+                    added_error: if at_rest { next - station } else { 0.0 },
+                }
             });
-            between = larger(between, error * leaf.scale.length);
-            for (&at, section) in points.iter().zip(&sections) {
-                for (j, fields) in section.iter().enumerate() {
-                    rods[j].push(transfer::node_state_from_fields(&leaf, (j, at), fields));
+            between = larger(between, found.added_error * leaf.scale.length);
+            for (&sigma, section) in points.iter().zip(&found.sections) {
+                for (vein, fields) in section.iter().enumerate() {
+                    let at = VeinStation { vein, sigma };
+                    rods[vein].push(transfer::node_state_from_fields(&leaf, at, fields));
                 }
             }
         }

@@ -88,7 +88,7 @@ pub fn move_grips(
     let mut walk = SupportContinuation {
         leaf,
         system: System::new(leaf),
-        held: GridRelaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit),
+        held: GridRelaxation::new(state, ACCURACY, &mut effort.work, ignored, limit),
         keeps_unstable: problem.keeps_unstable(),
         events: Vec::new(),
     };
@@ -189,11 +189,11 @@ impl SupportContinuation<'_> {
             self.system.set_solution(&mode);
             saddle::displace(leaf, &mut self.held.state, &self.system, sign);
             self.leave_saddles().ok()?;
-            Some((leaf.energy(&self.held.state), self.held.state.clone()))
+            Some(saddle::SideOfSaddle::new(leaf, self.held.state.clone()))
         });
-        let (state, equally_open) =
-            saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
-        self.held.state = state;
+        let side = saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
+        self.held.state = side.state;
+        let equally_open = side.equally_open;
         self.record_event(part, StabilityLoss::Branched { equally_open });
         Ok(())
     }

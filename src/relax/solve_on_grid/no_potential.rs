@@ -200,7 +200,7 @@ pub fn moment_curvature(leaf: &Leaf, segments: usize) -> Option<f64> {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
-    let (_, mut base) = leaf.leaf.base(0);
+    let mut base = leaf.leaf.base_pose(0).rotation;
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for (i, section) in leaf.sections.iter().enumerate() {
         turn = segment_turn(section, base, leaf.dead_moment_beyond(i), turn)?;
@@ -432,11 +432,7 @@ impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
             for node in self.free_segment_ends(j, i) {
-                let half = Wrench {
-                    moment: DVec3::ZERO,
-                    force: 0.5 * drag.force(),
-                };
-                system.add_load(j, node, half);
+                system.add_load(j, node, Wrench::from_force(0.5 * drag.force()));
             }
         }
     }

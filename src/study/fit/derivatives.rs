@@ -288,7 +288,8 @@ impl CaseSolution {
                     let near = NeighbouringEquilibria::new(
                         &self.equilibrium.levels[k],
                         &scenarios,
-                        (rate, &responses[k]),
+                        rate,
+                        &responses[k],
                     );
                     near.eigenvalue_rate(&self.modes[k][mode - 1])
                 };

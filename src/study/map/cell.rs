@@ -464,7 +464,7 @@ pub fn solve_by_explicit_motion(
             MapRemark::MotionFailed { motion, step },
         ))
     };
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     while motion.time() < duration {
         let until = motion.time() + STEPS_PER_TIME_CHECK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {

@@ -17,7 +17,7 @@ use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
     AxisDirection, CriticalTipForce, CriticalTipForceRemark, Equilibrium, GridLevel,
     InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, Progress,
-    RelaxError, relax_on_grids, without_wind,
+    RelaxError, RelaxedLeaf, relax_on_grids, without_wind,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
@@ -122,7 +122,10 @@ pub fn relax_with_margin(
         return Err(MarginError::Moment);
     }
     without_wind(scenario, "the margin")?;
-    let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
+    let RelaxedLeaf {
+        result: mut leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
