@@ -210,9 +210,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl DiscreteLeaf {
     /// Adds the effect of displacing and rotating a clamped base.
     fn add_base_motion(
         &self,
@@ -341,16 +339,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl LeafParameterDerivative<'_> {
-    /// Whether dead moments change.
-    pub fn changes_moments(&self) -> bool {
-        !self.moments.is_empty()
-    }
-}
-
-impl DiscreteLeaf {
     /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {

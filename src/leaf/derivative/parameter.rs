@@ -151,6 +151,11 @@ impl LeafParameterDerivative<'_> {
         self.rods[j].hinge
     }
 
+    /// Whether dead moments change.
+    pub fn changes_moments(&self) -> bool {
+        !self.moments.is_empty()
+    }
+
     /// The rate of the place of the base of rod `j` if it is clamped.
     pub fn base_motion_rate(&self, j: usize) -> NodeIncrement {
         self.rods[j].base
