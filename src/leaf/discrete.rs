@@ -120,7 +120,7 @@ impl DiscreteLeaf {
         DiscreteLeaf::with_sections(leaf, grid, sections)
     }
 
-    /// Another leaf on the same grid, if its rods are the same: their sections are copied, since
+    /// Discretizes `leaf` on this grid with the sections of this leaf, if both have the same rods:
     /// evaluating profiles takes as long as assembling a small leaf.
     pub fn with_same_rods(&self, leaf: &Leaf) -> Option<Self> {
         let same = self.leaf.has_same_rods(leaf);
@@ -270,7 +270,7 @@ impl DiscreteLeaf {
         f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
     }
 
-    /// The first node of a rod that has equations: its base if a hinge lets it turn, else the next.
+    /// The first node of a rod that has equations: the base if a hinge lets it turn, else the next node.
     /// Fields of increments and of nodal forces begin with it.
     #[inline]
     pub fn first_node(&self) -> usize {

@@ -249,7 +249,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds the loads that veins have of their own to the slopes of a stage, at `sigma`.
+    /// Adds the loads of single veins to the slopes of a stage, at `sigma`.
     fn add_own_loads(&mut self, sigma: f64, stage: usize) {
         if self.leaf.loads.rod_load_factor == 0.0 {
             return;
@@ -266,7 +266,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds `sign` times the forces and moments on points at `sigma` to those of the fields.
+    /// Adds `sign` times the loads on points at `sigma` to the forces and moments of the rods.
     fn add_point_loads(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
             let force = sign * self.leaf.point_force_at(j, sigma);

@@ -30,7 +30,7 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
+    /// The forces by which a change of the number unbalances this leaf, a whole one in space, in a state
     /// with these segments.
     pub fn parameter_forces(
         &self,
