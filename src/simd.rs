@@ -118,6 +118,16 @@ pub fn array_chunks<const K: usize>(
     parts
 }
 
+/// The components of the vectors of a group.
+#[inline(always)]
+pub fn group_components([a, b, c, d]: [DVec3; GROUP]) -> [NumberGroup; 3] {
+    [
+        NumberGroup([a.x, b.x, c.x, d.x]),
+        NumberGroup([a.y, b.y, c.y, d.y]),
+        NumberGroup([a.z, b.z, c.z, d.z]),
+    ]
+}
+
 /// The same part of three arrays, mutably.
 #[inline(always)]
 pub fn array_chunks_mut(arrays: &mut [impl AsMut<[f64]>; 3], span: ArraySpan) -> [&mut [f64]; 3] {
@@ -439,11 +449,16 @@ impl<S: Simd> Vectors<S> {
     /// Packs the vectors of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
     pub fn from_group(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
-        let [a, b, c, d] = vectors;
+        Vectors::load_group(simd, &group_components(vectors), part)
+    }
+
+    /// The vectors of a group with these components, from the lane `part` on.
+    #[inline(always)]
+    pub fn load_group(simd: S, [x, y, z]: &[NumberGroup; 3], part: usize) -> Self {
         Vectors::new(
-            Lanes::load_group(simd, &NumberGroup([a.x, b.x, c.x, d.x]), part),
-            Lanes::load_group(simd, &NumberGroup([a.y, b.y, c.y, d.y]), part),
-            Lanes::load_group(simd, &NumberGroup([a.z, b.z, c.z, d.z]), part),
+            Lanes::load_group(simd, x, part),
+            Lanes::load_group(simd, y, part),
+            Lanes::load_group(simd, z, part),
         )
     }
 

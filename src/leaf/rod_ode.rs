@@ -16,7 +16,9 @@ use crate::leaf::discrete::{
 use crate::natural::{Natural, Pose, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::rod::{NodePair, Section, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, directors};
-use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run, widest_arch};
+use crate::simd::{
+    GROUP, GroupKernel, Lanes, NumberGroup, Vectors, group_components, run, widest_arch,
+};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
 
@@ -253,7 +255,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds the loads that veins have of their own to the slopes of a stage, at `sigma`.
+    /// Adds the loads of single veins to the slopes of a stage, at `sigma`.
     fn add_own_loads(&mut self, sigma: f64, stage: usize) {
         if self.leaf.loads.rod_load_factor == 0.0 {
             return;
@@ -270,7 +272,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds `sign` times the forces and moments on points at `sigma` to those of the fields.
+    /// Adds `sign` times the loads on points at `sigma` to the forces and moments of the rods.
     fn add_point_loads(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
             let force = sign * self.leaf.point_force_at(j, sigma);
@@ -414,8 +416,7 @@ struct GroupLaws {
 
 /// The laws of sections whose `ds` is the length of the rod.
 fn group_laws(sections: [&Section; GROUP]) -> GroupLaws {
-    let vectors =
-        |of: fn(&Section) -> DVec3| [0, 1, 2].map(|c| NumberGroup(sections.map(|it| of(it)[c])));
+    let vectors = |of: fn(&Section) -> DVec3| group_components(sections.map(of));
     GroupLaws {
         length: NumberGroup(sections.map(|section| section.ds)),
         rest_strain: vectors(|section| section.rest_strain),
@@ -462,15 +463,14 @@ impl<S: Simd> LaneFields<S> {
     #[inline(always)]
     fn slopes(&self, laws: &GroupLaws, load: LaneNodeForces<S>, part: usize) -> Self {
         let (q, w) = self.q;
-        let number = |group: &NumberGroup| Lanes::load_group(w.simd, group, part);
-        let vector = |[x, y, z]: &[NumberGroup; 3]| Vectors::new(number(x), number(y), number(z));
+        let vector = |group: &[NumberGroup; 3]| Vectors::load_group(w.simd, group, part);
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
         let (n, m) = (
             self.n.director_components(frame),
             self.m.director_components(frame),
         );
-        let length = number(&laws.length);
+        let length = Lanes::load_group(w.simd, &laws.length, part);
         let strain = vector(&laws.compliance) * n;
         let bend = vector(&laws.couple_compliance) * m;
         let v = vector(&laws.rest_strain) + strain;

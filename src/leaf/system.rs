@@ -250,8 +250,8 @@ impl System {
         }
     }
 
-    /// Updates the coupling between rods, if there is any, from a leaf that otherwise differs
-    /// from that of [`System::new`] only in what is assembled.
+    /// Updates the coupling between rods, if there is any, from a leaf that differs from the leaf of
+    /// [`System::new`] only in its coupling and in what is assembled.
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
         if !self.gaps.is_empty() {
             self.gaps.clear();

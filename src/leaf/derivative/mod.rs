@@ -30,7 +30,7 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
+    /// The forces by which a change of the number unbalances this leaf, a whole one in space, in a state
     /// with these segments.
     pub fn parameter_forces(
         &self,
@@ -210,9 +210,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl DiscreteLeaf {
     /// Adds the effect of displacing and rotating a clamped base.
     fn add_base_motion(
         &self,
@@ -341,16 +339,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl LeafParameterDerivative<'_> {
-    /// Whether dead moments change.
-    pub fn changes_moments(&self) -> bool {
-        !self.moments.is_empty()
-    }
-}
-
-impl DiscreteLeaf {
     /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {
