@@ -7,7 +7,9 @@ use crate::modes::{Eigenpair, ModeRequest};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
+use crate::relax::accuracy::richardson::{
+    BestColumn, EXTRAPOLATED_GRIDS, Extrapolated, Richardson,
+};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
@@ -35,8 +37,6 @@ struct EigenvalueAccuracy {
     compared_grids: usize,
     /// Largest number of grids finer than those of the relaxation.
     added_grids: usize,
-    /// Largest number of grids that are extrapolated.
-    extrapolated_grids: usize,
     /// Growth of the rounding error of an eigenvalue from grid to grid.
     rounding_growth: f64,
 }
@@ -50,7 +50,6 @@ const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
     largest_listed: 4e-5,
     compared_grids: 3,
     added_grids: 6,
-    extrapolated_grids: 4,
     rounding_growth: 4.0,
 };
 
@@ -63,7 +62,7 @@ pub struct LowestModes {
     pub undecided_size: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
-    /// So many eigenvalues are below those of the list.
+    /// Number of eigenvalues below those of the list.
     pub left_out: usize,
     /// Whether each of the list is negative, where that is certain.
     pub signs: Vec<Option<bool>>,
@@ -79,7 +78,7 @@ impl LowestModes {
         self.left_out + negative.count()
     }
 
-    /// How many are negative where the first so `many` are known to be, if that is certain.
+    /// How many eigenvalues are negative where the first so `many` are known to be, if that is certain.
     pub fn negative_beyond(&self, many: usize) -> Option<usize> {
         let others = self.signs.iter().skip(many.saturating_sub(self.left_out));
         let negative = |sum, sign: &Option<bool>| Some(sum + usize::from((*sign)?));
@@ -121,7 +120,7 @@ impl EigenvalueRequest {
 
 /// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
 /// large, or there are several equal ones that cannot be told apart.
-/// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
+/// Where eigenvalues are neither requested nor needed in themselves, only their signs are computed.
 pub fn lowest(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
@@ -188,7 +187,7 @@ pub fn lowest(
             && (!compares || series.grids.len() >= EIGENVALUES.compared_grids)
     };
     let sufficient_grids = sufficient_grids(options, found);
-    let skipped = sufficient_grids.saturating_sub(EIGENVALUES.extrapolated_grids);
+    let skipped = sufficient_grids.saturating_sub(EXTRAPOLATED_GRIDS);
     for (k, level) in found.levels.iter().enumerate().skip(skipped) {
         let series = &nested.series;
         let decided = !series.grids.is_empty() && series.undecided_size().is_none();
@@ -425,7 +424,7 @@ fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape
     }
 }
 
-/// From what the error bar of an extrapolated eigenvalue is made.
+/// What the error bar of an extrapolated eigenvalue is made from.
 struct EigenvalueBar {
     /// Where all grids show the orders of their columns: factor on the largest correction of an
     /// eigenvalue.
@@ -434,7 +433,7 @@ struct EigenvalueBar {
     /// small by chance. Of 895 eigenvalues of 390 random leaves on three grids, and of 542 on finer or
     /// four, the largest error was 0.7 of the bar that follows.
     correction_part: f64,
-    /// That part where signs alone are needed: grids then go on until they are certain.
+    /// The part of each correction where signs alone are needed: grids then go on until they are certain.
     correction_part_of_signs: f64,
     /// Elsewhere: safety factor on the error.
     safety: f64,
@@ -510,13 +509,13 @@ impl EigenvalueSeries {
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
         let all = values.clone().count();
         let values = values
-            .skip(all.saturating_sub(EIGENVALUES.extrapolated_grids))
+            .skip(all.saturating_sub(EXTRAPOLATED_GRIDS))
             .enumerate();
         let table: Richardson = values
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
         let error = |best: BestColumn| {
-            if best.columns > 1 && best.columns + 1 == all.min(EIGENVALUES.extrapolated_grids) {
+            if best.columns > 1 && best.columns + 1 == all.min(EXTRAPOLATED_GRIDS) {
                 let part = match self.tolerance < EIGENVALUES.sign_tolerance {
                     true => BAR.correction_part,
                     false => BAR.correction_part_of_signs,

@@ -115,6 +115,7 @@ pub struct RelaxationProblem<'a> {
     /// The full leaf, if `leaf` is half of it.
     pub whole_leaf: Option<&'a Leaf>,
     pub options: &'a Options,
+    /// Requested error of positions, in lengths of the leaf.
     pub tolerance: f64,
     /// Whether only the shape and its stability are requested, without forces on the grids,
     /// eigenvalues or derivatives.
@@ -126,7 +127,7 @@ pub struct RelaxationProblem<'a> {
 }
 
 impl<'a> RelaxationProblem<'a> {
-    /// The leaf with forces and eigenvalues, wherever it comes to rest.
+    /// The problem of a leaf with forces and eigenvalues, wherever it comes to rest.
     pub fn new(leaf: &'a Leaf, options: &'a Options, tolerance: f64) -> Self {
         RelaxationProblem {
             leaf,
@@ -139,7 +140,7 @@ impl<'a> RelaxationProblem<'a> {
         }
     }
 
-    /// The same for the half of the leaf, if there is one.
+    /// The problem for the half of the leaf, if there is one.
     pub fn reduced_to_half(self, half: Option<&'a Leaf>) -> Self {
         match half {
             None => self,
@@ -264,9 +265,9 @@ const MOVING_STRETCH: f64 = 0.05;
 pub enum Acceptance {
     /// Slow loading leads there: it is stable and near the arcs, and the veins take their loads stably.
     EndOfLoading,
-    /// It is stable.
+    /// It is stable, wherever that is.
     Stable,
-    /// It is at rest.
+    /// It is at rest, stable or not.
     AtRest,
 }
 

@@ -136,7 +136,7 @@ fn solve_planned<'a>(
         Err(failure) => AttemptEnd::Failed(failure.stop),
     };
     let path = match attempt.needs_time {
-        // It takes the place of slow loading.
+        // The leaf is released in place of slow loading.
         true => Some(Path::Released),
         false => problem.undisturbed_path(),
     };
@@ -173,7 +173,7 @@ fn is_in_first_valley(history: &History) -> bool {
     history.from_start.is_some_and(near) && history.saddle.is_none()
 }
 
-/// Rest from the start, on this grid and finer ones.
+/// Brings a leaf to rest from its start, on this grid and finer ones.
 fn find_rest_on_grid(
     problem: &RelaxationProblem,
     grid: Grid,
@@ -270,7 +270,7 @@ impl Equilibrium {
             self.outcome = Outcome::Saddle;
             self.remark = Some(EquilibriumRemark::BeyondBifurcation);
         } else if unknown {
-            // It said so.
+            // The remark was that the index is not known.
             self.remark = None;
         }
     }

@@ -77,9 +77,9 @@ pub fn index(
 /// What is added to the Hessian of the energy before its negative eigenvalues are counted.
 #[derive(Clone, Copy)]
 struct HessianShift {
-    /// So many times the excess stiffness of the elements is subtracted.
+    /// Factor on the excess stiffness of the elements, which is subtracted.
     excess: f64,
-    /// So many times the mass matrix is added.
+    /// Factor on the mass matrix, which is added.
     shift: f64,
 }
 
@@ -106,7 +106,7 @@ fn count(
     count_coupled(leaf, state, system, shifted, work)
 }
 
-/// The matrix, minus `excess` times the excess stiffness of the elements.
+/// Assembles the Hessian, minus `excess` times the excess stiffness of the elements.
 fn assemble_minus_excess(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -136,13 +136,16 @@ fn count_coupled(
     pattern.count_negative(system, shift).ok()
 }
 
-/// How many eigenvalues of an equilibrium are negative beyond doubt, how many may be on this
-/// grid, being close to zero, and how many on finer ones: those of the Hessian less what
-/// [`clearly_stable`] subtracts. Also how close to zero is close.
+/// Bounds of the Morse index of an equilibrium, by its eigenvalues with respect to the masses.
 pub struct IndexBounds {
+    /// Eigenvalues that are negative beyond doubt.
     pub least: usize,
+    /// Eigenvalues that may be negative on this grid, being close to zero.
     pub here: usize,
+    /// Eigenvalues that may be negative on finer grids: those of the Hessian less what
+    /// [`clearly_stable`] subtracts.
     pub finer: usize,
+    /// The size up to which an eigenvalue is close to zero.
     pub close: f64,
 }
 
@@ -319,8 +322,8 @@ impl SideOfSaddle {
     }
 }
 
-/// Of the sides of a saddle to which a leaf turned that of less energy, or the first of two that are
-/// equal.
+/// The side of less energy of those to which a leaf turned from a saddle, or the first of two equal
+/// ones.
 pub fn lower_energy_side(sides: [Option<SideOfSaddle>; 2]) -> Option<SideOfSaddle> {
     match sides {
         [Some(one), Some(other)] => {

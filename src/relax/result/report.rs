@@ -162,8 +162,8 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     Some(path)
 }
 
-/// Segments of the coarsest grid from which on its nodes are enough stations.
-const STATIONS: usize = 8;
+/// Segments of the coarsest grid from which on its nodes are enough stations for a result.
+const LEAST_STATION_SEGMENTS: usize = 8;
 
 /// The leaf at the stations of its result.
 struct ResultStations {
@@ -189,7 +189,10 @@ fn stations_of_result(
         &found.levels[0].leaf.grid,
         &found.levels[found.levels.len() - 1],
     );
-    let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
+    let (every_node, few) = (
+        problem.options.every_node,
+        first.segments() < LEAST_STATION_SEGMENTS,
+    );
     let (grid, rods, added_error) = match found.integrated_leaf() {
         Some(IntegratedLeaf {
             estimate,
@@ -489,7 +492,7 @@ fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<EquilibriumDou
 pub(crate) const MIN_STATION_PARTS: usize = 16;
 
 impl Equilibrium {
-    /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
+    /// The leaf at stations that divide every vein into `parts` equal parts; `None`: at the
     /// nodes of the finest grid, with its segments halved until there are at least 17
     /// stations.
     ///
@@ -535,7 +538,7 @@ impl Equilibrium {
         (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
     }
 
-    /// The same at these stations.
+    /// The leaf at these stations, wherever its tolerance is kept.
     fn interpolated_to_stations(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
         let at_rest = !matches!(
             self.outcome,

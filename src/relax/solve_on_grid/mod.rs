@@ -28,11 +28,11 @@ use glam::DVec3;
 /// Errors of positions and rotations that the iteration on a grid may leave. Half of any of them costs
 /// a step of Newton's method on some of the finest grids.
 struct IterationErrors {
-    /// As a part of the tolerance.
+    /// The error as a part of the tolerance.
     usual: f64,
-    /// The part where the first grid is very coarse: that saves a step on the finest.
+    /// That part where the first grid is very coarse: a looser iteration there saves a step on the finest.
     from_coarse: f64,
-    /// The part on a grid that may be the only one, where the error of the iteration is estimated,
+    /// That part on a grid that may be the only one, where the error of the iteration is estimated,
     /// and subtracted, with that of the grid.
     alone: f64,
     /// The error on a fixed grid, whose results are meant for comparisons, in lengths and radians.
@@ -237,7 +237,7 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
     state
 }
 
-/// Iteration error allowed on a grid.
+/// The error that the iteration on a grid may leave in positions and rotations, in lengths and radians.
 fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf) -> f64 {
     let first = history.coarsest.unwrap_or(leaf.segments());
     match problem.segments() {
@@ -252,7 +252,7 @@ fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf)
     }
 }
 
-/// Settles by the semi-implicit method.
+/// Brings a leaf to rest on one grid by the semi-implicit method, off saddles.
 fn solve_semi_implicit(
     problem: &RelaxationProblem,
     history: &mut History,
@@ -362,7 +362,7 @@ fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> St
     }
 }
 
-/// What is known of the stability on one grid.
+/// What is known of the stability of a leaf on one grid.
 struct Count {
     /// Whether the leaf is clearly stable.
     clearly_stable: bool,

@@ -329,7 +329,7 @@ pub(in crate::relax) struct Motion {
 }
 
 impl Motion {
-    /// At rest, with the longest step.
+    /// The motion of a leaf that is at rest so far; its first step is Newton's.
     pub(in crate::relax) fn new(leaf: &DiscreteLeaf) -> Self {
         let velocity = vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()];
         Motion {
