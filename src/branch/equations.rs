@@ -123,7 +123,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
 
     /// The first node of a rod with equations, with which increments begin.
     pub fn first_node(&self) -> usize {
-        self.system.first()
+        self.system.first_node()
     }
 
     pub(super) fn rods(&self) -> usize {

@@ -310,10 +310,10 @@ pub fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.place_held_nodes(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
-        let (x, q) = leaf.leaf.base(j);
-        state.x[base] = x;
+        let pose = leaf.leaf.base_pose(j);
+        state.x[base] = pose.position;
         if !leaf.leaf.hinged() {
-            state.q[base] = q;
+            state.q[base] = pose.rotation;
         }
     }
 }
@@ -444,12 +444,12 @@ pub fn state_after_step(
     let mut increments = scale_field(increments, step);
     let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
     for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
-        let [turns, shifts] = leaf.allows_rotation_and_displacement(j, i);
+        let free = leaf.node_freedom(j, i);
         let increment = &mut increments[j][i - leaf.first_node()];
-        if !shifts {
+        if !free.displacement {
             increment[3..].fill(0.0);
         }
-        if !turns {
+        if !free.rotation {
             increment[..3].fill(0.0);
         }
     }

@@ -1,18 +1,20 @@
-//! Assembly of a discretised leaf: unbalanced forces, matrix, energy.
+//! Assembly of Newton's equations: unbalanced forces, matrix and energy of a leaf in a state.
 //!
-//! The loops over the segments of a group of rods.
-//!
-//! The first-order response of a leaf to jumps of the fields along its rods.
+//! The loops over the segments of a group of rods are kernels for instructions of any width. The
+//! right-hand side may also be that of a first-order change: if compliances were dropped, or if jumps
+//! of the fields along the rods were removed.
 
-use crate::leaf::block_tridiagonal::{
-    GroupIncrements, ROTATION_UNKNOWNS, group_and_lane, lane_rods,
-};
+use crate::leaf::block_tridiagonal::{GroupIncrements, ROTATION_UNKNOWNS, lane_rods, rod_lane};
 use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, group_loads};
+use crate::leaf::rod_ode::FieldChange;
 use crate::leaf::state::{State, add_to_increment};
-use crate::leaf::system::{AssemblyTotals, RodGroup, System, each_group, group_rods};
+use crate::leaf::system::{
+    AssemblyTotals, DiagonalBlocks, RodGroup, System, each_group, group_rods,
+};
 use crate::numbers::{larger, largest};
 use crate::rod::{
-    Element, LaneNodes, LaneSections, Section, Segment, SegmentHessian, UNKNOWNS, nodal_gradient,
+    Element, LaneNodes, LaneSections, Section, Segment, SegmentGradient, SegmentHessian, UNKNOWNS,
+    Wrench, nodal_gradient,
 };
 use crate::rotation::{Quaternions, exp_each, multiply_each};
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run};
@@ -83,7 +85,7 @@ impl DiscreteLeaf {
             run(arch, &mut kernel);
         });
         for j in 0..self.rods() {
-            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
+            self.clear_held_components(j, &mut system.groups[rod_lane(j).group].rhs);
         }
     }
 
@@ -99,9 +101,12 @@ impl DiscreteLeaf {
             let mut before = 0.0;
             for i in 0..=n {
                 let after = if i < n { excess(j, i) } else { 0.0 };
-                if self.allows_rotation_and_displacement(j, i)[0] {
-                    let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
-                    system.add_to_node(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
+                if self.node_freedom(j, i).rotation {
+                    let stiffness = DiagonalBlocks {
+                        rotary: DMat3::from_diagonal(DVec3::splat(-before - after)),
+                        translational: 0.0,
+                    };
+                    system.add_to_node(j, i, stiffness, Wrench::default());
                 }
                 before = after;
             }
@@ -158,36 +163,45 @@ impl DiscreteLeaf {
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
-                let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
+                let gradient = segment.gradient(self.section(j, i));
                 if i >= self.first_node() {
-                    let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
-                    let [turned, held] = self.holds_rotation_and_position(j, i);
-                    let forces = if held { 0.0 } else { forces };
-                    let moments = if turned { 0.0 } else { moments };
-                    largest = larger(largest, larger(forces, moments));
+                    let unbalanced =
+                        self.unbalanced_size(j, force + gradient.x, moment - gradient.a);
+                    let free = self.freedom_without_tip_support(j, i);
+                    let force = if free.displacement {
+                        unbalanced.force
+                    } else {
+                        0.0
+                    };
+                    let moment = if free.rotation {
+                        unbalanced.moment
+                    } else {
+                        0.0
+                    };
+                    largest = larger(largest, larger(force, moment));
                 }
                 let load = self.load(state, j, i + 1);
-                force = load.force - g_x;
-                moment = load.moment + self.node_dead_moment(i + 1) - g_b;
-                largest = larger(largest, component(segment.gap));
+                force = load.force - gradient.x;
+                moment = load.moment + self.node_dead_moment(i + 1) - gradient.b;
+                largest = larger(largest, largest_component(segment.gap));
             }
-            let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
+            let unbalanced = self.unbalanced_size(j, force, moment);
             // The holder balances the remaining force on a held tip.
-            let [turned, held] = self.holds_rotation_and_position(j, n);
+            let free = self.freedom_without_tip_support(j, n);
             match &self.leaf.tip_support {
-                _ if turned => continue,
-                _ if held => {}
+                _ if !free.rotation => continue,
+                _ if !free.displacement => {}
                 Some(held) if held.clamps.is_some() => continue,
                 Some(_) => {}
                 None if self.leaf.joined() => tip += force,
-                None => largest = larger(largest, unbalanced_force),
+                None => largest = larger(largest, unbalanced.force),
             }
-            largest = larger(largest, unbalanced_moment);
+            largest = larger(largest, unbalanced.moment);
         }
         if self.leaf.mirrored {
             tip.y = 0.0;
         }
-        larger(largest, component(tip))
+        larger(largest, largest_component(tip))
     }
 
     /// Potential energy of the loads and of the coupling at the bases: none where these are in the
@@ -220,13 +234,13 @@ impl DiscreteLeaf {
     }
 }
 
-/// The largest component of a vector.
-pub(super) fn component(vector: DVec3) -> f64 {
+/// The largest component of a vector, without its sign.
+pub(super) fn largest_component(vector: DVec3) -> f64 {
     largest(vector.abs().to_array())
 }
 
 /// The rods of a group in a state; lanes without a rod repeat the last.
-pub struct GroupRods<'a> {
+struct GroupRods<'a> {
     leaf: &'a DiscreteLeaf,
     group: usize,
     sections: [&'a [Section]; GROUP],
@@ -239,7 +253,7 @@ pub struct GroupRods<'a> {
 }
 
 impl<'a> GroupRods<'a> {
-    pub fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
+    fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
         let (n, last) = (leaf.segments(), leaf.rods() - 1);
         let rods = lane_rods(group, leaf.rods());
         let x = |j: usize| &state.x[state.base(j)..][..=n];
@@ -259,13 +273,13 @@ impl<'a> GroupRods<'a> {
     }
 
     #[inline(always)]
-    fn q<S: Simd>(&self, simd: S, i: usize, part: usize) -> Quaternions<S> {
+    fn rotations<S: Simd>(&self, simd: S, i: usize, part: usize) -> Quaternions<S> {
         let [a, b, c, d] = self.q;
         let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
         let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
-        let v = Vectors::from_group(simd, [vector(a), vector(b), vector(c), vector(d)], part);
+        let vectors = [vector(a), vector(b), vector(c), vector(d)];
         (
-            v,
+            Vectors::from_group(simd, vectors, part),
             Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
         )
     }
@@ -273,36 +287,48 @@ impl<'a> GroupRods<'a> {
     #[inline(always)]
     fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> LaneSections<S> {
         let [a, b, c, d] = self.sections;
-        LaneSections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
+        LaneSections::from_group_sections(simd, [&a[i], &b[i], &c[i], &d[i]], part)
     }
 
-    /// Segment `i` of every rod, and its sections.
+    /// Segment `i` of every rod.
     #[inline(always)]
-    fn element<S: Simd>(&self, simd: S, i: usize, part: usize) -> (Element<S>, LaneSections<S>) {
+    fn segments<S: Simd>(&self, simd: S, i: usize, part: usize) -> LaneSegments<S> {
         let nodes = LaneNodes {
             x: [
-                gather(simd, self.x, i, part),
-                gather(simd, self.x, i + 1, part),
+                lane_vectors(simd, self.x, i, part),
+                lane_vectors(simd, self.x, i + 1, part),
             ],
-            q: [self.q(simd, i, part), self.q(simd, i + 1, part)],
+            q: [
+                self.rotations(simd, i, part),
+                self.rotations(simd, i + 1, part),
+            ],
         };
         let sections = self.sections(simd, i, part);
-        let n = gather(simd, self.n, i, part);
-        (Element::new(&sections, &nodes, n), sections)
+        let n = lane_vectors(simd, self.n, i, part);
+        LaneSegments {
+            element: Element::new(&sections, &nodes, n),
+            sections,
+        }
     }
 }
 
-/// Number `i` of the vectors of each lane.
+/// A segment of several rods.
+struct LaneSegments<S: Simd> {
+    element: Element<S>,
+    sections: LaneSections<S>,
+}
+
+/// The vectors at index `i` of each rod of a group.
 #[inline(always)]
-fn gather<S: Simd>(simd: S, of: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
-    let [a, b, c, d] = of;
+fn lane_vectors<S: Simd>(simd: S, rods: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
+    let [a, b, c, d] = rods;
     Vectors::from_group(simd, [a[i], b[i], c[i], d[i]], part)
 }
 
-/// Right-hand side and energy, and the matrix if requested.
-pub struct AssemblyKernel<'a, const MATRIX: bool> {
-    pub rods: GroupRods<'a>,
-    pub group: &'a mut RodGroup,
+/// Assembles the right-hand side and the energy of a group, and the matrix if requested.
+struct AssemblyKernel<'a, const MATRIX: bool> {
+    rods: GroupRods<'a>,
+    group: &'a mut RodGroup,
 }
 
 impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
@@ -323,7 +349,7 @@ impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
         let (mut own, mut force) = ([[zero; UNKNOWNS]; UNKNOWNS], [zero; UNKNOWNS]);
         let (n, first) = (rods.leaf.segments(), rods.leaf.first_node());
         for i in 0..n {
-            let (element, sections) = rods.element(simd, i, part);
+            let LaneSegments { element, sections } = rods.segments(simd, i, part);
             energy = energy + element.strain_energy(&sections);
             squared_turn = squared_turn.larger_or_infinite(element.squared_turn());
             let gradient = nodal_gradient(element.condensed(&sections));
@@ -352,20 +378,17 @@ impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
                 own = hessian.diagonal_blocks[1];
             }
             let tip = i + 1 == n;
-            let weights = [
-                rods.leaf.grid.node_weight(i + 1),
-                rods.leaf.coupling_weight(i + 1),
-            ];
+            let weights = rods.leaf.node_weights(i + 1);
             let [previous, next] = rods.neighbour_positions;
             let x = [
-                gather(simd, previous, i + 1, part),
-                gather(simd, rods.x, i + 1, part),
-                gather(simd, next, i + 1, part),
+                lane_vectors(simd, previous, i + 1, part),
+                lane_vectors(simd, rods.x, i + 1, part),
+                lane_vectors(simd, next, i + 1, part),
             ];
-            let (load, potential) = loads.node_forces(x, weights, tip);
-            energy = energy + potential;
-            let load = load.array();
-            let coupling_weight = Lanes::splat(simd, weights[1]);
+            let loaded = loads.node_forces(x, weights, tip);
+            energy = energy + loaded.energy;
+            let load = loaded.force.array();
+            let coupling_weight = Lanes::splat(simd, weights.coupling);
             for r in 0..UNKNOWNS {
                 force[r] = -gradient[1][r];
                 if r >= ROTATION_UNKNOWNS {
@@ -389,11 +412,12 @@ impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
     }
 }
 
-/// The right-hand side of [`DiscreteLeaf::assemble_stiffening`].
-pub struct StiffeningKernel<'a> {
-    pub rods: GroupRods<'a>,
-    pub dropped_compliance: DVec3,
-    pub group: &'a mut RodGroup,
+/// Assembles the right-hand side of [`DiscreteLeaf::assemble_stiffening`].
+struct StiffeningKernel<'a> {
+    rods: GroupRods<'a>,
+    /// Ones for the components of compliance that are dropped, zeros for the others.
+    dropped_compliance: DVec3,
+    group: &'a mut RodGroup,
 }
 
 impl GroupKernel for StiffeningKernel<'_> {
@@ -412,7 +436,7 @@ impl GroupKernel for StiffeningKernel<'_> {
         for i in 0..=n {
             let gradient = match i < n {
                 true => {
-                    let (element, sections) = self.rods.element(simd, i, part);
+                    let LaneSegments { element, sections } = self.rods.segments(simd, i, part);
                     nodal_gradient(element.stiffening_gradient(&sections, dropped))
                 }
                 false => [none; 2],
@@ -428,14 +452,14 @@ impl GroupKernel for StiffeningKernel<'_> {
     }
 }
 
-/// The next state of a group, without clamped bases, which stay.
-pub struct StateAdvanceKernel<'a> {
-    pub rods: GroupRods<'a>,
-    pub solution: &'a [GroupIncrements],
-    pub step: f64,
-    pub x: &'a mut [DVec3],
-    pub q: &'a mut [DQuat],
-    pub n: &'a mut [DVec3],
+/// Writes the next state of a group, without clamped bases, which stay.
+struct StateAdvanceKernel<'a> {
+    rods: GroupRods<'a>,
+    solution: &'a [GroupIncrements],
+    step: f64,
+    x: &'a mut [DVec3],
+    q: &'a mut [DQuat],
+    n: &'a mut [DVec3],
 }
 
 impl GroupKernel for StateAdvanceKernel<'_> {
@@ -449,20 +473,20 @@ impl GroupKernel for StateAdvanceKernel<'_> {
         let segments = self.rods.leaf.segments();
         let ahead = self.solution.len() - segments;
         if ahead > 0 {
-            turn = vectors(simd, &self.solution[0], 0, part);
+            turn = increment_vectors(simd, &self.solution[0], 0, part);
             self.turn_bases(turn.scale(step), lanes.clone(), part);
         }
         for (i, increment) in self.solution[ahead..].iter().enumerate() {
-            let of = |c: usize| vectors(simd, increment, c, part);
+            let of = |c: usize| increment_vectors(simd, increment, c, part);
             let (turn_after, shift_after) = (of(0), of(3));
             let rods = &self.rods;
-            let (element, sections) = rods.element(simd, i, part);
+            let LaneSegments { element, sections } = rods.segments(simd, i, part);
             let turns = [turn, turn_after];
             let change = element.force_increment(&sections, shift_after - shift, turns);
-            let n = change.mul_add(step, gather(simd, rods.n, i, part));
-            let x = shift_after.mul_add(step, gather(simd, rods.x, i + 1, part));
+            let n = change.mul_add(step, lane_vectors(simd, rods.n, i, part));
+            let x = shift_after.mul_add(step, lane_vectors(simd, rods.x, i + 1, part));
             let turned = exp_each(turn_after.scale(step));
-            let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
+            let (q, qw) = multiply_each(turned, rods.rotations(simd, i + 1, part));
             let mut numbers = [NumberGroup::default(); 10];
             let [n, x, q] = [n, x, q].map(Vectors::array);
             for c in 0..3 {
@@ -488,7 +512,7 @@ impl StateAdvanceKernel<'_> {
     #[inline(always)]
     fn turn_bases<S: Simd>(&mut self, turn: Vectors<S>, lanes: Range<usize>, part: usize) {
         let simd = turn.x.simd;
-        let (q, qw) = multiply_each(exp_each(turn), self.rods.q(simd, 0, part));
+        let (q, qw) = multiply_each(exp_each(turn), self.rods.rotations(simd, 0, part));
         let mut numbers = [NumberGroup::default(); 4];
         let [x, y, z] = q.array();
         for (number, four) in [x, y, z, qw].into_iter().zip(&mut numbers) {
@@ -501,9 +525,9 @@ impl StateAdvanceKernel<'_> {
     }
 }
 
-/// The components of increments from `c` on.
+/// Three components of increments, from `c` on.
 #[inline(always)]
-fn vectors<S: Simd>(simd: S, of: &GroupIncrements, c: usize, part: usize) -> Vectors<S> {
+fn increment_vectors<S: Simd>(simd: S, of: &GroupIncrements, c: usize, part: usize) -> Vectors<S> {
     let [x, y, z] = [&of[c], &of[c + 1], &of[c + 2]];
     Vectors::new(
         Lanes::load_group(simd, x, part),
@@ -512,16 +536,12 @@ fn vectors<S: Simd>(simd: S, of: &GroupIncrements, c: usize, part: usize) -> Vec
     )
 }
 
-/// Jumps of a rod's position, rotation, force and moment at a node: the values before the
-/// node, seen from the base, minus those beyond it.
-pub type FieldJump = [DVec3; 4];
-
 /// A segment with its derivatives.
 pub struct SegmentTangent {
-    /// The segment.
+    /// The segment in its state.
     pub segment: Segment,
-    /// Derivatives of Pi with respect to its end position and the rotations of both nodes.
-    pub first: (DVec3, DVec3, DVec3),
+    /// First derivatives of Pi at fixed force.
+    pub first: SegmentGradient,
     /// Second derivatives, the force condensed out.
     pub second: SegmentHessian,
 }
@@ -538,38 +558,42 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Assembles the right-hand side for the first-order change that removes the `jumps` of a
-    /// leaf, given rod after rod at the midpoints of equal parts; `tangents` are the segments
-    /// that begin there.
+    /// Assembles the right-hand side for the first-order change that removes the `jumps` of the fields
+    /// of a leaf, given rod after rod at the midpoints of equal parts: the fields before a midpoint,
+    /// seen from the base, minus those beyond it. `tangents` are the segments that begin at the
+    /// midpoints.
     pub fn assemble_jump_correction(
         &self,
         tangents: &[Vec<SegmentTangent>],
-        jumps: &[Vec<FieldJump>],
+        jumps: &[Vec<FieldChange>],
         system: &mut System,
     ) {
         let (n, first) = (self.segments(), self.first_node());
         let mut rhs = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
         for ((rhs, rod), tangents) in rhs.iter_mut().zip(jumps).zip(tangents) {
             let part = n / rod.len();
-            for (k, (&[shift, turn, force, moment], tangent)) in
-                rod.iter().zip(tangents).enumerate()
-            {
+            for (k, (jump, tangent)) in rod.iter().zip(tangents).enumerate() {
                 // After the change the segment beyond the node begins where the one before it
                 // ends.
                 let i = k * part + part / 2;
-                let (second, (_, held, _)) = (&tangent.second, tangent.first);
+                let (second, held) = (&tangent.second, tangent.first.a);
+                let (shift, turn) = (jump.position, jump.rotation);
                 let pull = second.xa * turn - second.xx * shift;
                 // A moment with fixed lab components does not rotate with its node.
                 let at_begin =
                     second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
                 let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
-                add_to_increment(&mut rhs[i - first], -at_begin - moment, pull - force);
+                add_to_increment(
+                    &mut rhs[i - first],
+                    -at_begin - jump.moment,
+                    pull - jump.force,
+                );
                 add_to_increment(&mut rhs[i + 1 - first], -at_end, -pull);
             }
         }
         system.set_rhs(&rhs);
         for j in 0..self.rods() {
-            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
+            self.clear_held_components(j, &mut system.groups[rod_lane(j).group].rhs);
         }
     }
 }
@@ -590,7 +614,7 @@ mod tests {
 
     /// The displacements of a straight rod at rest, from its first node on, due to a jump at
     /// its midpoint.
-    fn displacements(jump: FieldJump) -> Vec<DVec3> {
+    fn displacements(jump: FieldChange) -> Vec<DVec3> {
         let rod = Scenario::from_toml(ROD).unwrap();
         let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(SEGMENTS, &[]));
         let x = leaf.grid.sigma().iter().map(|&sigma| sigma * DVec3::X);
@@ -607,7 +631,7 @@ mod tests {
         system.solution()[0].iter().map(displacement_part).collect()
     }
 
-    fn assert_moved(jump: FieldJump, expected: impl Fn(f64) -> DVec3) {
+    fn assert_moved(jump: FieldChange, expected: impl Fn(f64) -> DVec3) {
         for (i, found) in displacements(jump).into_iter().enumerate() {
             let expected = expected((i + 1) as f64 / SEGMENTS as f64);
             let off = (found - expected).length();
@@ -618,25 +642,38 @@ mod tests {
     /// The part beyond the jump moves as a rigid body.
     #[test]
     fn behind_a_jump_the_free_part_follows() {
-        let zero = DVec3::ZERO;
-        let jump = DVec3::new(0.1, -0.2, 0.3);
+        let by = DVec3::new(0.1, -0.2, 0.3);
         let beyond = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
-        assert_moved([jump, zero, zero, zero], |sigma| beyond(sigma) * jump);
-        let turned = |sigma: f64| beyond(sigma) * jump.cross((sigma - 0.5) * DVec3::X);
-        assert_moved([zero, jump, zero, zero], turned);
+        let shifted = FieldChange {
+            position: by,
+            ..FieldChange::default()
+        };
+        assert_moved(shifted, |sigma| beyond(sigma) * by);
+        let turned = FieldChange {
+            rotation: by,
+            ..FieldChange::default()
+        };
+        assert_moved(turned, |sigma| {
+            beyond(sigma) * by.cross((sigma - 0.5) * DVec3::X)
+        });
     }
 
     /// Removing a jump of force or moment is equivalent to a load of that size at the
     /// midpoint.
     #[test]
     fn before_a_jump_of_a_force_the_held_part_bends_back() {
-        let zero = DVec3::ZERO;
-        let axial = DVec3::new(0.7, 0.0, 0.0);
-        let pulled = |sigma: f64| -sigma.min(0.5) / 40.0 * axial;
-        assert_moved([zero, zero, axial, zero], pulled);
+        let force = DVec3::new(0.7, 0.0, 0.0);
+        let pulled = FieldChange {
+            force,
+            ..FieldChange::default()
+        };
+        assert_moved(pulled, |sigma| -sigma.min(0.5) / 40.0 * force);
         // A cantilever of half the length under a moment M at its end: M s^2/(2 A).
-        let moment = DVec3::new(0.0, 0.0, 0.6);
-        assert_moved([zero, zero, zero, moment], |sigma| {
+        let bent = FieldChange {
+            moment: DVec3::new(0.0, 0.0, 0.6),
+            ..FieldChange::default()
+        };
+        assert_moved(bent, |sigma| {
             let s = sigma.min(0.5);
             -0.6 * (0.5 * s * s + (sigma - s) * s) * DVec3::Y
         });

@@ -1,16 +1,12 @@
-//! The matrices of a group of rods, one rod in each lane: every rod's block-tridiagonal matrix
-//! (chain), its factorisation, base to tip, and its triangular solves. Linear in the number of
-//! nodes.
+//! The block-tridiagonal matrices of a group of rods, one rod in each lane: their factorization, base
+//! to tip, and their triangular solves. Linear in the number of nodes.
 //!
-//! The unknowns of a node are (theta, dx). The last node's dx is either the rod's own, or belongs
-//! to the joint tip: then it is not eliminated, and its Schur complement is the rod's contribution
-//! to the tip's 3 x 3 matrix.
-//!
-//! The loops along the rods of a group.
+//! The unknowns of a node are (theta, dx), rotation and displacement. The last node's dx is either the
+//! rod's own or that of the joint tip: then it is not eliminated, and its Schur complement is the rod's
+//! contribution to the tip's 3 x 3 matrix.
 
 use crate::leaf::state::Increment;
-use crate::rod;
-use crate::rod::{LaneBlock, UNKNOWNS};
+use crate::rod::{LaneBlock, NodeBlock, UNKNOWNS};
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, run};
 use glam::DVec3;
 use pulp::{Arch, Simd};
@@ -18,31 +14,28 @@ use pulp::{Arch, Simd};
 /// Increments of a node, or the forces dual to them, of all rods of a group.
 pub type GroupIncrements = [NumberGroup; 6];
 
-/// The increments of the rod in a lane.
+/// The increment of the rod in a lane.
 pub fn lane_increment(increments: &GroupIncrements, lane: usize) -> Increment {
     increments.map(|four| four.0[lane])
 }
 
-/// Writes the increments of the rod in a lane.
+/// Writes the increment of the rod in a lane.
 pub fn set_lane_increment(increments: &mut GroupIncrements, lane: usize, of_rod: &Increment) {
     for (four, value) in increments.iter_mut().zip(of_rod) {
         four.0[lane] = *value;
     }
 }
 
-/// A block of a chain, rows first.
-pub type RodBlock = [[f64; UNKNOWNS]; UNKNOWNS];
-
 /// Number of rotations among the unknowns of a node; they come first.
 pub const ROTATION_UNKNOWNS: usize = 3;
 
-/// Entries of the upper triangle of a block.
-const TRIANGLE: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
+/// Number of entries of the upper triangle of a block.
+const TRIANGLE_ENTRIES: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
 
 /// The entries of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
-type NodeEntries = [NumberGroup; ENTRIES];
+type NodeEntries = [NumberGroup; ENTRIES_PER_NODE];
 
-const ENTRIES: usize = TRIANGLE + UNKNOWNS * UNKNOWNS;
+const ENTRIES_PER_NODE: usize = TRIANGLE_ENTRIES + UNKNOWNS * UNKNOWNS;
 
 /// Position of the entry (r, c) of a triangle, r <= c.
 const fn triangle_index(r: usize, c: usize) -> usize {
@@ -51,14 +44,29 @@ const fn triangle_index(r: usize, c: usize) -> usize {
 
 /// Position of the entry (r, c) of a block (i, i + 1).
 const fn off_diagonal_index(r: usize, c: usize) -> usize {
-    TRIANGLE + r * UNKNOWNS + c
+    TRIANGLE_ENTRIES + r * UNKNOWNS + c
 }
 
-/// The 3 x 3 matrix of a tip, rows first.
-pub type TipMatrix = [[f64; 3]; 3];
+/// A 3 x 3 matrix, rows first.
+pub type Matrix3 = [[f64; 3]; 3];
+
+/// The two blocks of a node in the matrix of a rod.
+pub struct NodeBlocks {
+    /// The block of the node, upper triangle.
+    pub own: NodeBlock,
+    /// The block between the node and the next.
+    pub next: NodeBlock,
+}
+
+/// Masses of the rods of a group, per weight of their nodes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroupMasses {
+    pub rotary: NumberGroup,
+    pub translational: NumberGroup,
+}
 
 /// The matrices of a group of rods, nodes from the first with equations on (from 0), without the
-/// coupling to others, and their factorisations.
+/// coupling to others, and their factorizations.
 #[derive(Clone, Debug)]
 pub struct BlockTridiagonal {
     /// Entries of all nodes.
@@ -70,18 +78,18 @@ pub struct BlockTridiagonal {
     last_node_unknowns: usize,
 }
 
-/// The contribution of the masses to a matrix: `shift` times the masses per weight, rotary and
-/// translational, times the nodes' weights.
+/// The contribution of the masses to a matrix: `shift` times the masses per weight times the nodes'
+/// weights.
 pub struct ShiftedMasses<'a> {
     pub shift: f64,
-    pub per_weight: [NumberGroup; 2],
+    pub per_weight: GroupMasses,
     pub weights: &'a [f64],
 }
 
 impl BlockTridiagonal {
     /// Identity matrices, for rods with `nodes` nodes that have equations.
     pub fn new(nodes: usize, joined: bool) -> Self {
-        let zeros = [NumberGroup::default(); ENTRIES];
+        let zeros = [NumberGroup::default(); ENTRIES_PER_NODE];
         let mut identity = zeros;
         for k in 0..UNKNOWNS {
             identity[triangle_index(k, k)] = NumberGroup::splat(1.0);
@@ -103,8 +111,8 @@ impl BlockTridiagonal {
     pub fn store_node_blocks<S: Simd>(
         &mut self,
         i: usize,
-        own: &rod::LaneBlock<S>,
-        next: Option<&rod::LaneBlock<S>>,
+        own: &LaneBlock<S>,
+        next: Option<&LaneBlock<S>>,
         active: Lanes<S>,
         part: usize,
     ) {
@@ -137,11 +145,10 @@ impl BlockTridiagonal {
         &mut self.matrix[i][off_diagonal_index(r, c)]
     }
 
-    /// The block of node `i` (from 0) of the rod in a lane, its upper triangle, and
-    /// the one between it and the next.
-    pub fn blocks(&self, i: usize, lane: usize) -> (RodBlock, RodBlock) {
+    /// The blocks of node `i` (from 0) of the rod in a lane.
+    pub fn node_blocks(&self, i: usize, lane: usize) -> NodeBlocks {
         let node = &self.matrix[i];
-        let (mut own, mut next) = ([[0.0; UNKNOWNS]; UNKNOWNS], [[0.0; UNKNOWNS]; UNKNOWNS]);
+        let (mut own, mut next) = (NodeBlock::default(), NodeBlock::default());
         for r in 0..UNKNOWNS {
             for c in 0..UNKNOWNS {
                 next[r][c] = node[off_diagonal_index(r, c)].0[lane];
@@ -150,13 +157,13 @@ impl BlockTridiagonal {
                 }
             }
         }
-        (own, next)
+        NodeBlocks { own, next }
     }
 
-    /// Factorises the matrices plus `masses`. False if a pivot is not positive or, with
+    /// Factorizes the matrices plus `masses`. False if a pivot is not positive or, with
     /// `any_sign`, if one is zero.
     pub fn factorize(&mut self, arch: Arch, masses: &ShiftedMasses, any_sign: bool) -> bool {
-        let mut kernel = Factorize {
+        let mut kernel = FactorizationKernel {
             chain: self,
             masses,
             any_sign,
@@ -167,7 +174,7 @@ impl BlockTridiagonal {
     }
 
     /// The contribution of the rod in a lane to the matrix of the joint tip.
-    pub fn tip(&self, lane: usize) -> TipMatrix {
+    pub fn tip_block(&self, lane: usize) -> Matrix3 {
         let node = &self.factor[self.nodes() - 1];
         let entry = |r: usize, c: usize| {
             node[triangle_index(ROTATION_UNKNOWNS + r.min(c), ROTATION_UNKNOWNS + r.max(c))].0[lane]
@@ -179,18 +186,18 @@ impl BlockTridiagonal {
     /// rods' contributions to the tip's right-hand side.
     pub fn substitute_forward(&self, arch: Arch, b: &[GroupIncrements], y: &mut [GroupIncrements]) {
         let chain = self;
-        run(arch, &mut Forward { chain, b, y });
+        run(arch, &mut ForwardKernel { chain, b, y });
     }
 
-    /// Backward substitution in place, from the result of [`BlockTridiagonal::forward`]; with a joint tip
-    /// the last dx slots must hold its displacement. Returns b . y.
+    /// Backward substitution in place, from the result of [`BlockTridiagonal::substitute_forward`]; with
+    /// a joint tip the last dx slots must hold its displacement. Returns b . y.
     pub fn substitute_backward(
         &self,
         arch: Arch,
         b: &[GroupIncrements],
         y: &mut [GroupIncrements],
     ) -> f64 {
-        let mut kernel = Backward {
+        let mut kernel = BackwardKernel {
             chain: self,
             b,
             y,
@@ -201,12 +208,13 @@ impl BlockTridiagonal {
     }
 }
 
-/// Solves a symmetric 3 x 3 system by L D L^T; `None` if not positive definite.
+/// The factorization L D L^T of the matrix of a joint tip: L^T above the diagonal and 1/d on it.
 #[derive(Clone, Copy, Debug)]
-pub struct TipFactor(TipMatrix);
+pub struct TipFactor(Matrix3);
 
 impl TipFactor {
-    pub fn new(mut a: TipMatrix) -> Option<Self> {
+    /// Factorizes a symmetric matrix; `None` if it is not positive definite.
+    pub fn new(mut a: Matrix3) -> Option<Self> {
         for k in 0..3 {
             if a[k][k].is_nan() || a[k][k] <= 0.0 {
                 return None;
@@ -234,9 +242,19 @@ impl TipFactor {
     }
 }
 
-/// Group and lane of rod `j`.
-pub fn group_and_lane(j: usize) -> (usize, usize) {
-    (j / GROUP, j % GROUP)
+/// The group of a rod, and its lane within the group.
+#[derive(Clone, Copy)]
+pub struct RodLane {
+    pub group: usize,
+    pub lane: usize,
+}
+
+/// Where rod `j` is.
+pub fn rod_lane(j: usize) -> RodLane {
+    RodLane {
+        group: j / GROUP,
+        lane: j % GROUP,
+    }
 }
 
 /// The rods of a group, lane by lane; lanes without a rod repeat the last.
@@ -245,23 +263,27 @@ pub fn lane_rods(group: usize, rods: usize) -> [usize; GROUP] {
     std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
 }
 
-/// See [`BlockTridiagonal::factorize`].
-pub struct Factorize<'a> {
-    pub chain: &'a mut BlockTridiagonal,
-    pub masses: &'a ShiftedMasses<'a>,
-    pub any_sign: bool,
-    pub definite: bool,
+/// The loop of [`BlockTridiagonal::factorize`] along the rods of a group.
+struct FactorizationKernel<'a> {
+    chain: &'a mut BlockTridiagonal,
+    masses: &'a ShiftedMasses<'a>,
+    any_sign: bool,
+    definite: bool,
 }
 
-impl GroupKernel for Factorize<'_> {
+impl GroupKernel for FactorizationKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let shift = Lanes::splat(simd, self.masses.shift);
-        let mut masses = [zero; 2];
-        for k in 0..2 {
-            masses[k] = shift * Lanes::load_group(simd, &self.masses.per_weight[k], part);
-        }
+        let GroupMasses {
+            rotary,
+            translational,
+        } = &self.masses.per_weight;
+        let masses = [
+            shift * Lanes::load_group(simd, rotary, part),
+            shift * Lanes::load_group(simd, translational, part),
+        ];
         let n = self.chain.nodes();
         let mut schur = [[zero; UNKNOWNS]; UNKNOWNS];
         for i in 0..n {
@@ -356,14 +378,14 @@ fn eliminate_off_diagonal<S: Simd>(
     schur
 }
 
-/// See [`BlockTridiagonal::forward`].
-pub struct Forward<'a> {
-    pub chain: &'a BlockTridiagonal,
-    pub b: &'a [GroupIncrements],
-    pub y: &'a mut [GroupIncrements],
+/// The loop of [`BlockTridiagonal::substitute_forward`] along the rods of a group.
+struct ForwardKernel<'a> {
+    chain: &'a BlockTridiagonal,
+    b: &'a [GroupIncrements],
+    y: &'a mut [GroupIncrements],
 }
 
-impl GroupKernel for Forward<'_> {
+impl GroupKernel for ForwardKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let n = self.chain.nodes();
@@ -404,15 +426,15 @@ impl GroupKernel for Forward<'_> {
     }
 }
 
-/// See [`BlockTridiagonal::backward`].
-pub struct Backward<'a> {
-    pub chain: &'a BlockTridiagonal,
-    pub b: &'a [GroupIncrements],
-    pub y: &'a mut [GroupIncrements],
-    pub product: NumberGroup,
+/// The loop of [`BlockTridiagonal::substitute_backward`] along the rods of a group.
+struct BackwardKernel<'a> {
+    chain: &'a BlockTridiagonal,
+    b: &'a [GroupIncrements],
+    y: &'a mut [GroupIncrements],
+    product: NumberGroup,
 }
 
-impl GroupKernel for Backward<'_> {
+impl GroupKernel for BackwardKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let n = self.chain.nodes();

@@ -1,6 +1,13 @@
-//! The discretised leaf: its segments, loads and coupling.
+//! The grid of a leaf, and the leaf on it: sections of its segments, and the weights, loads and
+//! couplings of its nodes.
 //!
-//! The grid: positions of the nodes along the rods.
+//! Veins that tissue ties, or that meet at a tip, must fit together at rest: what their rest shapes
+//! miss by their discretization, stiff tissue would turn into forces. So the rest strain and the rest
+//! curvature of their segments are those of a segment between two nodes of the stress-free leaf,
+//!
+//! v0 = R^T (x1 - x0)/ds,   u0 = log(q0^* q1)/ds,
+//!
+//! which differ from those at its middle by a series in ds^2.
 
 use crate::leaf::state::State;
 use crate::leaf::{GrippedNode, Leaf, Loads};
@@ -19,16 +26,25 @@ use std::ops::Range;
 /// vein rotates with its strip of blade.
 const RADIUS_OF_GYRATION: f64 = 0.1;
 
+/// Smallest shift of the matrix, as a squared frequency, that keeps neutral modes from moving: far below
+/// the squared frequency of any bending mode.
+const LEAST_NEUTRAL_SHIFT: f64 = 1e-7;
+
+/// Largest difference between stations of a shape and nodes of a grid by rounding, in fractions of the
+/// length.
+const STATION_ROUNDING: f64 = 1e-9;
+
 /// A leaf on a grid.
 #[derive(Clone, Debug)]
 pub struct DiscreteLeaf {
-    /// The leaf.
+    /// The leaf before discretization.
     pub leaf: Leaf,
-    /// Its grid.
+    /// The grid of every rod.
     pub grid: Grid,
     /// Sections of all segments, rod after rod.
     pub sections: Vec<Section>,
-    /// Their rest curvatures, whatever [`DiscreteLeaf::scale_rest_curvatures`] sets.
+    /// Rest curvatures of all segments, from which [`DiscreteLeaf::scale_rest_curvatures`] sets those
+    /// of the sections.
     rest_curvatures: Vec<DVec3>,
     /// Coupling of each gap, per unit of sigma; the last may be the one between
     /// a rod and its image.
@@ -37,18 +53,63 @@ pub struct DiscreteLeaf {
     pub(super) strips: Vec<TissueStrip>,
     /// Forces on all nodes by loads of their veins alone; empty if there are none.
     pub(super) own_loads: Vec<DVec3>,
-    /// Nodes and sizes of the dead moments on points of a single rod.
-    pub(super) point_moments: Vec<(usize, DVec3)>,
+    /// Dead moments on points of a single rod, whole.
+    pub(super) point_moments: Vec<NodalMoment>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
-    /// Part of the loads that acts: one, except during continuation in the loads.
+    /// Factor of all loads: one, except during continuation in the loads.
     pub load_factor: f64,
-    /// The loads.
+    /// Loads that all rods share, before the factor.
     pub loads: Loads,
 }
 
+/// A dead moment on a node of a single rod, along the lab axes.
+#[derive(Clone, Copy, Debug)]
+pub struct NodalMoment {
+    pub node: usize,
+    pub moment: DVec3,
+}
+
+/// What a held tip exerts on its holder.
+#[derive(Clone, Debug)]
+pub struct TipReaction {
+    /// Force of all rods together.
+    pub force: DVec3,
+    /// Moment of every rod, which a clamp balances.
+    pub moments: Vec<DVec3>,
+}
+
+/// Mass of a node at unit density, or its mass per weight.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NodeMass {
+    /// Moment of inertia, the same about all axes.
+    pub rotary: f64,
+    pub translational: f64,
+}
+
+impl NodeMass {
+    /// The mass that belongs to component `c` of an increment (rotation, displacement).
+    #[inline]
+    pub fn of_component(self, c: usize) -> f64 {
+        if c < 3 {
+            self.rotary
+        } else {
+            self.translational
+        }
+    }
+}
+
+/// Weights of a node in sums along a rod.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeWeights {
+    /// Weight in dead loads.
+    pub load: f64,
+    /// Weight in the coupling: zero at a joint tip, which all rods share.
+    pub coupling: f64,
+}
+
 impl DiscreteLeaf {
-    /// Discretises `leaf` on `grid`.
+    /// Discretizes `leaf` on `grid`.
     pub fn new(leaf: &Leaf, grid: Grid) -> Self {
         let n = grid.segments();
         let mut sections: Vec<Section> = (0..leaf.rods())
@@ -92,15 +153,15 @@ impl DiscreteLeaf {
             discrete.grips = discrete.find_gripped_nodes(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
-                    true => discrete.strips(&natural),
-                    false => discrete.strips(&discrete.unstrained_state(false)),
+                    true => discrete.tissue_strips(&natural),
+                    false => discrete.tissue_strips(&discrete.unstrained_state(false)),
                 };
             }
         }
         discrete
     }
 
-    /// This leaf with its veins apart: [`Leaf::apart`].
+    /// The same discretization of [`Leaf::decoupled_leaf`].
     pub fn decoupled_leaf(&self) -> Self {
         let leaf = self.leaf.decoupled_leaf();
         DiscreteLeaf {
@@ -111,16 +172,18 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The natural leaf, unstrained rods: v = v0, u = u0, each from its base.
+    /// The stress-free leaf: unstrained rods, v = v0 and u = u0, each from its base.
     pub fn stress_free_state(&self) -> State {
         self.unstrained_state(true)
     }
 
-    /// The same, or before the rods have `grown`.
+    /// Unstrained rods, each from its base, with their rest stretch if they have `grown`, else of unit
+    /// stretch.
     fn unstrained_state(&self, grown: bool) -> State {
         let (mut xs, mut qs) = (Vec::new(), Vec::new());
         for j in 0..self.rods() {
-            let (mut x, mut q) = self.leaf.base(j);
+            let base = self.leaf.base_pose(j);
+            let (mut x, mut q) = (base.position, base.rotation);
             xs.push(x);
             qs.push(q);
             for i in 0..self.segments() {
@@ -143,7 +206,7 @@ impl DiscreteLeaf {
             .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
     }
 
-    /// The same leaf with no compliance below `floor`, and no tissue stiffer than its inverse.
+    /// This leaf with no compliance below `floor`, and no tissue stiffer than the inverse of `floor`.
     pub fn with_compliance_floor(&self, floor: f64) -> Self {
         let mut soft = self.clone();
         let n = self.segments();
@@ -159,8 +222,8 @@ impl DiscreteLeaf {
         soft
     }
 
-    /// Sets the force of every segment, and of the tissue, to that of its strain, and in rigid directions to zero;
-    /// returns the largest strain in these, as a length.
+    /// Sets the force of every segment, and of the tissue, to that of its strain, and in rigid
+    /// directions to zero; returns the largest strain in rigid directions, as a length.
     pub fn strain_forces(&self, state: &mut State) -> f64 {
         let (n, mut violation) = (self.segments(), 0.0_f64);
         state.tissue.clear();
@@ -194,11 +257,10 @@ impl DiscreteLeaf {
         (0..self.rods()).all(|j| open(j) <= within)
     }
 
-    /// A shift of the matrix (times the mass matrix) that is far below the squared frequency
-    /// of any bending mode, and above the error of a neutral mode's zero eigenvalue by
-    /// rounding and unfinished iterations.
+    /// A shift of the matrix (times the mass matrix) above the error of a neutral mode's zero
+    /// eigenvalue by rounding and unfinished iterations.
     pub fn neutral_shift(&self) -> f64 {
-        1e-7 + 4.0 * self.eigenvalue_rounding()
+        LEAST_NEUTRAL_SHIFT + 4.0 * self.eigenvalue_rounding()
     }
 
     /// Rounding error of the eigenvalues of the matrix.
@@ -255,10 +317,13 @@ impl DiscreteLeaf {
         self.coupling[g] * self.coupling_weight(i)
     }
 
-    /// Mass of the nodes of rod `j` at unit density, per weight: rotary, translational.
-    pub(super) fn mass_per_weight(&self, j: usize) -> [f64; 2] {
+    /// Mass of the nodes of rod `j` at unit density, per weight.
+    pub(super) fn mass_per_weight(&self, j: usize) -> NodeMass {
         let mass = self.leaf.length(j) * self.leaf.share(j);
-        [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
+        NodeMass {
+            rotary: RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass,
+            translational: mass,
+        }
     }
 
     /// Whether all tips are one point that moves.
@@ -267,19 +332,19 @@ impl DiscreteLeaf {
         self.leaf.joined() && self.rods() > 1 && self.leaf.tip_support.is_none()
     }
 
-    /// The force on the holder of a held tip, and the moments of the rods on a clamp.
-    pub fn reaction(&self, state: &State) -> (DVec3, Vec<DVec3>) {
+    /// What the tips exert on their holder.
+    pub fn reaction(&self, state: &State) -> TipReaction {
         let n = self.segments();
         let mut force = DVec3::ZERO;
         let mut moments = Vec::with_capacity(self.rods());
         for j in 0..self.rods() {
             let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
-            let (g_x, _, g_b) = segment.gradient(self.section(j, n - 1));
+            let gradient = segment.gradient(self.section(j, n - 1));
             let load = self.load(state, j, n);
-            force += load.force - g_x;
-            moments.push(load.moment + self.node_dead_moment(n) - g_b);
+            force += load.force - gradient.x;
+            moments.push(load.moment + self.node_dead_moment(n) - gradient.b);
         }
-        (force, moments)
+        TipReaction { force, moments }
     }
 
     /// Weight of node `i` in the masses: zero at a held tip, which does not move.
@@ -295,7 +360,7 @@ impl DiscreteLeaf {
         Segment::new(self.section(j, i), &state.ends(j, i), n)
     }
 
-    /// The same, carrying the force of its strains.
+    /// Segment `i` of rod `j` in `state`, carrying the force of its strains.
     pub fn strained_segment(&self, state: &State, j: usize, i: usize) -> Segment {
         Segment::with_strain_force(self.section(j, i), &state.ends(j, i))
     }
@@ -311,6 +376,15 @@ impl DiscreteLeaf {
         match self.leaf.joined() && i == self.segments() {
             true => 0.0,
             false => self.grid.node_weight(i),
+        }
+    }
+
+    /// Weights of node `i`.
+    #[inline]
+    pub(super) fn node_weights(&self, i: usize) -> NodeWeights {
+        NodeWeights {
+            load: self.grid.node_weight(i),
+            coupling: self.coupling_weight(i),
         }
     }
 
@@ -353,13 +427,13 @@ impl DiscreteLeaf {
             x(!last, k + nodes),
         ];
         let load = LaneRodLoads::load_group(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
-        let weights = [self.grid.node_weight(i), self.coupling_weight(i)];
-        let (force, energy) = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
+        let weights = self.node_weights(i);
+        let lanes = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
         let (tissue, own) = (self.tissue_load(state, j, i), self.own_load_on_node(j, i));
         NodeLoad {
             moment: tissue.moment,
-            force: DVec3::from(force) + tissue.force + own,
-            energy: f64::from(energy) + tissue.energy - own.dot(state.x[k]),
+            force: DVec3::from(lanes.force) + tissue.force + own,
+            energy: f64::from(lanes.energy) + tissue.energy - own.dot(state.x[k]),
         }
     }
 
@@ -380,8 +454,8 @@ impl DiscreteLeaf {
         0.5 * stretch.dot(self.node_coupling(j, i) * stretch) + self.tissue_load(state, j, i).energy
     }
 
-    /// Puts on parts of the loads and of the coupling of the `whole` leaf.
-    pub fn set_load_factors(&mut self, whole: &DiscreteLeaf, [loads, coupling]: [f64; 2]) {
+    /// Sets loads and coupling to these fractions of those of the `whole` leaf.
+    pub fn set_load_factors(&mut self, whole: &DiscreteLeaf, loads: f64, coupling: f64) {
         self.load_factor = loads * whole.load_factor;
         for (own, full) in self.coupling.iter_mut().zip(&whole.coupling) {
             *own = coupling * *full;
@@ -442,7 +516,10 @@ impl Grid {
         let grid = Grid::new(segments, kinks);
         let apart = |grid: &Grid| {
             let pairs = grid.sigma.iter().zip(stations);
-            grid.segments() != segments || pairs.into_iter().any(|(a, b)| (a - b).abs() > 1e-9)
+            grid.segments() != segments
+                || pairs
+                    .into_iter()
+                    .any(|(a, b)| (a - b).abs() > STATION_ROUNDING)
         };
         let mut nested = grid.clone();
         let mut halvings = 0;
@@ -454,12 +531,12 @@ impl Grid {
         if apart(&nested) { grid } else { nested }
     }
 
-    /// The same grid with every segment halved.
+    /// This grid with every segment halved.
     pub fn refined(&self) -> Self {
         self.subdivided_grid(|a, b, _| [a, 0.5 * (a + b)])
     }
 
-    /// The same grid with every segment cut in three.
+    /// This grid with every segment cut in three.
     pub fn tripled(&self) -> Self {
         self.subdivided_grid(|a, b, third| [a, a + third, b - third])
     }
@@ -475,8 +552,8 @@ impl Grid {
         })
     }
 
-    /// With every segment divided in N: `nodes` gives its first nodes from its ends and the
-    /// new width.
+    /// This grid with every segment divided in N: `nodes` gives the first N nodes of a segment from
+    /// its ends and the new width.
     fn subdivided_grid<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {
         let widths = self.widths.iter().map(|width| width / N as f64);
         let segments = self.sigma.windows(2).zip(widths.clone());
@@ -498,7 +575,7 @@ impl Grid {
     }
 
     /// The node nearest to a fraction of the length.
-    pub fn nearest(&self, sigma: f64) -> usize {
+    pub fn nearest_node(&self, sigma: f64) -> usize {
         let after = self
             .sigma
             .partition_point(|at| *at < sigma)
@@ -530,7 +607,7 @@ impl Grid {
 impl Leaf {
     /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
     /// ties the rods.
-    pub(crate) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
+    fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
         if !self.has_tissue() {
             return;
         }
@@ -542,10 +619,10 @@ impl Leaf {
             let mut before = natural.vein_pose(j, 0.0);
             for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
                 let next = natural.vein_pose(j, *sigma);
-                let ((x0, q0), (x1, q1)) = (before, next);
-                let chord = (x1 - x0) / (self.scale.length * section.ds);
-                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
-                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
+                let chord = (next.position - before.position) / (self.scale.length * section.ds);
+                let [from, to] = [before, next].map(|pose| pose.rotation);
+                section.rest_strain = rotation::midpoint(from, to).inverse() * chord;
+                section.rest_curvature = rotation::log(from.conjugate() * to) / section.ds;
                 before = next;
             }
         }
@@ -563,32 +640,38 @@ impl Leaf {
 /// Loads on a rod per weight of its nodes, except the force on its tip.
 #[derive(Clone, Copy)]
 pub struct RodLoad {
-    /// Dead load.
+    /// Dead load that all rods share.
     pub dead: DVec3,
-    /// Force on the tip.
+    /// Force on the tip, whole.
     pub tip: DVec3,
-    /// Coupling with the previous rod, with the next, and with its own mirror image.
+    /// Coupling with the previous rod, with the next, and with the rod's own mirror image.
     pub previous: DVec3,
     pub next: DVec3,
     pub image: DVec3,
 }
 
-/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
-/// to the lower rod.
+/// What acts on a node besides its segments.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NodeLoad {
-    /// Moment.
+    /// Moment of the tissue.
     pub moment: DVec3,
-    /// Force.
+    /// Force of loads, coupling and tissue.
     pub force: DVec3,
-    /// Potential energy.
+    /// Potential energy; that of a gap belongs to its lower rod.
     pub energy: f64,
 }
 
-/// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
-pub type GroupLoads = [[NumberGroup; 3]; 5];
+/// The [`RodLoad`] of each rod of a group, component by component.
+#[derive(Clone, Copy)]
+pub struct GroupLoads {
+    dead: [NumberGroup; 3],
+    tip: [NumberGroup; 3],
+    previous: [NumberGroup; 3],
+    next: [NumberGroup; 3],
+    image: [NumberGroup; 3],
+}
 
-/// The loads on the rods of a group.
+/// Arranges the loads of the rods of a group by components.
 #[inline(always)]
 pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
     let vectors = |of_load: fn(&RodLoad) -> DVec3| {
@@ -599,16 +682,16 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
             NumberGroup([a.z, b.z, c.z, d.z]),
         ]
     };
-    [
-        vectors(|load| load.dead),
-        vectors(|load| load.tip),
-        vectors(|load| load.previous),
-        vectors(|load| load.next),
-        vectors(|load| load.image),
-    ]
+    GroupLoads {
+        dead: vectors(|load| load.dead),
+        tip: vectors(|load| load.tip),
+        previous: vectors(|load| load.previous),
+        next: vectors(|load| load.next),
+        image: vectors(|load| load.image),
+    }
 }
 
-/// The loads on several rods.
+/// The [`RodLoad`] of several rods, as vectors in lanes.
 #[derive(Clone, Copy)]
 pub struct LaneRodLoads<S: Simd> {
     dead: Vectors<S>,
@@ -618,36 +701,43 @@ pub struct LaneRodLoads<S: Simd> {
     image: Vectors<S>,
 }
 
+/// Forces of dead loads and coupling on a node of several rods.
+#[derive(Clone, Copy)]
+pub struct LaneNodeForces<S: Simd> {
+    pub force: Vectors<S>,
+    /// Potential energy; that of a gap belongs to its lower rod.
+    pub energy: Lanes<S>,
+}
+
 impl<S: Simd> LaneRodLoads<S> {
     /// The loads on the lanes from `part` on.
     #[inline(always)]
     pub fn load_group(simd: S, group: &GroupLoads, part: usize) -> Self {
-        let vectors = |k: usize| {
-            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &group[k][c], part));
+        let vectors = |load: &[NumberGroup; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &load[c], part));
             Vectors::new(x, y, z)
         };
         LaneRodLoads {
-            dead: vectors(0),
-            tip: vectors(1),
-            previous: vectors(2),
-            next: vectors(3),
-            image: vectors(4),
+            dead: vectors(&group.dead),
+            tip: vectors(&group.tip),
+            previous: vectors(&group.previous),
+            next: vectors(&group.next),
+            image: vectors(&group.image),
         }
     }
 
-    /// Forces on nodes, and their share of the potential energy (that of a gap belongs to its
-    /// lower rod), from the positions of the nodes on the previous rods, of these, and on the
-    /// next rods, and from their weights in dead loads and in the coupling.
+    /// Forces on nodes, from the positions of the nodes on the previous rods, of these nodes, and of
+    /// those on the next rods.
     #[inline(always)]
     pub fn node_forces(
         &self,
         [previous, x, next]: [Vectors<S>; 3],
-        [weight, coupling_weight]: [f64; 2],
+        weights: NodeWeights,
         tip: bool,
-    ) -> (Vectors<S>, Lanes<S>) {
+    ) -> LaneNodeForces<S> {
         let simd = x.x.simd;
-        let (weight, half) = (Lanes::splat(simd, weight), Lanes::splat(simd, 0.5));
-        let coupling_weight = Lanes::splat(simd, coupling_weight);
+        let (weight, half) = (Lanes::splat(simd, weights.load), Lanes::splat(simd, 0.5));
+        let coupling_weight = Lanes::splat(simd, weights.coupling);
         let mut force = self.dead.scale(weight);
         if tip {
             force = force + self.tip;
@@ -657,7 +747,10 @@ impl<S: Simd> LaneRodLoads<S> {
         let pull = (self.next * stretch).scale(coupling_weight);
         let energy = half * (pull.dot(stretch) + to_image.dot(x)) - force.dot(x);
         let push = (self.previous * (x - previous)).scale(coupling_weight);
-        (force + pull - push - to_image, energy)
+        LaneNodeForces {
+            force: force + pull - push - to_image,
+            energy,
+        }
     }
 
     /// The contribution of the coupling to the diagonal of nodes, per weight.

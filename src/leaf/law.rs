@@ -3,7 +3,7 @@
 //! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
 //! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
 //! that is limited, as larger ones lose the soft modes to rounding
-//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
+//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::limit_condensing_stiffness)): of a segment that is stiffer, C < 1/k,
 //! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
 //! determine the force that is next to nothing; where holders, or other rods, determine the strain,
 //! each solution gains only the part k/H of the force.
@@ -21,11 +21,11 @@ use crate::numbers::largest;
 use crate::rod::{Section, Segment};
 use glam::DVec3;
 
-/// Parts of the law of a segment below this are rounding.
-const LAW_ROUNDING: f64 = 1e-12;
+/// Largest missing part of the law of a segment, 1 - C k, by rounding.
+const MISSING_LAW_ROUNDING: f64 = 1e-12;
 
-/// Accuracy to which what is missing of the law is found. A force is undetermined where the law
-/// closes less than the part `singular` of what a step misses: at a stiffness of
+/// Limits of the iteration for the missing lengths. A force is undetermined where the law closes less
+/// than the fraction `singular_value_limit` of the length that a step misses: at a stiffness of
 /// 10^12 A/L^2 it closes 10^-7 on branches, where k is 10^5.
 const LAW_COMPLETION_LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-9,
@@ -39,14 +39,18 @@ impl DiscreteLeaf {
     pub(super) fn missing_law_fraction(&self, j: usize, i: usize) -> DVec3 {
         let section = self.section(j, i);
         let left = DVec3::ONE - section.compliance * section.condensing;
-        DVec3::select(left.cmplt(DVec3::splat(LAW_ROUNDING)), DVec3::ZERO, left)
+        DVec3::select(
+            left.cmplt(DVec3::splat(MISSING_LAW_ROUNDING)),
+            DVec3::ZERO,
+            left,
+        )
     }
 
     /// Whether some segment of finite stiffness is stiffer than its force is condensed out with.
     pub fn is_nearly_rigid(&self) -> bool {
         let mut segments = self.rod_index_pairs(0..self.segments());
-        segments.any(|at| {
-            self.missing_law_fraction(at.0, at.1) * self.completed_law_fraction(at, false)
+        segments.any(|(j, i)| {
+            self.missing_law_fraction(j, i) * self.completed_law_fraction(j, i, false)
                 != DVec3::ZERO
         })
     }
@@ -59,7 +63,7 @@ impl DiscreteLeaf {
             let section = self.section(j, i);
             let change = (after.n[j * n + i] - before.n[j * n + i]).length();
             let missing =
-                self.missing_law_fraction(j, i) * self.completed_law_fraction((j, i), false);
+                self.missing_law_fraction(j, i) * self.completed_law_fraction(j, i, false);
             (missing / section.condensing).max_element() * change
         };
         largest(self.rod_index_pairs(0..n).map(missing))
@@ -88,7 +92,7 @@ impl DiscreteLeaf {
     /// finite stiffness. A straight rigid rod between holders has no force of its own, and its
     /// length depends on its deflection in second order: Newton's method with its exact length
     /// would converge slowly there, where that with a limited stiffness keeps it straight.
-    fn completed_law_fraction(&self, (j, i): (usize, usize), rigid: bool) -> DVec3 {
+    fn completed_law_fraction(&self, j: usize, i: usize, rigid: bool) -> DVec3 {
         let is_rigid = self.section(j, i).compliance.cmpeq(DVec3::ZERO);
         match rigid {
             true => DVec3::ONE,
@@ -99,7 +103,7 @@ impl DiscreteLeaf {
     /// Completes the law in the `response` of a leaf with these `segments`: `gaps` are the lengths
     /// that the response misses, and in return the additional gaps for which it was solved; without
     /// `rigid` directions these are left to the next iteration. `solve` solves for the increments of
-    /// the nodes under forces on them, with the factorised matrix. Forces that no law determines, of
+    /// the nodes under forces on them, with the factorized matrix. Forces that no law determines, of
     /// rigid rods between holders, do not change. False if a solution fails; the response is then as
     /// it was.
     pub fn complete_law(
@@ -112,8 +116,8 @@ impl DiscreteLeaf {
     ) -> bool {
         let close = |gaps: &mut [DVec3]| {
             let segments = self.rod_index_pairs(0..self.segments());
-            for (gap, segment) in gaps.iter_mut().zip(segments) {
-                *gap *= self.completed_law_fraction(segment, rigid);
+            for (gap, (j, i)) in gaps.iter_mut().zip(segments) {
+                *gap *= self.completed_law_fraction(j, i, rigid);
             }
         };
         close(gaps);
@@ -126,7 +130,7 @@ impl DiscreteLeaf {
             .collect();
         let mut responses: Vec<LinearResponse> = Vec::new();
         let product = &mut |direction: &[f64]| {
-            let mut left: Vec<DVec3> = vectors(direction);
+            let mut left: Vec<DVec3> = vectors_from_numbers(direction);
             let mut forces = none.clone();
             self.condense_gaps(segments, &left, &mut forces);
             let nodes = solve(&forces)?;
@@ -147,7 +151,7 @@ impl DiscreteLeaf {
             response.add(*part, more);
         }
         if let Some(sum) = found.solution() {
-            gaps.copy_from_slice(&vectors(&sum));
+            gaps.copy_from_slice(&vectors_from_numbers(&sum));
         }
         true
     }
@@ -208,6 +212,6 @@ impl System {
     }
 }
 
-fn vectors(numbers: &[f64]) -> Vec<DVec3> {
+fn vectors_from_numbers(numbers: &[f64]) -> Vec<DVec3> {
     numbers.chunks_exact(3).map(DVec3::from_slice).collect()
 }

@@ -7,7 +7,7 @@
 //! stretched.
 
 use crate::leaf::Leaf;
-use crate::leaf::rod_ode::RodFields;
+use crate::leaf::rod_ode::{FieldChange, RodFields};
 use crate::leaf::state::State;
 use crate::scenario::{Profile, Rod, Scenario, SupportKind};
 use crate::shape::{NodeState, RodShape};
@@ -38,8 +38,9 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         dynamics,
         ..
     } = scenario;
-    // Their images are not looked for yet; on hinges a leaf may swing out of its plane.
-    let other = distributed.is_some()
+    // Images of loads and supports of single veins are not looked for; a leaf on hinges may swing out
+    // of its mirror plane.
+    let unmatched = distributed.is_some()
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
         || *base_held != SupportKind::Clamped;
@@ -49,7 +50,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
     };
     let masses = |(a, b): (usize, usize)| dynamics.density[a] == dynamics.density[b];
     let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
-    !other
+    !unmatched
         && pairs(rods.len()).all(weights)
         && (scenario.g == [0.0; 3] || scenario.g[1] == 0.0 && pairs(rods.len()).all(masses))
         && tip_force[1] == 0.0
@@ -163,15 +164,13 @@ pub fn whole_leaf_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodF
     })
 }
 
-/// Changes of position, rotation, force and moment of the rods of the whole leaf, from those of its half.
-pub fn whole_leaf_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
-    whole_rods(half, rods, |&[x, turn, n, m], image, share| {
-        [
-            reflect_vector(x, image),
-            reflect_axial(turn, image),
-            reflect_vector(n / share, image),
-            reflect_axial(m / share, image),
-        ]
+/// Changes of the fields of the rods of the whole leaf, from those of its half.
+pub fn whole_leaf_changes(half: &Leaf, rods: Vec<Vec<FieldChange>>) -> Vec<Vec<FieldChange>> {
+    whole_rods(half, rods, |node, image, share| FieldChange {
+        position: reflect_vector(node.position, image),
+        rotation: reflect_axial(node.rotation, image),
+        force: reflect_vector(node.force / share, image),
+        moment: reflect_axial(node.moment / share, image),
     })
 }
 

@@ -1,55 +1,50 @@
-//! The whole leaf, dimensionless and discretised: numbering, loads, coupling,
-//! the joint tip, assembly, and the linear algebra that its structure allows.
+//! The leaf of a scenario in dimensionless form, and on a grid.
 //!
-//! A scenario in dimensionless form.
-//!
-//! The rest shape of curved veins at the nodes of a grid.
-//!
-//! Veins that tissue ties, or that meet at a tip, must fit together at rest: what their rest shapes
-//! miss by their discretisation, stiff tissue would turn into forces. So the rest strain and the rest
-//! curvature of their segments are those of a segment between two nodes of the natural leaf,
-//!
-//! v0 = R^T (x1 - x0)/ds,   u0 = log(q0^* q1)/ds,
-//!
-//! which differ from those at its middle by a series in ds^2.
-//!
-//! Loads that veins have of their own, besides those that all share: their weights, loads along
-//! them, and loads on points. They are dead.
+//! [`Leaf`] has the rods, loads, supports and couplings in units of length and stiffness, as functions
+//! of sigma, the fraction of a rod's length. [`DiscreteLeaf`] has them at the nodes and segments of a
+//! [`Grid`], and [`State`] the positions, rotations and forces there. [`System`] holds Newton's
+//! equations of a state, which are solved rod by rod with conjugate gradients (`solve`) or as a whole
+//! (`direct`). `derivative` is how a state responds to a number of the scenario; `rod_ode` integrates
+//! the differential equations of the rods, which the grid approximates.
 
 mod assembly;
 mod block_tridiagonal;
 mod derivative;
 mod direct;
-pub(crate) mod discrete;
+mod discrete;
 mod law;
-pub(crate) mod loads;
+mod loads;
 mod mirror;
 #[cfg(test)]
 mod not_a_number;
-pub(crate) mod rod_ode;
+mod rod_ode;
 mod solve;
 mod state;
-pub(crate) mod supports;
+mod supports;
 mod system;
 mod tissue;
 
-pub use crate::leaf::assembly::{FieldJump, SegmentTangent};
+pub use crate::leaf::assembly::SegmentTangent;
 pub use crate::leaf::derivative::parameter::{
-    LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
+    DenseParameterForces, LeafParameterDerivative, LinearResponse, ParameterForces, Weighted,
+    hessian_at_constant_force,
 };
 pub use crate::leaf::direct::unknowns::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
-pub use crate::leaf::discrete::{DiscreteLeaf, Grid};
+pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment};
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,
 };
-pub use crate::leaf::rod_ode::{RodFields, RodIntegrator, StationFields};
+pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFields};
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::state::{
     Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
 };
-pub use crate::leaf::system::{AssemblyTotals, EquationWorkspace, System};
+pub use crate::leaf::supports::NodeFreedom;
+pub use crate::leaf::system::{
+    AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
+};
 pub use crate::leaf::tissue::HalfTurn;
 use crate::numbers::sorted_distinct;
 use crate::rod::Section;
@@ -59,41 +54,55 @@ use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, Zero
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// Upper limit of the stiffness in stretch and shear with which segment forces are condensed
-/// out, in units of A/L^2 with the softest A of the leaf. Larger limits lose the soft modes to
-/// rounding, smaller ones cost iterations.
-const CONDENSING_STIFFNESS: f64 = 1e7;
+/// Limits of the stiffness in stretch and shear with which segment forces are condensed out. A
+/// larger stiffness loses the soft modes to rounding, a smaller one costs iterations.
+const CONDENSING_LIMITS: CondensingLimits = CondensingLimits {
+    of_softest: 1e7,
+    of_mean: 1e5,
+};
 
-/// Lower bound of that limit, in units of the mean A/L^2.
-const LEAST_CONDENSING: f64 = 1e5;
+struct CondensingLimits {
+    /// Largest stiffness, in units of A/L^2 with the softest A of the leaf.
+    of_softest: f64,
+    /// Largest stiffness of a leaf with a very soft part, in units of the mean A/L^2.
+    of_mean: f64,
+}
 
-/// A leaf with all quantities dimensionless, before discretisation.
+/// A leaf with all quantities dimensionless, before discretization.
 #[derive(Clone, Debug)]
 pub struct Leaf {
     scenario: Arc<Scenario>,
     /// Whether this is half of a mirror-symmetric leaf.
-    pub(super) mirrored: bool,
-    /// The units.
+    mirrored: bool,
+    /// Units of length, stiffness and time.
     pub scale: Scale,
-    /// The loads at rest.
+    /// Loads of the leaf at rest.
     pub loads: Loads,
-    /// The tip, if it is held.
+    /// Holder of the tips, if there is one.
     pub tip_support: Option<TipSupport>,
     /// Whether hinges hold the bases.
     hinged: bool,
-    /// The veins that can turn without resistance.
-    pub(super) turnings: Vec<ZeroEnergyRotation>,
+    /// Turns of veins without resistance.
+    zero_energy_rotations: Vec<ZeroEnergyRotation>,
+    /// Fractions of the length where some profile has a kink, ascending.
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest_couple_stiffness: f64,
 }
 
-/// A tip that is held.
+/// Position and rotation of the base of a rod.
+#[derive(Clone, Copy, Debug)]
+pub struct BasePose {
+    pub position: DVec3,
+    pub rotation: DQuat,
+}
+
+/// The holder of the tips.
 #[derive(Clone, Debug)]
 pub struct TipSupport {
-    /// The position.
+    /// Where all tips are held.
     pub position: DVec3,
-    /// If rotations are held too, the clamps, one per rod.
+    /// The clamps, one per rod, if rotations are held too.
     pub clamps: Option<Vec<Clamp>>,
 }
 
@@ -109,16 +118,26 @@ impl TipSupport {
 pub struct GrippedNode {
     /// Number of the grip.
     pub grip: usize,
-    /// Rod and node.
+    /// Number of the rod.
     pub rod: usize,
+    /// Number of the node on the rod.
     pub node: usize,
-    /// Where it is held.
+    /// Position in which the node is held.
     pub position: DVec3,
-    /// In which rotation, if that is held.
+    /// Rotation in which the node is held, if it is.
     pub rotation: Option<DQuat>,
 }
 
-/// Dead loads.
+/// Stiffness of tissue in a gap, per unit of sigma.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TissueStiffness {
+    /// k: force per displacement along the veins, across, and normal to the leaf.
+    pub displacement: DVec3,
+    /// c_1: moment per radian of a fold along the veins.
+    pub fold: f64,
+}
+
+/// Dead loads that all rods share, and the factors of dead loads on single rods.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loads {
     /// Gravity per unit length.
@@ -127,9 +146,9 @@ pub struct Loads {
     pub tip_force: DVec3,
     /// Moment on the tip of a single rod.
     pub tip_moment: DVec3,
-    /// Part of the loads that veins have of their own: zero without any.
+    /// Factor of the loads of single veins: zero without any.
     pub rod_load_factor: f64,
-    /// Part of the dead moments on points of a single rod: zero without any.
+    /// Factor of the dead moments on points of a single rod: zero without any.
     pub dead_moment_factor: f64,
 }
 
@@ -197,7 +216,7 @@ impl Leaf {
                 clamps: held.clamps.clone(),
             }),
             hinged: scenario.base_held == SupportKind::Pinned,
-            turnings: scenario.zero_energy_rotations(),
+            zero_energy_rotations: scenario.zero_energy_rotations(),
             kinks,
             softest_couple_stiffness: softest / scale.stiffness,
             scenario,
@@ -207,30 +226,30 @@ impl Leaf {
         } else {
             0.0
         };
-        if leaf.point_dead_moments().any(|(_, it)| it != DVec3::ZERO) {
+        if leaf.point_dead_moments().any(|it| it.moment != DVec3::ZERO) {
             leaf.loads.dead_moment_factor = 1.0;
         }
         leaf
     }
 
-    /// The scenario it was made from.
+    /// The scenario from which the leaf was made.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// Whether all that acts on it has a potential: a dead moment has none, nor has wind. Otherwise
-    /// its rest is no minimum of an energy, and no eigenvalue tells whether it is stable.
+    /// Whether all loads have a potential: a dead moment has none, nor has wind. Without a potential
+    /// an equilibrium is no minimum of an energy, and no eigenvalue tells whether it is stable.
     pub fn has_potential(&self) -> bool {
         !self.loads.has_moments() && !self.in_wind()
     }
 
-    /// Its scenario, shared.
-    pub(super) fn shared_scenario(&self) -> Arc<Scenario> {
+    /// The scenario from which the leaf was made, shared.
+    fn shared_scenario(&self) -> Arc<Scenario> {
         Arc::clone(&self.scenario)
     }
 
-    /// Whether it was made from this very scenario.
-    pub(super) fn is_of(&self, scenario: &Arc<Scenario>) -> bool {
+    /// Whether the leaf was made from this very scenario.
+    fn is_from_scenario(&self, scenario: &Arc<Scenario>) -> bool {
         Arc::ptr_eq(&self.scenario, scenario)
     }
 
@@ -265,7 +284,7 @@ impl Leaf {
             && self.scenario.rods == other.scenario.rods
     }
 
-    /// Whether it is half of a leaf that is its own mirror image.
+    /// Whether this is half of a leaf that is its own mirror image.
     pub fn is_mirror_half(&self) -> bool {
         self.mirrored
     }
@@ -286,7 +305,7 @@ impl Leaf {
         self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
     }
 
-    /// Whether no load, rest curvature or holder acts out of the plane z = 0.
+    /// Whether no load, rest curvature or support acts out of the plane z = 0.
     pub fn is_planar(&self) -> bool {
         let s = self.scenario();
         let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
@@ -315,14 +334,17 @@ impl Leaf {
         self.length(j) * self.rod(j).rest_stretch.integral(sigma)
     }
 
-    /// Position and rotation of the base of rod `j` (paper, section 2.4 (a) and (c)).
-    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+    /// Where the base of rod `j` is held (paper, section 2.4 (a) and (c)).
+    pub fn base_pose(&self, j: usize) -> BasePose {
         let (rod, length) = (self.rod(j), self.scale.length);
         let rotation = match rod.elevation == 0.0 && rod.roll == 0.0 {
             true => rotation::exp(rod.angle * DVec3::Z),
             false => rod.base_rotation(),
         };
-        (rod.base_position() / length, rotation)
+        BasePose {
+            position: rod.base_position() / length,
+            rotation,
+        }
     }
 
     /// Whether sections are the same all along each rod.
@@ -335,8 +357,7 @@ impl Leaf {
             .all(constant)
     }
 
-    /// Section of rod `j` at `sigma`, for a segment that is the fraction
-    /// `width` of the rod.
+    /// Section of rod `j` at `sigma`, for a segment that is the fraction `width` of the rod.
     pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
         let rod = self.rod(j);
         let at = |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p, sigma));
@@ -350,7 +371,9 @@ impl Leaf {
             condensing: DVec3::ZERO,
         }
         .limit_condensing_stiffness(
-            share * (CONDENSING_STIFFNESS * self.softest_couple_stiffness).max(LEAST_CONDENSING),
+            share
+                * (CONDENSING_LIMITS.of_softest * self.softest_couple_stiffness)
+                    .max(CONDENSING_LIMITS.of_mean),
         )
     }
 
@@ -362,7 +385,7 @@ impl Leaf {
             / self.scale.force()
     }
 
-    /// Whether the tip, or a part of a rod, is held by something that is moved to its place.
+    /// Whether there are supports that are moved to their places: a holder of the tips, or grips.
     pub fn has_placed_supports(&self) -> bool {
         self.tip_support.is_some() || !self.scenario.grips.is_empty()
     }
@@ -383,16 +406,18 @@ impl Leaf {
         self.scenario.tissue.is_some()
     }
 
-    /// Stiffness k of the tissue in gap `g` at `sigma` per displacement, and c_1 (in the first
-    /// component) per radian, both per unit of sigma.
-    pub fn tissue_stiffness(&self, g: usize, sigma: f64) -> [DVec3; 2] {
+    /// Stiffness of the tissue in gap `g` at `sigma`.
+    pub fn tissue_stiffness(&self, g: usize, sigma: f64) -> TissueStiffness {
         let Some(tissue) = &self.scenario.tissue else {
-            return [DVec3::ZERO; 2];
+            return TissueStiffness::default();
         };
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
         let [along, across, normal, fold] = tissue[g].stiffness_profiles().map(|of| of.at(sigma));
         let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
-        [k, fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
+        TissueStiffness {
+            displacement: k * gap_length / self.scale.force(),
+            fold: fold * gap_length / self.scale.force(),
+        }
     }
 
     fn rod(&self, j: usize) -> &Rod {

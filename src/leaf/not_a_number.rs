@@ -1,6 +1,8 @@
-//! What is not a number is no small number and has no sign.
+//! Not-a-number in a solution, a state or a matrix: it is no small number, and has no sign.
 
+use crate::leaf::system::IncrementSize;
 use crate::leaf::*;
+use crate::rod::Wrench;
 use crate::scenario::Scenario;
 use glam::{DMat3, DVec3};
 
@@ -14,7 +16,7 @@ const PAIR: &str = r#"
 fn discretize_pair(segments: usize) -> (DiscreteLeaf, State) {
     let leaf = Leaf::new(&Scenario::from_toml(PAIR).unwrap());
     let leaf = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
-    let state = crate::relax::initial_state(&leaf);
+    let state = leaf.stress_free_state();
     (leaf, state)
 }
 
@@ -22,11 +24,15 @@ fn discretize_pair(segments: usize) -> (DiscreteLeaf, State) {
 fn in_a_solution_it_is_the_largest() {
     let (leaf, _) = discretize_pair(4);
     let mut system = System::new(&leaf);
-    for (c, found) in [(1, [f64::INFINITY, 3.0]), (4, [2.0, f64::INFINITY])] {
+    let size = |rotation, displacement| IncrementSize {
+        rotation,
+        displacement,
+    };
+    for (c, found) in [(1, size(f64::INFINITY, 3.0)), (4, size(2.0, f64::INFINITY))] {
         let mut solution: NodalField = vec![vec![[2.0, 2.0, 2.0, 3.0, 3.0, 3.0]; 4]; 2];
         solution[1][2][c] = f64::NAN;
         system.set_solution(&solution);
-        assert_eq!(<[f64; 2]>::from(system.largest_increment()), found);
+        assert_eq!(system.largest_increment(), found);
     }
 }
 
@@ -64,8 +70,11 @@ fn in_a_matrix_it_makes_pivots_without_sign() {
             .negative_eigenvalue_count(),
         0
     );
-    let nothing = (DMat3::ZERO, f64::NAN);
-    system.add_to_node(1, 2, nothing, (DVec3::ZERO, DVec3::ZERO));
+    let stiffness = DiagonalBlocks {
+        rotary: DMat3::ZERO,
+        translational: f64::NAN,
+    };
+    system.add_to_node(1, 2, stiffness, Wrench::default());
     let failed = pattern.factorize(&system, 0.0).err();
     assert_eq!(failed, Some(DirectError::NotFinite));
 }
@@ -82,11 +91,20 @@ fn a_singular_matrix_under_a_dead_moment_is_not_solved() {
     let leaf = DiscreteLeaf::new(&leaf, Grid::new(1, &[]));
     let solved = |about_z: f64| {
         let mut system = System::new(&leaf);
-        let less = DMat3::from_diagonal(DVec3::new(0.0, 0.0, about_z - 1.0));
-        system.add_to_node(0, 1, (less, 0.0), (DVec3::Y, DVec3::ZERO));
-        system
-            .moments
-            .replace_moments([(0, 2.0 * DVec3::X)].into_iter());
+        let less = DiagonalBlocks {
+            rotary: DMat3::from_diagonal(DVec3::new(0.0, 0.0, about_z - 1.0)),
+            translational: 0.0,
+        };
+        let load = Wrench {
+            moment: DVec3::Y,
+            force: DVec3::ZERO,
+        };
+        system.add_to_node(0, 1, less, load);
+        let dead = NodalMoment {
+            node: 0,
+            moment: 2.0 * DVec3::X,
+        };
+        system.moments.replace_moments([dead].into_iter());
         assert!(system.factorize_indefinite());
         system.solve(None, 0.0)
     };

@@ -1,19 +1,20 @@
-//! Integration of the equilibrium equations along the rods of a leaf, by the explicit
-//! Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
-//!
-//! The equilibrium equations along rods, as functions of sigma = s/L:
+//! The equilibrium equations along the rods of a leaf as functions of sigma = s/L,
 //!
 //! x' = L R v,   q' = L/2 (R u) q,   n' = -f,   m' = n x x'          eqs (1) (2)
 //!
 //! with v = v0 + c R^T n and u = u0 + R^T m / A by eqs (5) and (6), n and m along the lab axes
 //! and f the force per unit of sigma; and the potential energy up to sigma,
 //!
-//! E' = L/2 (n.c n + m.m/A) + potential of the loads.
+//! E' = L/2 (n.c n + m.m/A) + potential of the loads,
+//!
+//! integrated by the explicit Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
 
-use crate::leaf::block_tridiagonal::lane_rods;
-use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, group_loads};
-use crate::natural::{Natural, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
-use crate::rod::{NodePair, Section, TissueStrip};
+use crate::leaf::block_tridiagonal::{RodLane, lane_rods, rod_lane};
+use crate::leaf::discrete::{
+    DiscreteLeaf, GroupLoads, LaneNodeForces, LaneRodLoads, NodeWeights, group_loads,
+};
+use crate::natural::{Natural, Pose, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
+use crate::rod::{NodePair, Section, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, directors};
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run, widest_arch};
 use glam::{DQuat, DVec3};
@@ -22,9 +23,9 @@ use pulp::{Arch, Simd};
 /// The fields of one rod at one sigma, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct RodFields {
-    /// Position.
+    /// Position of the centerline.
     pub x: DVec3,
-    /// Rotation.
+    /// Rotation of the directors.
     pub q: DQuat,
     /// Force exerted by the part beyond.
     pub n: DVec3,
@@ -32,26 +33,38 @@ pub struct RodFields {
     pub m: DVec3,
 }
 
+/// A change of the [`RodFields`] of a point, to first order, or a jump of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FieldChange {
+    pub position: DVec3,
+    /// Spatial rotation vector.
+    pub rotation: DVec3,
+    pub force: DVec3,
+    pub moment: DVec3,
+}
+
 /// The fields of all rods at one sigma, in groups of four.
 #[derive(Clone, Debug, Default)]
 pub struct StationFields(Vec<GroupFields>);
 
 impl StationFields {
-    /// Rod `j`.
+    /// The fields of rod `j`.
     pub fn rod(&self, j: usize) -> RodFields {
-        rod_of(&self.0, j)
+        rod_fields(&self.0, j)
     }
 }
 
-/// The fields of rod `j`.
-fn rod_of(groups: &[GroupFields], j: usize) -> RodFields {
-    let number = |k: usize| groups[j / GROUP][k].0[j % GROUP];
-    let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+/// The fields of rod `j` in its group.
+fn rod_fields(groups: &[GroupFields], j: usize) -> RodFields {
+    let RodLane { group, lane } = rod_lane(j);
+    let vector =
+        |first: usize| DVec3::from_array([0, 1, 2].map(|c| groups[group][first + c].0[lane]));
+    let [x, y, z] = vector(QUATERNION).to_array();
     RodFields {
-        x: vector(0),
-        q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
-        n: vector(7),
-        m: vector(10),
+        x: vector(POSITION),
+        q: DQuat::from_xyzw(x, y, z, groups[group][QUATERNION_W].0[lane]).normalize(),
+        n: vector(FORCE),
+        m: vector(MOMENT),
     }
 }
 
@@ -67,7 +80,7 @@ pub struct RodIntegrator<'a> {
     /// Constitutive laws at the present stage; constant if the rods are uniform.
     laws: Vec<GroupLaws>,
     uniform: bool,
-    /// Where tissue has no force, if there is any.
+    /// The stress-free leaf, if there is tissue.
     natural: Option<Natural<'a>>,
 }
 
@@ -80,19 +93,19 @@ struct RungeKuttaStage {
 }
 
 impl<'a> RodIntegrator<'a> {
-    /// For the rods of `leaf`, on any grid.
+    /// An integrator for the rods of `leaf`; its grid does not matter.
     pub fn new(leaf: &'a DiscreteLeaf) -> Self {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);
             if leaf.leaf.is_halved_midrib(j) {
-                // The image of its neighbour pulls it back into the plane.
+                // The image of the neighbour pulls the midrib back into the plane.
                 load.previous.y = 0.0;
             }
             load
         };
         let groups = leaf.rods().div_ceil(GROUP);
         let fields = vec![[NumberGroup::default(); FIELDS_PER_ROD]; groups];
-        let mut flow = RodIntegrator {
+        let mut integrator = RodIntegrator {
             leaf,
             arch: widest_arch(),
             loads: (0..groups)
@@ -111,8 +124,8 @@ impl<'a> RodIntegrator<'a> {
             }),
             fields,
         };
-        flow.look_up_laws(0.0);
-        flow
+        integrator.look_up_laws(0.0);
+        integrator
     }
 
     /// Integrates all rods from the fields `begin` at sigma = `from` to `to` in equal steps,
@@ -128,14 +141,20 @@ impl<'a> RodIntegrator<'a> {
         for (g, group) in self.fields.iter_mut().enumerate() {
             for (lane, j) in lane_rods(g, rods).into_iter().enumerate() {
                 let RodFields { x, q, n, m } = begin(j);
-                let vectors = [(0, x), (3, DVec3::new(q.x, q.y, q.z)), (7, n), (10, m)];
+                let imaginary = DVec3::new(q.x, q.y, q.z);
+                let vectors = [
+                    (POSITION, x),
+                    (QUATERNION, imaginary),
+                    (FORCE, n),
+                    (MOMENT, m),
+                ];
                 for (first, vector) in vectors {
                     for c in 0..3 {
                         group[first + c].0[lane] = vector[c];
                     }
                 }
-                group[6].0[lane] = q.w;
-                group[13].0[lane] = 0.0;
+                group[QUATERNION_W].0[lane] = q.w;
+                group[ENERGY].0[lane] = 0.0;
             }
         }
         let (h, last) = ((to - from) / after.len() as f64, after.len() - 1);
@@ -155,7 +174,10 @@ impl<'a> RodIntegrator<'a> {
     /// The potential energy of all rods over the interval of the last integration, without
     /// that of loads on the tips.
     pub fn energy(&self) -> f64 {
-        let energy = |j: usize| self.fields[j / GROUP][13].0[j % GROUP];
+        let energy = |j: usize| {
+            let at = rod_lane(j);
+            self.fields[at.group][ENERGY].0[at.lane]
+        };
         (0..self.leaf.rods()).map(energy).sum()
     }
 
@@ -186,34 +208,45 @@ impl<'a> RodIntegrator<'a> {
         };
         let (leaf, fields, slopes) = (&self.leaf.leaf, &self.stage.fields, &mut self.slopes[stage]);
         let at_rest = |j: usize| {
-            let (x, q) = natural.vein_pose(j, sigma);
-            (x / leaf.scale.length, q)
+            let pose = natural.vein_pose(j, sigma);
+            Pose {
+                position: pose.position / leaf.scale.length,
+                ..pose
+            }
         };
         let here = |j: usize| {
-            let RodFields { x, q, .. } = rod_of(fields, j);
-            (x, q)
+            let RodFields { x, q, .. } = rod_fields(fields, j);
+            Pose {
+                position: x,
+                rotation: q,
+            }
         };
-        let ends = |a: (DVec3, DQuat), b: (DVec3, DQuat)| NodePair {
-            x: [a.0, b.0],
-            q: [a.1, b.1],
+        let ends = |a: Pose, b: Pose| NodePair {
+            x: [a.position, b.position],
+            q: [a.rotation, b.rotation],
         };
         let mut left = (at_rest(0), here(0));
         for g in 0..leaf.rods() - 1 {
             let right = (at_rest(g + 1), here(g + 1));
-            let [stiffness, fold] = leaf.tissue_stiffness(g, sigma);
-            let strip = TissueStrip::stress_free_between(stiffness, fold.x, &ends(left.0, right.0));
-            let ends = ends(left.1, right.1);
-            let (energy, loads) = strip.energy_and_loads(&ends);
-            slopes[g / GROUP][13].0[g % GROUP] += energy;
-            for (j, [mut moment, mut force]) in [g, g + 1].into_iter().zip(loads) {
+            let stiffness = leaf.tissue_stiffness(g, sigma);
+            let strip = TissueStrip::stress_free_between(
+                stiffness.displacement,
+                stiffness.fold,
+                &ends(left.0, right.0),
+            );
+            let StripLoads { energy, on_nodes } = strip.loads(&ends(left.1, right.1));
+            let at = rod_lane(g);
+            slopes[at.group][ENERGY].0[at.lane] += energy;
+            for (j, mut load) in [g, g + 1].into_iter().zip(on_nodes) {
                 if leaf.is_halved_midrib(j) {
-                    // The image of its neighbour pulls it back into the plane.
-                    (moment.x, moment.z, force.y) = (0.0, 0.0, 0.0);
+                    // The image of the neighbour pulls the midrib back into the plane.
+                    (load.moment.x, load.moment.z, load.force.y) = (0.0, 0.0, 0.0);
                 }
-                let (slopes, lane) = (&mut slopes[j / GROUP], j % GROUP);
+                let at = rod_lane(j);
+                let slopes = &mut slopes[at.group];
                 for c in 0..3 {
-                    slopes[7 + c].0[lane] -= force[c];
-                    slopes[10 + c].0[lane] -= moment[c];
+                    slopes[FORCE + c].0[at.lane] -= load.force[c];
+                    slopes[MOMENT + c].0[at.lane] -= load.moment[c];
                 }
             }
             left = right;
@@ -227,12 +260,13 @@ impl<'a> RodIntegrator<'a> {
         }
         for j in 0..self.leaf.rods() {
             let force = self.leaf.rod_load_factor() * self.leaf.leaf.own_load_density(j, sigma);
-            let slopes = &mut self.slopes[stage][j / GROUP];
+            let RodLane { group, lane } = rod_lane(j);
+            let slopes = &mut self.slopes[stage][group];
             for c in 0..3 {
-                slopes[7 + c].0[j % GROUP] -= force[c];
+                slopes[FORCE + c].0[lane] -= force[c];
             }
-            let x = rod_of(&self.stage.fields, j).x;
-            slopes[13].0[j % GROUP] -= force.dot(x);
+            let x = rod_fields(&self.stage.fields, j).x;
+            slopes[ENERGY].0[lane] -= force.dot(x);
         }
     }
 
@@ -241,10 +275,11 @@ impl<'a> RodIntegrator<'a> {
         for j in 0..self.leaf.rods() {
             let force = sign * self.leaf.point_force_at(j, sigma);
             let moment = sign * self.leaf.dead_moment_at(sigma);
-            let fields = &mut self.fields[j / GROUP];
+            let RodLane { group, lane } = rod_lane(j);
+            let fields = &mut self.fields[group];
             for c in 0..3 {
-                fields[7 + c].0[j % GROUP] += force[c];
-                fields[10 + c].0[j % GROUP] += moment[c];
+                fields[FORCE + c].0[lane] += force[c];
+                fields[MOMENT + c].0[lane] += moment[c];
             }
         }
     }
@@ -254,7 +289,8 @@ impl<'a> RodIntegrator<'a> {
         let mut kernel = StageKernel {
             fields: &self.fields,
             slopes: &self.slopes,
-            weights: (h, weights),
+            step: h,
+            weights,
             out: &mut self.stage,
         };
         run(self.arch, &mut kernel);
@@ -265,13 +301,14 @@ impl<'a> RodIntegrator<'a> {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
             let sections = lane_rods(g, rods).map(|j| leaf.section(j, sigma, 1.0));
-            laws(sections.each_ref())
+            group_laws(sections.each_ref())
         };
         self.laws.clear();
         self.laws.extend((0..rods.div_ceil(GROUP)).map(group));
     }
 }
 
+/// Writes the slopes of all groups at a stage.
 struct SlopeKernel<'a> {
     stage: &'a RungeKuttaStage,
     loads: &'a [GroupLoads],
@@ -282,13 +319,18 @@ struct SlopeKernel<'a> {
 impl GroupKernel for SlopeKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        // Per unit of sigma.
+        let weights = NodeWeights {
+            load: 1.0,
+            coupling: 1.0,
+        };
         for (g, out) in self.out.iter_mut().enumerate() {
             let fields = LaneFields::load_group(simd, &self.stage.fields[g], part);
             let first = GROUP * g + part;
             let [previous, next] =
                 [first, first + 2].map(|at| Vectors::load(simd, &self.stage.x, at));
             let loads = LaneRodLoads::load_group(simd, &self.loads[g], part);
-            let load = loads.node_forces([previous, fields.x, next], [1.0; 2], false);
+            let load = loads.node_forces([previous, fields.x, next], weights, false);
             fields
                 .slopes(&self.laws[g], load, part)
                 .store_group(out, part);
@@ -296,21 +338,22 @@ impl GroupKernel for SlopeKernel<'_> {
     }
 }
 
+/// Writes a stage: the fields plus the step times the weighted sum of slopes.
 struct StageKernel<'a> {
     fields: &'a [GroupFields],
     slopes: &'a [Vec<GroupFields>],
-    weights: (f64, &'a [f64]),
+    step: f64,
+    weights: &'a [f64],
     out: &'a mut RungeKuttaStage,
 }
 
 impl GroupKernel for StageKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let (h, weights) = self.weights;
-        let h = Lanes::splat(simd, h);
+        let h = Lanes::splat(simd, self.step);
         for (g, out) in self.out.fields.iter_mut().enumerate() {
             let mut sums = [Lanes::splat(simd, 0.0); FIELDS_PER_ROD];
-            for (weight, slopes) in weights.iter().zip(self.slopes) {
+            for (weight, slopes) in self.weights.iter().zip(self.slopes) {
                 if *weight != 0.0 {
                     let weight = Lanes::splat(simd, *weight);
                     for (sum, slope) in sums.iter_mut().zip(&slopes[g]) {
@@ -331,100 +374,115 @@ impl GroupKernel for StageKernel<'_> {
 }
 
 /// Number of fields of a rod at one sigma.
-pub const FIELDS_PER_ROD: usize = 14;
+const FIELDS_PER_ROD: usize = 14;
+
+/// Indices of the first component of each field in [`GroupFields`].
+const POSITION: usize = 0;
+const QUATERNION: usize = 3;
+const QUATERNION_W: usize = 6;
+const FORCE: usize = 7;
+const MOMENT: usize = 10;
+const ENERGY: usize = 13;
 
 /// The fields of the rods of a group at one sigma: positions, quaternions, forces and moments
-/// along the lab axes, energies.
-pub type GroupFields = [NumberGroup; FIELDS_PER_ROD];
+/// along the lab axes, energies. An array, since every step of the integration is a sum of all.
+type GroupFields = [NumberGroup; FIELDS_PER_ROD];
 
 /// The fields of several rods at one sigma, as vectors.
 #[derive(Clone, Copy)]
-pub struct LaneFields<S: Simd> {
-    /// Positions.
-    pub x: Vectors<S>,
-    /// Rotations; quaternions of any length.
-    pub q: Quaternions<S>,
-    /// Forces.
-    pub n: Vectors<S>,
-    /// Moments.
-    pub m: Vectors<S>,
-    /// Energies.
-    pub energy: Lanes<S>,
+struct LaneFields<S: Simd> {
+    x: Vectors<S>,
+    /// Quaternions of any length.
+    q: Quaternions<S>,
+    n: Vectors<S>,
+    m: Vectors<S>,
+    energy: Lanes<S>,
 }
 
-/// The coefficients of the equations for a group of rods: lengths, v0, u0, c, 1/A.
-pub type GroupLaws = [NumberGroup; 13];
+/// The constitutive laws of the rods of a group at one sigma.
+struct GroupLaws {
+    length: NumberGroup,
+    /// v0
+    rest_strain: [NumberGroup; 3],
+    /// u0
+    rest_curvature: [NumberGroup; 3],
+    /// c
+    compliance: [NumberGroup; 3],
+    /// 1/A
+    couple_compliance: [NumberGroup; 3],
+}
 
-/// The coefficients from sections whose `ds` is the length of the rod.
-pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
-    let number = |k: usize| {
-        let of = |section: &Section| match k {
-            0 => section.ds,
-            1..4 => section.rest_strain[k - 1],
-            4..7 => section.rest_curvature[k - 4],
-            7..10 => section.compliance[k - 7],
-            _ => 1.0 / section.couple_stiffness[k - 10],
-        };
-        NumberGroup(sections.map(of))
-    };
-    std::array::from_fn(number)
+/// The laws of sections whose `ds` is the length of the rod.
+fn group_laws(sections: [&Section; GROUP]) -> GroupLaws {
+    let vectors =
+        |of: fn(&Section) -> DVec3| [0, 1, 2].map(|c| NumberGroup(sections.map(|it| of(it)[c])));
+    GroupLaws {
+        length: NumberGroup(sections.map(|section| section.ds)),
+        rest_strain: vectors(|section| section.rest_strain),
+        rest_curvature: vectors(|section| section.rest_curvature),
+        compliance: vectors(|section| section.compliance),
+        couple_compliance: vectors(|section| 1.0 / section.couple_stiffness),
+    }
 }
 
 impl<S: Simd> LaneFields<S> {
     /// The fields of the lanes from `part` on.
     #[inline(always)]
-    pub fn load_group(simd: S, group: &GroupFields, part: usize) -> Self {
+    fn load_group(simd: S, group: &GroupFields, part: usize) -> Self {
         let number = |k: usize| Lanes::load_group(simd, &group[k], part);
         let vector = |k: usize| Vectors::new(number(k), number(k + 1), number(k + 2));
         LaneFields {
-            x: vector(0),
-            q: (vector(3), number(6)),
-            n: vector(7),
-            m: vector(10),
-            energy: number(13),
+            x: vector(POSITION),
+            q: (vector(QUATERNION), number(QUATERNION_W)),
+            n: vector(FORCE),
+            m: vector(MOMENT),
+            energy: number(ENERGY),
         }
     }
 
-    /// Writes them.
+    /// Writes the fields of the lanes from `part` on.
     #[inline(always)]
-    pub fn store_group(self, group: &mut GroupFields, part: usize) {
-        for (first, vector) in [(0, self.x), (3, self.q.0), (7, self.n), (10, self.m)] {
+    fn store_group(self, group: &mut GroupFields, part: usize) {
+        let vectors = [
+            (POSITION, self.x),
+            (QUATERNION, self.q.0),
+            (FORCE, self.n),
+            (MOMENT, self.m),
+        ];
+        for (first, vector) in vectors {
             for (k, component) in vector.array().into_iter().enumerate() {
                 component.store_group(&mut group[first + k], part);
             }
         }
-        self.q.1.store_group(&mut group[6], part);
-        self.energy.store_group(&mut group[13], part);
+        self.q.1.store_group(&mut group[QUATERNION_W], part);
+        self.energy.store_group(&mut group[ENERGY], part);
     }
 
-    /// Their derivatives with respect to sigma under a force with its potential, of the lanes
-    /// from `part` on.
+    /// The derivatives of the fields with respect to sigma under a load, of the lanes from `part` on.
     #[inline(always)]
-    pub fn slopes(
-        &self,
-        laws: &GroupLaws,
-        (force, potential): (Vectors<S>, Lanes<S>),
-        part: usize,
-    ) -> Self {
+    fn slopes(&self, laws: &GroupLaws, load: LaneNodeForces<S>, part: usize) -> Self {
         let (q, w) = self.q;
-        let law = |k: usize| Lanes::load_group(w.simd, &laws[k], part);
-        let laws = |k: usize| Vectors::new(law(k), law(k + 1), law(k + 2));
+        let number = |group: &NumberGroup| Lanes::load_group(w.simd, group, part);
+        let vector = |[x, y, z]: &[NumberGroup; 3]| Vectors::new(number(x), number(y), number(z));
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
         let (n, m) = (
             self.n.director_components(frame),
             self.m.director_components(frame),
         );
-        let (length, strain, bend) = (law(0), laws(7) * n, laws(10) * m);
-        let (v, u) = (laws(1) + strain, laws(4) + bend);
+        let length = number(&laws.length);
+        let strain = vector(&laws.compliance) * n;
+        let bend = vector(&laws.couple_compliance) * m;
+        let v = vector(&laws.rest_strain) + strain;
+        let u = vector(&laws.rest_curvature) + bend;
         let tangent = v.from_director_components(frame).scale(length);
         let turn = u.from_director_components(frame).scale(length * half);
         LaneFields {
             x: tangent,
             q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
-            n: -force,
+            n: -load.force,
             m: self.n.cross(tangent),
-            energy: half * length * (n.dot(strain) + m.dot(bend)) + potential,
+            energy: half * length * (n.dot(strain) + m.dot(bend)) + load.energy,
         }
     }
 }

@@ -1,24 +1,22 @@
-//! Factorisation, and conjugate gradients.
+//! Factorization of Newton's equations, and their solution by conjugate gradients.
 //!
-//! B p is updated by the same recursion as p, so that an iteration costs one solve with B and
-//! one product with the sparse E.
-//!
-//! A positive definite matrix that is factorised once and solved with several right-hand sides: rod
-//! by rod with conjugate gradients or, where tissue ties the rods, as a whole.
+//! With the preconditioner B of `system`, B p is updated by the same recursion as the direction p, so
+//! that an iteration costs one solve with B and one product with the sparse E. [`DefiniteFactors`] is
+//! for several right-hand sides: rod by rod or, where tissue ties the rods, as a whole.
 
 use crate::leaf::block_tridiagonal::{GroupIncrements, ShiftedMasses, TipFactor};
 use crate::leaf::direct::{DirectSolver, MatrixFactors};
-use crate::leaf::state::Increment;
 use crate::leaf::system::{
-    CouplingOperator, CurvatureKernel, DirectionUpdateKernel, SolutionUpdateKernel, System,
-    each_group, group_rods,
+    CouplingOperator, CurvatureKernel, DirectionUpdateKernel, MassLoad, SolutionUpdateKernel,
+    System, each_group, group_rods,
 };
 use crate::simd::{NumberGroup, run};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Largest number of iterations with the rod-wise preconditioner.
-const MAX_ITERATIONS: usize = 200;
+/// Largest number of conjugate gradient iterations. Where more are needed a direct factorization is
+/// faster.
+const MAX_CG_ITERATIONS: usize = 200;
 
 /// The outcome of a linear solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,16 +44,16 @@ impl LinearSolveOutcome {
 }
 
 impl System {
-    /// Factorises B + shift M; false if it is not positive definite, or tissue ties the rods.
+    /// Factorizes B + shift M; false if it is not positive definite, or tissue ties the rods.
     pub fn factorize(&mut self, shift: f64) -> bool {
-        // Without the tissue, which is not in B + E.
+        // Tissue is not in B + E.
         if self.has_tissue() {
             return false;
         }
         self.factorize_signed(shift, false)
     }
 
-    /// Factorises the matrix of a single rod whatever the signs of its pivots;
+    /// Factorizes the matrix of a single rod whatever the signs of its pivots;
     /// false only if one of them is zero.
     pub fn factorize_indefinite(&mut self) -> bool {
         debug_assert_eq!(self.rods, 1);
@@ -81,7 +79,7 @@ impl System {
         let mut sum = [[0.0; 3]; 3];
         for (g, group) in self.groups.iter().enumerate() {
             for lane in 0..group_rods(g, self.rods).len() {
-                for (sum, row) in sum.iter_mut().zip(group.matrix.tip(lane)) {
+                for (sum, row) in sum.iter_mut().zip(group.matrix.tip_block(lane)) {
                     for c in 0..3 {
                         sum[c] += row[c];
                     }
@@ -92,16 +90,12 @@ impl System {
         self.tip.is_some()
     }
 
-    /// Solves with the factorised matrix for the assembled right-hand side
-    /// plus `inertia` (mass times velocity over time step), to the relative
-    /// accuracy `tolerance` in the energy norm.
-    pub fn solve(
-        &mut self,
-        inertia: Option<(&[Vec<Increment>], f64)>,
-        tolerance: f64,
-    ) -> LinearSolveOutcome {
+    /// Solves with the factorized matrix for the assembled right-hand side plus `inertia`, to the
+    /// relative accuracy `tolerance` in the energy norm.
+    pub fn solve(&mut self, inertia: Option<MassLoad>, tolerance: f64) -> LinearSolveOutcome {
         let mut tip_residual = self.set_residual(inertia);
-        let (mut tip_z, mut rz) = self.precondition(tip_residual);
+        let preconditioned = self.precondition(tip_residual);
+        let (mut tip_z, mut rz) = (preconditioned.tip, preconditioned.product);
         if !self.coupled {
             for group in &mut self.groups {
                 group.solution.copy_from_slice(&group.z);
@@ -135,12 +129,13 @@ impl System {
             self.advance(alpha);
             tip_solution += alpha * tip_p;
             tip_residual -= alpha * tip_b_p;
-            let rz_next;
-            (tip_z, rz_next) = self.precondition(tip_residual);
+            let preconditioned = self.precondition(tip_residual);
+            let rz_next = preconditioned.product;
+            tip_z = preconditioned.tip;
             if rz_next <= target {
                 break;
             }
-            if iterations >= MAX_ITERATIONS {
+            if iterations >= MAX_CG_ITERATIONS {
                 return LinearSolveOutcome::TooSlow(iterations);
             }
             iterations += 1;
@@ -160,16 +155,17 @@ impl System {
     }
 
     /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
-    fn set_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> DVec3 {
+    fn set_residual(&mut self, inertia: Option<MassLoad>) -> DVec3 {
         let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
         each_group(self.parallel, &mut self.groups, |g, group| {
             group.residual.copy_from_slice(&group.rhs);
-            let Some((velocity, per_step)) = inertia else {
+            let Some(MassLoad { field, factor }) = inertia else {
                 return;
             };
             for (lane, j) in group_rods(g, rods).enumerate() {
-                let [rotary, mass] = group.masses.map(|mass| mass.0[lane] * per_step);
-                for ((r, v), weight) in group.residual.iter_mut().zip(&velocity[j]).zip(weights) {
+                let rotary = group.masses.rotary.0[lane] * factor;
+                let mass = group.masses.translational.0[lane] * factor;
+                for ((r, v), weight) in group.residual.iter_mut().zip(&field[j]).zip(weights) {
                     for c in 0..3 {
                         r[c].0[lane] += rotary * weight * v[c];
                         r[3 + c].0[lane] += mass * weight * v[3 + c];
@@ -190,9 +186,8 @@ impl System {
         tip_residual
     }
 
-    /// z = B^-1 residual, including the tip's displacement in every rod's last slot; returns
-    /// that displacement and residual . z over all unknowns.
-    fn precondition(&mut self, tip_residual: DVec3) -> (DVec3, f64) {
+    /// Sets z = B^-1 residual, including the displacement of a joint tip in every rod's last slot.
+    fn precondition(&mut self, tip_residual: DVec3) -> PreconditionedTip {
         let (last, arch) = (self.nodes() - 1, self.arch);
         each_group(self.parallel, &mut self.groups, |_, group| {
             group
@@ -223,7 +218,10 @@ impl System {
             .iter()
             .map(|group| group.partial_product)
             .sum::<f64>();
-        (tip, product + tip_residual.dot(tip))
+        PreconditionedTip {
+            tip,
+            product: product + tip_residual.dot(tip),
+        }
     }
 
     /// p . (B + E) p without the contribution of the tip.
@@ -279,6 +277,14 @@ impl System {
     }
 }
 
+/// What a solve with the preconditioner leaves beside z.
+struct PreconditionedTip {
+    /// Displacement of a joint tip; zero without one.
+    tip: DVec3,
+    /// residual . z over all unknowns.
+    product: f64,
+}
+
 /// Writes the displacement of a joint tip.
 fn set_tip(last: &mut GroupIncrements, tip: DVec3, active: &NumberGroup) {
     for c in 0..3 {
@@ -286,11 +292,12 @@ fn set_tip(last: &mut GroupIncrements, tip: DVec3, active: &NumberGroup) {
     }
 }
 
-/// The factors of the matrix assembled in a [`System`]; those of the rods are in the system itself.
+/// The factors of the matrix assembled in a [`System`]: of the whole matrix or, if `None`, of the rods in
+/// the system itself.
 pub struct DefiniteFactors(Option<MatrixFactors>);
 
 impl DefiniteFactors {
-    /// Factorises K + `shift` M; `None` if it is not positive definite, or does not fit into memory.
+    /// Factorizes K + `shift` M; `None` if it is not positive definite, or does not fit into memory.
     pub fn new(system: &mut System, shift: f64) -> Option<Self> {
         if !system.has_tissue() {
             return system.factorize(shift).then_some(DefiniteFactors(None));
@@ -300,7 +307,7 @@ impl DefiniteFactors {
         Some(DefiniteFactors(Some(factors)))
     }
 
-    /// Factorises the matrix of a single rod whatever the signs of its pivots; `None` if one of them
+    /// Factorizes the matrix of a single rod whatever the signs of its pivots; `None` if one of them
     /// is zero.
     pub fn indefinite_single_rod(system: &mut System) -> Option<Self> {
         system

@@ -1,20 +1,11 @@
-//! Positions, rotations and segment forces of all nodes of a leaf.
-//!
-//! The turns of veins without resistance
-//! ([`Scenario::turnings`](crate::scenario::Scenario::turnings)): their phase conditions, their
-//! modes, and the equilibrium that stands for a circle of equilibria.
-//!
-//! Veins that can turn have an eigenvalue that is exactly zero, on every grid, unless they are straight
-//! and clamped. A spring that holds one node in the direction in which it would move is a phase condition: as the forces do
-//! no work in a turn, the equations with it have the same solutions, it has no force there, and the
-//! matrix has one negative eigenvalue for each of those of the leaf, and none for the turn.
+//! Positions, rotations and segment forces of all nodes of a leaf, and increments of these.
 
 use crate::numbers::{larger, largest};
 use crate::rod::NodePair;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 
-/// The state of a discretised leaf with N rods of n segments, rod after rod,
+/// The state of a discretized leaf with N rods of n segments, rod after rod,
 /// base to tip. Of a joined leaf all last positions are equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
@@ -25,21 +16,37 @@ pub struct State {
     /// Spatial force of each segment, N n.
     pub n: Vec<DVec3>,
     /// Spatial force of the tissue per unit of sigma at each node, gap after gap, (N - 1) (n + 1);
-    /// empty: that of its strains.
+    /// empty if the tissue carries the force of its strains.
     pub tissue: Vec<DVec3>,
     segments: usize,
 }
 
-/// Distance of tips, in lengths, that is rounding.
+/// Largest distance of joint tips by rounding, in lengths of the leaf.
 const TIP_COINCIDENCE_TOLERANCE: f64 = 1e-9;
 
 /// Increments of one node in the order of elimination: spatial rotation, then
 /// displacement.
 pub type Increment = [f64; 6];
 
+/// An [`Increment`], or a rate of one, as vectors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodeIncrement {
+    /// Spatial rotation vector.
+    pub rotation: DVec3,
+    pub displacement: DVec3,
+}
+
+impl NodeIncrement {
+    /// The increment, component by component.
+    pub fn to_array(self) -> Increment {
+        let [a, b] = [self.rotation.to_array(), self.displacement.to_array()];
+        [a[0], a[1], a[2], b[0], b[1], b[2]]
+    }
+}
+
 /// Increments, or the forces that are dual to them, of all nodes of a leaf with equations: rods,
-/// then nodes from [`first_node`](crate::leaf::DiscreteLeaf::first_node) on. With a joint tip the last displacement is the same in every rod,
-/// and the last force is each rod's share.
+/// then nodes from [`first_node`](crate::leaf::DiscreteLeaf::first_node) on. With a joint tip the
+/// last displacement is the same in every rod, and the last force is each rod's share.
 pub type NodalField = Vec<Vec<Increment>>;
 
 /// The rotation part of an increment.
@@ -63,7 +70,7 @@ pub fn add_to_increment(increment: &mut Increment, turn: DVec3, shift: DVec3) {
 }
 
 impl State {
-    /// From nodal positions and rotations, without forces.
+    /// A state of these nodal positions and rotations, without forces.
     pub fn new(segments: usize, x: Vec<DVec3>, q: Vec<DQuat>) -> Self {
         let rods = x.len() / (segments + 1);
         State {
@@ -162,9 +169,11 @@ impl State {
         for (j, rod) in field.iter_mut().enumerate() {
             for (i, increment) in rod.iter_mut().enumerate() {
                 let k = self.base(j) + i + first;
-                let turn = rotation::log(other.q[k] * self.q[k].conjugate());
-                let shift = other.x[k] - self.x[k];
-                *increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+                let change = NodeIncrement {
+                    rotation: rotation::log(other.q[k] * self.q[k].conjugate()),
+                    displacement: other.x[k] - self.x[k],
+                };
+                *increment = change.to_array();
             }
         }
     }

@@ -1,21 +1,51 @@
-//! Nodes that are held: bases, tips by their holder, and others by grips along their veins.
+//! Nodes that are held: bases, tips, and nodes in grips; the forces and moments on what holds them;
+//! and the components of increments that are zero there, or in the mirror plane of half a leaf.
 //!
-//! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
-//! at a pinned or clamped tip, at a hinged base, or by grips.
+//! Veins that can turn without resistance
+//! ([`Scenario::zero_energy_rotations`](crate::scenario::Scenario::zero_energy_rotations)) have an
+//! eigenvalue that is exactly zero, on every grid, unless they are straight and clamped. A spring that
+//! holds one node in the direction in which it would move is a phase condition. As forces do no work in
+//! a turn, the equations with the spring have the same solutions, in which the spring has no force, and
+//! the matrix has as many negative eigenvalues as that of the leaf, and no zero for the turn.
 
-use crate::leaf::assembly::component;
-use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, group_and_lane};
+use crate::leaf::assembly::largest_component;
+use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, rod_lane};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{NodalField, State};
-use crate::leaf::system::System;
+use crate::leaf::state::{NodalField, NodeIncrement, State};
+use crate::leaf::system::{HeldComponents, System};
 use crate::leaf::{GrippedNode, Leaf};
-use crate::rod::UNKNOWNS;
+use crate::rod::{UNKNOWNS, Wrench};
 use crate::rotation::outer;
 use crate::scenario::{BaseRotations, Grip, SupportKind, ZeroEnergyRotation};
 use crate::simd::NumberGroup;
 use glam::DVec3;
 use std::borrow::Cow;
-use std::ops::Range;
+
+/// Whether supports allow a node to rotate, and to be displaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeFreedom {
+    pub rotation: bool,
+    pub displacement: bool,
+}
+
+impl NodeFreedom {
+    /// The freedom of a node without support.
+    pub const FREE: NodeFreedom = NodeFreedom {
+        rotation: true,
+        displacement: true,
+    };
+
+    /// Whether the node is clamped.
+    pub fn is_fixed(self) -> bool {
+        !self.rotation && !self.displacement
+    }
+}
+
+/// The unbalanced force and moment on a node, each by its largest component.
+pub(super) struct UnbalancedSize {
+    pub force: f64,
+    pub moment: f64,
+}
 
 impl DiscreteLeaf {
     /// The nodes that grips hold, where they are in the `natural` leaf and moved by their
@@ -25,7 +55,7 @@ impl DiscreteLeaf {
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
             let Grip { vein, at, .. } = *grip;
-            let [from, to] = at.map(|sigma| self.grid.nearest(sigma));
+            let [from, to] = at.map(|sigma| self.grid.nearest_node(sigma));
             let moved = DVec3::from_array(grip.displacement) / length;
             (from..=to).map(move |node| {
                 let k = natural.base(vein) + node;
@@ -51,39 +81,50 @@ impl DiscreteLeaf {
         self.grips.iter().filter(move |held| held.rod == j)
     }
 
-    /// The nodes of rod `j` with equations that hinges or grips hold, and the components that are.
-    pub(super) fn held_inner_components(
-        &self,
-        j: usize,
-    ) -> impl Iterator<Item = (usize, Range<usize>)> {
+    /// What hinges and grips hold of the nodes of rod `j` with equations.
+    pub(super) fn held_inner_components(&self, j: usize) -> impl Iterator<Item = HeldComponents> {
+        let held = move |node: usize, first: usize| HeldComponents {
+            rod: j,
+            node,
+            components: first..6,
+        };
         let hinge = (0..1)
             .filter(|_| self.leaf.hinged())
-            .map(|base| (base, 3..6));
-        let grips = self.rod_grips(j).map(|held| {
-            let first = if held.rotation.is_some() { 0 } else { 3 };
-            (held.node, first..6)
+            .map(move |base| held(base, 3));
+        let grips = self.rod_grips(j).map(move |grip| {
+            let first = if grip.rotation.is_some() { 0 } else { 3 };
+            held(grip.node, first)
         });
         hinge.chain(grips)
     }
 
-    /// Whether node `i` of rod `j` is held at its base or by a grip: its rotation, and its position.
-    pub(super) fn holds_rotation_and_position(&self, j: usize, i: usize) -> [bool; 2] {
+    /// What base and grips allow to node `i` of rod `j`.
+    pub(super) fn freedom_without_tip_support(&self, j: usize, i: usize) -> NodeFreedom {
         if i == 0 {
-            return [!self.leaf.hinged(), true];
+            return NodeFreedom {
+                rotation: self.leaf.hinged(),
+                displacement: false,
+            };
         }
         let here = |it: &&GrippedNode| (it.rod, it.node) == (j, i);
         match self.grips.iter().find(here) {
-            Some(held) => [held.rotation.is_some(), true],
-            None => [false; 2],
+            Some(held) => NodeFreedom {
+                rotation: held.rotation.is_none(),
+                displacement: false,
+            },
+            None => NodeFreedom::FREE,
         }
     }
 
-    /// Whether node `i` of rod `j` may rotate, and be displaced.
-    pub fn allows_rotation_and_displacement(&self, j: usize, i: usize) -> [bool; 2] {
+    /// What all supports allow to node `i` of rod `j`.
+    pub fn node_freedom(&self, j: usize, i: usize) -> NodeFreedom {
         match &self.leaf.tip_support {
-            Some(held) if i == self.segments() => [held.clamps.is_none(), false],
-            _ if i > 0 && self.grips.is_empty() => [true; 2],
-            _ => self.holds_rotation_and_position(j, i).map(|held| !held),
+            Some(held) if i == self.segments() => NodeFreedom {
+                rotation: held.clamps.is_none(),
+                displacement: false,
+            },
+            _ if i > 0 && self.grips.is_empty() => NodeFreedom::FREE,
+            _ => self.freedom_without_tip_support(j, i),
         }
     }
 
@@ -100,7 +141,7 @@ impl DiscreteLeaf {
     }
 
     /// Force on every grip, and the moment about its middle if it is clamped.
-    pub fn grip_reactions(&self, state: &State) -> Vec<[DVec3; 2]> {
+    pub fn grip_reactions(&self, state: &State) -> Vec<Wrench> {
         let grips = &self.leaf.scenario().grips;
         let middle = |number: usize| {
             let held = self.grips.iter().filter(|it| it.grip == number);
@@ -110,13 +151,14 @@ impl DiscreteLeaf {
             sum / count
         };
         let middles: Vec<DVec3> = (0..grips.len()).map(middle).collect();
-        let mut reactions = vec![[DVec3::ZERO; 2]; grips.len()];
+        let mut reactions = vec![Wrench::default(); grips.len()];
         for held in &self.grips {
-            let [moment, force] = self.unbalanced_node_load(state, held.rod, held.node);
-            let [force_on, moment_on] = &mut reactions[held.grip];
-            *force_on += force;
+            let load = self.unbalanced_node_load(state, held.rod, held.node);
+            let on_grip = &mut reactions[held.grip];
+            on_grip.force += load.force;
             if held.rotation.is_some() {
-                *moment_on += moment + (held.position - middles[held.grip]).cross(force);
+                let arm = held.position - middles[held.grip];
+                on_grip.moment += load.moment + arm.cross(load.force);
             }
         }
         reactions
@@ -128,17 +170,17 @@ impl DiscreteLeaf {
             .leaf
             .tip_support
             .as_ref()
-            .map(|_| self.reaction(state).0);
+            .map(|_| self.reaction(state).force);
         let grips = match self.has_grips() {
             true => self.grip_reactions(state),
             false => Vec::new(),
         };
-        let grips = grips.into_iter().map(|[force, _]| force);
+        let grips = grips.into_iter().map(|on_grip| on_grip.force);
         tips.into_iter().chain(grips).collect()
     }
 
     /// Moment and force on a node by its segments, loads and neighbours.
-    pub(super) fn unbalanced_node_load(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+    pub(super) fn unbalanced_node_load(&self, state: &State, j: usize, i: usize) -> Wrench {
         let n = self.segments();
         let gradient = |i: usize| {
             let segment = self.segment(state, j, i, state.n[j * n + i]);
@@ -147,14 +189,14 @@ impl DiscreteLeaf {
         let load = self.load(state, j, i);
         let (mut moment, mut force) = (load.moment + self.node_dead_moment(i), load.force);
         if i > 0 {
-            let (g_x, _, g_b) = gradient(i - 1);
-            (moment, force) = (moment - g_b, force - g_x);
+            let before = gradient(i - 1);
+            (moment, force) = (moment - before.b, force - before.x);
         }
         if i < n {
-            let (g_x, g_a, _) = gradient(i);
-            (moment, force) = (moment - g_a, force + g_x);
+            let after = gradient(i);
+            (moment, force) = (moment - after.a, force + after.x);
         }
-        [moment, force]
+        Wrench { moment, force }
     }
 }
 
@@ -173,10 +215,11 @@ impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` of rod `j`.
     fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
         if i == 0 || !self.grips.is_empty() {
-            match self.holds_rotation_and_position(j, i) {
-                [true, _] => return &ALL_COMPONENTS,
-                [false, true] => return &ALL_COMPONENTS[3..],
-                [false, false] => {}
+            let freedom = self.freedom_without_tip_support(j, i);
+            match (freedom.rotation, freedom.displacement) {
+                (false, _) => return &ALL_COMPONENTS,
+                (true, false) => return &ALL_COMPONENTS[3..],
+                (true, true) => {}
             }
         }
         if let Some(held) = self
@@ -214,7 +257,7 @@ impl DiscreteLeaf {
         for i in self.first_held()..self.segments() + 1 {
             let rhs = &mut rhs[i - self.first_node()];
             for &c in self.held_components(j, i) {
-                rhs[c].0[group_and_lane(j).1] = 0.0;
+                rhs[c].0[rod_lane(j).lane] = 0.0;
             }
         }
     }
@@ -231,7 +274,7 @@ impl DiscreteLeaf {
     /// Replaces rows and columns of the held components of rod `j` in the matrix by those of
     /// the identity, which makes them zero.
     pub(super) fn hold_components(&self, j: usize, chain: &mut BlockTridiagonal) {
-        let set = |four: &mut NumberGroup, value: f64| four.0[group_and_lane(j).1] = value;
+        let set = |four: &mut NumberGroup, value: f64| four.0[rod_lane(j).lane] = value;
         for i in self.first_held()..self.segments() + 1 {
             let at = i - self.first_node();
             for &c in self.held_components(j, i) {
@@ -242,7 +285,7 @@ impl DiscreteLeaf {
                         set(chain.off_diagonal_entry_mut(at - 1, k, c), 0.0);
                     }
                 }
-                let gripped = self.holds_rotation_and_position(j, i)[1];
+                let gripped = !self.freedom_without_tip_support(j, i).displacement;
                 set(
                     chain.diagonal_entry_mut(at, c, c),
                     if gripped { HELD_DIAGONAL_ENTRY } else { 1.0 },
@@ -266,17 +309,31 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The largest components of an unbalanced force and moment on a node of
-    /// rod `j`, without those that the mirror image balances.
-    pub(super) fn unbalanced_residual(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
+    /// The size of an unbalanced force and moment on a node of rod `j`, without the components that
+    /// the mirror image balances.
+    pub(super) fn unbalanced_size(&self, j: usize, force: DVec3, moment: DVec3) -> UnbalancedSize {
         match self.leaf.is_halved_midrib(j) {
-            true => (component(force.with_y(0.0)), moment.y.abs()),
-            false => (component(force), component(moment)),
+            true => UnbalancedSize {
+                force: largest_component(force.with_y(0.0)),
+                moment: moment.y.abs(),
+            },
+            false => UnbalancedSize {
+                force: largest_component(force),
+                moment: largest_component(moment),
+            },
         }
     }
 }
 
 impl Leaf {
+    /// Puts the bases where the leaf begins.
+    pub fn place_bases(&self, state: &mut State) {
+        for j in 0..self.rods() {
+            let (base, pose) = (state.base(j), self.base_pose(j));
+            (state.x[base], state.q[base]) = (pose.position, pose.rotation);
+        }
+    }
+
     /// Puts the tips where they are held, if they are.
     pub fn place_held_tips(&self, state: &mut State) {
         let Some(held) = &self.tip_support else {
@@ -292,28 +349,30 @@ impl Leaf {
     }
 }
 
-/// Stiffness of the spring, A/L^3, or A/L against a rotation.
-pub(super) const PHASE_SPRING_STIFFNESS: f64 = 100.0;
+/// Stiffness of the spring of a phase condition: A/L^3 against a displacement, A/L against a rotation.
+/// It moves one eigenvalue from zero, and no solution.
+const PHASE_SPRING_STIFFNESS: f64 = 100.0;
 
-/// A node that turns slower than this (lengths per radian) is on the axis: straight veins do not move
-/// when they turn.
-pub(super) const AXIS_SPEED_TOLERANCE: f64 = 1e-6;
+/// Largest displacement per angle, in lengths per radian, of a node on the axis of a turn, by
+/// rounding. Straight veins do not move when they turn.
+const AXIS_SPEED_TOLERANCE: f64 = 1e-6;
 
-/// The node at which a turn is held.
-pub(super) struct PhaseConditionNode {
+/// The node whose motion in a turn without resistance a phase condition suppresses.
+struct PhaseConditionNode {
     rod: usize,
     node: usize,
-    /// The direction in which it rotates, or else that in which it is displaced.
-    direction: [DVec3; 2],
+    /// The direction in which the node is displaced or, if zero, that in which it rotates.
+    direction: NodeIncrement,
 }
 
 impl DiscreteLeaf {
-    /// The veins that can turn, whatever their state: in half of a mirror-symmetric leaf those
-    /// whose images turn the other way.
+    /// The turns without resistance, whatever the state: of half of a mirror-symmetric leaf the turns
+    /// of veins whose images turn the other way.
     fn zero_energy_rotations(&self) -> impl Iterator<Item = &ZeroEnergyRotation> {
         let moves = |j: usize| j < self.rods() && !self.leaf.is_halved_midrib(j);
         let half = self.leaf.is_mirror_half();
-        (self.leaf.turnings.iter()).filter(move |it| !half || it.rods.clone().all(moves))
+        (self.leaf.zero_energy_rotations.iter())
+            .filter(move |it| !half || it.rods.clone().all(moves))
     }
 
     /// The rotation and the displacement of a node by a turn at unit rate.
@@ -322,12 +381,17 @@ impl DiscreteLeaf {
         turning: &ZeroEnergyRotation,
         state: &State,
         k: usize,
-    ) -> [DVec3; 2] {
-        turning.node_velocity(state.x[k], state.q[k], self.leaf.scale.length)
+    ) -> NodeIncrement {
+        let length = self.leaf.scale.length;
+        let [rotation, displacement] = turning.node_velocity(state.x[k], state.q[k], length);
+        NodeIncrement {
+            rotation,
+            displacement,
+        }
     }
 
-    /// The node to hold: the one that is displaced most or, where sections spin, the base. A joint tip,
-    /// which all rods share, is none.
+    /// The node of the phase condition: the one that is displaced most or, where sections spin, the
+    /// base; not a joint tip, which all rods share. `None` where a turn moves nothing.
     fn phase_condition_node(
         &self,
         turning: &ZeroEnergyRotation,
@@ -336,25 +400,32 @@ impl DiscreteLeaf {
         if turning.axis == DVec3::ZERO {
             let rod = turning.rods.start;
             let points = &state.x[state.base(rod)..][..=self.segments()];
-            let [spin, _] = self.zero_energy_increment(turning, state, state.base(rod));
+            let spin = self.zero_energy_increment(turning, state, state.base(rod));
             let moves = turning.moves_something(points, DVec3::ZERO, AXIS_SPEED_TOLERANCE);
             return moves.then_some(PhaseConditionNode {
                 rod,
                 node: 0,
-                direction: [spin, DVec3::ZERO],
+                direction: NodeIncrement {
+                    displacement: DVec3::ZERO,
+                    ..spin
+                },
             });
         }
         let last = self.segments() - usize::from(self.tips_move_together());
         let mut farthest = None;
         let mut most = AXIS_SPEED_TOLERANCE;
         for (rod, node) in rotating_nodes(turning, last) {
-            let [_, speed] = self.zero_energy_increment(turning, state, state.base(rod) + node);
+            let turn = self.zero_energy_increment(turning, state, state.base(rod) + node);
+            let speed = turn.displacement;
             if speed.length() > most {
                 most = speed.length();
                 farthest = Some(PhaseConditionNode {
                     rod,
                     node,
-                    direction: [DVec3::ZERO, speed / most],
+                    direction: NodeIncrement {
+                        rotation: DVec3::ZERO,
+                        displacement: speed / most,
+                    },
                 });
             }
         }
@@ -365,17 +436,22 @@ impl DiscreteLeaf {
     pub fn add_phase_conditions(&self, state: &State, system: &mut System) {
         for turning in self.zero_energy_rotations() {
             if let Some(at) = self.phase_condition_node(turning, state) {
-                let [turn, shift] = at.direction.map(|d| PHASE_SPRING_STIFFNESS * outer(d, d));
+                let NodeIncrement {
+                    rotation,
+                    displacement,
+                } = at.direction;
+                let [turn, shift] =
+                    [rotation, displacement].map(|d| PHASE_SPRING_STIFFNESS * outer(d, d));
                 system.add_displacement_spring(at.rod, at.node, shift);
                 system.add_rotation_spring(at.rod, at.node, turn);
             }
         }
     }
 
-    /// Turns veins that can turn without resistance, so that of a circle of equilibria it is always
-    /// the same one, on all grids: clamped ones until their moment at the base bends them down
-    /// (towards -e3); on hinges as near as possible to where they begin in the natural leaf, or down;
-    /// and a vein that spins without a twist from there.
+    /// Turns veins that can turn without resistance to one equilibrium of a circle of them, the same on
+    /// all grids: clamped veins until their moment at the base bends them down (towards -e3); veins on
+    /// hinges as near as possible to where they begin in the stress-free leaf, or down; and a vein that
+    /// spins without a twist from there.
     pub fn rotate_to_representative(&self, state: &mut State) {
         for turning in self.zero_energy_rotations() {
             if turning.axis == DVec3::ZERO && self.phase_condition_node(turning, state).is_none() {
@@ -385,10 +461,10 @@ impl DiscreteLeaf {
             let moment = |j: usize| {
                 let n = state.n[j * self.segments()];
                 let segment = self.segment(state, j, 0, n);
-                -segment.gradient(self.section(j, 0)).1
+                -segment.gradient(self.section(j, 0)).a
             };
             let begin = |j: usize| BaseRotations {
-                stress_free: self.leaf.base(j).1,
+                stress_free: self.leaf.base_pose(j).rotation,
                 now: state.q[state.base(j)],
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
@@ -400,11 +476,11 @@ impl DiscreteLeaf {
             for j in rods.clone() {
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
-                    let [turns, shifts] = self.allows_rotation_and_displacement(j, node);
-                    if shifts || node < n {
+                    let freedom = self.node_freedom(j, node);
+                    if freedom.displacement || node < n {
                         state.x[k] = point + turn * (state.x[k] - point);
                     }
-                    if turns || node < n {
+                    if freedom.rotation || node < n {
                         state.q[k] = (turn * state.q[k] * back).normalize();
                     }
                 }
@@ -414,7 +490,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::rotate_to_representative`].
+    /// The equilibrium that stands for the circle of equilibria of a state: see
+    /// [`DiscreteLeaf::rotate_to_representative`].
     pub fn circle_representative<'s>(&self, state: &'s State) -> Cow<'s, State> {
         let mut state = Cow::Borrowed(state);
         if self.zero_energy_rotations().next().is_some() {
@@ -423,7 +500,7 @@ impl DiscreteLeaf {
         state
     }
 
-    /// The turns at unit rate of veins that can: increments of the nodes of all rods.
+    /// The turns without resistance in a state, at unit rate: increments of the nodes of all rods.
     pub fn zero_energy_fields(&self, state: &State) -> Vec<NodalField> {
         let moves =
             |turning: &&ZeroEnergyRotation| self.phase_condition_node(turning, state).is_some();
@@ -432,8 +509,7 @@ impl DiscreteLeaf {
             for j in turning.rods.clone() {
                 for (node, increments) in field[j].iter_mut().enumerate() {
                     let k = state.base(j) + node + self.first_node();
-                    let [spin, velocity] = self.zero_energy_increment(turning, state, k);
-                    *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
+                    *increments = self.zero_energy_increment(turning, state, k).to_array();
                 }
             }
             field
@@ -445,8 +521,8 @@ impl DiscreteLeaf {
     }
 }
 
-/// Rods and nodes of veins, to the node `last`.
-pub(super) fn rotating_nodes(
+/// Rods and nodes of the veins of a turn, without their bases, to the node `last`.
+fn rotating_nodes(
     turning: &ZeroEnergyRotation,
     last: usize,
 ) -> impl Iterator<Item = (usize, usize)> {

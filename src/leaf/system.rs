@@ -1,24 +1,23 @@
-//! Newton's equations of the leaf, solved rod by rod.
+//! Newton's equations of a leaf, in groups of four rods, one in each lane of an instruction.
 //!
-//! K = B + E, where B consists of every rod's own block-tridiagonal matrix (with its
-//! neighbours fixed) and the joint tip, and E is the coupling between neighbours. B is
-//! factorised in linear time and preconditions conjugate gradients for K; E is weak compared
-//! with a rod's own stiffness ([`solve`]).
+//! K = B + E, where B has the block-tridiagonal matrix of each rod (with its neighbours fixed) and the
+//! joint tip, and E is the coupling between neighbours. B is factorized in linear time and preconditions
+//! conjugate gradients for K (`solve`), whose vectors and products with E are here.
 //!
-//! Additions to the equations of single nodes.
-//!
-//! The coupling of neighbouring rods, in the lanes of their groups.
-//!
-//! The vectors of the conjugate gradients.
+//! A dead moment M on a single rod is not conservative in three dimensions: the derivative of its
+//! node's moment balance in spatial increments gains -\[M\]/2, which is skew. All dead moments together
+//! have a small rank, and are included by the Sherman-Morrison-Woodbury formula: with the rotations C
+//! of their nodes by unit moments on these, and the skew matrix S, the response to the moments x that
+//! solve (1 + S C) x = S t is subtracted from the solution without them, which has the rotations t.
 
 use crate::leaf::block_tridiagonal::{
-    BlockTridiagonal, GroupIncrements, TipFactor, group_and_lane, lane_increment,
+    BlockTridiagonal, GroupIncrements, GroupMasses, RodLane, TipFactor, lane_increment, rod_lane,
     set_lane_increment,
 };
-use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::discrete::{DiscreteLeaf, NodalMoment, NodeMass};
 use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
-use crate::rod::NodeBlock;
+use crate::rod::{NodeBlock, Wrench};
 use crate::scenario::Scenario;
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
@@ -27,9 +26,9 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// From this many nodes on, groups of rods are distributed over threads. Measured: below it
-/// waking the threads costs more than it saves.
-const PARALLEL_NODES: usize = 8192;
+/// Number of nodes from which on groups of rods are distributed over threads. Measured: with fewer
+/// nodes waking the threads costs more than it saves.
+const LEAST_PARALLEL_NODES: usize = 8192;
 
 /// Sums, and a maximum, over all rods from an assembly.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,10 +39,58 @@ pub struct AssemblyTotals {
     pub largest_turn: f64,
 }
 
+/// The largest component of a rotation, in radians, and of a displacement of any node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IncrementSize {
+    pub rotation: f64,
+    pub displacement: f64,
+}
+
+impl IncrementSize {
+    /// The larger one; infinite if one is not a number.
+    pub fn larger(self) -> f64 {
+        larger(self.rotation, self.displacement)
+    }
+}
+
+/// The mass matrix times a field times a factor, a part of the right-hand side: momentum over the time
+/// step, or the force of springs in proportion to the masses.
+#[derive(Clone, Copy, Debug)]
+pub struct MassLoad<'a> {
+    /// Velocities, or extensions of the springs, of all nodes with equations.
+    pub field: &'a [Vec<Increment>],
+    /// Inverse of the time step, or rate of the springs.
+    pub factor: f64,
+}
+
+/// A stiffness against motions of a node: the diagonal blocks of its matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct DiagonalBlocks {
+    /// Against rotations.
+    pub rotary: DMat3,
+    /// Against displacements, the same in all directions.
+    pub translational: f64,
+}
+
+/// Components of the increment of a node that a hinge or grip holds.
+#[derive(Clone, Debug)]
+pub(super) struct HeldComponents {
+    pub rod: usize,
+    pub node: usize,
+    pub components: Range<usize>,
+}
+
+/// E of the rods of a group: their coupling per weight with the rods before and after them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct GroupCoupling {
+    previous: [NumberGroup; 3],
+    next: [NumberGroup; 3],
+}
+
 /// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
 /// and forces are zero.
 #[derive(Clone, Debug)]
-pub(crate) struct RodGroup {
+pub(super) struct RodGroup {
     pub matrix: BlockTridiagonal,
     /// One in lanes with a rod, zero in others.
     pub active_lanes: NumberGroup,
@@ -53,16 +100,18 @@ pub(crate) struct RodGroup {
     /// Solution, all nodes with equations, complete.
     pub solution: Vec<GroupIncrements>,
     pub sums: AssemblyTotals,
-    /// Nodal masses per weight: rotary, translational.
-    pub(super) masses: [NumberGroup; 2],
-    /// E: coupling per weight with the previous rods, with the next.
-    pub(super) coupling: [[NumberGroup; 3]; 2],
+    /// Masses of the nodes.
+    pub(super) masses: GroupMasses,
+    coupling: GroupCoupling,
+    /// Residual of the conjugate gradients.
     pub(super) residual: Vec<GroupIncrements>,
+    /// z = B^-1 residual.
     pub(super) z: Vec<GroupIncrements>,
+    /// B p for the direction p.
     pub(super) b_p: Vec<GroupIncrements>,
-    /// Whether the last factorisation succeeded.
+    /// Whether the last factorization succeeded.
     pub(super) definite: bool,
-    /// Its part of a scalar product.
+    /// Part of the group in a scalar product.
     pub(super) partial_product: f64,
 }
 
@@ -71,27 +120,32 @@ pub(crate) struct RodGroup {
 pub struct System {
     /// The scenario of the leaf to which these equations belong.
     scenario: Arc<Scenario>,
-    pub(crate) groups: Vec<RodGroup>,
+    pub(super) groups: Vec<RodGroup>,
     pub(super) rods: usize,
+    /// Direction p of the conjugate gradients, group after group.
     pub(super) p: Vec<Vec<GroupIncrements>>,
+    /// Whether all tips are one point that moves.
     pub(super) joined: bool,
     pub(super) coupled: bool,
+    /// Whether groups are distributed over threads.
     pub(super) parallel: bool,
-    pub(super) segments: usize,
+    segments: usize,
     /// The first node of a rod with equations, from which its nodes are numbered here.
     pub(super) first: usize,
     /// Weights of the nodes with equations in the masses.
     pub(super) weights: Vec<f64>,
-    /// Weights of the nodes in E: zero at a joint tip and at hinged bases, which stay.
+    /// Weights of the nodes in E: zero at a joint tip and at hinged bases, which are not displaced.
     pub(super) coupling_weights: Vec<f64>,
     pub(super) arch: Arch,
     pub(super) tip: Option<TipFactor>,
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
     pub(super) gaps: Vec<DVec3>,
-    /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without tissue.
+    /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without
+    /// tissue.
     pub(super) gap_blocks: Vec<NodeBlock>,
-    /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
-    pub(super) held_components: Vec<(usize, usize, Range<usize>)>,
+    /// What hinges and grips hold, nodes from the first with equations: these components have no
+    /// momentum.
+    held_components: Vec<HeldComponents>,
     /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
     /// rigid ones; empty without any.
     pub(super) law_forces: Vec<DVec3>,
@@ -166,7 +220,9 @@ impl System {
             p: vec![vec![GroupIncrements::default(); n]; count],
             joined,
             coupled,
-            parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
+            parallel: rods * n >= LEAST_PARALLEL_NODES
+                && count > 1
+                && rayon::current_num_threads() > 1,
             segments: leaf.segments(),
             first,
             weights: nodes.clone().map(|i| leaf.mass_weight(i)).collect(),
@@ -182,8 +238,11 @@ impl System {
             ],
             held_components: (0..rods)
                 .flat_map(|j| {
-                    leaf.held_inner_components(j)
-                        .map(move |(i, parts)| (j, i - first, parts))
+                    let held = leaf.held_inner_components(j);
+                    held.map(move |it| HeldComponents {
+                        node: it.node - first,
+                        ..it
+                    })
                 })
                 .collect(),
             law_forces: Vec::new(),
@@ -198,7 +257,7 @@ impl System {
             self.gaps.clear();
             self.gaps.extend(gap_couplings(leaf));
             for (g, group) in self.groups.iter_mut().enumerate() {
-                group.coupling = group_couplings(group_rods(g, self.rods), &self.gaps);
+                group.coupling = group_coupling(group_rods(g, self.rods), &self.gaps);
             }
         }
     }
@@ -206,7 +265,7 @@ impl System {
     /// Whether these are equations of `leaf`: of the same veins, supports and coupling, on the same grid.
     fn belongs_to(&self, leaf: &DiscreteLeaf) -> bool {
         let nodes = leaf.moving_nodes();
-        leaf.leaf.is_of(&self.scenario)
+        leaf.leaf.is_from_scenario(&self.scenario)
             && (self.rods, self.segments) == (leaf.rods(), leaf.segments())
             && (self.first, self.joined) == (nodes.start, leaf.tips_move_together())
             && nodes
@@ -229,7 +288,7 @@ impl System {
     }
 
     /// The first node of a rod with equations; fields begin with it.
-    pub fn first(&self) -> usize {
+    pub fn first_node(&self) -> usize {
         self.first
     }
 
@@ -248,26 +307,31 @@ impl System {
         Some(*self.gaps.get(g)? * self.coupling_weights[i])
     }
 
-    /// Nodal mass of node `i` (from the first with equations) of rod `j`: rotary, translational.
-    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
-        let (group, lane) = group_and_lane(j);
-        let masses = &self.groups[group].masses;
-        masses.map(|mass| mass.0[lane] * self.weights[i])
+    /// Mass of node `i` (from the first with equations) of rod `j`.
+    pub(super) fn mass(&self, j: usize, i: usize) -> NodeMass {
+        let at = rod_lane(j);
+        let masses = &self.groups[at.group].masses;
+        NodeMass {
+            rotary: masses.rotary.0[at.lane] * self.weights[i],
+            translational: masses.translational.0[at.lane] * self.weights[i],
+        }
     }
 
-    /// The right-hand side of node `i` of rod `j`: moment and force on it; at a joint
-    /// tip the rod's share.
-    pub fn unbalanced_node_load(&self, j: usize, i: usize) -> (DVec3, DVec3) {
-        let (group, lane) = group_and_lane(j);
-        let rhs = lane_increment(&self.groups[group].rhs[i - self.first], lane);
-        (rotation_part(&rhs), displacement_part(&rhs))
+    /// The right-hand side of node `i` of rod `j`; at a joint tip the rod's share.
+    pub fn unbalanced_node_load(&self, j: usize, i: usize) -> Wrench {
+        let at = rod_lane(j);
+        let rhs = lane_increment(&self.groups[at.group].rhs[i - self.first], at.lane);
+        Wrench {
+            moment: rotation_part(&rhs),
+            force: displacement_part(&rhs),
+        }
     }
 
     /// Sets the right-hand side to the mass matrix times the last solution, scaled to a
     /// largest component of one: a step of inverse iteration.
     pub fn iterate_inverse(&mut self) {
-        let (turn, shift) = self.largest_increment();
-        let scale = 1.0 / turn.max(shift);
+        let size = self.largest_increment();
+        let scale = 1.0 / size.rotation.max(size.displacement);
         let mut rhs = self.mass_product(&self.solution());
         for value in rhs.iter_mut().flatten().flatten() {
             *value *= scale;
@@ -301,8 +365,8 @@ impl System {
                 for c in 0..3 {
                     let block = group.matrix.diagonal_entry_mut(i, 3 + c, 3 + c);
                     for (lane, value) in block.0.iter_mut().enumerate() {
-                        let [previous, next] = group.coupling.map(|side| side[c].0[lane]);
-                        *value -= (previous + next) * weight;
+                        let GroupCoupling { previous, next } = &group.coupling;
+                        *value -= (previous[c].0[lane] + next[c].0[lane]) * weight;
                     }
                 }
             }
@@ -312,49 +376,51 @@ impl System {
 
     /// The right-hand side as of the last assembly.
     pub fn rhs(&self) -> NodalField {
-        self.gather(|group| &group.rhs)
+        self.nodal_field(|group| &group.rhs)
     }
 
     /// Replaces the right-hand side.
     pub fn set_rhs(&mut self, rhs: &NodalField) {
-        self.scatter(rhs, |group| &mut group.rhs);
+        self.set_nodal_field(rhs, |group| &mut group.rhs);
     }
 
     /// The last solution.
     pub fn solution(&self) -> NodalField {
-        self.gather(|group| &group.solution)
+        self.nodal_field(|group| &group.solution)
     }
 
     /// The last solution at node `i` of rod `j`.
     pub fn node_solution(&self, j: usize, i: usize) -> Increment {
-        let (group, lane) = group_and_lane(j);
-        lane_increment(&self.groups[group].solution[i - self.first], lane)
+        let at = rod_lane(j);
+        lane_increment(&self.groups[at.group].solution[i - self.first], at.lane)
     }
 
     /// Replaces the last solution.
     pub fn set_solution(&mut self, increments: &NodalField) {
         self.law_forces.clear();
-        self.scatter(increments, |group| &mut group.solution);
+        self.set_nodal_field(increments, |group| &mut group.solution);
     }
 
-    fn gather(&self, of: impl Fn(&RodGroup) -> &Vec<GroupIncrements>) -> NodalField {
+    /// The increments or forces of all rods, from those of the groups.
+    fn nodal_field(&self, of: impl Fn(&RodGroup) -> &Vec<GroupIncrements>) -> NodalField {
         let rod = |j: usize| {
-            let (group, lane) = group_and_lane(j);
-            let nodes = of(&self.groups[group]).iter();
-            nodes.map(|node| lane_increment(node, lane)).collect()
+            let at = rod_lane(j);
+            let nodes = of(&self.groups[at.group]).iter();
+            nodes.map(|node| lane_increment(node, at.lane)).collect()
         };
         (0..self.rods).map(rod).collect()
     }
 
-    fn scatter(
+    /// Writes increments or forces of all rods to the lanes of the groups.
+    fn set_nodal_field(
         &mut self,
         field: &NodalField,
         of: impl Fn(&mut RodGroup) -> &mut Vec<GroupIncrements>,
     ) {
         for (j, rod) in field.iter().enumerate() {
-            let (group, lane) = group_and_lane(j);
-            for (node, of_rod) in of(&mut self.groups[group]).iter_mut().zip(rod) {
-                set_lane_increment(node, lane, of_rod);
+            let at = rod_lane(j);
+            for (node, of_rod) in of(&mut self.groups[at.group]).iter_mut().zip(rod) {
+                set_lane_increment(node, at.lane, of_rod);
             }
         }
     }
@@ -363,21 +429,21 @@ impl System {
     pub fn mass_product(&self, increments: &NodalField) -> NodalField {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
-            std::array::from_fn(|c| mass[c / 3] * v[c])
+            std::array::from_fn(|c| mass.of_component(c) * v[c])
         };
         let rods = increments.iter().enumerate();
         let mut momentum: NodalField = rods
             .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
             .collect();
-        for (j, i, held) in &self.held_components {
-            momentum[*j][*i][held.clone()].fill(0.0);
+        for held in &self.held_components {
+            momentum[held.rod][held.node][held.components.clone()].fill(0.0);
         }
         momentum
     }
 
     /// Largest rotation and largest displacement of the last solution; infinite if one is not a
     /// number.
-    pub fn largest_increment(&self) -> (f64, f64) {
+    pub fn largest_increment(&self) -> IncrementSize {
         let mut largest = [NumberGroup::default(); 2];
         for increment in self.groups.iter().flat_map(|group| &group.solution) {
             for c in 0..6 {
@@ -386,29 +452,31 @@ impl System {
                 }
             }
         }
-        let [turn, shift] = largest.map(|four| crate::numbers::largest(four.0));
-        (turn, shift)
+        let [rotation, displacement] = largest.map(|four| crate::numbers::largest(four.0));
+        IncrementSize {
+            rotation,
+            displacement,
+        }
     }
 
     /// Kinetic energy at unit density of the given nodal velocities.
     pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
-            0.5 * (mass[0] * rotation_part(v).length_squared()
-                + mass[1] * displacement_part(v).length_squared())
+            0.5 * (mass.rotary * rotation_part(v).length_squared()
+                + mass.translational * displacement_part(v).length_squared())
         };
         let rods = velocity.iter().enumerate();
         rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
             .sum()
     }
 
-    /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
-    /// time `dt`.
-    pub fn write_velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+    /// Writes the velocity that corresponds to a fraction of the last solution in a time `dt`.
+    pub fn write_velocity(&self, fraction: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
         for (j, rod) in velocity.iter_mut().enumerate() {
-            let (group, lane) = group_and_lane(j);
-            for (v, d) in rod.iter_mut().zip(&self.groups[group].solution) {
-                *v = lane_increment(d, lane).map(|d| part * d / dt);
+            let at = rod_lane(j);
+            for (v, d) in rod.iter_mut().zip(&self.groups[at.group].solution) {
+                *v = lane_increment(d, at.lane).map(|d| fraction * d / dt);
             }
         }
     }
@@ -419,12 +487,12 @@ impl RodGroup {
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
         let n = leaf.moving_nodes().len();
         let zeros = vec![GroupIncrements::default(); n];
-        let (mut active, mut masses) = (NumberGroup::default(), [NumberGroup::default(); 2]);
+        let (mut active, mut masses) = (NumberGroup::default(), GroupMasses::default());
         for (lane, j) in group_rods(group, leaf.rods()).enumerate() {
             active.0[lane] = 1.0;
-            for (four, mass) in masses.iter_mut().zip(leaf.mass_per_weight(j)) {
-                four.0[lane] = mass;
-            }
+            let mass = leaf.mass_per_weight(j);
+            masses.rotary.0[lane] = mass.rotary;
+            masses.translational.0[lane] = mass.translational;
         }
         RodGroup {
             matrix: BlockTridiagonal::new(n, leaf.tips_move_together()),
@@ -433,7 +501,7 @@ impl RodGroup {
             solution: zeros.clone(),
             sums: AssemblyTotals::default(),
             masses,
-            coupling: group_couplings(group_rods(group, leaf.rods()), gaps),
+            coupling: group_coupling(group_rods(group, leaf.rods()), gaps),
             residual: zeros.clone(),
             z: zeros.clone(),
             b_p: zeros,
@@ -444,27 +512,26 @@ impl RodGroup {
 }
 
 impl System {
-    /// Adds to the equations of node `i` of rod `j`: to the matrix a rotary and a
-    /// translational part on its diagonal, to the right-hand side a moment and a force.
-    pub fn add_to_node(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
-        let (group, lane) = group_and_lane(j);
+    /// Adds a stiffness and a load to the equations of node `i` of rod `j`.
+    pub fn add_to_node(&mut self, j: usize, i: usize, stiffness: DiagonalBlocks, load: Wrench) {
+        let RodLane { group, lane } = rod_lane(j);
         let (at, group) = (i - self.first, &mut self.groups[group]);
         let chain = &mut group.matrix;
         let increment = &mut group.rhs[at];
         for c in 0..3 {
             for r in 0..=c {
-                chain.diagonal_entry_mut(at, r, c).0[lane] += matrix.0.col(c)[r];
+                chain.diagonal_entry_mut(at, r, c).0[lane] += stiffness.rotary.col(c)[r];
             }
-            chain.diagonal_entry_mut(at, 3 + c, 3 + c).0[lane] += matrix.1;
-            increment[c].0[lane] += rhs.0[c];
-            increment[3 + c].0[lane] += rhs.1[c];
+            chain.diagonal_entry_mut(at, 3 + c, 3 + c).0[lane] += stiffness.translational;
+            increment[c].0[lane] += load.moment[c];
+            increment[3 + c].0[lane] += load.force[c];
         }
     }
 
     /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its
     /// displacement.
     pub fn add_displacement_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
-        let (group, lane) = group_and_lane(j);
+        let RodLane { group, lane } = rod_lane(j);
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..=c {
@@ -475,14 +542,17 @@ impl System {
 
     /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its rotation.
     pub fn add_rotation_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
-        let none = (DVec3::ZERO, DVec3::ZERO);
-        self.add_to_node(j, i, (stiffness, 0.0), none);
+        let against_rotation = DiagonalBlocks {
+            rotary: stiffness,
+            translational: 0.0,
+        };
+        self.add_to_node(j, i, against_rotation, Wrench::default());
     }
 
     /// Adds `stiffness` to the matrix between the displacements of nodes `i` and `i` + 1 of
     /// rod `j`.
     pub fn add_adjacent_node_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {
-        let (group, lane) = group_and_lane(j);
+        let RodLane { group, lane } = rod_lane(j);
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..3 {
@@ -493,7 +563,7 @@ impl System {
 }
 
 /// Coupling of every gap per weight.
-pub(super) fn gap_couplings(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
+fn gap_couplings(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
     let gap = move |g: usize| {
         // A node in the mirror plane is not displaced across it.
         let free = match leaf.leaf.is_halved_midrib(g) {
@@ -505,14 +575,15 @@ pub(super) fn gap_couplings(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> 
     (1..leaf.rods()).map(gap)
 }
 
-/// Coupling of the rods of a group with the previous and the next rods.
-pub(super) fn group_couplings(rods: Range<usize>, gaps: &[DVec3]) -> [[NumberGroup; 3]; 2] {
-    let mut coupling = [[NumberGroup::default(); 3]; 2];
+/// E of the rods of a group, from the coupling of all gaps.
+fn group_coupling(rods: Range<usize>, gaps: &[DVec3]) -> GroupCoupling {
+    let mut coupling = GroupCoupling::default();
+    let gap = |g: usize| gaps.get(g).copied().unwrap_or_default();
     for (lane, j) in rods.enumerate() {
-        for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
-            for c in 0..3 {
-                coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
-            }
+        let (before, after) = (gap(j.wrapping_sub(1)), gap(j));
+        for c in 0..3 {
+            coupling.previous[c].0[lane] = before[c];
+            coupling.next[c].0[lane] = after[c];
         }
     }
     coupling
@@ -520,10 +591,12 @@ pub(super) fn group_couplings(rods: Range<usize>, gaps: &[DVec3]) -> [[NumberGro
 
 /// The operands of E p.
 #[derive(Clone, Copy)]
-pub struct CouplingOperator<'a> {
-    /// The p of all groups, and the index of this group.
+pub(super) struct CouplingOperator<'a> {
+    /// The direction p of all groups.
     pub p: &'a [Vec<GroupIncrements>],
+    /// Number of the group of which E p is taken.
     pub group: usize,
+    /// Weights of the nodes in E.
     pub weights: &'a [f64],
 }
 
@@ -535,7 +608,7 @@ impl CouplingOperator<'_> {
         simd: S,
         i: usize,
         c: usize,
-        coupling: &[[NumberGroup; 3]; 2],
+        coupling: &GroupCoupling,
         part: usize,
     ) -> Lanes<S> {
         let at = |group: usize, lane: usize| match self.p.get(group) {
@@ -547,10 +620,10 @@ impl CouplingOperator<'_> {
         let last = at(self.group + 1, 0);
         let previous = NumberGroup([first, own[0], own[1], own[2]]);
         let next = NumberGroup([own[1], own[2], own[3], last]);
-        let pull = Lanes::load_group(simd, &coupling[0][c], part)
+        let pull = Lanes::load_group(simd, &coupling.previous[c], part)
             * Lanes::load_group(simd, &previous, part);
         let next = Lanes::load_group(simd, &next, part);
-        let pull = next.mul_add(Lanes::load_group(simd, &coupling[1][c], part), pull);
+        let pull = next.mul_add(Lanes::load_group(simd, &coupling.next[c], part), pull);
         Lanes::splat(simd, -self.weights[i]) * pull
     }
 
@@ -572,8 +645,8 @@ impl CouplingOperator<'_> {
     }
 }
 
-/// p . (B + E) p.
-pub struct CurvatureKernel<'a> {
+/// Sums p . (B + E) p over a group.
+pub(super) struct CurvatureKernel<'a> {
     pub group: &'a RodGroup,
     pub coupled: CouplingOperator<'a>,
     pub product: NumberGroup,
@@ -594,8 +667,8 @@ impl GroupKernel for CurvatureKernel<'_> {
     }
 }
 
-/// solution += alpha p, residual -= alpha (B + E) p.
-pub struct SolutionUpdateKernel<'a> {
+/// A step of the conjugate gradients: solution += alpha p, residual -= alpha (B + E) p.
+pub(super) struct SolutionUpdateKernel<'a> {
     pub group: &'a mut RodGroup,
     pub coupled: CouplingOperator<'a>,
     pub alpha: f64,
@@ -621,8 +694,8 @@ impl GroupKernel for SolutionUpdateKernel<'_> {
     }
 }
 
-/// p = z + beta p, B p = residual + beta B p.
-pub struct DirectionUpdateKernel<'a> {
+/// The next direction of the conjugate gradients: p = z + beta p, B p = residual + beta B p.
+pub(super) struct DirectionUpdateKernel<'a> {
     pub group: &'a mut RodGroup,
     pub p: &'a mut [GroupIncrements],
     pub beta: f64,
@@ -653,26 +726,26 @@ impl GroupKernel for DirectionUpdateKernel<'_> {
 
 /// The dead moments as of the last assembly, with the workspace of their equations.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct DeadMoments {
-    /// Nodes with equations (from 0) and moments.
-    on_nodes: Vec<(usize, DVec3)>,
-    /// Their equations, row after row, each with its right-hand side last.
+pub(super) struct DeadMoments {
+    /// The moments; nodes from the first with equations.
+    on_nodes: Vec<NodalMoment>,
+    /// The equations (1 + S C) x = S t, row after row, each with its right-hand side last.
     rows: Vec<f64>,
 }
 
 impl DeadMoments {
-    /// Replaces them.
-    pub fn replace_moments(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
+    /// Replaces all moments; nodes from the first with equations.
+    pub fn replace_moments(&mut self, moments: impl Iterator<Item = NodalMoment>) {
         self.on_nodes.clear();
         self.on_nodes.extend(moments);
     }
 
-    /// Nodes (from 1) and moments.
-    pub fn nodal_moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
+    /// The moments; nodes from the first with equations.
+    pub fn nodal_moments(&self) -> impl Iterator<Item = NodalMoment> {
         self.on_nodes.iter().copied()
     }
 
-    /// Whether there are none.
+    /// Whether no dead moment acts.
     pub fn is_empty(&self) -> bool {
         self.on_nodes.is_empty()
     }
@@ -680,9 +753,9 @@ impl DeadMoments {
     /// Writes S times the rotations of the nodes to a column of the equations.
     fn set_column(&mut self, column: usize, rotations: &[GroupIncrements]) {
         let width = 3 * self.on_nodes.len() + 1;
-        for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
-            let turn = node_rotation(&rotations[*node]);
-            let by = turn.cross(0.5 * *moment);
+        for (a, it) in self.on_nodes.iter().enumerate() {
+            let turn = node_rotation(&rotations[it.node]);
+            let by = turn.cross(0.5 * it.moment);
             for c in 0..3 {
                 self.rows[(3 * a + c) * width + column] = by[c];
             }
@@ -690,7 +763,8 @@ impl DeadMoments {
     }
 }
 
-pub(super) fn node_rotation(increments: &GroupIncrements) -> DVec3 {
+/// The rotation of a node of the only rod.
+fn node_rotation(increments: &GroupIncrements) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|c| increments[c].0[0]);
     DVec3::new(x, y, z)
 }
@@ -702,8 +776,11 @@ impl System {
         let size = 3 * dead.on_nodes.len();
         dead.rows.resize(size * (size + 1), 0.0);
         for column in 0..size {
-            let (node, axis) = (dead.on_nodes[column / 3].0, DVec3::AXES[column % 3]);
-            group.set_moment_response(arch, [(node, axis)]);
+            let unit = NodalMoment {
+                node: dead.on_nodes[column / 3].node,
+                moment: DVec3::AXES[column % 3],
+            };
+            group.set_moment_response(arch, [unit]);
             dead.set_column(column, &group.z);
             dead.rows[column * (size + 1) + column] += 1.0;
         }
@@ -711,14 +788,12 @@ impl System {
         if !solve_by_elimination(&mut dead.rows, size) {
             return false;
         }
-        let part = |k: usize| dead.rows[k * (size + 1) + size];
-        let taken = |(a, (node, _)): (usize, &(usize, DVec3))| {
-            (
-                *node,
-                DVec3::new(part(3 * a), part(3 * a + 1), part(3 * a + 2)),
-            )
+        let x = |k: usize| dead.rows[k * (size + 1) + size];
+        let correction = |(a, it): (usize, &NodalMoment)| NodalMoment {
+            node: it.node,
+            moment: DVec3::new(x(3 * a), x(3 * a + 1), x(3 * a + 2)),
         };
-        group.set_moment_response(arch, dead.on_nodes.iter().enumerate().map(taken));
+        group.set_moment_response(arch, dead.on_nodes.iter().enumerate().map(correction));
         for (solution, z) in group.solution.iter_mut().zip(&group.z) {
             for c in 0..6 {
                 solution[c].0[0] -= z[c].0[0];
@@ -730,13 +805,9 @@ impl System {
 
 impl RodGroup {
     /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
-    fn set_moment_response(
-        &mut self,
-        arch: Arch,
-        moments: impl IntoIterator<Item = (usize, DVec3)>,
-    ) {
+    fn set_moment_response(&mut self, arch: Arch, moments: impl IntoIterator<Item = NodalMoment>) {
         self.residual.fill(GroupIncrements::default());
-        for (node, moment) in moments {
+        for NodalMoment { node, moment } in moments {
             for c in 0..3 {
                 self.residual[node][c].0[0] += moment[c];
             }
@@ -749,7 +820,7 @@ impl RodGroup {
 
 /// Solves `size` equations in place by Gaussian elimination with partial pivoting: the solution is
 /// left in the last column. False if they are singular, or not finite.
-pub(super) fn solve_by_elimination(rows: &mut [f64], size: usize) -> bool {
+fn solve_by_elimination(rows: &mut [f64], size: usize) -> bool {
     let width = size + 1;
     for k in 0..size {
         let below = |i: &usize| rows[i * width + k].abs();

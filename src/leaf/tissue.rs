@@ -1,14 +1,13 @@
-//! Tissue between neighbouring veins: the law of a strip ([`TissueStrip`]) at every node of every gap, in
-//! the sums over the leaf.
-//!
-//! What ties neighbouring rods also by moments: the blocks between their nodes.
+//! Tissue between neighbouring veins: the law of a strip ([`TissueStrip`]) at every node of every gap,
+//! in the sums over the leaf, and the blocks between nodes of neighbouring rods, which strips tie by
+//! forces and moments.
 
-use crate::leaf::block_tridiagonal::group_and_lane;
+use crate::leaf::block_tridiagonal::{RodLane, rod_lane};
 use crate::leaf::discrete::{DiscreteLeaf, NodeLoad};
 use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::numbers::{format_two_digits, largest};
-use crate::rod::{NodeBlock, NodePair, TissueStrip};
+use crate::rod::{NodeBlock, NodePair, StripLoads, TissueStrip, Wrench};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
@@ -35,10 +34,50 @@ impl HalfTurn {
     }
 }
 
-/// Angle between two sections, in radians, by which half a turn exceeds theirs at most where an
-/// iteration that ended is taken to have ended at half a turn: such iterations go back and forth
-/// between both sides of the jump.
+/// Largest difference from half a turn, in radians, of the rotation between two sections at which an
+/// iteration is taken to have ended at half a turn: such iterations go back and forth between both
+/// sides of the jump.
 const HALF_TURN_TOLERANCE: f64 = 0.01;
+
+/// A strip of a leaf, with its place.
+#[derive(Clone, Copy)]
+struct PlacedStrip<'a> {
+    /// The gap after rod `gap`.
+    gap: usize,
+    node: usize,
+    strip: &'a TissueStrip,
+}
+
+impl PlacedStrip<'_> {
+    /// The two nodes of the strip in a state.
+    fn ends(&self, state: &State) -> NodePair {
+        strip_ends(state, self.gap, self.node)
+    }
+
+    /// The cosine of half the angle between the sections of the strip, negative where their
+    /// quaternions are on opposite sides.
+    fn cosine_of_half_angle(&self, state: &State) -> f64 {
+        let [a, b] = [self.gap, self.gap + 1].map(|rod| state.q[state.base(rod) + self.node]);
+        a.dot(b)
+    }
+
+    /// The second derivatives of the energy of the strip.
+    fn stiffness(&self, state: &State) -> StripStiffness {
+        StripStiffness {
+            gap: self.gap,
+            node: self.node,
+            matrix: stiffness_matrix(self.strip, &self.ends(state)),
+        }
+    }
+}
+
+/// The second derivatives of the energy of a strip of a leaf.
+pub struct StripStiffness {
+    pub gap: usize,
+    pub node: usize,
+    /// By the unknowns (rotation, displacement) of both nodes.
+    pub matrix: SMatrix<f64, 12, 12>,
+}
 
 impl DiscreteLeaf {
     /// For every strip, whether the quaternions of its nodes are on the same side: in a continuous
@@ -46,7 +85,7 @@ impl DiscreteLeaf {
     pub fn strip_alignments(&self, state: &State) -> Vec<bool> {
         let strips = self.each_strip();
         strips
-            .map(|(g, i, _)| cosine_of_half(state, g, i) >= 0.0)
+            .map(|it| it.cosine_of_half_angle(state) >= 0.0)
             .collect()
     }
 
@@ -54,38 +93,38 @@ impl DiscreteLeaf {
     /// motion that began with these alignments.
     pub fn half_turn_since(&self, alignments: &[bool], state: &State) -> Option<HalfTurn> {
         let mut strips = self.each_strip().zip(alignments);
-        let passed = strips.find(|((g, i, strip), aligned)| {
-            (cosine_of_half(state, *g, *i) >= 0.0) != **aligned && strip.has_stiffness()
+        let passed = strips.find(|(it, aligned)| {
+            (it.cosine_of_half_angle(state) >= 0.0) != **aligned && it.strip.has_stiffness()
         });
-        passed.map(|((g, i, _), _)| self.half_turn(g, i))
+        passed.map(|(it, _)| self.half_turn(it))
     }
 
     /// The place where sections are turned against each other by half a turn, nearly.
     pub fn half_turn_near(&self, state: &State) -> Option<HalfTurn> {
-        let acting = self
-            .each_strip()
-            .filter(|(.., strip)| strip.has_stiffness());
-        let cosines = acting.map(|(g, i, _)| (cosine_of_half(state, g, i).abs(), g, i));
-        let (cosine, g, i) = cosines.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (cosine < (0.5 * HALF_TURN_TOLERANCE).sin()).then(|| self.half_turn(g, i))
+        let acting = self.each_strip().filter(|it| it.strip.has_stiffness());
+        let cosine = |it: &PlacedStrip| it.cosine_of_half_angle(state).abs();
+        let nearest = acting.min_by(|a, b| cosine(a).total_cmp(&cosine(b)))?;
+        (cosine(&nearest) < (0.5 * HALF_TURN_TOLERANCE).sin()).then(|| self.half_turn(nearest))
     }
 
-    fn half_turn(&self, gap: usize, node: usize) -> HalfTurn {
-        let sigma = self.grid.sigma()[node];
-        HalfTurn { gap, sigma }
+    fn half_turn(&self, at: PlacedStrip) -> HalfTurn {
+        HalfTurn {
+            gap: at.gap,
+            sigma: self.grid.sigma()[at.node],
+        }
     }
 
     /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
     /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
     /// joint tip, where they resist rotations.
-    pub(super) fn strips(&self, natural: &State) -> Vec<TissueStrip> {
+    pub(super) fn tissue_strips(&self, natural: &State) -> Vec<TissueStrip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
-            let [stiffness, fold] = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);
+            let stiffness = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);
             let weight = self.grid.node_weight(i);
             TissueStrip::stress_free_between(
-                weight * stiffness,
-                weight * fold.x,
+                weight * stiffness.displacement,
+                weight * stiffness.fold,
                 &strip_ends(natural, g, i),
             )
         };
@@ -109,7 +148,10 @@ impl DiscreteLeaf {
             let gaps = gaps.into_iter().flatten();
             let k = 2.0
                 * gaps
-                    .map(|g| self.leaf.tissue_stiffness(g, 0.5)[0].max_element())
+                    .map(|g| {
+                        let stiffness = self.leaf.tissue_stiffness(g, 0.5);
+                        stiffness.displacement.max_element()
+                    })
                     .sum::<f64>();
             let section = self.leaf.section(j, 0.5, 1.0);
             let (length, softest) = (section.ds, section.couple_stiffness.min_element());
@@ -138,10 +180,9 @@ impl DiscreteLeaf {
         for (gap, end) in gaps {
             let Some(g) = gap else { continue };
             let (strip, ends) = (self.strip(g, i), strip_ends(state, g, i));
-            let (energy, loads) = strip.energy_and_loads(&ends);
-            let [moment, force] = loads[end];
-            load.moment += moment;
-            load.force += force;
+            let StripLoads { energy, on_nodes } = strip.loads(&ends);
+            load.moment += on_nodes[end].moment;
+            load.force += on_nodes[end].force;
             if end == 0 {
                 load.energy += energy;
             }
@@ -149,24 +190,36 @@ impl DiscreteLeaf {
         load
     }
 
-    fn each_strip(&self) -> impl Iterator<Item = (usize, usize, &TissueStrip)> {
+    fn each_strip(&self) -> impl Iterator<Item = PlacedStrip<'_>> {
         let nodes = self.segments() + 1;
         let strips = self.strips.iter().enumerate();
-        strips.map(move |(k, strip)| (k / nodes, k % nodes, strip))
+        strips.map(move |(k, strip)| PlacedStrip {
+            gap: k / nodes,
+            node: k % nodes,
+            strip,
+        })
     }
 
     /// Adds the tissue to the right-hand side of an assembled system and, if `matrix`, to its matrix,
     /// where nodes move; returns its energy.
     pub(super) fn add_tissue(&self, state: &State, system: &mut System, matrix: bool) -> f64 {
         let mut energy = 0.0;
-        for (g, i, strip) in self.each_strip() {
-            let ends = strip_ends(state, g, i);
-            let (own, mut loads) = strip.energy_and_loads(&ends);
+        for placed in self.each_strip() {
+            let PlacedStrip {
+                gap: g,
+                node: i,
+                strip,
+            } = placed;
+            let ends = placed.ends(state);
+            let StripLoads {
+                energy: own,
+                on_nodes: mut loads,
+            } = strip.loads(&ends);
             energy += own;
             if i < self.first_node() {
                 continue;
             }
-            let force = self.tissue_force(state, (g, i), strip, &ends);
+            let force = self.tissue_force(state, placed, &ends);
             if !state.tissue.is_empty() {
                 loads = strip.condensed_loads(&ends, force);
             }
@@ -185,16 +238,10 @@ impl DiscreteLeaf {
     }
 
     /// The spatial force that a strip carries in a state.
-    fn tissue_force(
-        &self,
-        state: &State,
-        (g, i): (usize, usize),
-        strip: &TissueStrip,
-        ends: &NodePair,
-    ) -> DVec3 {
-        match state.tissue.get(g * (self.segments() + 1) + i) {
-            Some(force) => self.grid.node_weight(i) * *force,
-            None => strip.force(ends),
+    fn tissue_force(&self, state: &State, at: PlacedStrip, ends: &NodePair) -> DVec3 {
+        match state.tissue.get(at.gap * (self.segments() + 1) + at.node) {
+            Some(force) => self.grid.node_weight(at.node) * *force,
+            None => at.strip.force(ends),
         }
     }
 
@@ -207,9 +254,14 @@ impl DiscreteLeaf {
         next: &mut State,
     ) {
         next.tissue.resize(self.strips.len(), DVec3::ZERO);
-        for (k, (g, i, strip)) in self.each_strip().enumerate() {
-            let ends = strip_ends(state, g, i);
-            let force = self.tissue_force(state, (g, i), strip, &ends);
+        for (k, placed) in self.each_strip().enumerate() {
+            let PlacedStrip {
+                gap: g,
+                node: i,
+                strip,
+            } = placed;
+            let ends = placed.ends(state);
+            let force = self.tissue_force(state, placed, &ends);
             let change = match i < self.first_node() {
                 true => DVec3::ZERO,
                 false => {
@@ -223,87 +275,73 @@ impl DiscreteLeaf {
     }
 
     /// Adds the moments and forces of all tissue on all nodes, rod after rod.
-    pub fn add_tissue_loads(&self, state: &State, loads: &mut [[DVec3; 2]]) {
-        for (g, i, strip) in self.each_strip() {
-            let (_, [a, b]) = strip.energy_and_loads(&strip_ends(state, g, i));
-            for (rod, [moment, force]) in [(g, a), (g + 1, b)] {
-                let load = &mut loads[state.base(rod) + i];
-                load[0] += moment;
-                load[1] += force;
+    pub fn add_tissue_loads(&self, state: &State, loads: &mut [Wrench]) {
+        for placed in self.each_strip() {
+            let [a, b] = placed.strip.loads(&placed.ends(state)).on_nodes;
+            for (rod, added) in [(placed.gap, a), (placed.gap + 1, b)] {
+                let load = &mut loads[state.base(rod) + placed.node];
+                load.moment += added.moment;
+                load.force += added.force;
             }
         }
     }
 
-    /// Gap, node and the second derivatives of the energy of every strip, by the unknowns of both
-    /// nodes.
-    pub fn tissue_stiffness(
-        &self,
-        state: &State,
-    ) -> impl Iterator<Item = (usize, usize, SMatrix<f64, 12, 12>)> {
-        self.each_strip()
-            .map(|(g, i, strip)| (g, i, stiffness(strip, &strip_ends(state, g, i))))
+    /// The second derivatives of the energy of every strip.
+    pub fn tissue_stiffness(&self, state: &State) -> impl Iterator<Item = StripStiffness> {
+        self.each_strip().map(|it| it.stiffness(state))
     }
 
-    /// The changes of moment and force of the strip of node `i` in gap `g` on its two nodes, by
-    /// increments of both.
+    /// The changes of the loads of the strip of node `i` in gap `g` on its two nodes, by increments of
+    /// both.
     pub(super) fn tissue_response(
         &self,
         state: &State,
-        (g, i): (usize, usize),
-        increments: &[Increment; 2],
-    ) -> [[DVec3; 2]; 2] {
-        let both = SVector::<f64, 12>::from_fn(|k, _| increments[k / 6][k % 6]);
-        let change = stiffness(self.strip(g, i), &strip_ends(state, g, i)) * both;
-        let vector = |first: usize| DVec3::from_slice(&change.as_slice()[first..first + 3]);
-        [0, 6].map(|node| [-vector(node), -vector(node + 3)])
-    }
-
-    /// The largest stiffness against displacements, that against a fold, and the natural width of
-    /// the strips on either side of node `i` of rod `j`.
-    pub fn adjacent_tissue_stiffness(
-        &self,
-        j: usize,
+        g: usize,
         i: usize,
-    ) -> impl Iterator<Item = (f64, f64, f64)> {
-        let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
-        let gaps = gaps.filter(|g| self.has_tissue() && g + 1 < self.rods());
-        gaps.map(move |g| {
-            let strip = self.strip(g, i);
-            (
-                strip.stiffness.max_element(),
-                strip.fold_stiffness,
-                strip.stress_free_gap.length(),
-            )
+        increments: &[Increment; 2],
+    ) -> [Wrench; 2] {
+        let both = SVector::<f64, 12>::from_fn(|k, _| increments[k / 6][k % 6]);
+        let change = stiffness_matrix(self.strip(g, i), &strip_ends(state, g, i)) * both;
+        let vector = |first: usize| DVec3::from_slice(&change.as_slice()[first..first + 3]);
+        [0, 6].map(|node| Wrench {
+            moment: -vector(node),
+            force: -vector(node + 3),
         })
     }
 
-    /// The changes of energy and loads of the strip of node `i` in gap `g` by a change of it.
+    /// The strips on either side of node `i` of rod `j`.
+    pub fn adjacent_strips(&self, j: usize, i: usize) -> impl Iterator<Item = &TissueStrip> {
+        let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
+        let gaps = gaps.filter(|g| self.has_tissue() && g + 1 < self.rods());
+        gaps.map(move |g| self.strip(g, i))
+    }
+
+    /// The changes of energy and loads of the strip of node `i` in gap `g` by a change of the strip.
     pub(super) fn strip_derivatives(
         &self,
         state: &State,
-        (g, i): (usize, usize),
+        g: usize,
+        i: usize,
         change: &TissueStrip,
-    ) -> (f64, [[DVec3; 2]; 2]) {
+    ) -> StripLoads {
         self.strip(g, i)
             .parameter_derivative(&strip_ends(state, g, i), change)
     }
 
     /// Second derivatives of the energy of the tissue along a shape, at all nodes but clamped bases.
-    pub fn tissue_curvature(&self, state: &State, shape: &[crate::leaf::Increment]) -> f64 {
-        let moving = self
-            .tissue_stiffness(state)
-            .filter(|(_, i, _)| *i >= self.first_node());
-        let each = moving.map(|(g, i, stiffness)| {
-            let [a, b] = [g, g + 1].map(|rod| &shape[state.base(rod) + i]);
+    pub fn tissue_curvature(&self, state: &State, shape: &[Increment]) -> f64 {
+        let moving = self.each_strip().filter(|it| it.node >= self.first_node());
+        let each = moving.map(|it| {
+            let [a, b] = [it.gap, it.gap + 1].map(|rod| &shape[state.base(rod) + it.node]);
             let both = SVector::<f64, 12>::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] });
-            both.dot(&(stiffness * both))
+            both.dot(&(it.stiffness(state).matrix * both))
         });
         each.sum()
     }
 }
 
 /// The second derivatives of the energy of a strip by the unknowns of both nodes.
-fn stiffness(strip: &TissueStrip, ends: &NodePair) -> SMatrix<f64, 12, 12> {
+fn stiffness_matrix(strip: &TissueStrip, ends: &NodePair) -> SMatrix<f64, 12, 12> {
     let hessian = strip.hessian(ends);
     SMatrix::from_fn(|r, c| match (r / 6, c / 6) {
         (0, 1) => hessian.off_diagonal_block[r][c - 6],
@@ -312,13 +350,7 @@ fn stiffness(strip: &TissueStrip, ends: &NodePair) -> SMatrix<f64, 12, 12> {
     })
 }
 
-/// The cosine of half the angle between the sections of a strip, negative where their quaternions
-/// are on opposite sides.
-fn cosine_of_half(state: &State, g: usize, i: usize) -> f64 {
-    state.q[state.base(g) + i].dot(state.q[state.base(g + 1) + i])
-}
-
-/// The two nodes of a strip.
+/// The two nodes of the strip of node `i` in gap `g`.
 fn strip_ends(state: &State, g: usize, i: usize) -> NodePair {
     let nodes = [g, g + 1].map(|rod| state.base(rod) + i);
     NodePair {
@@ -328,7 +360,7 @@ fn strip_ends(state: &State, g: usize, i: usize) -> NodePair {
 }
 
 impl System {
-    /// Whether tissue ties neighbours, also by moments: then the matrix must be factorised as a
+    /// Whether tissue ties neighbours, also by moments: then the matrix must be factorized as a
     /// whole, as rod by rod conjugate gradients take too many iterations.
     pub fn has_tissue(&self) -> bool {
         !self.gap_blocks.is_empty()
@@ -340,7 +372,8 @@ impl System {
         std::array::from_fn(|c| self.has_tissue() || c >= 3 && along(c - 3))
     }
 
-    /// The block between node `i` (from the first with equations) of rod `g` and that of the next, if there is tissue.
+    /// The block between node `i` (from the first with equations) of rod `g` and the same node of the
+    /// next rod, if there is tissue.
     pub(super) fn gap_block(&self, g: usize, i: usize) -> Option<&NodeBlock> {
         match self.has_tissue() && g + 1 < self.rods {
             true => Some(&self.gap_blocks[g * self.nodes() + i]),
@@ -348,7 +381,7 @@ impl System {
         }
     }
 
-    /// The same, to be changed.
+    /// As [`System::gap_block`], to be changed.
     pub(super) fn gap_block_mut(&mut self, g: usize, i: usize) -> &mut NodeBlock {
         let nodes = self.nodes();
         &mut self.gap_blocks[g * nodes + i]
@@ -356,7 +389,7 @@ impl System {
 
     /// Adds the upper triangle of a block to the matrix at node `i` of rod `j`.
     pub(super) fn add_block(&mut self, j: usize, i: usize, block: &NodeBlock) {
-        let (group, lane) = group_and_lane(j);
+        let RodLane { group, lane } = rod_lane(j);
         let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for (r, row) in block.iter().enumerate() {
             for c in r..row.len() {
@@ -365,13 +398,13 @@ impl System {
         }
     }
 
-    /// Adds a moment and a force to the right-hand side of node `i` of rod `j`.
-    pub fn add_load(&mut self, j: usize, i: usize, [moment, force]: [DVec3; 2]) {
-        let (group, lane) = group_and_lane(j);
+    /// Adds a load to the right-hand side of node `i` of rod `j`.
+    pub fn add_load(&mut self, j: usize, i: usize, load: Wrench) {
+        let RodLane { group, lane } = rod_lane(j);
         let rhs = &mut self.groups[group].rhs[i - self.first];
         for c in 0..3 {
-            rhs[c].0[lane] += moment[c];
-            rhs[3 + c].0[lane] += force[c];
+            rhs[c].0[lane] += load.moment[c];
+            rhs[3 + c].0[lane] += load.force[c];
         }
     }
 }

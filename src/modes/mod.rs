@@ -6,10 +6,10 @@
 //! A positive lambda is the square of a frequency, a negative one that of the
 //! rate at which the leaf leaves an unstable equilibrium.
 //!
-//! K - sigma M is factorised for a sigma below all eigenvalues, as the signs
+//! K - sigma M is factorized for a sigma below all eigenvalues, as the signs
 //! of its pivots prove, and the Lanczos method finds the eigenvalues nearest to
 //! sigma. Their number below the last one found follows from
-//! the signs of the pivots of a second factorisation there (Sylvester's law): missing ones,
+//! the signs of the pivots of a second factorization there (Sylvester's law): missing ones,
 //! such as the second one of a double eigenvalue, are
 //! searched for until the numbers agree. A list whose completeness cannot
 //! be proved is not returned.
@@ -23,12 +23,12 @@
 mod lanczos;
 
 use crate::leaf::{
-    DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,
-    displacement_part, hessian_at_constant_force, rotation_part,
+    DiagonalBlocks, DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State,
+    System, displacement_part, hessian_at_constant_force, rotation_part,
 };
 use crate::modes::lanczos::{Lanczos, NormalizedEigenvector, RitzBound};
 use crate::motion::Physics;
-use crate::rod::{Section, Segment};
+use crate::rod::{Section, Segment, Wrench};
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
 
@@ -201,7 +201,7 @@ impl Vibration<'_> {
         self.masses.add_to_system(system, -shift);
     }
 
-    /// K - shift M, factorised.
+    /// K - shift M, factorized.
     fn factorize(&self, system: &mut System, shift: f64) -> Option<MatrixFactors> {
         self.assemble(system, shift);
         self.direct_solver.factorize(system, 0.0).ok()
@@ -444,12 +444,12 @@ impl MassMatrix {
             let inertia = physics.inertia(leaf, j, i);
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
             // Fixed components have no mass.
-            let [turns, shifts] = leaf.allows_rotation_and_displacement(j, i);
+            let free = leaf.node_freedom(j, i);
             NodeMassBlock {
                 index: (j, i),
                 unknowns: pattern.unknowns(j, i),
-                tensor: if turns { tensor } else { DMat3::ZERO },
-                mass: if shifts { inertia.mass } else { 0.0 },
+                tensor: if free.rotation { tensor } else { DMat3::ZERO },
+                mass: if free.displacement { inertia.mass } else { 0.0 },
             }
         };
         let nodes = leaf
@@ -478,8 +478,12 @@ impl MassMatrix {
     /// Adds `factor` M to the matrix of a system.
     pub fn add_to_system(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let ((j, i), none) = (node.index, (DVec3::ZERO, DVec3::ZERO));
-            system.add_to_node(j, i, (node.tensor * factor, node.mass * factor), none);
+            let (j, i) = node.index;
+            let stiffness = DiagonalBlocks {
+                rotary: node.tensor * factor,
+                translational: node.mass * factor,
+            };
+            system.add_to_node(j, i, stiffness, Wrench::default());
         }
     }
 }
@@ -630,7 +634,7 @@ impl Eigenpair {
     }
 }
 
-/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighbouring
+/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighboring
 /// leaf and state: their errors have only a second-order effect. In the
 /// scenario's unit of time.
 pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &Eigenpair) -> f64 {

@@ -8,15 +8,15 @@
 //!
 //! With the symmetric matrix K without them and the derivative W of them, (1 - K^-1 W) d = K^-1 r
 //! is solved by GMRES ([`solve_minimal_residual`]). K is
-//! factorised once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
+//! factorized once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
 mod force_progress;
 
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
 use crate::leaf::{
-    DirectError, DirectSolver, DiscreteLeaf, Increment, LinearSolveOutcome, MatrixFactors,
-    NodalField, State, System,
+    DirectError, DirectSolver, DiscreteLeaf, Increment, LinearSolveOutcome, MassLoad,
+    MatrixFactors, NodalField, State, System,
 };
 pub use crate::newton::force_progress::ForceConvergence;
 use crate::numbers::larger;
@@ -45,7 +45,7 @@ const REPEATED_SOLVE_ACCURACY: f64 = 1e-10;
 pub struct SolverCounts {
     /// Accepted steps (time steps or Newton iterations).
     pub steps: usize,
-    /// Factorisations of a leaf matrix, rod by rod or sparse.
+    /// Factorizations of a leaf matrix, rod by rod or sparse.
     pub factorizations: usize,
     /// Evaluations of all internal forces of the leaf.
     pub force_evaluations: usize,
@@ -117,7 +117,7 @@ pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
 }
 
 /// Solver for matrices that must be positive definite: by conjugate gradients preconditioned
-/// by the factorised rods, or directly once these have proved too slow.
+/// by the factorized rods, or directly once these have proved too slow.
 #[derive(Default)]
 pub struct DefiniteSolver {
     /// The observed convergence of Newton's method so far.
@@ -136,13 +136,13 @@ impl DefiniteSolver {
         }
     }
 
-    /// Factorises K + `shift` M and solves for the assembled right-hand side plus
+    /// Factorizes K + `shift` M and solves for the assembled right-hand side plus
     /// `inertia`.
     pub fn solve(
         &mut self,
         system: &mut System,
         shift: f64,
-        inertia: Option<(&[Vec<Increment>], f64)>,
+        inertia: Option<MassLoad>,
         tolerance: f64,
         work: &mut SolverCounts,
     ) -> Result<(), LinearSolveFailure> {
@@ -190,7 +190,7 @@ impl DefiniteSolver {
 
 /// The linear equations of an iteration, and its limits on increments.
 pub enum NewtonEquations<'s> {
-    /// With pivots of any sign, by a sparse factorisation whose pattern is reused; increments
+    /// With pivots of any sign, by a sparse factorization whose pattern is reused; increments
     /// are shortened to the given size. Converges to an equilibrium nearby, stable or not,
     /// like a solver of boundary-value problems.
     Indefinite { largest: f64 },
@@ -263,7 +263,7 @@ struct NewtonLinearSolver<'s> {
 
 impl NewtonIteration<'_> {
     /// Newton's method from a state; returns the remaining iteration error. The last
-    /// factorisation stays in the system.
+    /// factorization stays in the system.
     pub fn solve(
         self,
         leaf: &DiscreteLeaf,
@@ -368,8 +368,7 @@ impl NewtonIteration<'_> {
 
 /// The largest rotation or displacement of the last solution.
 fn largest_increment(system: &System) -> f64 {
-    let (turn, shift) = system.largest_increment();
-    larger(turn, shift)
+    system.largest_increment().larger()
 }
 
 impl NewtonLinearSolver<'_> {
@@ -452,8 +451,11 @@ impl NewtonLinearSolver<'_> {
             NewtonEquations::Proximal {
                 solver, at, rate, ..
             } => {
-                state.increments_to(at, system.first(), &mut self.return_increments);
-                let springs = Some((self.return_increments.as_slice(), *rate));
+                state.increments_to(at, system.first_node(), &mut self.return_increments);
+                let springs = Some(MassLoad {
+                    field: &self.return_increments,
+                    factor: *rate,
+                });
                 let shift = self.neutral + *rate;
                 match solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work) {
                     Ok(()) => Ok(PROXIMAL_ACCURACY),

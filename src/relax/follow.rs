@@ -2,7 +2,9 @@
 //! the same grids, as long as they are stable, and elsewhere only where it is told so.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State, Weighted,
+};
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
@@ -144,10 +146,7 @@ pub(super) fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) ->
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);
     state.n.iter_mut().for_each(|n| *n *= force);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.base(j);
-    }
+    leaf.place_bases(&mut state);
     state
 }
 
@@ -278,10 +277,7 @@ impl EquilibriumTracker {
         }
         let grid = Grid::from_stations(stations, leaf.kinks());
         let mut state = state_from_rod_shapes(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
-        for j in 0..leaf.rods() {
-            let base = state.base(j);
-            (state.x[base], state.q[base]) = leaf.base(j);
-        }
+        leaf.place_bases(&mut state);
         leaf.place_held_tips(&mut state);
         EquilibriumTracker::begin_from(scenario, options, StateOnGrid { grid, state })
     }
@@ -479,7 +475,11 @@ impl EquilibriumTracker {
         let near = near.unwrap_or_else(|| self.at.without_estimates());
         let found = match self.has_same_structure(&leaf) {
             true => {
-                let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
+                let terms = [(-1.0, &self.scenario), (1.0, &scenario)];
+                let terms = terms.map(|(weight, scenario)| Weighted {
+                    weight,
+                    term: Scenario::clone(scenario),
+                });
                 let rate = LeafParameterDerivative::new(&near.levels[0].leaf.leaf, &terms);
                 let mut responses = Vec::new();
                 for level in &near.levels {

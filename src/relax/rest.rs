@@ -313,10 +313,7 @@ pub fn relax_from(
         .map(|rod| interpolate_rod_shape(stations, rod, grid.sigma()))
         .collect::<Vec<_>>();
     let mut state = state_from_rod_shapes(&leaf, &discrete, &there);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.base(j);
-    }
+    leaf.place_bases(&mut state);
     leaf.place_held_tips(&mut state);
     let mut effort = WorkLog::new(progress);
     let begun = NestedEquilibrium::without_grids(&problem);

@@ -6,7 +6,6 @@ use crate::leaf::{
     DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, NodalField, State, System,
 };
 use crate::newton::{NewtonEquations, NewtonIteration, SolverCounts};
-use crate::numbers::larger;
 use crate::relax::same_equilibrium::{are_different_sides, are_equally_low, is_noticed_saddle};
 use glam::DVec3;
 use serde::Serialize;
@@ -283,9 +282,8 @@ pub fn find_unstable_mode(
 
 /// Displaces a state along the mode that was found, to the side of this sign.
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
-    let (turn, displacement) = system.largest_increment();
     let mut pushed = state.clone();
-    let step = sign * ESCAPE.distance / larger(turn, displacement);
+    let step = sign * ESCAPE.distance / system.largest_increment().larger();
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }

@@ -4,8 +4,9 @@
 //! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{
-    DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative, LinearResponse, LinearSolveOutcome,
-    MatrixFactors, NodalField, ParameterForces, State, System, displacement_part, rotation_part,
+    DenseParameterForces, DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative,
+    LinearResponse, LinearSolveOutcome, MatrixFactors, NodalField, ParameterForces, State, System,
+    Weighted, displacement_part, rotation_part,
 };
 use crate::modes::Eigenpair;
 use crate::motion::Physics;
@@ -29,7 +30,7 @@ struct DifferentiatedParameter<'n, 'a> {
     key: &'n String,
     parameter: &'n Parameter<'a>,
     /// The derivative of the scenario, as a weighted sum of scenarios.
-    rate: Vec<(f64, Scenario)>,
+    rate: Vec<Weighted<Scenario>>,
     /// Scenarios for finite differences; none where no result needs these.
     neighbours: Vec<NeighbouringScenario>,
 }
@@ -277,8 +278,9 @@ impl SensitivityGrid<'_> {
             let n = leaf.segments();
             let tip = |j: usize| displacement_part(&response.node_increment(leaf, j, n));
             // The work of dead moments is not part of the energy.
-            let works = leaf.dead_moments().map(|(node, moment)| {
-                moment.dot(rotation_part(&response.node_increment(leaf, 0, node)))
+            let works = leaf.dead_moments().map(|it| {
+                let turn = rotation_part(&response.node_increment(leaf, 0, it.node));
+                it.moment.dot(turn)
             });
             let work: f64 = works.sum();
             ResultDerivatives {
@@ -352,7 +354,7 @@ impl SensitivityGrid<'_> {
             let (bases, nodes) = rod.split_at(1 - self.level.leaf.first_node());
             let base = bases
                 .first()
-                .map_or(rate.base_motion_rates(j)[0], displacement_part);
+                .map_or(rate.base_motion_rate(j).displacement, displacement_part);
             let nodes = nodes.iter().skip(self.stride - 1).step_by(self.stride);
             [base]
                 .into_iter()
@@ -484,14 +486,14 @@ impl NeighbouringEquilibria {
 
     /// The derivatives of the moments of the rods on a clamp.
     pub fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
-        self.vector_derivatives(level, |leaf, state| leaf.reaction(state).1)
+        self.vector_derivatives(level, |leaf, state| leaf.reaction(state).moments)
     }
 
     /// The derivatives of the moments on grips about their middles.
     pub fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
         self.vector_derivatives(level, |leaf, state| {
             let reactions = leaf.grip_reactions(state).into_iter();
-            reactions.map(|[_, moment]| moment).collect()
+            reactions.map(|on_grip| on_grip.moment).collect()
         })
     }
 
@@ -613,7 +615,7 @@ impl Parameter<'_> {
     }
 
     /// The derivative of the scenario as a weighted sum of scenarios.
-    pub fn rate(&self) -> Option<Vec<(f64, Scenario)>> {
+    pub fn rate(&self) -> Option<Vec<Weighted<Scenario>>> {
         let found = match self.linear {
             true => self.differences(STEPS.linear * self.step_unit(), &[&LINEAR_DIFFERENCE_RULE]),
             false => self.differences(
@@ -622,7 +624,11 @@ impl Parameter<'_> {
             ),
         };
         let terms = found?.into_iter();
-        Some(terms.map(|near| (near.weight, near.scenario)).collect())
+        let weighted = terms.map(|near| Weighted {
+            weight: near.weight,
+            term: near.scenario,
+        });
+        Some(weighted.collect())
     }
 
     /// Neighbouring scenarios for the finite difference of a function of the scenario.
@@ -765,7 +771,10 @@ fn response(
     load: &ParameterForces,
     solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
 ) -> Option<LinearResponse> {
-    let (mut rhs, mut gaps) = load.dense(leaf);
+    let DenseParameterForces {
+        nodes: mut rhs,
+        mut gaps,
+    } = load.dense(leaf);
     let mut response = LinearResponse {
         nodes: NodalField::new(),
         force_changes: vec![DVec3::ZERO; gaps.len()],
@@ -799,9 +808,9 @@ pub(crate) fn displace_along_response(
     let mut state = level.state.clone();
     for j in 0..state.rods() {
         let base = state.base(j);
-        let [shift, turn] = rate.base_motion_rates(j);
-        state.x[base] += step * shift;
-        state.q[base] = (rotation::exp(step * turn) * state.q[base]).normalize();
+        let motion = rate.base_motion_rate(j);
+        state.x[base] += step * motion.displacement;
+        state.q[base] = (rotation::exp(step * motion.rotation) * state.q[base]).normalize();
     }
     response.advance(&mut state, step);
     state

@@ -29,9 +29,10 @@ mod segment;
 mod strip;
 
 pub use crate::rod::segment::{
-    LaneSections, NodePair, Section, SectionParameterDerivative, Segment, SegmentHessian,
+    LaneSections, NodePair, Section, SectionParameterDerivative, Segment, SegmentGradient,
+    SegmentHessian, Wrench,
 };
-pub use crate::rod::strip::{NodeBlock, TissueStrip};
+pub use crate::rod::strip::{NodeBlock, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, RelativeRotation};
 use crate::simd::{Lanes, Vectors};
 use pulp::Simd;

@@ -9,6 +9,21 @@ use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
+/// Moment and force on a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    pub moment: DVec3,
+    pub force: DVec3,
+}
+
+impl Wrench {
+    /// A force without a moment.
+    pub fn from_force(force: DVec3) -> Self {
+        let moment = DVec3::ZERO;
+        Wrench { moment, force }
+    }
+}
+
 /// The two nodes of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct NodePair {
@@ -71,6 +86,21 @@ pub struct Segment {
     /// R^T (x1 - x0) - ds w: the residual of the constitutive law.
     pub gap: DVec3,
     relative: RelativeRotation<Scalar>,
+}
+
+/// First derivatives with respect to x = x1 - x0 and the spatial rotation increments a, b of the two
+/// nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct SegmentGradient {
+    pub x: DVec3,
+    pub a: DVec3,
+    pub b: DVec3,
+}
+
+impl From<[DVec3; 3]> for SegmentGradient {
+    fn from([x, a, b]: [DVec3; 3]) -> Self {
+        SegmentGradient { x, a, b }
+    }
 }
 
 /// Second derivatives with respect to (x1 - x0) and the spatial rotation
@@ -180,9 +210,8 @@ impl Segment {
         least * (squared_wave_number * ds).powi(2) * ds / 6.0
     }
 
-    /// First derivatives of Pi at fixed force: with respect to x1 (that to x0 is its negative)
-    /// and to the rotations of the two nodes.
-    pub fn gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
+    /// First derivatives of Pi at fixed force.
+    pub fn gradient(&self, section: &Section) -> SegmentGradient {
         self.element()
             .gradient(&section.into())
             .map(DVec3::from)
@@ -191,7 +220,7 @@ impl Segment {
 
     /// As [`Segment::gradient`], with the force condensed out: the right-hand side for
     /// [`Segment::hessian`].
-    pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
+    pub fn condensed_gradient(&self, section: &Section) -> SegmentGradient {
         let gradient = self.element().condensed(&section.into());
         gradient.map(DVec3::from).into()
     }
@@ -256,11 +285,15 @@ impl Segment {
     }
 
     /// The change of the condensed gradient by a change of the gap.
-    pub fn gap_gradient(&self, section: &Section, gap: DVec3) -> (DVec3, DVec3, DVec3) {
+    pub fn gap_gradient(&self, section: &Section, gap: DVec3) -> SegmentGradient {
         let correction = section.condensing * gap;
         let g_mu = self.nu.cross(section.compliance * correction) - self.w.cross(correction);
         let [a, b] = self.nodal_derivatives(g_mu, DVec3::ZERO);
-        (self.frame * (correction / section.ds), a, b)
+        SegmentGradient {
+            x: self.frame * (correction / section.ds),
+            a,
+            b,
+        }
     }
 
     /// Converts derivatives with respect to the rotation of the midpoint, and to the
@@ -313,9 +346,9 @@ pub struct LaneSections<S: Simd> {
 }
 
 impl<S: Simd> LaneSections<S> {
-    /// The sections of the lanes from `part` on.
+    /// The sections of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
-    pub fn gather(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
+    pub fn from_group_sections(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
         let ds = NumberGroup([a.ds, b.ds, c.ds, d.ds]);
         let ds = Lanes::load_group(simd, &ds, part);
         let vectors = |of: fn(&Section) -> DVec3| {
@@ -336,7 +369,7 @@ impl<S: Simd> LaneSections<S> {
 impl From<&Section> for LaneSections<Scalar> {
     #[inline]
     fn from(section: &Section) -> Self {
-        LaneSections::gather(Scalar, [section; GROUP], 0)
+        LaneSections::from_group_sections(Scalar, [section; GROUP], 0)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Tissue between two neighbouring veins: the midpoint element laid across, from a node of one to
+//! Tissue between two neighboring veins: the midpoint element laid across, from a node of one to
 //! the node of the other at an equal fraction of their lengths.
 //!
 //! With the geodesic midpoint R of the rotations q0 and q1 of both nodes, the positions x0 and x1
@@ -7,13 +7,13 @@
 //! e = R^T (x1 - x0) - \[natural\],   theta = log(q0^* q1) - \[natural\],
 //! E = 1/2 sum_k k_k e_k^2 + 1/2 c_1 theta_1^2.
 //!
-//! k_1 resists neighbours that slide along each other, k_2 a change of width, k_3 one vein that rises
+//! k_1 resists neighbors that slide along each other, k_2 a change of width, k_3 one vein that rises
 //! above the other, c_1 a fold along the veins. As a segment a strip carries a spatial
 //! force as a further unknown, which is condensed out ([`Element`]), so that Newton's method
 //! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
 //! direction, in which it then carries no force.
 
-use crate::rod::segment::{LaneSections, NodePair, Section};
+use crate::rod::segment::{LaneSections, NodePair, Section, Wrench};
 use crate::rod::{Element, FirstDerivatives, LaneNodes, UNKNOWNS, nodal_gradient};
 use crate::rotation;
 use crate::simd::Vectors;
@@ -23,7 +23,7 @@ use pulp::Scalar;
 /// A block of a matrix of the unknowns (rotation, displacement) of a node, rows first.
 pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 
-/// The tissue that belongs to a node of two neighbouring veins; also its derivative with respect
+/// The tissue that belongs to a node of two neighboring veins; also its derivative with respect
 /// to a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissueStrip {
@@ -43,6 +43,14 @@ pub struct StripHessian {
     pub diagonal_blocks: [NodeBlock; 2],
     /// The block between the first and the second.
     pub off_diagonal_block: NodeBlock,
+}
+
+/// The energy of a strip, and what it exerts on its two nodes; also their derivatives with respect to a
+/// parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct StripLoads {
+    pub energy: f64,
+    pub on_nodes: [Wrench; 2],
 }
 
 impl TissueStrip {
@@ -120,8 +128,8 @@ impl TissueStrip {
     }
 
     /// The right-hand side for [`TissueStrip::hessian`] if it carries this spatial force, which is condensed
-    /// out: a moment and a force on either node.
-    pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [[DVec3; 2]; 2] {
+    /// out.
+    pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [Wrench; 2] {
         let (element, _) = self.element_with_force(ends, force);
         let Element { nu, w, gap, .. } = element;
         let correction = Vectors::from(self.stiffness) * gap;
@@ -157,19 +165,18 @@ impl TissueStrip {
     }
 
     /// Its energy, and the moment and force that it exerts on either node.
-    pub fn energy_and_loads(&self, ends: &NodePair) -> (f64, [[DVec3; 2]; 2]) {
+    pub fn loads(&self, ends: &NodePair) -> StripLoads {
         let (element, sections) = self.strained_element(ends);
         let (e, theta) = self.strains(&element);
         let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold_stiffness * theta * theta);
-        (energy, nodal_loads(element.gradient(&sections)))
+        StripLoads {
+            energy,
+            on_nodes: nodal_loads(element.gradient(&sections)),
+        }
     }
 
     /// The change of its energy and of its loads by a change of the strip.
-    pub fn parameter_derivative(
-        &self,
-        ends: &NodePair,
-        rate: &TissueStrip,
-    ) -> (f64, [[DVec3; 2]; 2]) {
+    pub fn parameter_derivative(&self, ends: &NodePair, rate: &TissueStrip) -> StripLoads {
         let (mut element, sections) = self.strained_element(ends);
         let (e, theta) = self.strains(&element);
         let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.stress_free_gap).dot(e)
@@ -181,7 +188,10 @@ impl TissueStrip {
             - self.fold_stiffness * rate.stress_free_rotation.x)
             * DVec3::X)
             .into();
-        (energy, nodal_loads(element.gradient(&sections)))
+        StripLoads {
+            energy,
+            on_nodes: nodal_loads(element.gradient(&sections)),
+        }
     }
 
     /// The second derivatives of its energy.
@@ -205,10 +215,13 @@ impl TissueStrip {
 }
 
 /// Moment and force on both nodes, minus the derivatives of an energy.
-fn nodal_loads(first: FirstDerivatives<Scalar>) -> [[DVec3; 2]; 2] {
+fn nodal_loads(first: FirstDerivatives<Scalar>) -> [Wrench; 2] {
     nodal_gradient(first).map(|node| {
         let [a, b, c, d, e, f] = node.map(f64::from);
-        [-DVec3::new(a, b, c), -DVec3::new(d, e, f)]
+        Wrench {
+            moment: -DVec3::new(a, b, c),
+            force: -DVec3::new(d, e, f),
+        }
     })
 }
 
@@ -235,11 +248,11 @@ mod tests {
     }
 
     fn energy(strip: &TissueStrip, ends: &NodePair) -> f64 {
-        strip.energy_and_loads(ends).0
+        strip.loads(ends).energy
     }
 
-    fn loads(strip: &TissueStrip, ends: &NodePair) -> [[DVec3; 2]; 2] {
-        strip.energy_and_loads(ends).1
+    fn loads(strip: &TissueStrip, ends: &NodePair) -> [Wrench; 2] {
+        strip.loads(ends).on_nodes
     }
 
     /// The ends with one of the 12 unknowns changed.
@@ -258,12 +271,9 @@ mod tests {
         (4.0 * central(1e-3) - central(2e-3)) / 3.0
     }
 
-    fn flat(loads: [[DVec3; 2]; 2]) -> Vec<f64> {
-        loads
-            .as_flattened()
-            .iter()
-            .flat_map(|v| v.to_array())
-            .collect()
+    fn flat(loads: [Wrench; 2]) -> Vec<f64> {
+        let vectors = loads.into_iter().flat_map(|it| [it.moment, it.force]);
+        vectors.flat_map(|v| v.to_array()).collect()
     }
 
     #[test]
@@ -350,9 +360,9 @@ mod tests {
             stress_free_gap: strip.stress_free_gap + h * rate.stress_free_gap,
             stress_free_rotation: strip.stress_free_rotation + h * rate.stress_free_rotation,
         };
-        let (by_energy, by_loads) = strip.parameter_derivative(&ends, &rate);
-        assert!((by_energy - slope(|h| energy(&changed(h), &ends))).abs() < 1e-9);
-        for (k, load) in flat(by_loads).into_iter().enumerate() {
+        let found = strip.parameter_derivative(&ends, &rate);
+        assert!((found.energy - slope(|h| energy(&changed(h), &ends))).abs() < 1e-9);
+        for (k, load) in flat(found.on_nodes).into_iter().enumerate() {
             let expected = slope(|h| flat(loads(&changed(h), &ends))[k]);
             assert!((load - expected).abs() < 1e-9, "{k}: {load} {expected}");
         }

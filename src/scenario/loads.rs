@@ -29,7 +29,7 @@ pub struct PointLoad {
 /// The weight of a vein per reference length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight<'s> {
-    /// The part that is the same all along the vein.
+    /// The weight per length that is the same all along the vein.
     pub even: [f64; 3],
     /// The acceleration of gravity, and the mass per length that it pulls, if any.
     pub of_mass: Option<([f64; 3], &'s Profile)>,
@@ -243,7 +243,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// The default for these rods, of which there is at least one, without loads: see
+    /// The default motion of these rods, of which there is at least one, without loads: see
     /// [`Dynamics::with_loads`].
     ///
     /// ```
@@ -302,7 +302,7 @@ impl Dynamics {
         critical_damping(&self.density, self.natural_time(rods))
     }
 
-    /// The default for rods of these densities.
+    /// The default motion of rods with these densities.
     fn with_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
         let scale = Scale::of(rods);
         let time = natural_time_unit(scale, &density);
@@ -332,7 +332,7 @@ fn critical_damping(density: &[Profile], time: f64) -> f64 {
     2.0 * LOWEST_FREQUENCY * mean_mid_rod_value(density) / time
 }
 
-/// Mean of the mid-rod values; exact if all are equal.
+/// Mean of the values of profiles mid-rod; exact if all are equal.
 fn mean_mid_rod_value(profiles: &[Profile]) -> f64 {
     let counted = profiles.iter().zip(1..);
     counted.fold(0.0, |mean, (profile, count)| {

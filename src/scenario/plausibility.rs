@@ -17,9 +17,7 @@ struct PlausibleRanges {
     /// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under its
     /// own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
     hanging_length: f64,
-    /// The acceleration of gravity in metres, and the relative tolerance with which this number is
-    /// recognized.
-    gravity: f64,
+    /// Relative tolerance with which the acceleration of gravity is recognized.
     gravity_tolerance: f64,
     /// Multiple of (A/q)^(1/3) from which on a weight of 9.81 is taken for an acceleration.
     suspicious_length: f64,
@@ -35,7 +33,6 @@ struct PlausibleRanges {
 
 const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
     hanging_length: 30.0,
-    gravity: 9.81,
     gravity_tolerance: 2e-3,
     suspicious_length: 5.0,
     weight_contradiction: 10.0,
@@ -64,8 +61,11 @@ const GRAVITY_IN_UNITS: [GravityInUnit; 4] = {
     ]
 };
 
-/// The range of the acceleration of gravity in all of these units.
-const GRAVITY_RANGE: [f64; 2] = [9.81, 9810.0];
+/// The least and the largest acceleration of gravity in these units: in metres and in millimetres.
+const GRAVITY_RANGE: [f64; 2] = [
+    GRAVITY_IN_UNITS[0].acceleration,
+    GRAVITY_IN_UNITS[2].acceleration,
+];
 
 impl GravityInUnit {
     fn of(length: &str) -> Option<&'static GravityInUnit> {
@@ -299,7 +299,7 @@ fn fan_angles_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
         turned.then_some(PlausibilityWarning::AngleInDegrees { key, angle })
     };
     if let Some(blade) = &scenario.blade {
-        // The directions of its veins follow from this angle and its outline.
+        // The directions of a blade's veins follow from this angle and the outline.
         return doubt("leaf.elevation", blade.elevation);
     }
     kinds.into_iter().find_map(|(key, of)| {
@@ -418,9 +418,9 @@ fn leaf_too_long_for_weight(scenario: &Scenario) -> Option<PlausibilityWarning> 
     let weights = weights.map(|weight| DVec3::from_array(weight).length());
     let weight = weights.fold(0.0, f64::max);
     // 9.81 times a power of ten, for other units of length.
-    let digits = weight / 10_f64.powf((weight / PLAUSIBLE.gravity).log10().round());
+    let digits = weight / 10_f64.powf((weight / GRAVITY_RANGE[0]).log10().round());
     let of_mass = scenario.g != [0.0; 3];
-    let slip = !of_mass && (digits / PLAUSIBLE.gravity - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
+    let slip = !of_mass && (digits / GRAVITY_RANGE[0] - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
     // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
     let stiffness = |rod: &Rod| {
         let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));

@@ -165,7 +165,7 @@ impl Entries {
         Ok(scenario)
     }
 
-    /// The scenario, entry by entry.
+    /// Interprets the entries one after the other; ends at the first mistake.
     fn read(&self) -> ScenarioResult<Scenario> {
         let name = match self.given_value(Key::Name) {
             Some(item) => read_name(item)?,
@@ -364,7 +364,7 @@ impl Entries {
             }
             found.push(next);
         }
-        // The first that is missing names all others.
+        // The error about the first missing key names all missing keys.
         let is_missing = |error: &ScenarioError| error.key.is_some_and(|key| !self.is_given(key));
         let first = found.iter().position(is_missing);
         let others = found.into_iter().enumerate().skip(1);
@@ -376,8 +376,8 @@ impl Entries {
         ScenarioError { others, ..error }
     }
 
-    /// Replaces the entry that is refused by one that is allowed; false if none is known, or if others
-    /// are right or wrong by what it says.
+    /// Replaces the refused entry by one that is allowed. Returns false if none is known, or if other
+    /// entries are right or wrong by what the refused one says.
     fn replace_refused_entry(&mut self, error: &ScenarioError) -> bool {
         let Some(key) = error.key.filter(|key| !self.other_entries_depend(*key)) else {
             return false;
@@ -417,7 +417,7 @@ impl Entries {
     }
 }
 
-/// How deep lists stand within each other; of a profile in those at each knot.
+/// How deep lists are nested; in a profile, within the value at a knot.
 fn list_depth(value: &Value) -> usize {
     match value {
         Value::Array(list) => 1 + list.first().map_or(0, list_depth),

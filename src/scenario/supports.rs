@@ -11,7 +11,7 @@ use glam::DQuat;
 use std::f64::consts::PI;
 
 words! {
-    /// What is held.
+    /// What a support holds.
     pub enum SupportKind {
         /// The position; directions are free, as on a hinge.
         Pinned = "pinned",
@@ -55,7 +55,7 @@ pub struct Clamp {
 }
 
 impl Clamp {
-    /// The rotation of the tip.
+    /// The rotation of the directors at the tip.
     pub fn rotation(self) -> DQuat {
         DQuat::from_rotation_z(self.angle) * DQuat::from_rotation_x(self.twist)
     }

@@ -125,9 +125,9 @@ impl ZeroEnergyRotation {
         }
     }
 
-    /// Whether anything moves when veins through these points turn: some point that is farther than
-    /// `near` from the axis through `point`; or, where a vein spins, its sections, if it is round or no
-    /// point is so far from the line between its ends.
+    /// Whether anything moves when veins through these points turn: some point farther than `near` from
+    /// the axis through `point`. Of a vein that spins the sections move if the vein is round or nearly
+    /// straight.
     pub fn moves_something(&self, points: &[DVec3], point: DVec3, near: f64) -> bool {
         let off = |from: DVec3, axis: DVec3, near: f64| {
             let mut points = points.iter();
@@ -153,8 +153,8 @@ impl ZeroEnergyRotation {
         [turn, DQuat::from_rotation_x(self.section_rate * angle)]
     }
 
-    /// The velocity of a node in this position, whose unit of length is `length`, and with these
-    /// directors.
+    /// The angular velocity and the velocity, at unit rate, of a node in the position `x`, whose unit of
+    /// length is `length`, with the rotation `q`.
     pub fn node_velocity(&self, x: DVec3, q: DQuat, length: f64) -> [DVec3; 2] {
         let spin = self.axis + self.section_rate * (q * DVec3::X);
         [spin, self.axis.cross(x - self.point / length)]
@@ -177,7 +177,7 @@ impl Scenario {
                 includes_bent_veins: true,
             }));
             if hinged {
-                // In this order: to lean, a vein spins back from where it has turned to as a whole.
+                // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
                 let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
                 rotations.extend(rigid);
                 rotations.extend(
@@ -242,8 +242,8 @@ impl Scenario {
         turns.then_some(axis)
     }
 
-    /// The moments on a leaf that cannot rest: on a group of veins that turns as a rigid body while
-    /// no force does work, they sum up to something about the axis.
+    /// Moments that keep a leaf from resting: on a group of veins that turns as a rigid body while no
+    /// force does work, their sum about the axis is not zero.
     pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
         if self.base_held != SupportKind::Pinned || self.wind.is_some() {
             return None;
@@ -307,8 +307,8 @@ impl Scenario {
         hinged && self.tied_groups().into_iter().any(free)
     }
 
-    /// Whether a coupling within a group differs from a multiple of the unit matrix along an axis
-    /// alone.
+    /// Whether every coupling within a group has one stiffness in all directions across an axis: no
+    /// turn about the axis changes its energy.
     fn coupling_is_isotropic(&self, group: &Range<usize>, axis: DVec3) -> bool {
         self.coupling[group.start..group.end - 1].iter().all(|k| {
             (0..3).any(|own| {
@@ -334,7 +334,7 @@ impl Scenario {
         moments.map(DVec3::from_array).collect()
     }
 
-    /// All loads on a group of veins, where they may be largest.
+    /// All loads on a group of veins, those that vary along a vein at the knots of their profiles.
     fn group_loads(&self, group: &Range<usize>) -> Vec<DVec3> {
         let points = self.points.iter();
         let points = points.filter(|point| group.contains(&point.vein));
@@ -396,7 +396,7 @@ impl Scenario {
             && !self.has_moments_on(&group)
             && held
             && self.coupling_is_isotropic(&group, axis)
-            // This takes longest.
+            // Comparing profiles takes longest.
             && rods.iter().all(is_round);
         turns.then_some(axis)
     }
@@ -413,7 +413,7 @@ impl Scenario {
 
     /// Number of directions in which the leaf can move without resistance in an equilibrium: one
     /// for every vein that can spin, and for every group that can turn and is bent. Each has an
-    /// eigenvalue that is zero. `points` are those of a vein.
+    /// eigenvalue that is zero. `points` gives the points of a vein.
     pub fn neutral_directions<P: IntoIterator<Item = DVec3>>(
         &self,
         points: impl Fn(usize) -> P,

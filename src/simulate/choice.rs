@@ -1,10 +1,10 @@
 //! Which method moves a leaf, and why.
 //!
-//! What a motion costs by either method, known or estimated beforehand: numbers of steps times
-//! measured times.
+//! What a motion costs by either method is known or estimated beforehand: numbers of steps times measured
+//! times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
 use crate::numbers::format_two_digits;
 use crate::simulate::{Options, Scheme};
 use crate::words;
@@ -134,16 +134,16 @@ impl Serialize for Choice {
 
 /// Measured seconds of steps.
 struct MotionCosts {
-    /// Of an explicit step in all.
+    /// Seconds of an explicit step, whatever the leaf.
     explicit_step: f64,
-    /// Of an explicit step per segment.
+    /// Further seconds of an explicit step per segment.
     explicit_segment: f64,
-    /// Of a semi-implicit step in all, with the iterations and the rejected attempts that belong to
+    /// Seconds of a semi-implicit step, whatever the leaf, with the iterations and the rejected attempts that belong to
     /// it.
     semi_implicit_step: f64,
-    /// Of a semi-implicit step per segment of rods.
+    /// Further seconds of a semi-implicit step per segment.
     semi_implicit_segment: f64,
-    /// Number of rods that it processes at a time.
+    /// Number of rods that a semi-implicit step processes at a time.
     rods_at_once: usize,
 }
 
@@ -206,7 +206,7 @@ pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
 pub(super) fn explicit_cost(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     let steps = duration / method.longest_step();
     Cost {
         steps,
@@ -227,7 +227,7 @@ pub(super) fn semi_implicit_cost(
     tolerance: f64,
     most: f64,
 ) -> Cost {
-    let (duration, interval) = physics.duration_and_interval();
+    let MotionTimes { duration, interval } = physics.times();
     let error = (PILOT.error_ratio * tolerance)
         .min(PILOT.largest_error)
         .max(tolerance);

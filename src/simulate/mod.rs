@@ -19,13 +19,6 @@
 //! # assert!((simulation.frame().time - 10.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! Where a motion begins.
-//!
-//! Requests that cannot be simulated.
-//!
-//! What makes a motion doubtful from its beginning: it starts where it would stay for ever but for
-//! rounding.
 
 mod choice;
 mod record;
@@ -39,7 +32,7 @@ use crate::leaf::{
 use crate::modes::{Eigenpair, ModeRequest, lowest};
 pub use crate::motion::{Energy, Stopped};
 use crate::motion::{
-    Explicit, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
+    Explicit, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
     TimeIntegrator, project_constraints,
 };
 use crate::newton::{NewtonIteration, SolverCounts};
@@ -61,7 +54,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 /// Default number of segments per rod, unless its rest shape needs more.
-const SEGMENTS: usize = 16;
+pub(crate) const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
 /// longest rod.
@@ -129,7 +122,7 @@ impl Simulation {
         Simulation::with_initial_state(scenario, options, &from)
     }
 
-    /// The same from where a leaf is that followed another scenario, without velocity: what it is
+    /// The motion from where a leaf is that followed another scenario, without velocity: what it is
     /// released from, or where its stable equilibria end.
     pub fn from_tracker(
         follower: &EquilibriumTracker,
@@ -172,7 +165,7 @@ impl Simulation {
         let leaf = Leaf::new(scenario);
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         relax::check_tolerance(tolerance)?;
-        let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
+        let segments = relax::check_segments(&leaf, options.segments, DEFAULT_MOTION_SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
         let state = state(&leaf, &grid)?;
@@ -183,7 +176,9 @@ impl Simulation {
         let choice = match Choice::forced_choice(options, &physics, rigid) {
             Some(choice) => choice,
             None => {
-                let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
+                let explicit = &begun
+                    .insert(explicit_motion(&discrete, &physics, &state, None)?)
+                    .method;
                 let cost = choice::explicit_cost(&discrete, &physics, explicit);
                 let other = choice::semi_implicit_cost(
                     &discrete,
@@ -207,13 +202,16 @@ impl Simulation {
         let mut stable = None;
         let mut method: Box<dyn TimeIntegrator + Send> = match choice.scheme {
             Scheme::Explicit => {
-                let (explicit, bound) = match begun {
+                let ExplicitMotion {
+                    method,
+                    stable: bound,
+                } = match begun {
                     Some(begun) => begun,
-                    None => explicit(&discrete, &physics, &state, step)?,
+                    None => explicit_motion(&discrete, &physics, &state, step)?,
                 };
-                step = Some(explicit.longest_step() * physics.time_unit);
+                step = Some(method.longest_step() * physics.time_unit);
                 stable = Some(bound);
-                Box::new(explicit)
+                Box::new(method)
             }
             Scheme::SemiImplicit => {
                 let step = step.map(|step| step / physics.time_unit);
@@ -223,7 +221,7 @@ impl Simulation {
             }
         };
         method.set_limit(options.limit.clone());
-        let (duration, interval) = physics.duration_and_interval();
+        let MotionTimes { duration, interval } = physics.times();
         let warnings = plausibility_warnings(scenario).into_iter();
         let simulation = Simulation {
             leaf,
@@ -265,7 +263,7 @@ impl Simulation {
     /// Steps from here to the end, and the approximate number of seconds they take on one core
     /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
-        let (duration, _) = self.physics.duration_and_interval();
+        let duration = self.physics.times().duration;
         let left = (duration * self.physics.time_unit - self.time()).max(0.0);
         let steps = match (self.step, self.choice.costs) {
             (Some(step), _) => left / step,
@@ -331,7 +329,7 @@ impl Simulation {
 
     /// Bounds the steps to half of the time between outputs.
     fn halve_outputs(&mut self) {
-        let (_, interval) = self.physics.duration_and_interval();
+        let interval = self.physics.times().interval;
         self.longest_steps = vec![0.5 * interval; self.outputs];
     }
 
@@ -467,7 +465,7 @@ impl Simulation {
 
     /// The time of an output, in the method's unit.
     fn output_time(&self, number: usize) -> f64 {
-        let (duration, interval) = self.physics.duration_and_interval();
+        let MotionTimes { duration, interval } = self.physics.times();
         match number >= self.outputs {
             true => duration,
             false => interval * number as f64,
@@ -475,18 +473,23 @@ impl Simulation {
     }
 }
 
-/// The explicit method, and its stable step in the scenario's unit of time, which `step`
-/// must not exceed.
-fn explicit(
+/// The explicit method, and its stable step in the scenario's unit of time.
+struct ExplicitMotion {
+    method: Explicit,
+    stable: StableStep,
+}
+
+/// The explicit method with a `step` that must not exceed the stable one.
+fn explicit_motion(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     step: Option<f64>,
-) -> Result<(Explicit, StableStep), SimulationError> {
+) -> Result<ExplicitMotion, SimulationError> {
     let own = step.map(|step| step / physics.time_unit);
-    let explicit = Explicit::new(leaf.clone(), physics.clone(), state, own)
+    let method = Explicit::new(leaf.clone(), physics.clone(), state, own)
         .map_err(|RigidRodError| SimulationError::Rigid)?;
-    let bound = explicit.stable_step();
+    let bound = method.stable_step();
     let stable = bound.step * physics.time_unit;
     match step {
         Some(found) if found > stable => {
@@ -499,7 +502,10 @@ fn explicit(
         }
         _ => {
             let step = stable;
-            Ok((explicit, StableStep { step, ..bound }))
+            Ok(ExplicitMotion {
+                method,
+                stable: StableStep { step, ..bound },
+            })
         }
     }
 }

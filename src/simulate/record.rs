@@ -1,6 +1,5 @@
-//! A leaf at an instant, and the record of a simulation that has ended.
-//!
-//! Selection of outputs for a few pictures.
+//! A leaf at an instant, the record of a simulation that has ended, and which outputs are chosen for a few
+//! pictures or a film.
 
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
@@ -51,7 +50,7 @@ impl OutputSample {
 }
 
 impl Imbalance {
-    /// That of the outputs of a motion, if it is more than a few per cent.
+    /// The imbalance of the outputs of a motion, if it is more than a few per cent.
     fn from_samples(moments: &[OutputSample], rounding: f64) -> Option<Self> {
         let start = moments.first()?.energy;
         let (mut moved, mut off) = (rounding, 0.0_f64);
@@ -220,7 +219,7 @@ fn serialize_outcome<S: Serializer>(
     keys.end()
 }
 
-/// Their number, all energies at the last one, and the conserved quantity at the first and the
+/// The number of outputs, all energies at the last one, and the conserved quantity at the first and the
 /// last.
 fn serialize_moments<S: Serializer>(
     moments: &[OutputSample],
@@ -246,7 +245,7 @@ fn serialize_moments<S: Serializer>(
 }
 
 /// Number of nodes for cubic interpolation.
-const CUBIC: usize = 4;
+pub(super) const CUBIC: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
 /// by rod, base to tip.

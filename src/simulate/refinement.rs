@@ -1,8 +1,6 @@
 //! A motion followed on finer and finer grids in shorter and shorter steps, each run compared with
-//! the one before, until its tips are as accurate as requested.
-//!
-//! How accurate a motion is: its tips, and the middles of its veins, compared at every output with
-//! those of a run on another grid in other steps.
+//! the one before, until its tips are as accurate as requested. Compared are the tips and the middles
+//! of the veins, at every output.
 //!
 //! Both methods are of second order in space and time. With the length h of segments, and steps in
 //! proportion to it, the error of a run is C h^2, and the difference of two runs tells C
@@ -16,6 +14,7 @@ use crate::motion::Stopped;
 use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
 use crate::shape::interpolation_weights;
+use crate::simulate::record::CUBIC;
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::{
     Choice, DEFAULT_TIP_ERROR, Frame, Options, Scheme, Simulation, SimulationError,
@@ -105,9 +104,9 @@ pub struct Refinement {
     /// The next run, not begun, and the points of the run that it is compared with, if they are
     /// known.
     next: Option<Simulation>,
-    coarser: Option<(usize, Trajectory)>,
-    /// Those of the run before that.
-    coarsest: Option<(usize, Trajectory)>,
+    coarser: Option<RunTrajectory>,
+    /// The points of the run before that.
+    coarsest: Option<RunTrajectory>,
     /// Number of runs that have ended, and whether the next is the last in any case.
     runs: usize,
     last: bool,
@@ -204,7 +203,10 @@ impl Refinement {
             self.refine(simulation, stopped);
         }
         if self.next.is_some() {
-            let others = (simulation.segments(), trajectory.unwrap_or_default());
+            let others = RunTrajectory {
+                segments: simulation.segments(),
+                trajectory: trajectory.unwrap_or_default(),
+            };
             let before = self.coarser.replace(others);
             if self.last {
                 // The run before once more, compared with what it was compared with.
@@ -350,6 +352,10 @@ impl Refinement {
                 true => (coarser, 2.0),
                 false => (2 * own.segments, 0.5),
             };
+        let with_trajectory = |trajectory: Trajectory| RunTrajectory {
+            segments,
+            trajectory,
+        };
         let with = |step: Option<f64>| Resolution {
             segments,
             step,
@@ -364,7 +370,7 @@ impl Refinement {
             };
             let same = self.run_unrecorded(same, watch)?;
             let halved = self.run_unrecorded(halved, watch)?;
-            let comparison = Comparison::new(own.segments, (segments, same), self.length);
+            let comparison = Comparison::new(own.segments, with_trajectory(same), self.length);
             return Some(Some(comparison.with_half_steps(&halved)));
         }
         let longer = own.step.map(|step| factor * step);
@@ -379,7 +385,7 @@ impl Refinement {
             self.resolution.step = Some(0.5 * step);
             match self.build(self.resolution) {
                 Ok(shorter) => *first = shorter,
-                // It was accepted with longer steps.
+                // Unreachable: the run was accepted with longer steps.
                 Err(_) => return Some(None),
             }
         }
@@ -389,13 +395,10 @@ impl Refinement {
         let trajectory = self.run_unrecorded(run, watch)?;
         if factor > 1.0 {
             first.halve_coarser_steps(&trajectory);
-            self.coarser = Some((segments, trajectory.clone()));
+            self.coarser = Some(with_trajectory(trajectory.clone()));
         }
-        Some(Some(Comparison::new(
-            own.segments,
-            (segments, trajectory),
-            self.length,
-        )))
+        let other = with_trajectory(trajectory);
+        Some(Some(Comparison::new(own.segments, other, self.length)))
     }
 
     /// Whether the leaf has a grid of so many segments.
@@ -405,10 +408,9 @@ impl Refinement {
 
     /// The comparison of a later run with the one before.
     fn compare_next(&self, next: &mut Simulation) -> Option<Comparison> {
-        let (segments, trajectory) = self.coarser.clone()?;
-        next.halve_coarser_steps(&trajectory);
-        let run = (segments, trajectory);
-        Some(Comparison::new(next.segments(), run, self.length))
+        let coarser = self.coarser.clone()?;
+        next.halve_coarser_steps(&coarser.trajectory);
+        Some(Comparison::new(next.segments(), coarser, self.length))
     }
 }
 
@@ -439,9 +441,6 @@ const COMPARISON: RunComparison = RunComparison {
     negligible: 1e-3,
     rounding: 1e-12,
 };
-
-/// Number of nodes for cubic interpolation.
-const CUBIC: usize = 4;
 
 /// Where the compared points are at all outputs of a run.
 #[derive(Clone, Debug, Default)]
@@ -504,6 +503,13 @@ pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> 
     points
 }
 
+/// Where the compared points are in a run on a grid of so many segments.
+#[derive(Clone, Debug)]
+pub(super) struct RunTrajectory {
+    pub segments: usize,
+    pub trajectory: Trajectory,
+}
+
 /// A run compared with others, output after output.
 #[derive(Clone, Debug)]
 pub(super) struct Comparison {
@@ -525,10 +531,13 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// Of a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
+    /// Compares a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
     /// longest rod has this length.
-    pub fn new(segments: usize, other: (usize, Trajectory), length: f64) -> Self {
-        let (others, other) = other;
+    pub fn new(segments: usize, other: RunTrajectory, length: f64) -> Self {
+        let RunTrajectory {
+            segments: others,
+            trajectory: other,
+        } = other;
         let [own, its] = [segments, others].map(|count| (count as f64).powi(-2));
         Comparison {
             factor: COMPARISON.safety * own / (its - own).abs(),
@@ -544,7 +553,7 @@ impl Comparison {
         }
     }
 
-    /// With the distances of the other run from one like it in steps half as long.
+    /// Adds the distances of the other run from one like it in steps half as long.
     pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
         let distances = self.other.distances(halved);
         let bar = |distance: f64| match distance <= self.parting_distance {

@@ -1,6 +1,5 @@
-//! Two independent methods for the same equilibrium, compared.
-//!
-//! Serialisation of both solutions for `check.json`.
+//! Two independent methods for the same equilibrium, compared: relaxation, and the boundary-value problem
+//! by shooting.
 
 use crate::numbers::{larger, largest};
 use crate::relax::{
@@ -12,8 +11,8 @@ use crate::scenario::Scenario;
 use crate::shape::{Difference, serialize_tips};
 use crate::shooting::{ShootingFailure, ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::study::judge::{
-    common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near, rod_differences,
-    run_timed,
+    Timed, common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near,
+    rod_differences, run_timed,
 };
 use crate::study::remark::CheckReason;
 use crate::{relax, shooting, words};
@@ -312,7 +311,10 @@ fn solve_by_shooting(
         gives_up: true,
         ..shooting::ShootingOptions::new(start, &stations, precision)
     };
-    let (found, wall_seconds) = run_timed(|| {
+    let Timed {
+        result: found,
+        seconds: wall_seconds,
+    } = run_timed(|| {
         shooting::solve(scenario, &options, &mut |step| {
             progress(&Progress::Shooting(*step))
         })
@@ -324,10 +326,13 @@ fn solve_by_shooting(
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
-            Ok(solution) => {
-                let shape = (&solution.stations[..], &solution.rods[..]);
-                morse_index_near(scenario, grid, shape, solution.error.position)
-            }
+            Ok(solution) => morse_index_near(
+                scenario,
+                grid,
+                &solution.stations,
+                &solution.rods,
+                solution.error.position,
+            ),
             Err(_) => None,
         },
         found,

@@ -1,4 +1,4 @@
-//! Equilibria shapes of a leaf, as far as many starts find them.
+//! Equilibria of a leaf, as far as many starts find them.
 
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
@@ -44,7 +44,7 @@ pub struct Equilibria {
     pub scenario: String,
     /// Number of starts.
     pub starts: usize,
-    /// Those that did not come to rest within the tolerance.
+    /// Number of starts that did not come to rest within the tolerance.
     pub failed: usize,
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
@@ -68,7 +68,7 @@ pub struct FoundEquilibrium {
     pub plain: bool,
 }
 
-/// Of the equilibrium only what identifies it, and its shape.
+/// An equilibrium as JSON: what identifies it, and its shape.
 impl Serialize for FoundEquilibrium {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]

@@ -32,11 +32,11 @@ pub use crate::study::equilibria::{
     Equilibria, FoundEquilibrium, MOST_FRUITLESS_STARTS, equilibria,
 };
 pub use crate::study::fit::{
-    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, Fit,
-    FitAlternative, FitBudget, FitCandidate, FitCandidateRemark, FitError, FitExperiment, FitLeaf,
-    FitOutcome, FitParameter, FitRemark, FitRequest, FitResidual, FitStep, FitWork, FreeParameter,
-    FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn,
-    RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
+    ComparisonOperator, Data, DataFile, DataFileOptions, DataOrigin, Experiment,
+    ExperimentConditions, Fit, FitAlternative, FitCandidate, FitCandidateRemark, FitCostLimit,
+    FitError, FitLeaf, FitOutcome, FitParameter, FitRemark, FitRequest, FitResidual, FitStep,
+    FitWork, FreeParameter, FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue,
+    OffsetColumn, RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
     DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapMotionFailure, MapOutcome, MapRefused,
@@ -83,7 +83,10 @@ crate::renamed! {
     PeerRow => PeerMeasurement,
     Place => DifferenceLocation,
     Quantity => ComparedQuantity,
-    Reading => DataReadingOptions,
+    Reading => DataFileOptions,
+    DataReadingOptions => DataFileOptions,
+    FitBudget => FitCostLimit,
+    FitExperiment => ExperimentConditions,
     Reference => ReferenceSolution,
     Row => ChartRow,
     RowChoice => RowFilter,

@@ -1,6 +1,5 @@
-//! A leaf at rest, and its derivatives with respect to numbers of its scenario.
-//!
-//! A blade at rest, and what its division into veins matters: the same blade with half as many, and
+//! A leaf at rest with the derivatives of its results with respect to numbers of its scenario; and a blade
+//! at rest with the effect of its division into veins, told by the same blade with half as many veins, and
 //! with narrower ends.
 
 use crate::numbers::largest;
@@ -9,6 +8,7 @@ use crate::relax::{
     RelaxError, RelaxedLeaf, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
+use crate::study::judge::SAME_STATION_DISTANCE;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
 use glam::DVec3;
 
@@ -21,7 +21,7 @@ pub enum SensitivityError {
     /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
-    /// Shooting has no grids on which equations are linearised.
+    /// Shooting has no grids on which equations are linearized.
     #[error("sensitivities are those of a relaxed leaf: use the method semi-implicit")]
     Method,
 }
@@ -66,7 +66,8 @@ pub fn relax_with_sensitivities(
     Ok(leaf)
 }
 
-/// The same derivatives of a leaf that follows, and is where `base` has it.
+/// Derivatives of the tip, the energy and the lowest eigenvalue of a leaf that is followed, where
+/// `base` has it now.
 pub fn sensitivities_of_tracker(
     follower: &EquilibriumTracker,
     base: &BaseScenario,
@@ -94,7 +95,7 @@ fn values_of_keys<'k>(
         .collect()
 }
 
-/// These numbers by their names.
+/// The numbers as parameters of the scenario, by their names.
 fn named_parameters<'v>(
     base: &'v BaseScenario,
     values: &'v [(&'v ParameterKeys, f64)],
@@ -110,7 +111,7 @@ fn named_parameters<'v>(
 fn decides_zero_energy_rotation(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| count_zero_energy_rotations(scenario) < turnings)
+        .any(|it| count_zero_energy_rotations(&it.term) < turnings)
 }
 
 fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
@@ -123,9 +124,6 @@ fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
 
 /// Tolerance of the blades that a blade is compared with.
 const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
-
-/// Stations nearer to each other than this are the same.
-const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Relaxes the leaf of `base` and, if it is a blade that comes to rest in a stable equilibrium,
 /// compares it with others: [`Equilibrium::blade`] tells how far they are apart. Neither is

@@ -23,10 +23,6 @@
 //! assert_eq!(heavy.scenario.gravity, [0.0, 0.0, -100.0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! The scenario into which varying numbers are substituted.
-//!
-//! The numbers of a scenario that can vary, one by one.
 
 #[cfg(test)]
 mod tests;
@@ -433,12 +429,12 @@ impl BaseScenario {
         BaseScenario::from_text(scenario::text(path)?, path.display().to_string(), overrides)
     }
 
-    /// The same from a text; messages call it `file`.
+    /// Reads a scenario from a text; messages call it `file`.
     pub fn from_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
         BaseScenario::new(&Entries::from_text(&text, &file)?, overrides, true)
     }
 
-    /// The same from entries; settings of methods are unknown keys unless they are allowed.
+    /// Checks entries with the `overrides` replaced; settings of methods are unknown keys unless they are allowed.
     pub fn new(
         entries: &Entries,
         overrides: &[String],
@@ -612,12 +608,12 @@ impl BaseScenario {
             }),
             value,
             unit,
-            // The natural leaf depends on shapes at rest otherwise.
+            // The stress-free leaf depends on shapes at rest otherwise.
             linear: keys.is_scenario_linear() && !self.scenario().needs_stress_free_leaf(),
         }
     }
 
-    /// The same keys, or one for each entry if they are a list or a profile.
+    /// These keys or, of a list or a profile, one key for each entry.
     pub(crate) fn keys_by_entry(&self, keys: &ParameterKeys) -> Vec<ParameterKeys> {
         let [VariableTarget::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];

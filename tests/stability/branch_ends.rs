@@ -35,7 +35,7 @@ fn thrust(until: Option<TraceUntil>, switch: bool) -> Trace {
 #[test]
 fn a_branch_ends_where_it_loses_its_stability() {
     let whole = thrust(None, false);
-    assert_eq!(whole.branches[0].destabilizations(), 3);
+    assert_eq!(whole.branches[0].index_increase_count(), 3);
     let ended = thrust(Some(TraceUntil::Unstable), true);
     let [straight, sides @ ..] = &ended.branches[..] else {
         panic!("no branch")

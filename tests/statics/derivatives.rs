@@ -133,8 +133,8 @@ proptest! {
         prop_assert!((section.elastic_energy(&segment) + nu_gap - value).abs() < 1e-11 * (1.0 + value.abs()));
 
         // Gradient.
-        let (g_x, g_a, g_b) = segment.gradient(&section);
-        let ours: Vec<f64> = [-g_x, g_a, g_x, g_b, segment.frame * segment.gap]
+        let g = segment.gradient(&section);
+        let ours: Vec<f64> = [-g.x, g.a, g.x, g.b, segment.frame * segment.gap]
             .iter().flat_map(|g| g.to_array()).collect();
         let scale = 1.0 + gradient.amax();
         for (k, ours) in ours.iter().enumerate() {
@@ -162,8 +162,8 @@ proptest! {
 
         // Condensed gradient and the force that goes with a nodal increment.
         let reduced = gradient.fixed_rows::<12>(0) - k_zn * inverse * gradient.fixed_rows::<3>(12);
-        let (g_x, g_a, g_b) = segment.condensed_gradient(&section);
-        let ours: Vec<f64> = [-g_x, g_a, g_x, g_b].iter().flat_map(|g| g.to_array()).collect();
+        let g = segment.condensed_gradient(&section);
+        let ours: Vec<f64> = [-g.x, g.a, g.x, g.b].iter().flat_map(|g| g.to_array()).collect();
         for (k, ours) in ours.iter().enumerate() {
             prop_assert!((ours - reduced[k]).abs() < 1e-9 * (1.0 + reduced.amax()));
         }

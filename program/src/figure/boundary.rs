@@ -1,10 +1,8 @@
-//! The boundary of stability: curves in the plane of two numbers, with the index on both
-//! sides, and leaves from either side.
+//! The boundary of stability in the plane of two numbers: curves with the index on both sides, shaded
+//! ground on which the branch is stable, cells of a coarse map, and leaves from either side of a curve.
 //!
-//! Labels with the index on both sides of the curves of a boundary.
-//!
-//! The ground of a plane of two numbers on which the branch is stable, between the curves of a
-//! boundary.
+//! Labels stand on both sides of a curve where there is room; curves close to each other share them. Ground
+//! is stable where all curves around it say so, which is found along rows and columns of the panel.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
@@ -17,7 +15,7 @@ use crate::figure::drawing::{
     BLUE, Color, DashPattern, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, PAGE, PURPLE, PageRectangle,
     SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, draw_panel_title, polygon_path,
 };
-use crate::figure::map::{DARKEST_MORSE_INDEX, PALE, fill_cell_by_index};
+use crate::figure::map::{DARKEST_MORSE_INDEX, STABLE_GROUND_COLOR, fill_cell_by_index};
 use crate::figure::scenario::{FigureSetting, QuantityLabel};
 use crate::report::numbers::{
     count_in_words, format_error_bound, format_four_digits, vein_count_text,
@@ -48,7 +46,7 @@ const LAYOUT: BoundaryLayout = BoundaryLayout {
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
 
-/// Colours of neighbouring curves; they also differ in their dashes.
+/// Colors of neighboring curves; they also differ in their dashes.
 const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
 pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
@@ -240,7 +238,7 @@ fn join_segments(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<D
     lines
 }
 
-/// Draws the cells of the map, each in the colour of its index.
+/// Draws the cells of the map, each in the color of its index.
 fn draw_index_cells(
     page: &mut Drawing,
     axes: &PanelAxes,
@@ -377,7 +375,7 @@ const SIDE_LABEL: SideLabelRules = SideLabelRules {
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
-pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
+fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
     let mut named = vec![false; curves.len()];
     for c in 0..curves.len() {
         if named[c] {
@@ -414,24 +412,24 @@ struct LabelPlace {
 }
 
 /// A straight piece of a curve.
-pub struct BoundarySegment {
+struct BoundarySegment {
     pub ends: [DVec2; 2],
     /// Indices to the left and to the right.
     pub sides: [usize; 2],
 }
 
 /// Where a curve crosses a line: how far along the line, and what is on both sides.
-pub struct LineCrossing<S> {
+struct LineCrossing<S> {
     pub along: f64,
     pub sides: S,
 }
 
 /// A curve on the page.
-pub struct BoundaryLine {
+struct BoundaryLine {
     segments: Vec<BoundarySegment>,
     /// Whether two branches meet and vanish there, so that it has no sides.
     is_fold: bool,
-    /// Of a fold, to which side there is a stable leaf, if that is known.
+    /// On which sides of a fold there is a stable leaf, if that is known.
     stable_sides: Option<[bool; 2]>,
 }
 
@@ -445,11 +443,7 @@ impl BoundaryLine {
         }
     }
 
-    pub fn from_curve(
-        axes: &PanelAxes,
-        boundary: &StabilityBoundary,
-        curve: &BoundaryCurve,
-    ) -> Self {
+    fn from_curve(axes: &PanelAxes, boundary: &StabilityBoundary, curve: &BoundaryCurve) -> Self {
         // Along the axis the first number may move towards the end of its range, or away.
         let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
         let points = curve.points.iter();
@@ -491,19 +485,18 @@ impl BoundaryLine {
         }
     }
 
-    /// The ends of its segments.
-    pub fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
+    fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
         self.segments.iter().map(|segment| segment.ends)
     }
 
     /// Whether ground on one of its sides is stable.
-    pub fn bounds_stable_region(&self) -> bool {
+    fn bounds_stable_region(&self) -> bool {
         (self.segments.iter()).any(|segment| segment.sides.contains(&0))
     }
 
     /// Its crossings with a line, and whether the ground on both sides is stable, unless that is not
     /// known.
-    pub fn stability_crossings(
+    fn stability_crossings(
         &self,
         at: DVec2,
         normal: DVec2,
@@ -552,7 +545,7 @@ impl BoundaryLine {
         places.into_iter().map(|(_, place)| place).collect()
     }
 
-    /// Its crossings with a line, and the indices on both sides.
+    /// Where the curve crosses a line through a point along this normal, with the indices on both sides.
     fn index_crossings(
         &self,
         at: DVec2,
@@ -658,11 +651,7 @@ struct RowStretch {
 
 /// Shades where the branch is stable in a part of the plane that curves leave only at its rim; whether
 /// there is such ground.
-pub fn shade_stable_region(
-    page: &mut Drawing,
-    cell: PageRectangle,
-    curves: &[BoundaryLine],
-) -> bool {
+fn shade_stable_region(page: &mut Drawing, cell: PageRectangle, curves: &[BoundaryLine]) -> bool {
     let rows = (cell.size.y / SHADING.row).floor().max(1.0) as usize;
     let height = cell.size.y / rows as f64;
     let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;
@@ -708,7 +697,7 @@ pub fn shade_stable_region(
         let left = ends.iter().map(|ends| ends[0]);
         let right = ends.iter().rev().map(|ends| ends[1]);
         let corners: Vec<DVec2> = left.chain(right).collect();
-        page.draw_shape(polygon_path(&corners), PALE, None);
+        page.draw_shape(polygon_path(&corners), STABLE_GROUND_COLOR, None);
     }
     any
 }
@@ -721,25 +710,29 @@ fn row_stretches(
     y: f64,
 ) -> Vec<RowStretch> {
     let from = cell.corner.with_y(y);
-    let mut crossings: Vec<(f64, [bool; 2], usize)> = (curves.iter().enumerate())
+    let mut crossings: Vec<(usize, LineCrossing<Option<[bool; 2]>>)> = (curves.iter().enumerate())
         .flat_map(|(k, curve)| {
             let found = curve.stability_crossings(from, DVec2::X);
-            found.map(move |it| (it.along, it.sides.unwrap_or_default(), k))
+            found.map(move |crossing| (k, crossing))
         })
-        .filter(|(x, ..)| (0.0..=cell.size.x).contains(x))
+        .filter(|(_, crossing)| (0.0..=cell.size.x).contains(&crossing.along))
         .collect();
-    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    crossings.sort_by(|(_, a), (_, b)| a.along.total_cmp(&b.along));
     let at = |k: Option<usize>| k.and_then(|k| crossings.get(k));
+    let sides = |crossing: &LineCrossing<Option<[bool; 2]>>| crossing.sides.unwrap_or_default();
     (0..=crossings.len())
         .map(|k| {
             let (left, right) = (at(k.checked_sub(1)), at(Some(k)));
-            let said = [left.map(|it| it.1[1]), right.map(|it| it.1[0])];
+            let said = [
+                left.map(|(_, it)| sides(it)[1]),
+                right.map(|(_, it)| sides(it)[0]),
+            ];
             RowStretch {
                 row,
-                end_curves: [left, right].map(|it| it.map(|it| it.2)),
+                end_curves: [left, right].map(|it| it.map(|(curve, _)| *curve)),
                 ends: [
-                    left.map_or(0.0, |it| it.0),
-                    right.map_or(cell.size.x, |it| it.0),
+                    left.map_or(0.0, |(_, it)| it.along),
+                    right.map_or(cell.size.x, |(_, it)| it.along),
                 ]
                 .map(|x| from.x + x),
                 stable: said.into_iter().flatten().reduce(|a, b| a && b),
@@ -748,7 +741,7 @@ fn row_stretches(
         .collect()
 }
 
-/// The region of each stretch: those of neighbouring rows are one where a column leads from one to the
+/// The region of each stretch: those of neighboring rows are one where a column leads from one to the
 /// other without a curve in between.
 fn connected_regions(
     stretches: &[RowStretch],

@@ -1,7 +1,6 @@
-//! Speed against accuracy: error against time, and time against the number of
-//! veins, for every method of relaxation.
-//!
-//! The panel of a chart: one line per series, with failures in lanes above.
+//! Speed against accuracy: error against time, and time against the number of veins, for every method of
+//! relaxation and for other programs. A series is a line of points; its failures are crosses in lanes above
+//! the frame, one lane for each way to fail.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
@@ -17,7 +16,7 @@ use crate::report::numbers::format_error_bound;
 use glam::DVec2;
 use leafdyn::study::{Chart, ChartRow, PeerProgram, ScalingStudy, SolverConfig};
 
-/// Fixed colours of the peers that come with this crate, the same in every chart;
+/// Fixed colors of the peers that come with this crate, the same in every chart;
 /// other peers take the rest in turn.
 const KNOWN_PEER_COLORS: [(&str, Color); 3] = [
     ("solve_bvp", Color(120, 120, 128)),
@@ -31,7 +30,7 @@ const OTHER_PEER_COLORS: [Color; 3] = [
     Color(165, 120, 130),
 ];
 
-/// Smaller errors are drawn here.
+/// Errors below this one, down to zero, are drawn as if they were as large.
 const SMALLEST_ERROR_DRAWN: f64 = 1e-17;
 
 const FEWEST_DECADES: f64 = 1.0;
@@ -117,7 +116,6 @@ fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
     drawing
 }
 
-/// The points of all series.
 fn series_points(series: &[ChartSeries]) -> impl Iterator<Item = (f64, f64)> {
     series.iter().flat_map(ChartSeries::point_coordinates)
 }
@@ -130,7 +128,7 @@ struct RowOfLeaf<'c> {
 
 /// How the points of a series look, and the line through them.
 #[derive(Clone, Copy)]
-pub struct SeriesStyle {
+struct SeriesStyle {
     color: Color,
     marker: Marker,
     dashed: bool,
@@ -204,7 +202,7 @@ fn peer_color(name: &str, others: usize) -> Color {
     )
 }
 
-/// One dashed line for each peer, from large errors to small.
+/// A dashed series for each other program, from large errors to small.
 fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
     let mut all: Vec<ChartSeries> = Vec::new();
     for peer in peers {
@@ -258,17 +256,17 @@ const LAYOUT: ChartLayout = ChartLayout {
     lane_gap: 7.0,
 };
 
-/// Colour of the points on the Pareto front and of the band that joins them.
+/// Color of the points on the Pareto front and of the band that joins them.
 const PARETO_FRONT_COLOR: Color = Color(247, 205, 92);
 
-/// Colour of the area below the accuracy of the reference.
+/// Color of the area below the accuracy of the reference.
 const REFERENCE_ACCURACY_COLOR: Color = Color(240, 240, 243);
 
 const FAILURE_LANES_COLOR: Color = Color(250, 240, 238);
 
 /// A point, in the units of the axes.
 #[derive(Clone, Copy, Debug)]
-pub struct ChartPoint {
+struct ChartPoint {
     pub coordinates: (f64, f64),
     /// Ends of its spread in repeated measurements.
     pub spread: [(f64, f64); 2],
@@ -277,13 +275,13 @@ pub struct ChartPoint {
 
 /// A run without a point.
 #[derive(Clone, Debug)]
-pub struct FailedRun {
-    /// Where it is on the horizontal axis; `None`: not known.
+struct FailedRun {
+    /// Its value along the horizontal axis, if that is known.
     pub x: Option<f64>,
     pub word: String,
 }
 
-pub struct ChartSeries {
+struct ChartSeries {
     pub name: String,
     pub style: SeriesStyle,
     pub points: Vec<ChartPoint>,
@@ -291,7 +289,6 @@ pub struct ChartSeries {
 }
 
 impl ChartSeries {
-    /// Without points so far.
     pub fn new(name: String, style: SeriesStyle) -> Self {
         ChartSeries {
             name,
@@ -310,7 +307,7 @@ impl ChartSeries {
     }
 }
 
-pub struct ChartPanel {
+struct ChartPanel {
     pub series: Vec<ChartSeries>,
     pub across: Axis,
     pub up: Axis,
@@ -337,7 +334,7 @@ impl ChartPanel {
     }
 
     /// Height of the panel with lanes and axis.
-    pub fn total_height(&self) -> f64 {
+    fn total_height(&self) -> f64 {
         self.lanes_height() + LAYOUT.frame + PAGE.panel_axis
     }
 

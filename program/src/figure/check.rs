@@ -27,7 +27,7 @@ struct DifferenceLayout {
     key: f64,
     /// Height of the strip below for differences of exactly zero: one lane per quantity.
     zero_strip: f64,
-    /// Most stations that are marked.
+    /// Curves through more stations have no markers.
     most_marked: usize,
 }
 

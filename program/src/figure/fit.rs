@@ -1,11 +1,7 @@
-//! A fit: its numbers with their intervals, results of experiments with the model and its confidence
-//! band along what varied, measured points over the veins, and below each the residuals.
-//!
-//! The free numbers of a fit with their intervals.
-//!
-//! The panels of the figure of a fit.
-//!
-//! The results of experiments as series along the column that varies.
+//! A fit: the free numbers with their intervals, results of experiments with the model and its confidence
+//! band, measured points over the veins, and below each panel the residuals. Results of experiments that
+//! differ along a line are a series along the column that varies most; other results keep the numbers of
+//! their experiments.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
@@ -122,7 +118,7 @@ const INTERVALS: IntervalLayout = IntervalLayout {
 };
 
 /// Draws the free numbers with their intervals; returns where that ends.
-pub fn draw_fit_parameters(
+fn draw_fit_parameters(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -158,12 +154,13 @@ pub fn draw_fit_parameters(
         emphasizes_zero: true,
         ..Axis::linear("from the value / %", -end, end)
     };
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
+    let axes = PanelAxes::draw_titled(
+        page,
+        cell,
+        [letter, "95 % intervals"],
+        across,
+        Axis::blank(),
+    );
     for (k, it) in shown.iter().enumerate() {
         let middle = corner.y + INTERVALS.row * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
@@ -285,7 +282,7 @@ fn result_label(kind: &str, units: &Units) -> QuantityLabel {
 
 /// Draws results of one kind with the model along what varied, and their residuals along the same;
 /// returns where that ends.
-pub fn draw_results(
+fn draw_results(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -469,9 +466,50 @@ fn draw_residuals(
     cell.opposite_corner().y + PAGE.panel_axis
 }
 
+/// A measured point of a vein, as a view shows it.
+struct MeasuredPoint {
+    /// Counted from 0.
+    rod: usize,
+    at: (f64, f64),
+}
+
+/// A leaf and its measured points along one of the axes, with axes that cover both.
+struct LeafView {
+    title: &'static str,
+    across: Axis,
+    up: Axis,
+    curves: Vec<Vec<(f64, f64)>>,
+    points: Vec<MeasuredPoint>,
+}
+
+impl LeafView {
+    fn of_leaf(view: PlaneView, leaf: &FitLeaf, units: &Units) -> Self {
+        let [right, upward] = view.axes;
+        let traced = leaf.traced.iter();
+        let points = traced.filter_map(|(rod, at)| {
+            let at = (at[right]?, at[upward]?);
+            Some(MeasuredPoint { rod: *rod, at })
+        });
+        let points: Vec<MeasuredPoint> = points.collect();
+        let flat = |point: &DVec3| (point[right], point[upward]);
+        let curves = leaf.curves.iter();
+        let curves = curves.map(|curve| curve.iter().map(flat).collect());
+        let curves: Vec<Vec<(f64, f64)>> = curves.collect();
+        let all = || (curves.iter().flatten()).chain(points.iter().map(|point| &point.at));
+        let name = |axis: usize| name_with_unit(COORDINATE_NAMES[axis], units.length.as_deref());
+        LeafView {
+            title: view.title,
+            across: Axis::linear_covering(&name(right), all().map(|point| point.0)),
+            up: Axis::linear_covering(&name(upward), all().map(|point| point.1)),
+            curves,
+            points,
+        }
+    }
+}
+
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
-pub fn draw_measured_veins(
+fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
@@ -497,25 +535,11 @@ pub fn draw_measured_veins(
         _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.views_gap),
     };
     let count = leaf.curves.len();
-    let panels: Vec<_> = (views.iter())
-        .map(|PlaneView { axes, .. }| {
-            let seen = |at: [Option<f64>; 3]| Some((at[axes[0]]?, at[axes[1]]?));
-            let traced = leaf.traced.iter();
-            let points = traced.filter_map(|(rod, at)| Some((*rod, seen(*at)?)));
-            let points: Vec<(usize, (f64, f64))> = points.collect();
-            let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
-            let curves = leaf.curves.iter();
-            let curves = curves.map(|curve| curve.iter().map(flat).collect());
-            let curves: Vec<Vec<(f64, f64)>> = curves.collect();
-            let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
-            let name =
-                |k: usize| name_with_unit(COORDINATE_NAMES[axes[k]], units.length.as_deref());
-            let across = Axis::linear_covering(&name(0), all().map(|p| p.0));
-            let up = Axis::linear_covering(&name(1), all().map(|p| p.1));
-            (across, up, curves, points)
-        })
+    let panels: Vec<LeafView> = (views.into_iter())
+        .map(|view| LeafView::of_leaf(view, leaf, units))
         .collect();
-    let tall = |(across, up, ..): &(Axis, Axis, _, _)| {
+    let tall = |panel: &LeafView| {
+        let LeafView { across, up, .. } = panel;
         width * (up.end - up.start) / (across.end - across.start)
     };
     let height = panels
@@ -529,7 +553,8 @@ pub fn draw_measured_veins(
     };
     let mut below =
         PageRectangle::left_of_legend(top + PAGE.panel_title, height, RESULT_LAYOUT.key);
-    for (k, (view, (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
+    let is_single = panels.len() == 1;
+    for (k, view) in panels.into_iter().enumerate() {
         let corner = DVec2::new(
             PAGE.left_margin + k as f64 * (width + RESULT_LAYOUT.views_gap),
             top + PAGE.panel_title,
@@ -537,20 +562,20 @@ pub fn draw_measured_veins(
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
         let what = format!("{experiment}, {}", view.title);
-        let (across, up) = equalize_axis_scales(across, up, cell.size);
+        let (across, up) = equalize_axis_scales(view.across, view.up, cell.size);
         let panel = PanelAxes::draw_titled(page, cell, [letter, &what], across, up);
-        for (rod, line) in curves.iter().enumerate() {
+        for (rod, line) in view.curves.iter().enumerate() {
             let drawn = panel.smooth_curve(line).into_iter().flatten().map(Some);
             let stroke = Stroke::new(color_of_vein(rod, count), 1.4);
             panel.draw_clipped_line(page, &drawn.collect::<Vec<_>>(), stroke);
         }
-        for (rod, point) in points {
-            if let Some(at) = panel.page_position(point) {
+        for MeasuredPoint { rod, at } in view.points {
+            if let Some(at) = panel.page_position(at) {
                 let rim = Stroke::new(color_of_vein(rod, count), 1.2);
                 page.draw_shape(circle_path(at, 2.6), WHITE, Some(rim));
             }
         }
-        if views.len() == 1 {
+        if is_single {
             let mut key = Legend::right_of(cell);
             key.add_line(page, "model", "each vein in its colour", MODEL_STROKE);
             key.add_entry(page, "traced points", "", |page, cell| {
@@ -593,14 +618,14 @@ const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 /// A result of an experiment, and where a panel has it: the value that varied, or the number of the
 /// experiment.
 #[derive(Clone, Copy)]
-pub struct PlacedResidual<'f> {
+struct PlacedResidual<'f> {
     pub abscissa: f64,
     pub residual: &'f FitResidual,
 }
 
 /// Results of one kind, drawn in one panel.
-pub struct ResultSeries<'f> {
-    /// As in the data: `tip_x`.
+struct ResultSeries<'f> {
+    /// The name of its column in the data, such as `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
     /// experiments.
@@ -610,7 +635,7 @@ pub struct ResultSeries<'f> {
 }
 
 impl<'f> ResultSeries<'f> {
-    pub fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
+    fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
         self.series.iter().flatten().copied()
     }
 }
@@ -619,7 +644,7 @@ type ExperimentSettings = [(ParameterKeys, f64)];
 
 /// The results of all experiments by their kinds. Those of experiments that differ along a line, as
 /// one column varies or several together, are a series; those of others keep their numbers.
-pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
+fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     let leaves = fit.leaves.iter();
     let settings: HashMap<usize, &ExperimentSettings> = leaves
         .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))
@@ -686,7 +711,7 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     all
 }
 
-/// Which of their numbers varies most, if the experiments differ along a line.
+/// Which setting of the experiments varies most, if they differ along a line.
 fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
     let first = settings.first()?;
     let same = |it: &&ExperimentSettings| {

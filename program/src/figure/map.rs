@@ -1,8 +1,6 @@
-//! A map: one panel per method and one colour per outcome or, if waves are shown, per
-//! number of waves of stable leaves. Results of one method along one axis are also drawn as
+//! A map: one panel per method and one color per outcome or, if waves are shown, per number of waves of
+//! stable leaves. Over a single number a panel is a strip, and the results of one method are also drawn as
 //! curves below its strip: the tip and the energy or, where waves are shown, waves and twist.
-//!
-//! One panel of a map: its cells in the colours of their outcomes.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
@@ -23,7 +21,7 @@ use leafdyn::study::{
 
 /// Sizes of the panels of a map over two numbers, in pixels.
 struct MapLayout {
-    /// Of a colour in the key.
+    /// Side of a color in the key.
     swatch: f64,
     /// Room below each panel for ticks and, below the last, for the name of the axis.
     ticks: f64,
@@ -49,13 +47,12 @@ const LAYOUT: MapLayout = MapLayout {
     single_page: 600.0,
 };
 
-/// Explains a map of waves.
 const WAVES_EXPLANATION: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
     of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
 
 /// Sizes of the strip of a method over one number, and of the curves below a single one, in pixels.
 struct StripLayout {
-    /// Of the strip, and of the gap below it.
+    /// Height of the strip, and of the gap below it.
     height: f64,
     gap: f64,
     /// Room for the name of the method and for its count.
@@ -303,7 +300,7 @@ fn draw_method_name(
     );
 }
 
-/// Smaller variations are rounding.
+/// Extent of an axis of values that vary by less, which is rounding.
 const ROUNDING_VARIATION: f64 = 1e-9;
 
 /// A curve over the number that varies.
@@ -428,14 +425,14 @@ const CELL: CellMarks = CellMarks {
     number_font: 8.0,
 };
 
-/// Of stable leaves.
-pub const PALE: Color = Color(226, 236, 226);
+/// Color where leaves are stable.
+pub const STABLE_GROUND_COLOR: Color = Color(226, 236, 226);
 
-/// More waves than this have the same colour.
+/// More waves than this have the same color.
 const MOST_WAVES_DISTINGUISHED: f64 = 2.5;
 
-/// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
-/// light. Those that are alike without colours also differ in their marks.
+/// Colors that the color-blind can distinguish (Okabe and Ito); that of right answers is
+/// light. Those that are alike without colors also differ in their marks.
 fn outcome_color(outcome: MapOutcome) -> Color {
     match outcome {
         MapOutcome::Right => Color(170, 214, 240),
@@ -450,12 +447,12 @@ fn outcome_color(outcome: MapOutcome) -> Color {
 }
 
 /// Waves along the margins, where these are shown and the leaf is stable.
-pub fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
+fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
 /// Fills a cell, with the mark of its outcome if it has one and is large enough.
-pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
+fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
     page.draw_shape(
         rectangle_path(cell.corner, cell.size),
         outcome_color(outcome),
@@ -480,21 +477,21 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
     }
 }
 
-pub fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
+fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
     let color = match waves {
-        0.0 => PALE,
+        0.0 => STABLE_GROUND_COLOR,
         waves => vein_color((waves - 1.0) / (MOST_WAVES_DISTINGUISHED - 1.0)),
     };
     page.draw_shape(rectangle_path(cell.corner, cell.size), color, None);
 }
 
-/// Indices from this one on have the same colour.
+/// Indices from this one on have the same color.
 pub const DARKEST_MORSE_INDEX: usize = 4;
 
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
 pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize) {
     let color = match index {
-        0 => PALE,
+        0 => STABLE_GROUND_COLOR,
         1 => Color(255, 240, 222),
         2 => Color(252, 224, 194),
         3 => Color(246, 204, 168),
@@ -505,7 +502,7 @@ pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize)
 
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
 /// none.
-pub fn mark_unconfirmed_reference(
+fn mark_unconfirmed_reference(
     page: &mut Drawing,
     cell: PageRectangle,
     reference: ReferenceConfidence,
@@ -521,9 +518,9 @@ pub fn mark_unconfirmed_reference(
 }
 
 /// Stroke of the longest stable step.
-pub const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
+const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
-pub struct VariedAxis {
+struct VariedAxis {
     pub axis: Axis,
     /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
@@ -531,7 +528,7 @@ pub struct VariedAxis {
 
 impl VariedAxis {
     /// Cells in the order given, each around its value.
-    pub fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
+    fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -565,7 +562,7 @@ impl VariedAxis {
 }
 
 /// A panel; with one axis it is a strip.
-pub struct MapPanel<'a> {
+struct MapPanel<'a> {
     axes: PanelAxes,
     x: &'a VariedAxis,
     y: Option<&'a VariedAxis>,
@@ -587,11 +584,7 @@ impl<'a> MapPanel<'a> {
             labelled,
             ..unnamed(&x.axis)
         };
-        let strip = Axis {
-            ticks: TickPlacement::WholeNumbers(Vec::new()),
-            ..Axis::linear("", 0.0, 1.0)
-        };
-        let up = y.map_or(strip, |y| unnamed(&y.axis));
+        let up = y.map_or(Axis::blank(), |y| unnamed(&y.axis));
         let axes = PanelAxes { cell, across, up };
         MapPanel { axes, x, y }
     }
@@ -659,7 +652,7 @@ impl<'a> MapPanel<'a> {
     }
 
     /// Draws the longest step known to be stable, across every row or column.
-    pub fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
+    fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
         let along_x = request.axes[0]
             .keys
             .contains_solver_setting(SolverSetting::Step);

@@ -1,8 +1,5 @@
-//! The energies of a moving leaf and the position of its tip over time.
-//!
-//! A moving leaf as a GIF, in the same view as the film strip.
-//!
-//! A moving leaf at several instants.
+//! A moving leaf: its energies and the position of its tip over time, its shapes at several instants, and
+//! a film as GIF in the same view.
 
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
@@ -181,9 +178,9 @@ fn energy_curves(record: &Record) -> Vec<NamedCurve> {
     curves
 }
 
-/// Pictures of a film.
+/// Number, size and delays of the pictures of a film.
 struct FilmFormat {
-    /// In hundredths of a second.
+    /// Time that the film takes, in hundredths of a second.
     duration: f64,
     most_pictures: usize,
     /// How long a picture is shown: browsers show shorter delays for longer.
@@ -301,10 +298,10 @@ fn draw_picture(
     page
 }
 
-/// Vein colours in several tints, greys, and the colours of markers.
+/// Vein colors in several tints, greys, and the colors of markers.
 struct ColorPalette {
     colors: Vec<Color>,
-    /// Indices found so far.
+    /// Nearest colors found so far.
     indices_by_color: HashMap<[u8; 3], u8>,
 }
 
@@ -329,7 +326,7 @@ impl ColorPalette {
         }
     }
 
-    /// The index of the nearest colour for every pixel.
+    /// The index of the nearest color for every pixel.
     fn nearest_color_indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
         let rgb = pixels.data().chunks_exact(4);
         rgb.map(|rgba| {
@@ -405,10 +402,10 @@ fn changed_rows(before: Option<&Vec<u8>>, picture: &[u8], width: usize) -> Chang
     }
 }
 
-/// Below the notes.
+/// From the notes to the key below them, in pixels.
 const LEGEND_BASE_LINE: f64 = 20.0;
 
-/// Colour of the earlier path of the tip.
+/// Color of the earlier path of the tip.
 const EARLIER_PATH_COLOR: Color = Color(240, 190, 176);
 
 /// Most points of the tip's path that are drawn between two panels.
@@ -570,7 +567,7 @@ mod film_tests {
         assert_eq!(repeat, gif::Repeat::Infinite);
         assert_eq!(pictures.len(), 101);
         assert_eq!(total(&delays), 1000);
-        // Every picture shows its instant, in colours that are close enough.
+        // Every picture shows its instant, in colors that are close enough.
         let stills = record.film.iter();
         let shapes: Vec<DrawnVeins> = stills
             .map(|it| DrawnVeins::from_motion(&record, it, &scenario))
@@ -588,7 +585,7 @@ mod film_tests {
             let worst = off.iter().filter(|&&off| off > 48).count();
             assert!(worst < off.len() / 2000, "picture {k}: {worst} are off");
         }
-        // Five veins, five colours.
+        // Five veins, five colors.
         let pixels = pictures[0].chunks_exact(4);
         let seen: HashSet<[u8; 3]> = pixels.map(|c| [c[0], c[1], c[2]]).collect();
         for vein in 0..5 {

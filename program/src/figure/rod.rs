@@ -1,7 +1,7 @@
 //! A single rod at rest in one large view: of the plane in which it lies, or in space; with its loads,
 //! its supports and its unloaded shape.
 
-use crate::figure::drawing::labels::{LegendRows, new_page};
+use crate::figure::drawing::labels::{LegendRows, SUPPORT_NAMES, new_page};
 use crate::figure::drawing::markers::{
     ForceArrow, RodPoint, draw_support_marker, draw_tip_marker, force_arrows,
 };
@@ -25,11 +25,11 @@ struct RodLayout {
     /// Least and largest height, in pixels.
     lowest: f64,
     highest: f64,
-    /// Around the box in space.
+    /// Margins around the box in space.
     margins: BoxMargins,
     /// Width of the rod, in pixels.
     line: f64,
-    /// Around the rod and its arrows, as a fraction of the largest extent.
+    /// Padding around the rod and its arrows, as a fraction of the largest extent.
     padding: f64,
 }
 
@@ -61,7 +61,7 @@ const VISIBILITY: RodVisibility = RodVisibility {
     farthest: 4.0,
 };
 
-/// Points of the unloaded shape.
+/// Segments of which the unloaded shape is drawn.
 const UNLOADED_SHAPE_POINTS: usize = 96;
 
 const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
@@ -70,7 +70,7 @@ const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
 struct ClampWall {
     half_length: f64,
     hatching_depth: f64,
-    /// To each side of the middle.
+    /// Strokes to each side of the middle.
     hatching_strokes: i32,
 }
 
@@ -148,7 +148,7 @@ impl<'a> DrawnRod<'a> {
         let at = |k: usize| {
             natural
                 .vein_pose(0, k as f64 / UNLOADED_SHAPE_POINTS as f64)
-                .0
+                .position
                 / veins.unit
         };
         let mut unloaded: Vec<DVec3> = (0..=UNLOADED_SHAPE_POINTS)
@@ -257,13 +257,8 @@ impl<'a> DrawnRod<'a> {
             });
         }
         let veins = self.veins;
-        for (how, name) in [
-            (SupportKind::Clamped, "clamp"),
-            (SupportKind::Pinned, "pinned"),
-        ] {
-            let mut grips = veins.grips.iter();
-            let gripped = grips.any(|grip| grip.support == how);
-            let ends = veins.base_support == how || veins.tip_support == Some(how);
+        for (how, name) in SUPPORT_NAMES {
+            let (ends, gripped) = (veins.has_held_ends(how), veins.has_grips(how));
             match how {
                 SupportKind::Clamped if ends => key.add_entry(page, name, |page, cell| {
                     let [left, right] = cell.midline();

@@ -1,7 +1,7 @@
 //! What a change of each number does to the tip of a leaf or, if that is held, to the force on its
 //! holder: signed bars along each axis.
 
-use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
+use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::{
@@ -48,7 +48,7 @@ const SHOWN_VALUE_PRECISION: f64 = 5e-3;
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
 const RELATIVE_CHANGE: f64 = 0.01;
 
-/// What changes with a number.
+/// What a change of one number of the scenario does.
 struct SensitivityRow {
     words: String,
     change_text: String,
@@ -187,12 +187,7 @@ fn draw_bars(
     rows: &[SensitivityRow],
     axis: usize,
 ) {
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, ["", what], across, up);
+    let axes = PanelAxes::draw_titled(page, cell, ["", what], across, Axis::blank());
     // Values are in the unit of the labels of the axis.
     let unit = 10f64.powi(axes.across.label_power_of_ten());
     let Some(zero) = axes.page_position((0.0, 0.0)) else {

@@ -28,7 +28,6 @@ struct TraceLayout {
     between: f64,
     /// Width right of the panels, for the key.
     key: f64,
-    /// Most leaves drawn.
     most_leaves: usize,
 }
 
@@ -41,14 +40,14 @@ const LAYOUT: TraceLayout = TraceLayout {
     most_leaves: 8,
 };
 
-/// Smaller differences are invisible in small panels, in lengths.
-const VISIBLE: f64 = 0.04;
+/// Leaves whose points differ by less, in lengths, look the same in small panels.
+const VISIBLE_DIFFERENCE: f64 = 0.04;
 
 /// Equal parts of each vein at whose ends leaves are compared.
 const COMPARED_PARTS_PER_VEIN: usize = 8;
 
-/// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
-const ROUNDING: f64 = 1e-7;
+/// Variations of the twist, in radians, and of tips, in lengths, that are rounding.
+const ROUNDING_VARIATION: f64 = 1e-7;
 
 pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -146,7 +145,9 @@ fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| largest_leaf_distance(point(at), point(other)) <= VISIBLE;
+        let alike = |&other: &[usize; 2]| {
+            largest_leaf_distance(point(at), point(other)) <= VISIBLE_DIFFERENCE
+        };
         if shown.len() < LAYOUT.most_leaves && !shown.iter().any(alike) {
             shown.push(at);
         }
@@ -218,7 +219,10 @@ fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
     let units = &trace.units;
     let (name, least) = match quantity {
         TraceShow::Energy => (name_with_unit("energy", units.energy().as_deref()), 0.0),
-        TraceShow::Twist => (name_with_unit("mean twist", Some("rad")), ROUNDING),
+        TraceShow::Twist => (
+            name_with_unit("mean twist", Some("rad")),
+            ROUNDING_VARIATION,
+        ),
         TraceShow::Reaction(axis) => {
             let force = format!("reaction along {}", TraceShow::Tip(axis));
             (name_with_unit(&force, units.force.as_deref()), 0.0)
@@ -230,7 +234,7 @@ fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
         tip => {
             let longest = longest_curve(points().take(1).flat_map(|point| &point.curves));
             let name = name_with_unit(&format!("{tip} of the tip"), units.length.as_deref());
-            (name, ROUNDING * longest)
+            (name, ROUNDING_VARIATION * longest)
         }
     };
     Axis::linear_covering(&name, points().map(|point| point.figure_value(quantity)))

@@ -12,7 +12,6 @@ const PEER_TABLE_COLUMNS: [&str; 7] = [
     "program", "scenario", "rods", "knob", "seconds", "error", "outcome",
 ];
 
-/// Most bytes of a table.
 const MOST_TABLE_BYTES: u64 = 16 << 20;
 
 /// Most rows: a chart of more is unreadable.
@@ -21,7 +20,6 @@ const MOST_TABLE_ROWS: usize = 10_000;
 /// Most programs in one chart, each a marker and a line of the key.
 const MOST_PROGRAMS: usize = 100;
 
-/// Most characters of a cell.
 const MOST_CELL_CHARACTERS: usize = 200;
 
 /// Reads a table.

@@ -15,7 +15,7 @@ use std::io::Write;
 /// Most shapes of a film: each has all vertices.
 const MOST_FILM_SHAPES: usize = 61;
 
-/// Most segments of a vein.
+/// Most segments of a vein: finer ones are thinned.
 const MOST_SEGMENTS_PER_VEIN: usize = 32;
 
 /// Length of a film in seconds, as the unit of time is not known.
@@ -40,7 +40,7 @@ struct ShapeAtTime<'s> {
     curves: &'s [Vec<DVec3>],
 }
 
-/// A leaf at rest.
+/// Writes a leaf at rest.
 pub fn write_leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let leaf = [ShapeAtTime {
@@ -50,7 +50,7 @@ pub fn write_leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<
     write_shapes(&equilibrium.scenario, &leaf, shape.longest(), out)
 }
 
-/// A moving leaf.
+/// Writes a motion, of which some shapes are left out.
 pub fn write_motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let film = &record.film;
     let last = film.len().saturating_sub(1);
@@ -242,7 +242,7 @@ fn write_container(
     Ok(())
 }
 
-/// Converts a colour from sRGB to linear RGB, opaque.
+/// Converts a color from sRGB to linear RGB, opaque.
 fn linear_color(Color(red, green, blue): Color) -> [u8; 4] {
     let of = |value: u8| {
         let value = f64::from(value) / 255.0;

@@ -66,13 +66,13 @@ pub trait PageResult: ReportedResult {
     fn fill_page_data(&self, view: &mut PageData, units: &Units);
 }
 
-/// One of several shapes.
+/// A shape of the leaf among several.
 pub struct ShapeInSeries<'r> {
     /// Its time, or its number.
     pub time: f64,
     /// Fractions of the length at which its nodes are.
     pub stations: &'r [f64],
-    /// The centrelines of its veins.
+    /// The centerlines of its veins.
     pub curves: &'r [Vec<DVec3>],
 }
 
@@ -130,7 +130,7 @@ pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
     view
 }
 
-/// The same without any result.
+/// The data of a page that shows a scenario without a result.
 pub fn page_data_without_result(scenario: &Scenario) -> PageData {
     let count = scenario.rods.len();
     let drawn: Vec<usize> = (1..=count)
@@ -226,7 +226,7 @@ mod tests {
         scenario
     }
 
-    /// The data of a page.
+    /// The data that stand in the text of a page.
     fn data(page: &str) -> Value {
         let (_, rest) = page.split_once("type=\"application/json\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()

@@ -1,9 +1,9 @@
 //! A chart as text, and as rows of `chart.csv` and `chart_rods.csv`, one per measurement;
 //! `chart.json` has the same values under the same names.
 
+use crate::report::document::{ReportedResult, contender_name};
 use crate::report::numbers::{duration_text, format_error_bound, veins_text_for_count};
 use crate::report::table::{LabelledLines, label_first_line, text_cell};
-use crate::report::{ReportedResult, contender_name};
 use leafdyn::scenario::Units;
 use leafdyn::study::{
     Chart, ChartRow, FastestByAccuracy, PeerProgram, ReferenceSolution, ScalingStudy,

@@ -1,5 +1,8 @@
 //! The text report of a check.
 
+use crate::report::document::{
+    ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name,
+};
 use crate::report::numbers::{
     duration_text, format_as_accurate, format_error_bound, format_position, grids_text,
     negative_eigenvalues_text, number_in_unit, position_decimals, position_error_text,
@@ -7,7 +10,6 @@ use crate::report::numbers::{
 };
 use crate::report::relax::{doubt_with_option, equilibrium_phrase};
 use crate::report::table::{LabelledLines, label_first_line};
-use crate::report::{ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH};

@@ -17,7 +17,7 @@ pub fn veins_text(equilibrium: &Equilibrium) -> String {
     veins_text_for_count(equilibrium.shape.rods.len(), equilibrium.shape.joined)
 }
 
-/// The same for any leaf.
+/// How many veins there are, and whether their tips are joined.
 pub fn veins_text_for_count(count: usize, joined: bool) -> String {
     let tips = match joined {
         _ if count == 1 => "",
@@ -43,7 +43,7 @@ pub fn negative_eigenvalues_text(count: Option<usize>) -> String {
     count.map_or(String::new(), |count| format!(" ({count})"))
 }
 
-/// The grids of a relaxation.
+/// The grids of a relaxation, as in `grids of 8, 16 segments a vein`.
 pub fn grids_text(equilibrium: &Equilibrium) -> String {
     let grids = equilibrium.accuracy.segments.iter();
     let grids: Vec<String> = grids.map(usize::to_string).collect();
@@ -157,7 +157,6 @@ pub fn format_as_accurate(equilibrium: &Equilibrium, value: f64, size: f64) -> S
     }
 }
 
-/// A position with `decimals` decimals.
 pub fn format_position(point: [f64; 3], decimals: usize) -> String {
     let least = 0.5 * 10f64.powi(-(decimals as i32));
     let [x, y, z] = point.map(|value| match value.abs() < least {

@@ -1,11 +1,9 @@
-//! The text report of a relaxation.
-//!
-//! A blade in the report of a relaxation.
-//!
-//! All equilibria of a leaf, as text.
-//!
-//! The stability margin of a leaf, as text.
+//! The text report of a relaxation: the leaf at rest, the blade of which it is made, its modes and
+//! sensitivities, all of its equilibria, and its stability margin.
 
+use crate::report::document::{
+    ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase,
+};
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
     format_five_digits, format_position, format_within_error, grids_text,
@@ -13,7 +11,6 @@ use crate::report::numbers::{
     position_error_text, round_to_error, upper_bound_text, veins_text,
 };
 use crate::report::table::{LabelledLines, label_first_line};
-use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
@@ -134,7 +131,7 @@ pub fn equilibrium_phrase(equilibrium: &Equilibrium) -> String {
     }
 }
 
-/// That it is one of a circle of equilibria, if it is.
+/// Says that an equilibrium is one of a circle of equilibria, if it is.
 fn zero_energy_rotation_line(equilibrium: &Equilibrium) -> String {
     match (
         equilibrium.stability.neutral_directions,
@@ -383,7 +380,7 @@ fn solver_work_line(equilibrium: &Equilibrium) -> String {
 }
 
 /// The lines about a blade.
-pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
+fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     let length = |it: f64| number_in_unit(format_five_digits(it), units, LENGTH);
     let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, COUPLE_STIFFNESS);
     let mass = |it: f64| match units.grams() {
@@ -501,7 +498,7 @@ fn equilibrium_line(number: usize, found: &FoundEquilibrium, units: &Units) -> S
 const SINGLE_GRID_PRECISION: f64 = 1e-3;
 
 /// The lines about a margin of a leaf of this length, the smallest push first.
-pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
+fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
@@ -602,7 +599,7 @@ fn energy_barrier_line(barrier: &Barrier, length: f64, units: &Units) -> String 
     )
 }
 
-pub fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
+fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
     let tip = format_position(
         tip.to_array(),
         decimals_for_error(SINGLE_GRID_PRECISION * length),

@@ -1,7 +1,6 @@
-//! Layout of results: labelled lines for the console, rows for CSV.
-//!
-//! Tables of a leaf: `centerlines.csv`, `modes.csv` and `sensitivity.csv`, with every rod at
-//! every station, for spreadsheets and scripts.
+//! Layout of results: labeled lines for the console, and tables as CSV. A table of several scenarios has
+//! the scalars of their JSON; `centerlines.csv`, `modes.csv` and `sensitivity.csv` have every rod at every
+//! station.
 
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
@@ -69,7 +68,7 @@ pub fn csv_writer_without_header<W: Write>(out: W) -> csv::Writer<W> {
 
 /// What came of one of several scenarios.
 pub struct ScenarioOutput {
-    /// The scenario's file.
+    /// Path of the scenario's file.
     pub file: String,
     pub exit_status: i32,
     /// Its result, or why there is none.
@@ -285,7 +284,7 @@ pub fn write_modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::
     table.flush()
 }
 
-/// The columns from `x` onwards.
+/// Cells of `centerlines.csv` from the column `x` onwards.
 fn node_columns(node: &NodeState) -> [f64; 19] {
     let NodeState {
         position: r,

@@ -2,8 +2,8 @@
 //! the program for editors, shells and readers.
 
 use crate::files;
-use crate::verbs::{Cli, ExitStatus, Refusal, show_report, write_standard_output};
-use clap::{Args, CommandFactory, ValueEnum, ValueHint};
+use crate::verbs::exit::{ExitStatus, Refusal, show_report, write_standard_output};
+use clap::{Args, Command, ValueEnum, ValueHint};
 use clap_complete::Shell;
 use leafdyn::scenario::schema;
 use std::io::ErrorKind;
@@ -33,9 +33,9 @@ pub struct CompletionsArguments {
 }
 
 impl CompletionsArguments {
-    pub fn run(self) -> Result<ExitStatus, Refusal> {
+    pub fn run(self, mut program: Command) -> Result<ExitStatus, Refusal> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "leafdyn", &mut script);
+        clap_complete::generate(self.shell, &mut program, "leafdyn", &mut script);
         write_standard_output(&script)?;
         Ok(ExitStatus::Success)
     }
@@ -51,8 +51,7 @@ pub struct ManArguments {
 }
 
 impl ManArguments {
-    pub fn run(self) -> Result<ExitStatus, Refusal> {
-        let mut program = Cli::command();
+    pub fn run(self, mut program: Command) -> Result<ExitStatus, Refusal> {
         program.build();
         let page = match self.verb.as_deref() {
             None => clap_mangen::Man::new(program),

@@ -3,12 +3,12 @@
 use crate::files::{FileKind, LIVE_PAGE_FILE};
 use crate::report::doubt_with_option;
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study;

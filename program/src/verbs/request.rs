@@ -1,17 +1,15 @@
-//! The options common to all verbs, and how a verb runs over its scenarios: folders,
-//! files and output.
-//!
-//! One scenario of a request, and the delivery of its result.
+//! The options common to all verbs, and how a verb runs over its scenarios: one after the other or in
+//! parallel, each with a folder, and how the result of each is delivered: files, a report, or JSON.
 
 use crate::files::{FileKind, FileSelection, ResultDocument, WrittenResult};
 use crate::report::table::{ScenarioOutput, file_list_text, table_of_json_results};
 use crate::report::{RefusalDocument, ReportedResult};
-use crate::verbs::help::EXPERT_OPTIONS_HEADING;
-use crate::verbs::progress::{ProgressLine, completed_fraction};
-use crate::verbs::{
+use crate::verbs::exit::{
     ExitStatus, InterruptedRun, Refusal, find_cause, limit_until_interrupt, print_note,
     refusal_with_option_names, report_refusal, show_report, signal_phrase, write_standard_output,
 };
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::{files, live, report};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
@@ -94,7 +92,7 @@ fn parse_file_kinds(list: &str) -> Result<FileKinds, String> {
         .map(FileKinds)
 }
 
-/// Parses one of these words.
+/// A parser of options that takes one of these words.
 pub fn word_parser<T>(
     words: impl IntoIterator<Item = &'static str>,
 ) -> impl TypedValueParser<Value = T>
@@ -107,7 +105,7 @@ where
 /// How a verb treats its scenarios.
 #[derive(Clone, Copy, Default)]
 pub struct VerbTraits<'f> {
-    /// Whether it varies numbers of the scenario and settings of methods.
+    /// Whether the verb varies numbers of the scenario and settings of methods.
     pub varies_numbers: bool,
     /// Whether the stations in its files can be chosen.
     pub has_station_choice: bool,
@@ -229,7 +227,7 @@ impl ScenarioArguments {
         Ok(())
     }
 
-    /// All files that are read.
+    /// The scenarios and the other files that the verb reads.
     fn input_files<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
         self.scenarios.iter().chain(traits.input_files)
     }
@@ -397,7 +395,6 @@ impl ScenarioArguments {
         })
     }
 
-    /// Whether it is about one scenario only.
     fn is_single_scenario(&self) -> bool {
         self.scenarios.len() == 1
     }
@@ -418,7 +415,7 @@ pub struct ScenarioJob {
     pub(super) json: bool,
     /// Whether the report says what it took.
     pub(super) verbose: bool,
-    /// Whether it is the only one of its request.
+    /// Whether the request names no other scenario.
     pub(super) is_only_scenario: bool,
     pub scenario: Scenario,
     /// The scenario as a base for varied numbers.
@@ -427,14 +424,14 @@ pub struct ScenarioJob {
     pub selection: FileSelection,
     pub(super) file: String,
     pub(super) source: String,
-    /// Whether several run in parallel.
+    /// Whether scenarios of the request run in parallel.
     pub(super) runs_in_parallel: bool,
     /// When the run ends with what it has found: at a signal, if that is of use.
     pub limit: Limit,
 }
 
 /// The lines that list files, or why these could not be written.
-pub type FileLines = Result<Vec<String>, Refusal>;
+type FileLines = Result<Vec<String>, Refusal>;
 
 /// The delivered result of a scenario.
 pub struct DeliveredResult {
@@ -454,7 +451,7 @@ struct UnsolvedScenario {
 }
 
 /// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.
-pub fn run_catching_panics(
+fn run_catching_panics(
     job: &ScenarioJob,
     run: impl Fn(&ScenarioJob) -> Result<DeliveredResult, Refusal>,
 ) -> Result<DeliveredResult, Refusal> {
@@ -472,7 +469,7 @@ fn panic_message(cause: &(dyn Any + Send)) -> String {
 }
 
 impl ScenarioJob {
-    /// Its progress line; hidden if scenarios run in parallel, which share one.
+    /// The progress line of the scenario; hidden if scenarios run in parallel, which share one.
     pub fn progress_line(&self) -> ProgressLine {
         ProgressLine::new(&self.scenario.name, !self.runs_in_parallel)
     }

@@ -2,11 +2,11 @@
 
 use crate::files::MotionRecording;
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::progress::{ProgressLine, format_duration, range_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal, print_note};
 use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
@@ -21,7 +21,7 @@ const FINER_GRID_ANNOUNCED_SECONDS: f64 = 5.0;
 const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
 /// What is told of an option that is gone.
-const RESUME: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
+const RESUME_REFUSAL: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
                       none is continued; leave it out to simulate from the beginning";
 
 /// What is told where no output but the first was made.
@@ -71,7 +71,7 @@ impl SimulateArguments {
             ..VerbTraits::default()
         };
         if self.resume {
-            return Err(RESUME.into());
+            return Err(RESUME_REFUSAL.into());
         }
         self.request
             .run_each_scenario::<Record>(traits, |job| self.run_scenario(job))

@@ -1,27 +1,24 @@
-//! The derivative of a leaf with respect to a number of its scenario: of its forces in a given
-//! state, and of its energy. Exact except for the finite differences of scenarios that define
-//! the number's effect on the scenario itself.
+//! The derivative of a leaf with respect to a number of its scenario: of its forces in a given state,
+//! and of its energy. It is exact but for the finite differences of scenarios that define how the
+//! number acts on the scenario itself.
 //!
-//! Bases: their motion, and its effect where clamps hold them.
-//!
-//! The forces by which a parameter change unbalances a leaf, and the linear response to them.
-//!
-//! What depends on the leaf as a whole, or on its natural state: tissue, and loads of single veins.
-//! Their changes are weighted sums over leaves that differ in the number.
-//!
-//! Dead moments on a single rod that change.
+//! Sections, loads, coupling, bases and dead moments change by their own derivatives. What depends on
+//! the leaf as a whole, or on its stress-free state (tissue, loads of single veins, grips), changes by
+//! weighted sums over leaves that differ in the number.
 
 pub(super) mod parameter;
 mod supports;
 
 use crate::leaf::Leaf;
 use crate::leaf::derivative::parameter::{
-    LeafParameterDerivative, LinearResponse, ParameterForces, RodParameterDerivative,
+    LeafParameterDerivative, LinearResponse, ParameterForces, RodParameterDerivative, Weighted,
     hessian_at_constant_force,
 };
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{NodalField, State, add_to_increment};
-use crate::rod::{Section, Segment, TissueStrip};
+use crate::leaf::state::{
+    NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
+};
+use crate::rod::{Section, Segment, StripLoads, TissueStrip};
 use glam::DVec3;
 
 impl DiscreteLeaf {
@@ -52,23 +49,24 @@ impl DiscreteLeaf {
             if of_all || coupling || rod.length != 0.0 {
                 self.add_load_changes(state, j, rate, &mut forces);
             }
-            if rod.base != [DVec3::ZERO; 2] {
+            if rod.base != NodeIncrement::default() {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
         self.add_moment_changes(rate, &mut forces);
-        self.add_tissue_changes(state, &neighbours, &mut forces);
+        self.add_tissue_and_own_load_changes(state, &neighbours, &mut forces);
         let motion = self.support_motion_increments(rate, &neighbours);
         self.add_support_motion(state, segments, motion, &mut forces);
         forces
     }
 
+    /// Adds the effect of changes of the sections of rod `j`.
     fn add_section_changes(
         &self,
         segments: &[Segment],
         j: usize,
         rod: &RodParameterDerivative,
-        neighbours: &[(f64, DiscreteLeaf)],
+        neighbours: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
         let (n, first) = (self.segments(), self.first_node());
@@ -83,7 +81,9 @@ impl DiscreteLeaf {
                 self.grid.segment_width(i),
             );
             if self.has_tissue() {
-                [change.rest_strain, change.rest_curvature] = rest_rates(neighbours, j, i);
+                let rate = |of: fn(&Section) -> DVec3| section_rate(neighbours, j, i, of);
+                change.rest_strain = rate(|it| it.rest_strain);
+                change.rest_curvature = rate(|it| it.rest_curvature);
             }
             let change = segment.parameter_derivative(section, &change);
             let [left, right] = change.gradient;
@@ -97,7 +97,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
+    /// Adds the changes of loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
     fn add_load_changes(
         &self,
         state: &State,
@@ -139,8 +139,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The work of forces on a response to others: by symmetry also that of the
-    /// others on the response to these.
+    /// The work of forces in the response to other forces: by symmetry also the work of the other
+    /// forces in the response to these.
     pub fn mutual_work(
         &self,
         segments: &[Segment],
@@ -173,11 +173,11 @@ impl DiscreteLeaf {
                 continue;
             }
             let segment = &segments[j * n + i];
-            let (g_x, g_a, g_b) = segment.gap_gradient(self.section(j, i), gap);
+            let change = segment.gap_gradient(self.section(j, i), gap);
             if i >= first {
-                add_to_increment(&mut nodes[j][i - first], -g_a, g_x);
+                add_to_increment(&mut nodes[j][i - first], -change.a, change.x);
             }
-            add_to_increment(&mut nodes[j][i + 1 - first], -g_b, -g_x);
+            add_to_increment(&mut nodes[j][i + 1 - first], -change.b, -change.x);
         }
         // Held components have no equations.
         self.clear_held_forces(nodes);
@@ -197,16 +197,10 @@ impl DiscreteLeaf {
         for (j, rod) in increments.iter().enumerate() {
             let (bases, nodes) = rod.split_at(1 - self.first_node());
             let base = bases.first().copied().unwrap_or([0.0; 6]);
-            let (mut a, mut dx0) = (
-                crate::leaf::rotation_part(&base),
-                crate::leaf::displacement_part(&base),
-            );
+            let (mut a, mut dx0) = (rotation_part(&base), displacement_part(&base));
             for (i, increment) in nodes.iter().enumerate() {
                 let k = j * n + i;
-                let (b, dx1) = (
-                    crate::leaf::rotation_part(increment),
-                    crate::leaf::displacement_part(increment),
-                );
+                let (b, dx1) = (rotation_part(increment), displacement_part(increment));
                 let section = self.section(j, i);
                 let segment = &segments[k];
                 let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
@@ -225,9 +219,10 @@ impl DiscreteLeaf {
         state: &State,
         segments: &[Segment],
         j: usize,
-        [shift, turn]: [DVec3; 2],
+        motion: NodeIncrement,
         forces: &mut ParameterForces,
     ) {
+        let (shift, turn) = (motion.displacement, motion.rotation);
         let n = self.segments();
         let section = self.section(j, 0);
         let segment = &segments[j * n];
@@ -239,63 +234,70 @@ impl DiscreteLeaf {
         );
         forces.gap_effects_mut(j, n)[0] +=
             segment.gap_increment(section, -shift, turn, DVec3::ZERO);
-        let ((g_x, g_a, _), load) = (segment.gradient(section), self.load(state, j, 0));
-        forces.energy += (g_a - load.moment).dot(turn) - (g_x + load.force).dot(shift);
+        let (gradient, load) = (segment.gradient(section), self.load(state, j, 0));
+        forces.energy +=
+            (gradient.a - load.moment).dot(turn) - (gradient.x + load.force).dot(shift);
     }
 }
 
-/// The changes of the rest strain and the rest curvature of segment `i` of rod `j`.
-fn rest_rates(each: &[(f64, DiscreteLeaf)], j: usize, i: usize) -> [DVec3; 2] {
-    let Some((_, first)) = each.first() else {
-        return [DVec3::ZERO; 2];
+/// The change of a property of the section of segment `i` of rod `j`, from the leaves that differ.
+fn section_rate(
+    leaves: &[Weighted<DiscreteLeaf>],
+    j: usize,
+    i: usize,
+    property: fn(&Section) -> DVec3,
+) -> DVec3 {
+    let Some(first) = leaves.first() else {
+        return DVec3::ZERO;
     };
-    let sum = |of: fn(&Section) -> DVec3| -> DVec3 {
-        let own = of(first.section(j, i));
-        each.iter()
-            .map(|(weight, leaf)| *weight * (of(leaf.section(j, i)) - own))
-            .sum()
-    };
-    [sum(|it| it.rest_strain), sum(|it| it.rest_curvature)]
+    let own = property(first.term.section(j, i));
+    leaves
+        .iter()
+        .map(|it| it.weight * (property(it.term.section(j, i)) - own))
+        .sum()
 }
 
 impl DiscreteLeaf {
-    /// The weighted leaves of a rate on this grid.
-    fn weighted_leaves_on_grid(&self, rate: &LeafParameterDerivative) -> Vec<(f64, DiscreteLeaf)> {
-        let leaves = rate.weighted_leaves.iter();
-        leaves
-            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
-            .collect()
+    /// The leaves that differ in the number, on this grid.
+    fn weighted_leaves_on_grid(
+        &self,
+        rate: &LeafParameterDerivative,
+    ) -> Vec<Weighted<DiscreteLeaf>> {
+        let leaves = rate.weighted_leaves.iter().map(|it| Weighted {
+            weight: it.weight,
+            term: DiscreteLeaf::new(&it.term, self.grid.clone()),
+        });
+        leaves.collect()
     }
 
-    /// The change of the loads that rod `j` has of its own on its node `i`.
+    /// The change of the loads of rod `j` alone on its node `i`.
     fn own_load_rate(&self, rate: &LeafParameterDerivative, j: usize, i: usize) -> DVec3 {
         let sigma = self.grid.sigma()[i];
         let on = |leaf: &Leaf| {
-            let points = leaf.point_loads();
-            let here = points.filter(|(rod, at, _)| (*rod, self.grid.nearest(*at)) == (j, i));
-            let points: DVec3 = here.map(|(_, _, force)| force).sum();
+            let points = leaf.point_forces();
+            let here = points.filter(|it| (it.rod, self.grid.nearest_node(it.sigma)) == (j, i));
+            let points: DVec3 = here.map(|it| it.force).sum();
             self.grid.node_weight(i) * leaf.own_load_density(j, sigma) + points
         };
         rate.weighted_leaves
             .iter()
-            .map(|(weight, leaf)| *weight * on(leaf))
+            .map(|it| it.weight * on(&it.term))
             .sum()
     }
 
-    /// Adds the changes of the loads that veins have of their own, from the weighted leaves of
-    /// which they are the sum.
+    /// Adds the effect of changes of the loads of single veins: weighted sums over leaves that differ.
     fn add_own_load_changes(
         &self,
         state: &State,
-        each: &[(f64, DiscreteLeaf)],
+        each: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
         let (n, nodes) = (self.segments(), self.moving_nodes());
         for (j, i) in self.rod_index_pairs(0..n + 1) {
-            let first = each[0].1.own_load_on_node(j, i);
+            let first = each[0].term.own_load_on_node(j, i);
             let changes = each
                 .iter()
-                .map(|(w, leaf)| *w * (leaf.own_load_on_node(j, i) - first));
+                .map(|it| it.weight * (it.term.own_load_on_node(j, i) - first));
             let change = self.load_factor * changes.sum::<DVec3>();
             if change != DVec3::ZERO {
                 forces.energy -= change.dot(state.x[state.base(j) + i]);
@@ -307,38 +309,34 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Adds the effect of the changes of the tissue, and of its natural state, and of loads of
-    /// single veins: from the weighted leaves of which they are the sum.
-    fn add_tissue_changes(
+    /// Adds the effect of changes of the tissue, of its stress-free state, and of loads of single
+    /// veins: weighted sums over leaves that differ.
+    fn add_tissue_and_own_load_changes(
         &self,
         state: &State,
-        each: &[(f64, DiscreteLeaf)],
+        each: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
         let (n, nodes) = (self.segments(), self.moving_nodes());
-        let Some((_, first)) = each.first() else {
+        let Some(first) = each.first() else {
             return;
         };
         self.add_own_load_changes(state, each, forces);
-        let (first, each): (_, Vec<_>) = (
-            &first.strips,
-            each.iter().map(|(w, leaf)| (w, &leaf.strips)).collect(),
-        );
-        for (k, own) in first.iter().enumerate() {
+        for (k, own) in first.term.strips.iter().enumerate() {
             let mut change = TissueStrip::default();
-            for (weight, strips) in &each {
-                change.add(**weight, &strips[k].difference_from(own));
+            for Weighted { weight, term } in each {
+                change.add(*weight, &term.strips[k].difference_from(own));
             }
             if change == TissueStrip::default() {
                 continue;
             }
             let (g, i) = (k / (n + 1), k % (n + 1));
-            let (energy, loads) = self.strip_derivatives(state, (g, i), &change);
+            let StripLoads { energy, on_nodes } = self.strip_derivatives(state, g, i, &change);
             forces.energy += energy;
-            for (j, [moment, force]) in [g, g + 1].into_iter().zip(loads) {
+            for (j, load) in [g, g + 1].into_iter().zip(on_nodes) {
                 if nodes.contains(&i) {
                     let on = &mut forces.node_forces_mut(j, nodes.len())[i - nodes.start];
-                    add_to_increment(on, moment, force);
+                    add_to_increment(on, load.moment, load.force);
                 }
             }
         }
@@ -353,12 +351,16 @@ impl LeafParameterDerivative<'_> {
 }
 
 impl DiscreteLeaf {
-    /// Adds the changes of dead moments.
+    /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
-        for (sigma, moment) in &rate.moments {
+        for it in &rate.moments {
             let nodes = forces.node_forces_mut(0, self.moving_nodes().len());
-            if let Some(i) = self.grid.nearest(*sigma).checked_sub(self.first_node()) {
-                add_to_increment(&mut nodes[i], self.load_factor * *moment, DVec3::ZERO);
+            if let Some(i) = self
+                .grid
+                .nearest_node(it.sigma)
+                .checked_sub(self.first_node())
+            {
+                add_to_increment(&mut nodes[i], self.load_factor * it.moment, DVec3::ZERO);
             }
         }
     }

@@ -1,36 +1,46 @@
-//! The derivative of a leaf with respect to a number of its scenario: what changes of its rods, its
-//! profiles and its held tips, the forces of that change, and the response of the nodes to them.
+//! What of a leaf changes with a number of its scenario: its rods, profiles, loads and held tips
+//! ([`LeafParameterDerivative`]); the forces by which that unbalances the leaf ([`ParameterForces`]);
+//! and the response of the nodes to such forces ([`LinearResponse`]).
 
 use crate::leaf::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{Increment, NodalField, State};
+use crate::leaf::loads::PointMoment;
+use crate::leaf::state::{Increment, NodalField, NodeIncrement, State};
 use crate::rod::{Section, SectionParameterDerivative, Segment, SegmentHessian};
 use crate::rotation;
 use crate::scenario::{Clamp, Profile, Scenario};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
+/// A term of a weighted sum, such as a derivative by finite differences.
+#[derive(Clone, Copy, Debug)]
+pub struct Weighted<T> {
+    pub weight: f64,
+    pub term: T,
+}
+
 /// The derivative of a leaf: weighted sums over scenarios that differ in the number, with
 /// weights that add up to zero.
 pub struct LeafParameterDerivative<'s> {
     pub(super) rods: Vec<RodParameterDerivative<'s>>,
+    /// Rates of the coupling of every gap, per unit of sigma.
     pub(super) coupling: Vec<DVec3>,
     pub(super) gravity: DVec3,
     pub(super) tip_force: DVec3,
-    /// Sigma and change of dead moments on a single rod.
-    pub(super) moments: Vec<(f64, DVec3)>,
+    /// Rates of the dead moments that change.
+    pub(super) moments: Vec<PointMoment>,
+    /// Rate of the place of the tips' holder, if that moves.
     pub(super) held: Option<TipSupportDerivative>,
-    /// The leaves that differ in the number, with their weights, if they have tissue, loads of
-    /// single veins, or grips.
-    pub(super) weighted_leaves: Vec<(f64, Leaf)>,
+    /// The leaves that differ in the number, if they have tissue, loads of single veins, or grips.
+    pub(super) weighted_leaves: Vec<Weighted<Leaf>>,
 }
 
 /// The derivative of a rod, in the leaf's units.
 pub(super) struct RodParameterDerivative<'s> {
     pub(super) length: f64,
-    /// Of a clamped base: its position, its rotation.
-    pub(super) base: [DVec3; 2],
-    /// Of the place of a hinge.
+    /// Rate of the place of a clamped base; zero for a hinged one.
+    pub(super) base: NodeIncrement,
+    /// Rate of the position of a hinge; zero for a clamped base.
     hinge: DVec3,
     couple_stiffness: [ProfileDerivative<'s>; 3],
     force_stiffness: [ProfileDerivative<'s>; 3],
@@ -39,25 +49,28 @@ pub(super) struct RodParameterDerivative<'s> {
 }
 
 /// The derivative of a profile: a weighted sum of profiles, without terms if it is zero.
-pub(super) struct ProfileDerivative<'s>(Vec<(f64, &'s Profile)>);
+struct ProfileDerivative<'s>(Vec<Weighted<&'s Profile>>);
 
 impl<'s> ProfileDerivative<'s> {
     fn from_terms(
-        terms: &'s [(f64, Scenario)],
+        terms: &'s [Weighted<Scenario>],
         unit: f64,
         profile: impl Fn(&'s Scenario) -> &'s Profile,
     ) -> Self {
-        let first = profile(&terms[0].1);
-        let profiles = terms.iter().map(|(weight, s)| (weight * unit, profile(s)));
+        let first = profile(&terms[0].term);
+        let profiles = terms.iter().map(|it| Weighted {
+            weight: it.weight * unit,
+            term: profile(&it.term),
+        });
         let mut profiles: Vec<_> = profiles.collect();
-        if profiles.iter().all(|(_, other)| *other == first) {
+        if profiles.iter().all(|it| it.term == first) {
             profiles.clear();
         }
         ProfileDerivative(profiles)
     }
 
     fn value_at(&self, sigma: f64) -> f64 {
-        let terms = self.0.iter().map(|(weight, p)| weight * p.at(sigma));
+        let terms = self.0.iter().map(|it| it.weight * it.term.at(sigma));
         terms.fold(0.0, |sum, term| sum + term)
     }
 
@@ -67,21 +80,25 @@ impl<'s> ProfileDerivative<'s> {
 }
 
 impl<'s> LeafParameterDerivative<'s> {
-    /// Of a leaf, from neighbouring scenarios with their weights.
-    pub fn new(leaf: &Leaf, terms: &'s [(f64, Scenario)]) -> Self {
+    /// The derivative of `leaf` from neighbouring scenarios.
+    pub fn new(leaf: &Leaf, terms: &'s [Weighted<Scenario>]) -> Self {
         let scale = leaf.scale;
         let sum = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
         let vector = |value: fn(&Scenario) -> [f64; 3], unit: f64| {
             DVec3::from_array([0, 1, 2].map(|axis| sum(&|s| value(s)[axis]))) / unit
         };
-        let bases = |j: usize| match (base_rate(terms, j, scale.length), leaf.hinged()) {
-            ([shift, _], true) => ([DVec3::ZERO; 2], shift),
-            (clamped, false) => (clamped, DVec3::ZERO),
-        };
+        let none = NodeIncrement::default();
         let rod = |j: usize| RodParameterDerivative {
             length: sum(&|s| s.rods[j].length) / scale.length,
-            base: bases(j).0,
-            hinge: bases(j).1,
+            base: match leaf.hinged() {
+                true => none,
+                false => base_rate(terms, j, scale.length),
+            },
+            hinge: match leaf.hinged() {
+                true => base_rate(terms, j, scale.length),
+                false => none,
+            }
+            .displacement,
             couple_stiffness: [0, 1, 2].map(|k| {
                 ProfileDerivative::from_terms(terms, 1.0 / scale.stiffness, move |s| {
                     &s.rods[j].couple_stiffness[k]
@@ -119,7 +136,7 @@ impl<'s> LeafParameterDerivative<'s> {
             weighted_leaves: match leaf.has_tissue()
                 || terms
                     .iter()
-                    .any(|(_, s)| s.has_own_loads() || !s.grips.is_empty())
+                    .any(|it| it.term.has_own_loads() || !it.term.grips.is_empty())
             {
                 true => weighted_leaves(leaf, terms),
                 false => Vec::new(),
@@ -134,8 +151,8 @@ impl LeafParameterDerivative<'_> {
         self.rods[j].hinge
     }
 
-    /// The rates of displacement and rotation of the base of rod `j` if it is clamped.
-    pub fn base_motion_rates(&self, j: usize) -> [DVec3; 2] {
+    /// The rate of the place of the base of rod `j` if it is clamped.
+    pub fn base_motion_rate(&self, j: usize) -> NodeIncrement {
         self.rods[j].base
     }
 }
@@ -175,9 +192,9 @@ impl RodParameterDerivative<'_> {
 
 /// The derivative of a number of the scenario: relative to the first, so that without changes it
 /// is exactly zero.
-pub(super) fn value_derivative(terms: &[(f64, Scenario)], value: &dyn Fn(&Scenario) -> f64) -> f64 {
-    let first = value(&terms[0].1);
-    let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
+fn value_derivative(terms: &[Weighted<Scenario>], value: &dyn Fn(&Scenario) -> f64) -> f64 {
+    let first = value(&terms[0].term);
+    let change = |it: &Weighted<Scenario>| it.weight * (value(&it.term) - first);
     terms.iter().map(change).sum()
 }
 
@@ -192,11 +209,11 @@ pub fn hessian_at_constant_force(segment: &Segment, section: &Section) -> Segmen
 /// The effect of a parameter change in a fixed state. Unaffected rods have no entries.
 #[derive(Clone, Debug)]
 pub struct ParameterForces {
-    /// On the unbalanced forces at the nodes.
+    /// Changes of the unbalanced forces at the nodes.
     pub nodes: NodalField,
-    /// On the gaps of the segments (residuals of their constitutive laws).
+    /// Changes of the gaps of the segments, which are the residuals of their constitutive laws.
     pub gaps: Vec<Vec<DVec3>>,
-    /// On the energy.
+    /// Change of the energy.
     pub energy: f64,
     /// Increments of held nodes. Rods on which it moves none have no entries.
     pub support_increments: NodalField,
@@ -257,7 +274,7 @@ impl ParameterForces {
     }
 
     /// Forces on all nodes and effects on all gaps of the rods of `leaf`, zeros included.
-    pub fn dense(&self, leaf: &DiscreteLeaf) -> (NodalField, Vec<DVec3>) {
+    pub fn dense(&self, leaf: &DiscreteLeaf) -> DenseParameterForces {
         let (segments, count) = (leaf.segments(), leaf.moving_nodes().len());
         let mut gaps = vec![DVec3::ZERO; self.gaps.len() * segments];
         for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {
@@ -267,8 +284,19 @@ impl ParameterForces {
             true => vec![[0.0; 6]; count],
             false => nodes.clone(),
         };
-        (self.nodes.iter().map(rod).collect(), gaps)
+        DenseParameterForces {
+            nodes: self.nodes.iter().map(rod).collect(),
+            gaps,
+        }
     }
+}
+
+/// [`ParameterForces`] of all rods, zeros included.
+pub struct DenseParameterForces {
+    /// Changes of the unbalanced forces at the nodes.
+    pub nodes: NodalField,
+    /// Changes of the gaps of the segments, rod after rod.
+    pub gaps: Vec<DVec3>,
 }
 
 impl LinearResponse {
@@ -323,7 +351,7 @@ pub(super) struct TipSupportDerivative {
 
 impl TipSupportDerivative {
     /// `None` if the tips are free, or their holder does not move.
-    pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
+    fn new(leaf: &Leaf, terms: &[Weighted<Scenario>]) -> Option<Self> {
         let held = leaf.tip_support.as_ref()?;
         let of = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
         let axis =
@@ -342,52 +370,52 @@ impl TipSupportDerivative {
         let moves = shift != DVec3::ZERO || turns.iter().any(|turn| *turn != DVec3::ZERO);
         moves.then_some(TipSupportDerivative { shift, turns })
     }
-}
 
-impl TipSupportDerivative {
     /// The increment of the tip of rod `j`.
-    pub(super) fn tip_increment(&self, j: usize) -> Increment {
-        increment_from_vectors(
-            self.turns.get(j).copied().unwrap_or(DVec3::ZERO),
-            self.shift,
-        )
+    pub(super) fn tip_increment(&self, j: usize) -> NodeIncrement {
+        NodeIncrement {
+            rotation: self.turns.get(j).copied().unwrap_or(DVec3::ZERO),
+            displacement: self.shift,
+        }
     }
 }
 
-/// The derivatives of the position and of the rotation of the base of rod `j`.
-pub(super) fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
-    let (first, turned) = terms[0].1.base(j);
-    let mut rate = [DVec3::ZERO; 2];
-    for (weight, scenario) in terms {
-        let (x, q) = scenario.base(j);
-        rate[0] += *weight * (x - first) / length;
-        rate[1] += *weight * rotation::log(q * turned.conjugate());
+/// The derivative of the place of the base of rod `j`, in units of `length`.
+fn base_rate(terms: &[Weighted<Scenario>], j: usize, length: f64) -> NodeIncrement {
+    let (first, turned) = terms[0].term.base(j);
+    let mut rate = NodeIncrement::default();
+    for Weighted { weight, term } in terms {
+        let (x, q) = term.base(j);
+        rate.displacement += *weight * (x - first) / length;
+        rate.rotation += *weight * rotation::log(q * turned.conjugate());
     }
     rate
 }
 
-/// Sigma and derivative of every dead moment that changes, over a unit.
-pub(super) fn moment_rates(terms: &[(f64, Scenario)], unit: f64) -> Vec<(f64, DVec3)> {
+/// The derivatives of the dead moments that change, in units of `unit`.
+fn moment_rates(terms: &[Weighted<Scenario>], unit: f64) -> Vec<PointMoment> {
     let rate = |moment: &dyn Fn(&Scenario) -> [f64; 3]| {
         DVec3::from_array([0, 1, 2].map(|axis| value_derivative(terms, &|s| moment(s)[axis])))
             / unit
     };
-    let points = terms[0].1.points.iter().enumerate();
-    let on_points = points.map(|(k, point)| (point.at, rate(&|s| s.points[k].moment)));
-    let all = std::iter::once((1.0, rate(&|s| s.tip_moment))).chain(on_points);
-    all.filter(|(_, moment)| *moment != DVec3::ZERO).collect()
+    let points = terms[0].term.points.iter().enumerate();
+    let on_points = points.map(|(k, point)| PointMoment {
+        sigma: point.at,
+        moment: rate(&|s| s.points[k].moment),
+    });
+    let on_tip = PointMoment {
+        sigma: 1.0,
+        moment: rate(&|s| s.tip_moment),
+    };
+    let all = std::iter::once(on_tip).chain(on_points);
+    all.filter(|it| it.moment != DVec3::ZERO).collect()
 }
 
-/// The leaves of neighbouring scenarios with their weights, in the units of this one.
-pub(super) fn weighted_leaves(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Vec<(f64, Leaf)> {
-    let each = terms.iter().map(|(weight, scenario)| {
-        let scenario = Arc::new(scenario.clone());
-        (*weight, Leaf::with_scale(scenario, leaf.scale))
+/// The leaves of neighbouring scenarios, in the units of `leaf`.
+fn weighted_leaves(leaf: &Leaf, terms: &[Weighted<Scenario>]) -> Vec<Weighted<Leaf>> {
+    let each = terms.iter().map(|it| Weighted {
+        weight: it.weight,
+        term: Leaf::with_scale(Arc::new(it.term.clone()), leaf.scale),
     });
     each.collect()
-}
-
-pub(super) fn increment_from_vectors(turned: DVec3, moved: DVec3) -> Increment {
-    let [a, b] = [turned.to_array(), moved.to_array()];
-    [a[0], a[1], a[2], b[0], b[1], b[2]]
 }

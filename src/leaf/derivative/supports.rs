@@ -1,60 +1,60 @@
-//! Held nodes: the effect of moving their holders, and the changes of the forces on these.
+//! Derivatives with respect to a number that moves supports: the effect of held nodes that move, and
+//! the changes of the forces on grips and on the holder of a tip.
 
 use crate::leaf::derivative::parameter::{
-    LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
-    increment_from_vectors,
+    LeafParameterDerivative, LinearResponse, ParameterForces, Weighted, hessian_at_constant_force,
 };
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
-    Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
+    Increment, NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
-use crate::rod::Segment;
+use crate::rod::{Segment, Wrench};
 use crate::rotation;
 use glam::DVec3;
 
 impl DiscreteLeaf {
-    /// The increments of held nodes by the motion of their holders; rods without any have none.
-    /// Where grips hold nodes depends on the natural leaf: on those of the weighted leaves, of which
-    /// the change is the sum.
+    /// The increments of held nodes by the motion of what holds them; empty for rods on which nothing
+    /// moves. Grips hold nodes where these are in the stress-free leaf: their motion is the weighted
+    /// sum over the stress-free leaves that differ.
     pub(super) fn support_motion_increments(
         &self,
         rate: &LeafParameterDerivative,
-        each: &[(f64, DiscreteLeaf)],
+        each: &[Weighted<DiscreteLeaf>],
     ) -> NodalField {
         let (n, nodes) = (self.segments(), self.moving_nodes());
         let mut motion = vec![Vec::new(); self.rods()];
-        let mut put = |j: usize, i: usize, by: Increment| {
-            if by != [0.0; 6] {
+        let mut put = |j: usize, i: usize, by: NodeIncrement| {
+            if by != NodeIncrement::default() {
                 let of_rod: &mut Vec<Increment> = &mut motion[j];
                 of_rod.resize(nodes.len(), [0.0; 6]);
-                of_rod[i - nodes.start] = by;
+                of_rod[i - nodes.start] = by.to_array();
             }
         };
         for j in 0..self.rods() {
-            put(
-                j,
-                0,
-                increment_from_vectors(DVec3::ZERO, rate.hinge_displacement_rate(j)),
-            );
+            let hinge = NodeIncrement {
+                rotation: DVec3::ZERO,
+                displacement: rate.hinge_displacement_rate(j),
+            };
+            put(j, 0, hinge);
         }
         for (j, held) in (0..self.rods()).flat_map(|j| rate.held.iter().map(move |it| (j, it))) {
             put(j, n, held.tip_increment(j));
         }
         for (k, own) in self.grips.iter().enumerate() {
-            let (mut turned, mut moved) = (DVec3::ZERO, DVec3::ZERO);
-            for (weight, leaf) in each {
-                let [first, other] = [&each[0].1, leaf].map(|leaf| leaf.grips[k]);
-                moved += *weight * (other.position - first.position);
+            let mut by = NodeIncrement::default();
+            for Weighted { weight, term } in each {
+                let [first, other] = [&each[0].term, term].map(|leaf| leaf.grips[k]);
+                by.displacement += *weight * (other.position - first.position);
                 if let (Some(from), Some(to)) = (first.rotation, other.rotation) {
-                    turned += *weight * rotation::log(to * from.conjugate());
+                    by.rotation += *weight * rotation::log(to * from.conjugate());
                 }
             }
-            put(own.rod, own.node, increment_from_vectors(turned, moved));
+            put(own.rod, own.node, by);
         }
         motion
     }
 
-    /// Adds the effect of holders that move and rotate by these increments of held nodes.
+    /// Adds the effect of supports that move by these increments of held nodes.
     pub(super) fn add_support_motion(
         &self,
         state: &State,
@@ -65,7 +65,7 @@ impl DiscreteLeaf {
         for (j, rod) in motion.iter().enumerate() {
             for (i, by) in rod.iter().enumerate() {
                 if *by != [0.0; 6] {
-                    self.add_node_motion((state, segments), (j, i + self.first_node()), by, forces);
+                    self.add_node_motion(state, segments, j, i + self.first_node(), by, forces);
                 }
             }
         }
@@ -76,8 +76,10 @@ impl DiscreteLeaf {
     /// Adds what moving node `i` of rod `j` does to its segments, and to the energy.
     fn add_node_motion(
         &self,
-        (state, segments): (&State, &[Segment]),
-        (j, i): (usize, usize),
+        state: &State,
+        segments: &[Segment],
+        j: usize,
+        i: usize,
         by: &Increment,
         forces: &mut ParameterForces,
     ) {
@@ -113,8 +115,8 @@ impl DiscreteLeaf {
             forces.gap_effects_mut(j, n)[i] +=
                 segment.gap_increment(section, -moved, turned, DVec3::ZERO);
         }
-        let [moment, force] = self.unbalanced_node_load(state, j, i);
-        forces.energy -= force.dot(moved) + moment.dot(turned);
+        let load = self.unbalanced_node_load(state, j, i);
+        forces.energy -= load.force.dot(moved) + load.moment.dot(turned);
     }
 
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
@@ -139,25 +141,23 @@ impl DiscreteLeaf {
             }
             let pull = self.node_coupling(g, i)
                 * (displacement_part(&both[1]) - displacement_part(&both[0]));
-            let mut on = [[DVec3::ZERO, pull], [DVec3::ZERO, -pull]];
+            let mut loads = [pull, -pull].map(Wrench::from_force);
             if self.has_tissue() {
-                let tissue = self.tissue_response(state, (g, i), &both);
-                for (on, tissue) in on.iter_mut().zip(tissue) {
-                    (on[0], on[1]) = (on[0] + tissue[0], on[1] + tissue[1]);
+                let tissue = self.tissue_response(state, g, i, &both);
+                for (load, tissue) in loads.iter_mut().zip(tissue) {
+                    load.moment += tissue.moment;
+                    load.force += tissue.force;
                 }
             }
-            for (j, [moment, force]) in [g, g + 1].into_iter().zip(on) {
-                add_to_increment(
-                    &mut forces.node_forces_mut(j, count)[i - first],
-                    moment,
-                    force,
-                );
+            for (j, load) in [g, g + 1].into_iter().zip(loads) {
+                let on_node = &mut forces.node_forces_mut(j, count)[i - first];
+                add_to_increment(on_node, load.moment, load.force);
             }
         }
     }
 
-    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: of the loads,
-    /// of coupling and tissue, and of the forces in the segments on either side.
+    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: by loads,
+    /// coupling and tissue, and by the forces in the segments on either side.
     pub fn grip_force_rates(
         &self,
         state: &State,
@@ -169,7 +169,11 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.add_load_changes(state, j, rate, &mut loads);
         }
-        self.add_tissue_changes(state, &self.weighted_leaves_on_grid(rate), &mut loads);
+        self.add_tissue_and_own_load_changes(
+            state,
+            &self.weighted_leaves_on_grid(rate),
+            &mut loads,
+        );
         self.add_coupling_response(state, &response.nodes, &mut loads);
         let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
         for held in &self.grips {

@@ -1,8 +1,6 @@
-//! The whole matrix of the leaf factorised directly, whatever the signs of its eigenvalues: for the
-//! Morse index, for modes, and for Newton's method at a saddle.
-//!
-//! Numbering of the unknowns, and positions of the matrix entries, in the sparse
-//! factorisation.
+//! The matrix of a leaf factorized as a whole, whatever the signs of its eigenvalues: for the Morse
+//! index, for modes, and for Newton's method at a saddle. On coarse grids vein after vein (`veinwise`),
+//! else by a sparse factorization (`sparse`), in the numbering of `unknowns`.
 
 mod sparse;
 #[cfg(test)]
@@ -10,28 +8,28 @@ mod tests;
 pub(super) mod unknowns;
 mod veinwise;
 
-use crate::leaf::direct::sparse::{Cholesky, Sparse, Symbolic};
+use crate::leaf::direct::sparse::{BunchKaufmanFactors, CholeskyFactors, SymbolicFactorization};
 use crate::leaf::direct::unknowns::{DirectError, UnknownNumbering, for_each_matrix_entry};
 use crate::leaf::direct::veinwise::CondensedFactors;
-use crate::leaf::state::{Increment, NodalField};
-use crate::leaf::system::System;
+use crate::leaf::state::NodalField;
+use crate::leaf::system::{MassLoad, System};
 use crate::memory;
 use std::sync::{Arc, OnceLock};
 
-/// Up to so many segments the matrix is factorised vein after vein. Measured with the leaf of Fig. 4:
-/// the sparse factorisation takes 1 to 3 times as long on 32 segments, 2 to 5 times on 8 and 16; its
-/// symbolic part takes about half as long again.
+/// Largest number of segments of a rod with which the matrix is factorized vein after vein. Measured
+/// with the leaf of Fig. 4: the sparse factorization takes 1 to 3 times as long on 32 segments, 2 to 5
+/// times on 8 and 16; its symbolic part takes about half as long again.
 const MAX_CONDENSED_SEGMENTS: usize = 32;
 
 /// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
-/// symbolic factorisation where one is needed.
+/// symbolic factorization where one is needed.
 pub struct DirectSolver {
     unknowns: Arc<UnknownNumbering>,
     /// The first node of a rod with equations.
     first: usize,
-    /// Whether the matrix is factorised vein after vein, if its pivots allow it.
+    /// Whether the matrix is factorized vein after vein, if its pivots allow it.
     uses_condensation: bool,
-    symbolic: OnceLock<Result<Arc<Symbolic>, DirectError>>,
+    symbolic: OnceLock<Result<Arc<SymbolicFactorization>, DirectError>>,
     /// Number of border rows, which follow all unknowns.
     border: usize,
 }
@@ -39,9 +37,9 @@ pub struct DirectSolver {
 /// The solution of a bordered system.
 #[derive(Clone, Debug)]
 pub struct BorderedSolution {
-    /// The increments.
+    /// Increments of all nodes with equations.
     pub increments: NodalField,
-    /// The multipliers of the border.
+    /// Multipliers of the border rows.
     pub multipliers: Vec<f64>,
 }
 
@@ -54,30 +52,30 @@ pub struct MatrixFactors {
 
 enum FactorizationKind {
     Condensed(CondensedFactors),
-    Sparse(Sparse),
-    Cholesky(Cholesky),
+    Sparse(BunchKaufmanFactors),
+    Cholesky(CholeskyFactors),
 }
 
 impl DirectSolver {
-    /// For the matrix of this leaf.
+    /// A solver for the matrix assembled in `system`, and others of the same leaf on the same grid.
     pub fn new(system: &System) -> Result<Self, DirectError> {
         DirectSolver::with_border(system, 0)
     }
 
-    /// For this matrix, and others of the same leaf with the same coupling: axes along which it is
-    /// zero separate the rods.
+    /// A solver for the matrix assembled in `system`, and others of the same leaf with the same coupling:
+    /// axes along which the coupling is zero separate the rods.
     pub fn for_coupling_pattern(system: &System) -> Result<Self, DirectError> {
         DirectSolver::with_coupling(system, system.coupled_unknowns(), 0)
     }
 
-    /// For the matrix bordered by `rows` dense rows and columns at the end.
+    /// A solver for the matrix bordered by `rows` dense rows and columns at the end.
     pub fn with_border(system: &System, rows: usize) -> Result<Self, DirectError> {
         let [turns, shifts] = [system.has_tissue(), system.coupled()];
         let coupled = [turns, turns, turns, shifts, shifts, shifts];
         DirectSolver::with_coupling(system, coupled, rows)
     }
 
-    /// For rods of whose nodes these unknowns are coupled, with border rows.
+    /// A solver for rods of whose nodes these unknowns are `coupled`, with `border` rows.
     fn with_coupling(
         system: &System,
         coupled: [bool; 6],
@@ -86,7 +84,7 @@ impl DirectSolver {
         let (rods, n) = (system.rods(), system.nodes());
         let solver = DirectSolver {
             unknowns: Arc::new(UnknownNumbering::new(system, coupled)),
-            first: system.first(),
+            first: system.first_node(),
             uses_condensation: border == 0
                 && coupled != [false; 6]
                 && !system.has_tissue()
@@ -101,8 +99,9 @@ impl DirectSolver {
         Ok(solver)
     }
 
-    fn symbolic(&self, system: &System) -> Result<&Arc<Symbolic>, DirectError> {
-        let symbolic = || Symbolic::new(system, &self.unknowns, self.border).map(Arc::new);
+    fn symbolic(&self, system: &System) -> Result<&Arc<SymbolicFactorization>, DirectError> {
+        let symbolic =
+            || SymbolicFactorization::new(system, &self.unknowns, self.border).map(Arc::new);
         self.symbolic
             .get_or_init(symbolic)
             .as_ref()
@@ -155,13 +154,13 @@ impl DirectSolver {
         forces
     }
 
-    /// Factorises the matrix assembled in `system`, of the same leaf, plus
+    /// Factorizes the matrix assembled in `system`, of the same leaf, plus
     /// `shift` times its mass matrix.
     pub fn factorize(&self, system: &System, shift: f64) -> Result<MatrixFactors, DirectError> {
         self.factorize_bordered(system, shift, &[])
     }
 
-    /// Factorises the matrix assembled in `system` plus `shift` times its mass matrix; `None` if it
+    /// Factorizes the matrix assembled in `system` plus `shift` times its mass matrix; `None` if it
     /// is not positive definite.
     pub fn factorize_definite(
         &self,
@@ -177,7 +176,7 @@ impl DirectSolver {
         Ok(cholesky.map(|cholesky| self.factors(FactorizationKind::Cholesky(cholesky))))
     }
 
-    /// As [`DirectSolver::factorize`], by the sparse factorisation, whose pivots tell the signs of
+    /// As [`DirectSolver::factorize`], by the sparse factorization, whose pivots tell the signs of
     /// eigenvalues closer to zero where veins are stiff.
     pub fn factorize_sparse(
         &self,
@@ -203,7 +202,7 @@ impl DirectSolver {
         }
     }
 
-    /// Factorises the matrix plus `shift` times the mass matrix, bordered by as many rows as the
+    /// Factorizes the matrix plus `shift` times the mass matrix, bordered by as many rows as the
     /// solver is for, with a zero corner block.
     pub fn factorize_bordered(
         &self,
@@ -235,7 +234,7 @@ impl MatrixFactors {
     /// Number of negative eigenvalues, by Sylvester's law of inertia.
     pub fn negative_eigenvalue_count(&self) -> usize {
         match &self.kind {
-            FactorizationKind::Condensed(condensed) => condensed.negative(),
+            FactorizationKind::Condensed(condensed) => condensed.negative_eigenvalue_count(),
             FactorizationKind::Sparse(sparse) => sparse.negative_eigenvalue_count(),
             FactorizationKind::Cholesky(_) => 0,
         }
@@ -250,7 +249,7 @@ impl MatrixFactors {
         }
     }
 
-    /// As [`MatrixFactors::solve_vector`], in half of the time where the matrix is factorised vein after
+    /// As [`MatrixFactors::solve_vector`], in half of the time where the matrix is factorized vein after
     /// vein, and without the last digits of stiff veins: for directions that are orthogonalised.
     pub fn solve_unrefined(&mut self, b: &mut [f64]) {
         match &mut self.kind {
@@ -260,16 +259,16 @@ impl MatrixFactors {
         }
     }
 
-    /// Solves for the right-hand side assembled in `system` plus `inertia` (see
-    /// [`System::solve`]); the solution is stored in `system`.
-    pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
+    /// Solves for the right-hand side assembled in `system` plus `inertia`; the solution is stored in
+    /// `system`.
+    pub fn solve(&mut self, system: &mut System, inertia: Option<MassLoad>) {
         let mut rhs = system.rhs();
-        if let Some((velocity, per_step)) = inertia {
+        if let Some(MassLoad { field, factor }) = inertia {
             for (j, rod) in rhs.iter_mut().enumerate() {
                 for (i, rhs) in rod.iter_mut().enumerate() {
                     let mass = system.mass(j, i);
                     for c in 0..6 {
-                        rhs[c] += mass[c / 3] * velocity[j][i][c] * per_step;
+                        rhs[c] += mass.of_component(c) * field[j][i][c] * factor;
                     }
                 }
             }

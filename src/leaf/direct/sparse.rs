@@ -1,34 +1,35 @@
-//! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
+//! BunchKaufmanFactors factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
+//! ones, also bordered, and definite ones without a search for pivots.
 
 use crate::leaf::direct::unknowns::{
-    DirectError, UnknownNumbering, for_each_matrix_entry, lower_triangle,
+    DirectError, TrianglePattern, UnknownNumbering, for_each_matrix_entry, lower_triangle,
 };
 use crate::leaf::state::NodalField;
 use crate::leaf::system::System;
 use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
 
-/// The symbolic factorisation of a leaf's matrix, bordered or not.
-pub struct Symbolic {
+/// The symbolic factorization of a leaf's matrix, bordered or not.
+pub struct SymbolicFactorization {
     factors: SymbolicCholesky<usize>,
-    /// Pattern of the lower triangle, and the position in it of each of the [`entries`].
-    lower: SymbolicSparseColMat<usize>,
-    places: Vec<usize>,
+    /// The lower triangle, summed from the entries of [`for_each_matrix_entry`] in their order.
+    lower: TrianglePattern,
+    /// Number of unknowns, with those of the border.
     size: usize,
 }
 
 /// L B L^T by Bunch and Kaufman within supernodes.
-pub struct Sparse {
-    symbolic: Arc<Symbolic>,
+pub struct BunchKaufmanFactors {
+    symbolic: Arc<SymbolicFactorization>,
     values: Vec<f64>,
     subdiagonal: Vec<f64>,
     forward: Vec<usize>,
@@ -37,13 +38,13 @@ pub struct Sparse {
 }
 
 /// L L^T of a positive definite matrix.
-pub struct Cholesky {
-    symbolic: Arc<Symbolic>,
+pub struct CholeskyFactors {
+    symbolic: Arc<SymbolicFactorization>,
     values: Vec<f64>,
     memory: MemBuffer,
 }
 
-impl Cholesky {
+impl CholeskyFactors {
     /// Solves in place.
     pub fn solve(&mut self, b: &mut [f64]) {
         let size = b.len();
@@ -57,8 +58,8 @@ impl Cholesky {
     }
 }
 
-impl Symbolic {
-    /// Of a leaf's matrix with so many border rows after all unknowns.
+impl SymbolicFactorization {
+    /// The symbolic factorization of a leaf's matrix with so many border rows after all unknowns.
     pub fn new(
         system: &System,
         unknowns: &UnknownNumbering,
@@ -72,9 +73,9 @@ impl Symbolic {
         for_each_matrix_entry(system, unknowns, &ones, border, 0.0, |a, b, _| {
             pairs.push([a.min(b), a.max(b)]);
         });
-        let (lower, places) = lower_triangle(size, &pairs);
-        // With its ordering given, faer reads the pattern of the upper triangle.
-        let upper = lower.transpose().to_col_major();
+        let lower = lower_triangle(size, &pairs);
+        // If an ordering is given, faer reads the pattern of the upper triangle.
+        let upper = lower.pattern.transpose().to_col_major();
         let upper = upper.map_err(|_| DirectError::Memory)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -87,10 +88,9 @@ impl Symbolic {
             params,
         )
         .map_err(|_| DirectError::Memory)?;
-        let symbolic = Symbolic {
+        let symbolic = SymbolicFactorization {
             factors,
             lower,
-            places,
             size,
         };
         memory::check_factor_memory(symbolic.factor_entry_count())
@@ -119,8 +119,8 @@ impl Symbolic {
         shift: f64,
         border: &[NodalField],
     ) -> Vec<f64> {
-        let mut values = vec![0.0; self.lower.compute_nnz()];
-        let mut places = self.places.iter();
+        let mut values = vec![0.0; self.lower.pattern.compute_nnz()];
+        let mut places = self.lower.places.iter();
         let first_border = unknowns.count;
         for_each_matrix_entry(
             system,
@@ -137,14 +137,14 @@ impl Symbolic {
         values
     }
 
-    /// Factorises the matrix plus `shift` times the mass matrix if it is positive definite, without
+    /// Factorizes the matrix plus `shift` times the mass matrix if it is positive definite, without
     /// a search for pivots. `None` if it is not.
     pub fn factorize_definite(
         self: &Arc<Self>,
         system: &System,
         unknowns: &UnknownNumbering,
         shift: f64,
-    ) -> Result<Option<Cholesky>, DirectError> {
+    ) -> Result<Option<CholeskyFactors>, DirectError> {
         let symbolic = self.supernodes();
         let entries = self.matrix_entries(system, unknowns, shift, &[]);
         let scratch = supernodal::factorize_supernodal_numeric_llt_scratch::<usize, f64>(
@@ -153,14 +153,14 @@ impl Symbolic {
             Default::default(),
         )
         .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let mut factor = Cholesky {
+        let mut factor = CholeskyFactors {
             symbolic: self.clone(),
             values: vec![0.0; symbolic.len_val()],
             memory: MemBuffer::try_new(scratch).map_err(|_| DirectError::Memory)?,
         };
         let done = supernodal::factorize_supernodal_numeric_llt(
             &mut factor.values,
-            SparseColMatRef::new(self.lower.as_ref(), &entries),
+            SparseColMatRef::new(self.lower.pattern.as_ref(), &entries),
             Default::default(),
             symbolic,
             Par::Seq,
@@ -170,7 +170,7 @@ impl Symbolic {
         Ok(done.is_ok().then_some(factor))
     }
 
-    /// Factorises the matrix assembled in `system` plus `shift` times the mass matrix, bordered
+    /// Factorizes the matrix assembled in `system` plus `shift` times the mass matrix, bordered
     /// with a zero corner block.
     pub fn factorize(
         self: &Arc<Self>,
@@ -178,7 +178,7 @@ impl Symbolic {
         unknowns: &UnknownNumbering,
         shift: f64,
         border: &[NodalField],
-    ) -> Result<Sparse, DirectError> {
+    ) -> Result<BunchKaufmanFactors, DirectError> {
         let symbolic = self.supernodes();
         let values = self.matrix_entries(system, unknowns, shift, border);
         let scratch =
@@ -188,7 +188,7 @@ impl Symbolic {
                 Default::default(),
             )
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let mut factor = Sparse {
+        let mut factor = BunchKaufmanFactors {
             symbolic: self.clone(),
             values: vec![0.0; symbolic.len_val()],
             subdiagonal: vec![0.0; self.size],
@@ -201,7 +201,7 @@ impl Symbolic {
             &mut factor.subdiagonal,
             &mut factor.forward,
             &mut factor.inverse,
-            SparseColMatRef::new(self.lower.as_ref(), &values),
+            SparseColMatRef::new(self.lower.pattern.as_ref(), &values),
             symbolic,
             Par::Seq,
             MemStack::new(&mut factor.memory),
@@ -212,7 +212,7 @@ impl Symbolic {
     }
 }
 
-impl Sparse {
+impl BunchKaufmanFactors {
     fn factor_view(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
         let symbolic = self.symbolic.supernodes();
         let perm = PermRef::new_checked(&self.forward, &self.inverse, self.symbolic.size);

@@ -1,9 +1,9 @@
-//! Factors vein after vein against those of the sparse factorisation, which pivots by blocks.
+//! Factors vein after vein against those of the sparse factorization, which pivots by blocks.
 
 use crate::leaf::direct::*;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::scenario::Scenario;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 const LEAF: &str = r#"
     name = "leaf"
@@ -20,7 +20,10 @@ fn assembled_system(segments: usize, entries: &[&str]) -> System {
     let entries: Vec<String> = entries.iter().map(|&entry| entry.into()).collect();
     let leaf = Leaf::new(&Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap());
     let leaf = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
-    let mut state: State = crate::relax::initial_state(&leaf);
+    let mut state = match leaf.leaf.joined() {
+        true => arcs_to_one_tip(&leaf),
+        false => leaf.stress_free_state(),
+    };
     for j in 0..state.rods() {
         let base = state.base(j);
         let last = segments - usize::from(leaf.leaf.joined() || leaf.leaf.tip_support.is_some());
@@ -32,6 +35,29 @@ fn assembled_system(segments: usize, entries: &[&str]) -> System {
     let mut system = System::new(&leaf);
     leaf.assemble(&state, &mut system);
     system
+}
+
+/// Circular arcs that leave the bases in the directions of the fan and end on the axis e1, stretched to
+/// the same chord.
+fn arcs_to_one_tip(leaf: &DiscreteLeaf) -> State {
+    let rods = &leaf.leaf.scenario().rods;
+    let arc = |j: usize, sigma: f64| {
+        let (sin, cos) = (rods[j].angle * (1.0 - sigma)).sin_cos();
+        let turn = rods[j].angle * sigma;
+        let sinc = if turn == 0.0 { 1.0 } else { turn.sin() / turn };
+        leaf.leaf.length(j) * sigma * sinc * DVec3::new(cos, sin, 0.0)
+    };
+    let tip = (0..rods.len()).map(|j| arc(j, 1.0)).sum::<DVec3>() / rods.len() as f64;
+    let (mut x, mut q) = (Vec::new(), Vec::new());
+    for (j, rod) in rods.iter().enumerate() {
+        for &sigma in leaf.grid.sigma() {
+            x.push(arc(j, sigma) + sigma * (tip - arc(j, 1.0)));
+            q.push(DQuat::from_rotation_z(rod.angle * (1.0 - 2.0 * sigma)));
+        }
+    }
+    let mut state = State::new(leaf.segments(), x, q);
+    state.join_tips();
+    state
 }
 
 /// A vector without symmetry.
@@ -92,17 +118,16 @@ fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
     assert!(condensed_ones > 135, "{condensed_ones} of 150");
 }
 
-/// Where a pivot is too small for what it divides, the sparse factorisation takes over.
+/// Where a pivot is too small for what it divides, the sparse factorization takes over.
 #[test]
-fn small_pivots_are_left_to_the_sparse_factorisation() {
+fn small_pivots_are_left_to_the_sparse_factorization() {
     let system = assembled_system(8, &[]);
     let solver = DirectSolver::for_coupling_pattern(&system).unwrap();
     // The shift at which the first pivot vanishes: at a rotation about an axis of its own.
     let group = &system.groups[0].matrix;
-    let (own, _) = group.blocks(0, 0);
+    let own = group.node_blocks(0, 0).own;
     let turns = nalgebra::Matrix3::from_fn(|r, c| own[r.min(c)][r.max(c)]);
-    let [rotary, _] = system.mass(0, 0);
-    let shift = -turns.symmetric_eigenvalues()[1] / rotary;
+    let shift = -turns.symmetric_eigenvalues()[1] / system.mass(0, 0).rotary;
     assert!(CondensedFactors::new(&system, shift).is_none());
     let there = solver
         .factorize_sparse(&system, shift)
@@ -130,7 +155,7 @@ fn sparse_factors_are_as_small_as_the_coupling_allows() {
 }
 
 /// The shifts at which the count of negative eigenvalues changes, which are eigenvalues, are those of
-/// the sparse factorisation to rounding, also of leaves that are far from definite there.
+/// the sparse factorization to rounding, also of leaves that are far from definite there.
 #[test]
 fn counts_change_at_the_eigenvalues() {
     let leaves: [&[&str]; 3] = [

@@ -1,26 +1,34 @@
 //! The numbering of the unknowns of a leaf's nodes, by nested dissection or rod after rod, and the
 //! entries of its matrix in that numbering.
 
-use crate::leaf::block_tridiagonal::group_and_lane;
+use crate::leaf::block_tridiagonal::{NodeBlocks, RodLane, rod_lane};
 use crate::leaf::state::{Increment, NodalField};
 use crate::leaf::system::System;
 use faer::sparse::SymbolicSparseColMat;
+use std::ops::Range;
 
-/// Why a matrix could not be factorised.
+/// Why a matrix could not be factorized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DirectError {
-    /// It is too large for the memory that is allowed.
+    /// The factors are too large for the memory that is allowed.
     Memory,
     /// A pivot is not a finite number: it has no sign.
     NotFinite,
 }
 
-/// Blocks of the grid of rods and nodes no larger than this are not dissected.
-pub(super) const UNDISSECTED_BLOCK_SIZE: usize = 4;
+/// Shapes of blocks of the grid of rods and nodes that are not dissected further.
+const DISSECTION_LIMITS: DissectionLimits = DissectionLimits {
+    block_size: 4,
+    width_ratio: 2.5,
+};
 
-/// Of a block this many times wider than it is long, in unknowns, the rods are eliminated one
-/// after the other.
-pub(super) const WIDE_BLOCK_RATIO: f64 = 2.5;
+struct DissectionLimits {
+    /// Largest number of nodes of a block that are numbered one after the other.
+    block_size: usize,
+    /// Ratio of width to length, in unknowns, from which on the rods of a block are eliminated one
+    /// after the other.
+    width_ratio: f64,
+}
 
 /// The numbering of the unknowns of the nodes.
 pub struct UnknownNumbering {
@@ -48,7 +56,7 @@ impl UnknownNumbering {
             joined: system.joined,
             coupled,
         };
-        order.dissect((0, rods), (0, n));
+        order.dissect(0..rods, 0..n);
         let DissectionOrder {
             mut numbers,
             mut count,
@@ -97,10 +105,12 @@ impl UnknownNumbering {
     }
 }
 
-/// The numbering, as far as it has come.
-pub(super) struct DissectionOrder {
+/// A numbering that is being made.
+struct DissectionOrder {
     numbers: Vec<[usize; 6]>,
+    /// Number of unknowns that have a number.
     count: usize,
+    /// Nodes of a rod that have equations.
     nodes: usize,
     joined: bool,
     coupled: [bool; 6],
@@ -110,53 +120,48 @@ impl DissectionOrder {
     /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
     /// first, then the line between them. A rod is separated from its neighbours by the
     /// unknowns that are coupled to theirs alone: its others precede these.
-    fn dissect(&mut self, rods: (usize, usize), nodes: (usize, usize)) {
-        let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
+    fn dissect(&mut self, rods: Range<usize>, nodes: Range<usize>) {
+        let (width, length) = (rods.len(), nodes.len());
         let axes = self.coupled.iter().filter(|&&coupled| coupled).count();
         let (across, along) = (6 * width, axes * length);
         if width == 0 || length == 0 {
         } else if width == 1 {
-            self.dissect_rod(rods.0, nodes, |_| true);
-        } else if width * length <= UNDISSECTED_BLOCK_SIZE {
-            for j in rods.0..rods.1 {
-                (nodes.0..nodes.1).for_each(|i| self.number_node(j, i, |_| true));
+            self.dissect_rod(rods.start, nodes, |_| true);
+        } else if width * length <= DISSECTION_LIMITS.block_size {
+            for j in rods {
+                (nodes.clone()).for_each(|i| self.number_node(j, i, |_| true));
             }
-        } else if across as f64 >= WIDE_BLOCK_RATIO * along as f64 {
-            (rods.0..rods.1).for_each(|j| self.number_rod(j, nodes));
+        } else if across as f64 >= DISSECTION_LIMITS.width_ratio * along as f64 {
+            rods.for_each(|j| self.number_rod(j, nodes.clone()));
         } else if across > along {
-            let middle = rods.0 + width / 2;
-            self.dissect((rods.0, middle), nodes);
-            self.dissect((middle + 1, rods.1), nodes);
+            let middle = rods.start + width / 2;
+            self.dissect(rods.start..middle, nodes.clone());
+            self.dissect(middle + 1..rods.end, nodes.clone());
             self.number_rod(middle, nodes);
         } else {
-            let middle = nodes.0 + length / 2;
-            self.dissect(rods, (nodes.0, middle));
-            self.dissect(rods, (middle + 1, nodes.1));
-            (rods.0..rods.1).for_each(|j| self.number_node(j, middle, |_| true));
+            let middle = nodes.start + length / 2;
+            self.dissect(rods.clone(), nodes.start..middle);
+            self.dissect(rods.clone(), middle + 1..nodes.end);
+            rods.for_each(|j| self.number_node(j, middle, |_| true));
         }
     }
 
-    /// A rod's own unknowns, then those that are coupled.
-    fn number_rod(&mut self, j: usize, nodes: (usize, usize)) {
+    /// Numbers the unknowns of a rod that are not coupled with neighbours, then those that are.
+    fn number_rod(&mut self, j: usize, nodes: Range<usize>) {
         let coupled = self.coupled;
         let is_coupled = |c: usize| coupled[c];
-        self.dissect_rod(j, nodes, |c| !is_coupled(c));
-        (nodes.0..nodes.1).for_each(|i| self.number_node(j, i, is_coupled));
+        self.dissect_rod(j, nodes.clone(), |c| !is_coupled(c));
+        nodes.for_each(|i| self.number_node(j, i, is_coupled));
     }
 
     /// Nested dissection of the nodes of a rod, some components of each.
-    fn dissect_rod(
-        &mut self,
-        j: usize,
-        nodes: (usize, usize),
-        some: impl Fn(usize) -> bool + Copy,
-    ) {
-        if nodes.0 == nodes.1 {
+    fn dissect_rod(&mut self, j: usize, nodes: Range<usize>, some: impl Fn(usize) -> bool + Copy) {
+        if nodes.is_empty() {
             return;
         }
-        let middle = nodes.0 + (nodes.1 - nodes.0) / 2;
-        self.dissect_rod(j, (nodes.0, middle), some);
-        self.dissect_rod(j, (middle + 1, nodes.1), some);
+        let middle = nodes.start + nodes.len() / 2;
+        self.dissect_rod(j, nodes.start..middle, some);
+        self.dissect_rod(j, middle + 1..nodes.end, some);
         self.number_node(j, middle, some);
     }
 
@@ -185,17 +190,17 @@ pub fn for_each_matrix_entry(
 ) {
     let n = system.nodes();
     for j in 0..system.rods() {
-        let (group, lane) = group_and_lane(j);
+        let RodLane { group, lane } = rod_lane(j);
         let chain = &system.groups[group].matrix;
         for i in 0..n {
-            let (own, next) = chain.blocks(i, lane);
+            let NodeBlocks { own, next } = chain.node_blocks(i, lane);
             let mass = system.mass(j, i);
             let (here, ahead) = (
                 unknowns.node_numbers(j, i),
                 unknowns.node_numbers(j, (i + 1).min(n - 1)),
             );
             for r in 0..6 {
-                add(here[r], here[r], shift * mass[r / 3]);
+                add(here[r], here[r], shift * mass.of_component(r));
                 for c in r..6 {
                     add(here[r], here[c], own[r][c]);
                 }
@@ -235,12 +240,16 @@ pub fn for_each_matrix_entry(
     }
 }
 
-/// The pattern of a lower triangle with entries in these columns and rows, possibly repeated,
-/// and the position of each of them in it.
-pub fn lower_triangle(
-    size: usize,
-    entries: &[[usize; 2]],
-) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
+/// The pattern of the lower triangle of a matrix that is a sum of entries.
+pub struct TrianglePattern {
+    /// Rows of the nonzero entries of every column.
+    pub pattern: SymbolicSparseColMat<usize>,
+    /// Position in the pattern of each entry of the sum.
+    pub places: Vec<usize>,
+}
+
+/// The pattern of a lower triangle with entries in these columns and rows, possibly repeated.
+pub fn lower_triangle(size: usize, entries: &[[usize; 2]]) -> TrianglePattern {
     // Sorted by rows and then, in this order, by columns: the rows of each column ascend.
     let sorted = |by: usize, order: &mut dyn Iterator<Item = usize>| {
         let mut ends = vec![0; size + 1];
@@ -274,6 +283,8 @@ pub fn lower_triangle(
         }
         starts.push(rows.len());
     }
-    let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
-    (pattern, places)
+    TrianglePattern {
+        pattern: SymbolicSparseColMat::new_checked(size, size, starts, None, rows),
+        places,
+    }
 }

@@ -1,29 +1,24 @@
-//! The matrix of a leaf factorised vein after vein, without a general sparse solver.
+//! The matrix of a leaf factorized vein after vein, without a general sparse solver.
 //!
-//! The rotations of a vein are eliminated node by node. What they leave is a dense symmetric matrix
-//! T_j of its displacements, by which alone a vein is coupled with the next one (diagonal matrices
-//! E_j), so that the veins follow one another: S_1 = T_1 and
-//! S_j+1 = T_j+1 - E_j S_j^-1 E_j. Every S_j is inverted in place by symmetric sweeps (J. H.
-//! Goodnight, A tutorial on the SWEEP operator, Am. Stat. 33, 1979), whose pivots have the signs of
-//! the eigenvalues by Sylvester's law; the displacement of a joint tip follows all others.
+//! The rotations of a vein are eliminated node by node. That leaves a dense symmetric matrix T_j of its
+//! displacements, by which alone a vein is coupled with the next one (diagonal matrices E_j), so that
+//! the veins follow one another: S_1 = T_1 and S_j+1 = T_j+1 - E_j S_j^-1 E_j. Every S_j is inverted in
+//! place by symmetric sweeps (J. H. Goodnight, A tutorial on the SWEEP operator, Am. Stat. 33, 1979):
+//! a sweep of the pivots P turns the blocks [P B; B^T C] of a symmetric matrix into
+//! [-P^-1 P^-1 B; B^T P^-1 C - B^T P^-1 B]. The displacement of a joint tip follows all others. By
+//! Sylvester's law of inertia the pivots have as many negative eigenvalues as the matrix.
 //!
 //! The pivots are the rotation or the displacement of a node. Where one would let the other entries
-//! grow, the matrix is left to the sparse factorisation, which chooses its pivots.
-//!
-//! One vein of a leaf: its matrix, condensed to the displacements and eliminated after the vein before
-//! it, and solutions for its rotations.
-//!
-//! Symmetric sweeps: matrices inverted in place (J. H. Goodnight, A tutorial on the SWEEP operator,
-//! Am. Stat. 33, 1979). A sweep of the pivots P turns the blocks [P B; B^T C] of a symmetric matrix
-//! into [-P^-1 P^-1 B; B^T P^-1 C - B^T P^-1 B]; the negative pivots are as many as the negative
-//! eigenvalues of P.
+//! grow, the matrix is left to the sparse factorization, which chooses its pivots.
 
-use crate::leaf::block_tridiagonal::{RodBlock, group_and_lane};
+use crate::leaf::block_tridiagonal::{Matrix3, NodeBlocks, RodLane, rod_lane};
 use crate::leaf::direct::unknowns::UnknownNumbering;
 use crate::leaf::system::System;
+use crate::rod::NodeBlock;
+use crate::simd::MAX_LANES;
 use pulp::{Arch, Simd, WithSimd};
 
-/// The factorised matrix.
+/// The matrix of a leaf, factorized vein after vein.
 pub struct CondensedFactors {
     veins: Vec<CondensedRod>,
     /// Coupling of every vein with the next, at the displacements that are eliminated.
@@ -32,14 +27,15 @@ pub struct CondensedFactors {
     tip: Option<Matrix3>,
     /// Number of negative pivots.
     negative: usize,
-    /// Displacements of a vein, and those of them that are eliminated with it.
+    /// Number of displacements of a vein.
     displacements_per_rod: usize,
+    /// Number of displacements that are eliminated with their vein: without those of a joint tip.
     eliminated_displacements: usize,
     arch: Arch,
 }
 
 impl CondensedFactors {
-    /// Factorises the matrix assembled in `system` plus `shift` times its mass matrix. `None` if
+    /// Factorizes the matrix assembled in `system` plus `shift` times its mass matrix. `None` if
     /// pivots are too small or not numbers.
     pub fn new(system: &System, shift: f64) -> Option<Self> {
         let mut work = Workspace::new(system);
@@ -58,44 +54,50 @@ impl CondensedFactors {
         for j in 0..system.rods() {
             let mut vein = CondensedRod::default();
             let before = j.checked_sub(1);
-            let before = before.map(|k| (&condensed.veins[k], condensed.coupling[k].as_slice()));
-            condensed.negative += vein.eliminate((system, shift, j), before, &mut work)?;
+            let before = before.map(|k| PrecedingVein {
+                vein: &condensed.veins[k],
+                coupling: &condensed.coupling[k],
+            });
+            condensed.negative += vein.eliminate(system, shift, j, before, &mut work)?;
             symmetrize_matrix(&mut vein.swept, width);
             condensed.veins.push(vein);
         }
         if system.joined {
-            let (negative, tip) = invert_tip_block(condensed.veins.last()?, &work)?;
-            condensed.negative += negative;
-            condensed.tip = Some(tip);
+            let tip = invert_tip_block(condensed.veins.last()?, &work)?;
+            condensed.negative += tip.negative;
+            condensed.tip = Some(tip.minus_inverse);
         }
         Some(condensed)
     }
 
     /// The number of negative eigenvalues alone, without the factors. `None` as for
-    /// [`Condensed::new`].
+    /// [`CondensedFactors::new`].
     pub fn count_negative_eigenvalues(system: &System, shift: f64) -> Option<usize> {
         let mut work = Workspace::new(system);
         let [mut vein, mut last] = [(); 2].map(|()| CondensedRod::default());
         let mut negative = 0;
         let mut gap = Vec::new();
         for j in 0..system.rods() {
-            let before = (j > 0).then_some((&last, gap.as_slice()));
-            negative += vein.eliminate((system, shift, j), before, &mut work)?;
+            let before = (j > 0).then_some(PrecedingVein {
+                vein: &last,
+                coupling: &gap,
+            });
+            negative += vein.eliminate(system, shift, j, before, &mut work)?;
             gap = gap_coupling(system, j, work.eliminated_displacements);
             std::mem::swap(&mut vein, &mut last);
         }
         if system.joined {
-            negative += invert_tip_block(&last, &work)?.0;
+            negative += invert_tip_block(&last, &work)?.negative;
         }
         Some(negative)
     }
 
     /// Number of negative eigenvalues, by Sylvester's law of inertia.
-    pub fn negative(&self) -> usize {
+    pub fn negative_eigenvalue_count(&self) -> usize {
         self.negative
     }
 
-    /// Solves in place, with these numbers of the unknowns. A step of iterative refinement makes the
+    /// Solves in place, with the unknowns numbered by `unknowns`. A step of iterative refinement makes the
     /// solution as accurate as one without inverse matrices.
     pub fn solve(&self, unknowns: &UnknownNumbering, b: &mut [f64]) {
         let mut x = b.to_vec();
@@ -120,14 +122,14 @@ impl CondensedFactors {
             for (i, node) in vein.nodes.iter().enumerate() {
                 let here = unknowns.node_numbers(j, i);
                 let own = here.map(|k| x[k]);
-                for (at, row) in here.iter().zip(&node.eliminated_displacements) {
-                    b[*at] -= product(row, &own);
+                for (at, row) in here.iter().zip(&node.blocks.own) {
+                    b[*at] -= row_product(row, &own);
                 }
                 if i + 1 < vein.nodes.len() {
                     let ahead = unknowns.node_numbers(j, i + 1);
                     let next = ahead.map(|k| x[k]);
-                    for (r, row) in node.next.iter().enumerate() {
-                        b[here[r]] -= product(row, &next);
+                    for (r, row) in node.blocks.next.iter().enumerate() {
+                        b[here[r]] -= row_product(row, &next);
                         for (at, value) in ahead.iter().zip(row) {
                             b[*at] -= value * own[r];
                         }
@@ -146,7 +148,8 @@ impl CondensedFactors {
     }
 }
 
-fn product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
+/// A row times a column.
+fn row_product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
     row.iter().zip(values).map(|(a, b)| a * b).sum()
 }
 
@@ -162,7 +165,7 @@ fn gap_coupling(system: &System, j: usize, own: usize) -> Vec<f64> {
 
 /// Completes a symmetric matrix of padded rows, given by its upper triangle.
 fn symmetrize_matrix(a: &mut [f64], width: usize) {
-    let stride = padded(width);
+    let stride = padded_length(width);
     for r in 1..width {
         for c in 0..r {
             a[r * stride + c] = a[c * stride + r];
@@ -170,17 +173,27 @@ fn symmetrize_matrix(a: &mut [f64], width: usize) {
     }
 }
 
-/// The number of negative pivots of a joint tip after the last vein, and minus the inverse of
-/// its matrix.
-fn invert_tip_block(last: &CondensedRod, work: &Workspace) -> Option<(usize, Matrix3)> {
+/// The elimination of a joint tip, after all veins.
+struct TipElimination {
+    /// Number of negative pivots.
+    negative: usize,
+    /// Minus the inverse of the matrix that is left for the tip.
+    minus_inverse: Matrix3,
+}
+
+/// Eliminates a joint tip after the last vein. `None` if a pivot is too small.
+fn invert_tip_block(last: &CondensedRod, work: &Workspace) -> Option<TipElimination> {
     let at = |k: usize| {
-        (work.eliminated_displacements + k) * padded(work.displacements_per_rod)
+        (work.eliminated_displacements + k) * padded_length(work.displacements_per_rod)
             + work.eliminated_displacements
     };
     let entry = |r: usize, c: usize| last.swept[at(r.min(c)) + r.max(c)];
     let mut tip: Matrix3 = std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)));
     let scale = std::array::from_fn(|k| tip[k][k].abs());
-    Some((sweep_matrix3(&mut tip, scale)?, tip))
+    Some(TipElimination {
+        negative: sweep_matrix3(&mut tip, scale)?,
+        minus_inverse: tip,
+    })
 }
 
 /// Solves for a vector of all unknowns, in place.
@@ -265,7 +278,7 @@ impl WithSimd for CondensedSolve<'_> {
                 }
             }
             for (c, tip) in tip.iter().enumerate().take(width - own) {
-                let column = &vein.swept[(own + c) * padded(width)..];
+                let column = &vein.swept[(own + c) * padded_length(width)..];
                 for k in 0..own {
                     here[k] -= column[k] * tip;
                 }
@@ -285,31 +298,41 @@ impl WithSimd for CondensedSolve<'_> {
     }
 }
 
-/// A vein of a factorised leaf.
+/// A vein of a factorized leaf.
 #[derive(Default)]
-pub struct CondensedRod {
-    pub nodes: Vec<CondensedNode>,
+struct CondensedRod {
+    nodes: Vec<CondensedNode>,
     /// The swept matrix: -S^-1 and, in the columns of a joint tip, S^-1 times the matrix between
     /// the vein and the tip; rows padded, symmetric.
-    pub swept: Vec<f64>,
+    swept: Vec<f64>,
 }
 
-/// A node of a vein: the blocks of the assembled matrix, the inverse pivot of its rotation, and
-/// that times the block between it and the next rotation.
-pub struct CondensedNode {
-    pub eliminated_displacements: RodBlock,
-    pub next: RodBlock,
+/// A node of a vein.
+struct CondensedNode {
+    /// The blocks of the assembled matrix, that of the node complete.
+    blocks: NodeBlocks,
+    /// The inverse pivot of the rotation.
     inverse: Matrix3,
+    /// The inverse pivot times the block between the rotation and that of the next node.
     inverse_times_next: Matrix3,
 }
 
+/// A vein that has been eliminated.
+struct PrecedingVein<'a> {
+    vein: &'a CondensedRod,
+    /// Coupling with the next vein at the displacements that were eliminated.
+    coupling: &'a [f64],
+}
+
 impl CondensedRod {
-    /// Eliminates vein `j` after the one `before` it, and what couples them; the number of
-    /// negative pivots. Of the swept matrix the upper triangle is written.
-    pub fn eliminate(
+    /// Eliminates vein `j` after the vein `before` it; returns the number of negative pivots. Of the
+    /// swept matrix the upper triangle is written.
+    fn eliminate(
         &mut self,
-        (system, shift, j): (&System, f64, usize),
-        before: Option<(&CondensedRod, &[f64])>,
+        system: &System,
+        shift: f64,
+        j: usize,
+        before: Option<PrecedingVein>,
         work: &mut Workspace,
     ) -> Option<usize> {
         self.assemble(system, j, shift, work.displacements_per_rod);
@@ -322,23 +345,24 @@ impl CondensedRod {
 
     /// Writes the blocks of its matrix, and the matrix of its displacements, upper triangle.
     fn assemble(&mut self, system: &System, j: usize, shift: f64, width: usize) {
-        let (group, lane) = group_and_lane(j);
+        let RodLane { group, lane } = rod_lane(j);
         let chain = &system.groups[group].matrix;
-        let (n, stride) = (system.nodes(), padded(width));
+        let (n, stride) = (system.nodes(), padded_length(width));
         self.nodes.clear();
         self.swept.clear();
         self.swept.resize(width * stride, 0.0);
         for i in 0..n {
-            let (mut own, mut next) = chain.blocks(i, lane);
+            let mut blocks = chain.node_blocks(i, lane);
+            let NodeBlocks { own, next } = &mut blocks;
             let mass = system.mass(j, i);
             for r in 0..6 {
-                own[r][r] += shift * mass[r / 3];
+                own[r][r] += shift * mass.of_component(r);
                 for c in 0..r {
                     own[r][c] = own[c][r];
                 }
             }
             if i + 1 == n {
-                next = RodBlock::default();
+                *next = NodeBlock::default();
             }
             for r in 0..3 {
                 let row = &mut self.swept[(3 * i + r) * stride..][..width];
@@ -348,8 +372,7 @@ impl CondensedRod {
                 }
             }
             self.nodes.push(CondensedNode {
-                eliminated_displacements: own,
-                next,
+                blocks,
                 inverse: Matrix3::default(),
                 inverse_times_next: Matrix3::default(),
             });
@@ -358,9 +381,9 @@ impl CondensedRod {
 
     /// The swept matrix times a vector of the eliminated displacements.
     #[inline(always)]
-    pub fn multiply_swept(&self, vector: &[f64], product: &mut [f64]) {
+    fn multiply_swept(&self, vector: &[f64], product: &mut [f64]) {
         product.fill(0.0);
-        let stride = padded(product.len());
+        let stride = padded_length(product.len());
         for (row, factor) in self.swept.chunks_exact(stride).zip(vector) {
             for (product, value) in product.iter_mut().zip(row) {
                 *product += factor * value;
@@ -370,7 +393,7 @@ impl CondensedRod {
 
     /// Solves for the rotations with the displacements held.
     #[inline(always)]
-    pub fn solve_rotations(&self, turns: &mut [[f64; 3]]) {
+    fn solve_rotations(&self, turns: &mut [[f64; 3]]) {
         for (i, node) in self.nodes.iter().enumerate() {
             if i + 1 < self.nodes.len() {
                 for c in 0..3 {
@@ -396,16 +419,9 @@ impl CondensedRod {
 
     /// Subtracts from the forces on the nodes those of rotations.
     #[inline(always)]
-    pub fn subtract_rotations(&self, turns: &[[f64; 3]], load: &mut [f64]) {
-        for (
-            i,
-            CondensedNode {
-                eliminated_displacements: own,
-                next,
-                ..
-            },
-        ) in self.nodes.iter().enumerate()
-        {
+    fn subtract_rotations(&self, turns: &[[f64; 3]], load: &mut [f64]) {
+        for (i, node) in self.nodes.iter().enumerate() {
+            let NodeBlocks { own, next } = &node.blocks;
             let ahead = i + 1 < self.nodes.len();
             for c in 0..3 {
                 for k in 0..3 {
@@ -421,17 +437,10 @@ impl CondensedRod {
 
     /// The rotations that balance the moments of displacements, with the opposite sign.
     #[inline(always)]
-    pub fn balancing_rotations(&self, shifts: &[f64], turns: &mut [[f64; 3]]) {
+    fn balancing_rotations(&self, shifts: &[f64], turns: &mut [[f64; 3]]) {
         turns.fill([0.0; 3]);
-        for (
-            i,
-            CondensedNode {
-                eliminated_displacements: own,
-                next,
-                ..
-            },
-        ) in self.nodes.iter().enumerate()
-        {
+        for (i, node) in self.nodes.iter().enumerate() {
+            let NodeBlocks { own, next } = &node.blocks;
             let ahead = i + 1 < self.nodes.len();
             for c in 0..3 {
                 for k in 0..3 {
@@ -452,7 +461,7 @@ impl CondensedRod {
 struct RodElimination<'a> {
     work: &'a mut Workspace,
     vein: &'a mut CondensedRod,
-    before: Option<(&'a CondensedRod, &'a [f64])>,
+    before: Option<PrecedingVein<'a>>,
 }
 
 impl WithSimd for RodElimination<'_> {
@@ -462,8 +471,8 @@ impl WithSimd for RodElimination<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Option<usize> {
         let RodElimination { work, vein, before } = self;
         let turns = eliminate_rotations(simd, vein, work)?;
-        if let Some((before, coupling)) = before {
-            add_previous(&mut vein.swept, &before.swept, coupling, work)?;
+        if let Some(before) = before {
+            add_previous(&mut vein.swept, before, work)?;
         }
         Some(turns + sweep_displacements(simd, &mut vein.swept, work)?)
     }
@@ -479,22 +488,19 @@ fn eliminate_rotations<S: Simd>(
 ) -> Option<usize> {
     let CondensedRod { nodes, swept } = vein;
     let width = work.displacements_per_rod;
-    let stride = padded(width);
+    let stride = padded_length(width);
     for k in 0..width {
         work.diagonal_sizes[k] = swept[k * stride + k].abs();
     }
     let mut negative = 0;
     for i in 0..nodes.len() {
         let filled = (3 * (i + 2)).min(width);
-        let mut pivot: Matrix3 = matrix3(|r, c| nodes[i].eliminated_displacements[r][c]);
+        let mut pivot: Matrix3 = matrix3(|r, c| nodes[i].blocks.own[r][c]);
         let turn_scale = std::array::from_fn(|k| pivot[k][k].abs());
         match i.checked_sub(1).map(|k| &nodes[k]) {
             None => work.rows.fill(0.0),
-            Some(CondensedNode {
-                next,
-                inverse_times_next: ahead,
-                ..
-            }) => {
+            Some(previous) => {
+                let (next, ahead) = (&previous.blocks.next, &previous.inverse_times_next);
                 let turned = matrix3(|r, c| ahead[c][r]);
                 multiply_rows(simd, &turned, &work.before, &mut work.rows);
                 for r in 0..3 {
@@ -507,11 +513,7 @@ fn eliminate_rotations<S: Simd>(
                 }
             }
         }
-        let CondensedNode {
-            eliminated_displacements: own,
-            next,
-            ..
-        } = &nodes[i];
+        let NodeBlocks { own, next } = &nodes[i].blocks;
         for r in 0..3 {
             let row = &mut work.rows[r * stride..][..filled];
             for c in 0..3 {
@@ -536,25 +538,21 @@ fn eliminate_rotations<S: Simd>(
     Some(negative)
 }
 
-/// Adds what the elimination of the vein before leaves: of it the swept matrix, upper triangle.
+/// Adds to the matrix of a vein what the elimination of the preceding vein leaves, upper triangle.
 /// `None` if that is too large.
 #[inline(always)]
-fn add_previous(
-    swept: &mut [f64],
-    before: &[f64],
-    coupling: &[f64],
-    work: &Workspace,
-) -> Option<()> {
+fn add_previous(swept: &mut [f64], before: PrecedingVein, work: &Workspace) -> Option<()> {
+    let PrecedingVein { vein, coupling } = before;
     let Workspace {
         displacements_per_rod: width,
         eliminated_displacements: own,
         ..
     } = *work;
-    let stride = padded(width);
+    let stride = padded_length(width);
     for a in 0..width {
         let factor = coupling.get(a).copied().unwrap_or(1.0);
         let row = &mut swept[a * stride..][..width];
-        let from = &before[a * stride..][..width];
+        let from = &vein.swept[a * stride..][..width];
         let small = factor * from[a].abs() * factor <= MAX_PIVOT_GROWTH * work.diagonal_sizes[a];
         if a < own && !small {
             return None;
@@ -569,46 +567,46 @@ fn add_previous(
     Some(())
 }
 
-/// The largest factor by which the elimination of a pivot may change a diagonal entry of a
-/// matrix, in units of the entry that was assembled. In a positive definite one it is less than
-/// one.
-pub const MAX_PIVOT_GROWTH: f64 = 1e3;
+/// The largest change of a diagonal entry of a matrix by the elimination of a pivot, in units of the
+/// entry that was assembled. In a positive definite matrix it is less than one.
+const MAX_PIVOT_GROWTH: f64 = 1e3;
 
-/// Rows are padded to a multiple of so many numbers, with zeros.
-pub const ROW_PADDING: usize = 8;
-
-pub type Matrix3 = [[f64; 3]; 3];
+/// Number of lanes to a multiple of which rows are padded, with zeros.
+const ROW_PADDING: usize = MAX_LANES;
 
 /// The matrix with these entries.
 #[inline(always)]
-pub fn matrix3(entry: impl Fn(usize, usize) -> f64) -> Matrix3 {
+fn matrix3(entry: impl Fn(usize, usize) -> f64) -> Matrix3 {
     std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
 }
 
 /// The length of a padded row.
-pub fn padded(width: usize) -> usize {
+fn padded_length(width: usize) -> usize {
     width.div_ceil(ROW_PADDING) * ROW_PADDING
 }
 
 /// Memory for the elimination of a vein.
-pub struct Workspace {
-    /// Displacements of a vein, and those of them that are eliminated with it.
-    pub displacements_per_rod: usize,
-    pub eliminated_displacements: usize,
+struct Workspace {
+    /// Number of displacements of a vein.
+    displacements_per_rod: usize,
+    /// Number of displacements that are eliminated with their vein: without those of a joint tip.
+    eliminated_displacements: usize,
     /// Sizes of the diagonal entries that were assembled.
-    pub diagonal_sizes: Vec<f64>,
-    /// Three rows of the matrix, those before them, and their multiples by an inverse pivot.
-    pub rows: Vec<f64>,
-    pub before: Vec<f64>,
-    pub scaled: Vec<f64>,
+    diagonal_sizes: Vec<f64>,
+    /// Three rows of the matrix, which belong to a node.
+    rows: Vec<f64>,
+    /// The rows of the node before.
+    before: Vec<f64>,
+    /// The rows times an inverse pivot.
+    scaled: Vec<f64>,
     /// Whether the displacement of a node is eliminated.
     swept: Vec<bool>,
 }
 
 impl Workspace {
-    pub fn new(system: &System) -> Self {
+    fn new(system: &System) -> Self {
         let width = 3 * system.nodes();
-        let rows = || vec![0.0; 3 * padded(width)];
+        let rows = || vec![0.0; 3 * padded_length(width)];
         Workspace {
             displacements_per_rod: width,
             eliminated_displacements: if system.joined { width - 3 } else { width },
@@ -625,13 +623,13 @@ impl Workspace {
 /// upper triangle; the number of negative pivots. A node whose pivot is too small for what it
 /// divides is left for later; `None` if only such are left.
 #[inline(always)]
-pub fn sweep_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
+fn sweep_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
     let Workspace {
         displacements_per_rod: width,
         eliminated_displacements: own,
         ..
     } = *work;
-    let stride = padded(width);
+    let stride = padded_length(width);
     work.swept.fill(false);
     let (mut negative, mut left) = (0, own / 3);
     while left > 0 {
@@ -681,14 +679,14 @@ pub fn sweep_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace
 
 /// Three rows of one memory.
 #[inline(always)]
-pub fn split_three_rows(rows: &[f64]) -> [&[f64]; 3] {
+fn split_three_rows(rows: &[f64]) -> [&[f64]; 3] {
     let stride = rows.len() / 3;
     [0, 1, 2].map(|r| &rows[r * stride..][..stride])
 }
 
 /// Minus a matrix times three rows.
 #[inline(always)]
-pub fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: &mut [f64]) {
+fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: &mut [f64]) {
     let [r0, r1, r2] = split_three_rows(rows).map(|row| S::as_simd_f64s(row).0);
     let products = product.chunks_exact_mut(rows.len() / 3);
     for (product, row) in products.zip(factor) {
@@ -705,7 +703,7 @@ pub fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: 
 /// Subtracts from the upper triangle of a matrix of padded rows, up to row and column `filled`, the
 /// product of three columns and three rows. Less than a lane is written beside the triangle.
 #[inline(always)]
-pub fn subtract_rank_three_product<S: Simd>(
+fn subtract_rank_three_product<S: Simd>(
     simd: S,
     a: &mut [f64],
     [c0, c1, c2]: [&[f64]; 3],
@@ -732,7 +730,7 @@ pub fn subtract_rank_three_product<S: Simd>(
 
 /// [`sweep_displacements`] of a matrix of three rows: minus its inverse.
 #[inline(always)]
-pub fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
+fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
     let mut swept = [false; 3];
     let mut negative = 0;
     for _ in 0..3 {
@@ -763,13 +761,13 @@ pub fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
 /// Whether the product of three columns and three rows changes no diagonal entry by too much,
 /// but for some; what is not a number does.
 #[inline(always)]
-pub fn is_growth_bounded(
+fn is_growth_bounded(
     [c0, c1, c2]: [&[f64]; 3],
     [z0, z1, z2]: [&[f64]; 3],
     scale: &[f64],
     is_free: impl Fn(usize) -> bool,
 ) -> bool {
-    // By parts: those of a pivot that is not definite may cancel.
+    // Sizes of the three products: those of a pivot that is not definite may cancel.
     let change = |i: usize| (c0[i] * z0[i]).abs() + (c1[i] * z1[i]).abs() + (c2[i] * z2[i]).abs();
     (0..scale.len()).all(|i| is_free(i) || change(i) <= MAX_PIVOT_GROWTH * scale[i])
 }

@@ -14,7 +14,7 @@
 //! the relative error of the linear equations: about a hundredth on 8 segments.
 
 use crate::leaf::{
-    DefiniteFactors, DiscreteLeaf, EquationWorkspace, FieldJump, Grid, LinearSolveOutcome,
+    DefiniteFactors, DiscreteLeaf, EquationWorkspace, FieldChange, Grid, LinearSolveOutcome,
     NodalField, RodFields, RodIntegrator, SegmentTangent, State, StationFields, System,
     displacement_part, rotation_part,
 };
@@ -260,7 +260,7 @@ pub fn estimate(
 struct MidpointIntegration {
     /// After every step from the two ends of a part to its midpoint, part after part.
     slices: Vec<[Vec<StationFields>; 2]>,
-    jumps: Vec<Vec<FieldJump>>,
+    jumps: Vec<Vec<FieldChange>>,
     energy: f64,
 }
 
@@ -291,7 +291,7 @@ fn integrate_to_midpoints(
             let [a, b] = at_midpoint(ends, j);
             let jump = jump(&a, &b);
             // Minus the work of closing the jump: the energy error is then of second order.
-            energy -= a.n.dot(jump[0]) + a.m.dot(jump[1]);
+            energy -= a.n.dot(jump.position) + a.m.dot(jump.rotation);
             jumps.push(jump);
         }
     }
@@ -363,16 +363,25 @@ impl MidpointIntegration {
 
 /// Changes at the nodes, and at the midpoints between them on the side where they are larger: half
 /// of the jump is added to their mean.
-fn with_midpoints(changes: &[Vec<FieldChange>], jumps: &[Vec<FieldJump>]) -> Vec<Vec<FieldChange>> {
-    let rod = |(nodes, jumps): (&Vec<FieldChange>, &Vec<FieldJump>)| {
+fn with_midpoints(
+    changes: &[Vec<FieldChange>],
+    jumps: &[Vec<FieldChange>],
+) -> Vec<Vec<FieldChange>> {
+    let rod = |(nodes, jumps): (&Vec<FieldChange>, &Vec<FieldChange>)| {
         let mut all = Vec::with_capacity(nodes.len() + jumps.len());
         for (pair, jump) in nodes.windows(2).zip(jumps) {
             all.push(pair[0]);
-            all.push(std::array::from_fn(|k| {
-                let mean = 0.5 * (pair[0][k] + pair[1][k]);
-                let half = 0.5 * jump[k];
+            let larger_side = |field: fn(&FieldChange) -> DVec3| {
+                let mean = 0.5 * (field(&pair[0]) + field(&pair[1]));
+                let half = 0.5 * field(jump);
                 mean + if mean.dot(half) < 0.0 { -half } else { half }
-            }));
+            };
+            all.push(FieldChange {
+                position: larger_side(|it| it.position),
+                rotation: larger_side(|it| it.rotation),
+                force: larger_side(|it| it.force),
+                moment: larger_side(|it| it.moment),
+            });
         }
         all.extend(nodes.last());
         all
@@ -389,18 +398,24 @@ fn with_midpoints(changes: &[Vec<FieldChange>], jumps: &[Vec<FieldJump>]) -> Vec
 fn energy_error(
     leaf: &DiscreteLeaf,
     changes: &[Vec<FieldChange>],
-    jumps: &[Vec<FieldJump>],
+    jumps: &[Vec<FieldChange>],
 ) -> f64 {
     let mut error = 0.0;
     for (nodes, jumps) in changes.iter().zip(jumps) {
-        for (pair, [x, turn, n, m]) in nodes.windows(2).zip(jumps) {
-            let mean = |k: usize| 0.5 * (pair[0][k].length() + pair[1][k].length());
-            error += 0.5 * (n.length() * mean(0) + mean(2) * x.length());
-            error += 0.5 * (m.length() * mean(1) + mean(3) * turn.length());
+        for (pair, jump) in nodes.windows(2).zip(jumps) {
+            let mean = |field: fn(&FieldChange) -> DVec3| {
+                0.5 * (field(&pair[0]).length() + field(&pair[1]).length())
+            };
+            error += 0.5
+                * (jump.force.length() * mean(|it| it.position)
+                    + mean(|it| it.force) * jump.position.length());
+            error += 0.5
+                * (jump.moment.length() * mean(|it| it.rotation)
+                    + mean(|it| it.moment) * jump.rotation.length());
         }
     }
     let [turned, _] = largest_rotation_and_stress(changes);
-    let moments = leaf.dead_moments().map(|(_, moment)| moment.length());
+    let moments = leaf.dead_moments().map(|it| it.moment.length());
     error + turned * moments.sum::<f64>()
 }
 
@@ -440,9 +455,13 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
     }
 }
 
-fn jump(a: &RodFields, b: &RodFields) -> FieldJump {
-    let turn = rotation::log(a.q * b.q.conjugate());
-    [a.x - b.x, turn, a.n - b.n, a.m - b.m]
+fn jump(a: &RodFields, b: &RodFields) -> FieldChange {
+    FieldChange {
+        position: a.x - b.x,
+        rotation: rotation::log(a.q * b.q.conjugate()),
+        force: a.n - b.n,
+        moment: a.m - b.m,
+    }
 }
 
 fn mean(a: &RodFields, b: &RodFields) -> RodFields {
@@ -453,9 +472,6 @@ fn mean(a: &RodFields, b: &RodFields) -> RodFields {
         m: 0.5 * (a.m + b.m),
     }
 }
-
-/// Changes of position, rotation, force and moment.
-pub type FieldChange = [DVec3; 4];
 
 /// The linearized equations of a leaf on a grid that is divided into equal parts of `part`
 /// segments; its fields may jump at their midpoints.
@@ -498,7 +514,7 @@ impl<'a> Tangents<'a> {
     fn response(
         &self,
         linear: &mut FactorizedLevel,
-        jumps: &[Vec<FieldJump>],
+        jumps: &[Vec<FieldChange>],
     ) -> Option<JumpResponse> {
         let leaf = &self.level.leaf;
         let FactorizedLevel {
@@ -513,17 +529,17 @@ impl<'a> Tangents<'a> {
         let solution = system.solution();
         for (rod, jumps) in solution.iter().zip(jumps) {
             // The ends of parts, without the bases.
-            let nodes = &rod[1 - system.first()..];
+            let nodes = &rod[1 - system.first_node()..];
             for (nodes, jump) in nodes.chunks(self.part).zip(jumps) {
                 let before = displacement_part(&nodes[self.part / 2 - 1]);
-                let middle = larger(before.length(), (before + jump[0]).length());
+                let middle = larger(before.length(), (before + jump.position).length());
                 between = larger(between, middle);
                 at_ends = larger(at_ends, displacement_part(&nodes[self.part - 1]).length());
             }
         }
         Some(JumpResponse {
             solution,
-            first: system.first(),
+            first: system.first_node(),
             position_errors: PositionErrors {
                 at_nodes: at_ends,
                 between,
@@ -535,7 +551,7 @@ impl<'a> Tangents<'a> {
     fn changes(
         &mut self,
         response: &JumpResponse,
-        jumps: &[Vec<FieldJump>],
+        jumps: &[Vec<FieldChange>],
     ) -> Vec<Vec<FieldChange>> {
         let GridLevel { leaf, state } = self.level;
         if self.at_ends.is_empty() {
@@ -546,7 +562,7 @@ impl<'a> Tangents<'a> {
             self.at_ends = (0..leaf.rods()).map(ends).collect();
         }
         let moved = displace_state(state, response);
-        let ends = |(j, jumps): (usize, &Vec<FieldJump>)| {
+        let ends = |(j, jumps): (usize, &Vec<FieldChange>)| {
             let end = |k: usize| self.change(response, &moved, j, jumps, k);
             (0..=jumps.len()).map(end).collect()
         };
@@ -560,7 +576,7 @@ impl<'a> Tangents<'a> {
         response: &JumpResponse,
         moved: &State,
         j: usize,
-        jumps: &[FieldJump],
+        jumps: &[FieldChange],
         k: usize,
     ) -> FieldChange {
         let GridLevel { leaf, state } = self.level;
@@ -570,12 +586,12 @@ impl<'a> Tangents<'a> {
         let mut across = end - begin;
         if s % self.part == self.part / 2 {
             // This segment begins just beyond the jump at the midpoint.
-            let [shift, turn, ..] = jumps[s / self.part];
-            a += turn;
-            across -= shift;
+            let jump = jumps[s / self.part];
+            a += jump.rotation;
+            across -= jump.position;
         }
         let tangent = &self.at_ends[j][k];
-        let (segment, second, (_, g_a, g_b)) = (&tangent.segment, &tangent.second, tangent.first);
+        let (segment, second, first) = (&tangent.segment, &tangent.second, &tangent.first);
         let (section, zero) = (leaf.section(j, s), DVec3::ZERO);
         // Without the part that closes the segment's remaining gap (residual of its
         // constitutive law).
@@ -584,12 +600,12 @@ impl<'a> Tangents<'a> {
         // A moment with fixed lab components does not rotate with its node.
         if i == 0 {
             let moment = second.xa.transpose() * across + second.aa * a + second.ab * b;
-            return [
-                zero,
-                response.at(j, 0)[1],
+            return FieldChange {
+                position: zero,
+                rotation: response.at(j, 0)[1],
                 force,
-                -moment - 0.5 * a.cross(g_a),
-            ];
+                moment: -moment - 0.5 * a.cross(first.a),
+            };
         }
         let moment = second.xb.transpose() * across + second.ab.transpose() * a + second.bb * b;
         let left = leaf.grid.segment_width(i - 1);
@@ -600,12 +616,12 @@ impl<'a> Tangents<'a> {
         };
         let [before, after] = [state, moved].map(|state| leaf.load(state, j, i));
         let part = left / (left + right);
-        [
-            end,
-            b,
-            force - part * (after.force - before.force),
-            moment + 0.5 * b.cross(g_b) - part * (after.moment - before.moment),
-        ]
+        FieldChange {
+            position: end,
+            rotation: b,
+            force: force - part * (after.force - before.force),
+            moment: moment + 0.5 * b.cross(first.b) - part * (after.moment - before.moment),
+        }
     }
 }
 
@@ -625,19 +641,19 @@ impl JumpResponse {
 fn largest_rotation_and_stress(changes: &[Vec<FieldChange>]) -> [f64; 2] {
     let most = |of: fn(&FieldChange) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
     [
-        most(|[_, turn, ..]| turn.length()),
-        most(|[.., force, moment]| larger(force.length(), moment.length())),
+        most(|it| it.rotation.length()),
+        most(|it| larger(it.force.length(), it.moment.length())),
     ]
 }
 
 /// Adds the changes to the fields of the leaf.
 fn apply_changes(changes: &[Vec<FieldChange>], known: &mut [Vec<RodFields>]) {
     let changes = changes.iter().flatten();
-    for (node, [shift, turn, force, moment]) in known.iter_mut().flatten().zip(changes) {
-        node.x += shift;
-        node.q = (rotation::exp(*turn) * node.q).normalize();
-        node.n += force;
-        node.m += moment;
+    for (node, change) in known.iter_mut().flatten().zip(changes) {
+        node.x += change.position;
+        node.q = (rotation::exp(change.rotation) * node.q).normalize();
+        node.n += change.force;
+        node.m += change.moment;
     }
 }
 

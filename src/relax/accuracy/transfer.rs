@@ -521,7 +521,7 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
     };
     let (force, moment) = if i == 0 {
         let load = leaf.load(state, j, 0);
-        (carried(0) + load.force, load.moment - segment(0).1)
+        (carried(0) + load.force, load.moment - segment(0).a)
     } else {
         // The part of the nodal load that belongs to the left half-cell.
         let left = leaf.grid.segment_width(i - 1);
@@ -537,7 +537,7 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         };
         let before = left / (left + right);
         let force = carried(i - 1) - before * load.force;
-        (force, segment(i - 1).2 - before * load.moment)
+        (force, segment(i - 1).b - before * load.moment)
     };
     [force, moment].map(|vector| to_directors * vector)
 }

@@ -486,7 +486,7 @@ impl<'a> LoadedLeaf<'a> {
             return;
         }
         self.leaf = self.whole.clone();
-        self.leaf.set_load_factors(self.whole, [1.0, 0.0]);
+        self.leaf.set_load_factors(self.whole, 1.0, 0.0);
         if let TipMotion::Joining(offsets) = &mut self.tips {
             let tips: Vec<DVec3> = state.tips().collect();
             let bases: Vec<DVec3> = (0..state.rods()).map(|j| state.x[state.base(j)]).collect();
@@ -497,11 +497,11 @@ impl<'a> LoadedLeaf<'a> {
     /// Goes to a part of the stage, with the tips of a `state` that is in equilibrium at the part
     /// `from`.
     pub fn carry_to_lambda(&mut self, [from, part]: [f64; 2], state: &mut State) {
-        let shares = match self.stage {
-            Stage::LoadedLeaf => [part, 0.0],
-            Stage::Joining | Stage::Moving => [1.0, part],
+        let (loads, coupling) = match self.stage {
+            Stage::LoadedLeaf => (part, 0.0),
+            Stage::Joining | Stage::Moving => (1.0, part),
         };
-        self.leaf.set_load_factors(self.whole, shares);
+        self.leaf.set_load_factors(self.whole, loads, coupling);
         self.lambda = part;
         if let (TipMotion::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
             for (j, offset) in offsets.iter().enumerate() {

@@ -1,11 +1,12 @@
 //! The forces and moments that a leaf exerts on what holds it and the largest stresses along its veins,
 //! with their errors.
 
-use crate::leaf::{DiscreteLeaf, Scale};
+use crate::leaf::{DiscreteLeaf, FieldChange, Scale};
 use crate::numbers::{larger, largest};
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::accuracy::{FieldErrors, NestedEquilibrium, transfer};
+use crate::rod::Wrench;
 use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
 use glam::DVec3;
@@ -119,8 +120,8 @@ impl NestedEquilibrium {
         let held = leaf.tip_support.as_ref()?;
         let noise = self.force_noise();
         let clamped = held.clamps.is_some();
-        let force = |level: &GridLevel| vec![level.leaf.reaction(&level.state).0];
-        let moments = |level: &GridLevel| level.leaf.reaction(&level.state).1;
+        let force = |level: &GridLevel| vec![level.leaf.reaction(&level.state).force];
+        let moments = |level: &GridLevel| level.leaf.reaction(&level.state).moments;
         let forces = extrapolate_vectors(&self.levels, force, noise);
         let (mut force, mut error) = (forces.value[0], forces.error);
         let Extrapolated {
@@ -130,14 +131,14 @@ impl NestedEquilibrium {
         if let Some(FieldErrors { estimate, safety }) = self.field_errors() {
             let tips = || estimate.rods.iter().filter_map(|rod| rod.last());
             let level = &self.levels[0].leaf;
-            let off = |k: usize| {
+            let off = |of: fn(&FieldChange) -> DVec3| {
                 let tips = estimate.errors.iter().filter_map(|rod| rod.last());
-                tips.map(move |tip| safety * tip[k].length())
+                tips.map(move |tip| safety * of(tip).length())
             };
             let bar = |error: f64, size: f64| error + noise.relative * size + noise.rounding;
             let largest_moment = largest(tips().map(|tip| tip.m.length()));
-            let own = bar(off(2).sum(), force.length());
-            let own_of_moments = bar(largest(off(3)), largest_moment);
+            let own = bar(off(|tip| tip.force).sum(), force.length());
+            let own_of_moments = bar(largest(off(|tip| tip.moment)), largest_moment);
             if error.is_none_or(|error| own < SPURIOUS_DEFECT * error) {
                 let forces = tips().enumerate();
                 force = forces.map(|(j, tip)| level.tip_force(j) - tip.n).sum();
@@ -168,14 +169,14 @@ impl NestedEquilibrium {
             return Vec::new();
         }
         let noise = self.force_noise();
-        let on = |which: usize| {
+        let on = |part: fn(&Wrench) -> DVec3| {
             move |level: &GridLevel| -> Vec<DVec3> {
                 let reactions = level.leaf.grip_reactions(&level.state);
-                reactions.iter().map(|it| it[which]).collect()
+                reactions.iter().map(part).collect()
             }
         };
-        let forces = extrapolate_vectors(&self.levels, on(0), noise);
-        let moments = extrapolate_vectors(&self.levels, on(1), noise);
+        let forces = extrapolate_vectors(&self.levels, on(|it| it.force), noise);
+        let moments = extrapolate_vectors(&self.levels, on(|it| it.moment), noise);
         let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
         let both = forces.value.iter().zip(&moments.value).zip(&scenario.grips);
         let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
@@ -276,9 +277,9 @@ impl Stresses {
             let along = |it: DVec3| fields.q.conjugate() * it;
             let moduli = scenario.moduli(j, station)?;
             let at = |place: usize| {
-                let [_, turn, n, m] = estimate.errors[j][place];
-                let force = along(n - turn.cross(fields.n)) * scale.force();
-                let moment = along(m - turn.cross(fields.m)) * scale.moment();
+                let off = estimate.errors[j][place];
+                let force = along(off.force - off.rotation.cross(fields.n)) * scale.force();
+                let moment = along(off.moment - off.rotation.cross(fields.m)) * scale.moment();
                 safety * moduli.stress(force, moment).equivalent
             };
             let place = i * places / nodes;

@@ -15,6 +15,7 @@ use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::rotation::Pose;
 use crate::scenario::{
     LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
@@ -128,7 +129,7 @@ pub fn equilibrium(
             rods,
             joined,
             curves: (lines.iter())
-                .map(|line| line.iter().map(|(x, _)| *x).collect())
+                .map(|line| line.iter().map(|pose| pose.position).collect())
                 .collect(),
             curve_stations: grid.sigma().to_vec(),
         },
@@ -260,14 +261,21 @@ struct DrawnCenterlines<'f> {
 fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f GridLevel) -> DrawnCenterlines<'f> {
     let length = finest.leaf.leaf.scale.length;
     if let Some(estimate) = found.corrected_estimate() {
-        let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
+        let pose = |fields: &RodFields| Pose {
+            position: fields.x * length,
+            rotation: fields.q,
+        };
+        let line = |rod: &Vec<RodFields>| rod.iter().map(pose).collect();
         return DrawnCenterlines {
             grid: &estimate.grid,
             lines: estimate.rods.iter().map(line).collect(),
         };
     }
     let n = finest.leaf.segments();
-    let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);
+    let node = |k: usize| Pose {
+        position: finest.state.x[k] * length,
+        rotation: finest.state.q[k],
+    };
     let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
     let lines = bases.map(|base| (base..=base + n).map(node).collect());
     DrawnCenterlines {
@@ -352,7 +360,7 @@ const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
-        let base = [(SpanHolder::Base, 0, leaf.leaf.base(j).0)];
+        let base = [(SpanHolder::Base, 0, leaf.leaf.base_pose(j).position)];
         let grips = leaf.rod_grips(j).map(|held| {
             let sigma = leaf.grid.sigma()[held.node];
             (SpanHolder::Grip(sigma), held.node, held.position)
@@ -415,7 +423,7 @@ fn obstacle_to_rest(
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
     let loads = problem.leaf.loads;
     let [weight, tip] = [loads.gravity, loads.tip_force].map(|load| load.length());
-    let moment = problem.leaf.dead_moments().map(|(_, moment)| moment);
+    let moment = problem.leaf.dead_moments().map(|it| it.moment);
     let moment = moment.max_by(|a, b| a.length().total_cmp(&b.length()));
     // Along the directors at the base a moment shows what it turns; forces turn by their arms.
     let base = level.state.q[level.state.base(vein)];

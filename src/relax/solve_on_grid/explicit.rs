@@ -254,6 +254,5 @@ fn distance_to_equilibrium(
         return f64::INFINITY;
     };
     factor.solve(system, None);
-    let (turn, shift) = system.largest_increment();
-    turn.max(shift)
+    system.largest_increment().larger()
 }

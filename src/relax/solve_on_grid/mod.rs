@@ -352,7 +352,7 @@ fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> St
     let mut effect = |dropped: DVec3| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {
-            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().1),
+            LinearSolveOutcome::Converged(_) => Some(system.largest_increment().displacement),
             _ => None,
         }
     };

@@ -20,7 +20,7 @@ use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegra
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
 use crate::relax::solve_on_grid::start::GridRelaxation;
-use crate::rod::{RESOLVED_TURN, Section};
+use crate::rod::{RESOLVED_TURN, Section, Wrench};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -200,7 +200,7 @@ pub fn moment_curvature(leaf: &Leaf, segments: usize) -> Option<f64> {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
-    let (_, mut base) = leaf.leaf.base(0);
+    let mut base = leaf.leaf.base_pose(0).rotation;
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for (i, section) in leaf.sections.iter().enumerate() {
         turn = segment_turn(section, base, leaf.dead_moment_beyond(i), turn)?;
@@ -273,7 +273,7 @@ const MOTION_ERROR: f64 = 1e-3;
 /// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
 const REST_CHECK_INTERVAL: f64 = 0.5;
 
-const LONGEST_MOTION: f64 = 400.0;
+const LONGEST_TIME_TO_REST: f64 = 400.0;
 
 /// Largest velocity (lengths or radians per unit of time) with which the leaf hardly moves, and the
 /// factor on it where Newton's method led elsewhere.
@@ -330,7 +330,7 @@ fn approach_rest_in_wind(
     let mut end = Err(EquilibriumFailure::StepLimit);
     // Where forces are balanced, as found before, and how far from there the leaf was.
     let mut before: Option<(State, f64)> = None;
-    while until < LONGEST_MOTION && !rest.limit.reached() {
+    while until < LONGEST_TIME_TO_REST && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
             end = Err(EquilibriumFailure::NoDescent);
             break;
@@ -403,7 +403,7 @@ struct SteadyWind {
 impl SteadyWind {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| leaf.allows_rotation_and_displacement(j, i)[1];
+        let free = |(j, i)| leaf.node_freedom(j, i).displacement;
         Some(SteadyWind {
             wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
@@ -432,7 +432,7 @@ impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
             for node in self.free_segment_ends(j, i) {
-                system.add_load(j, node, [DVec3::ZERO, 0.5 * drag.force()]);
+                system.add_load(j, node, Wrench::from_force(0.5 * drag.force()));
             }
         }
     }

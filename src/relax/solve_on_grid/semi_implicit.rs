@@ -11,7 +11,7 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, NodalField, State, System};
+use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
@@ -232,7 +232,13 @@ impl GridRelaxation<'_> {
         }
         loop {
             let (shift, inertia) = match motion.mass_factors() {
-                Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
+                Some([shift, per_step]) => {
+                    let momentum = MassLoad {
+                        field: &motion.velocity,
+                        factor: per_step,
+                    };
+                    (shift, Some(momentum))
+                }
                 None => (leaf.neutral_shift(), None),
             };
             let (solver, work) = (&mut self.solver, &mut *self.work);
@@ -262,10 +268,11 @@ struct MotionStep {
 
 impl MotionStep {
     fn new(system: &System, motion: &Motion) -> Self {
-        let (turn, shift) = system.largest_increment();
-        let part = (STEP_LIMITS.turn / turn).min(STEP_LIMITS.shift / shift);
+        let size = system.largest_increment();
+        let turn = STEP_LIMITS.turn / size.rotation;
+        let part = turn.min(STEP_LIMITS.shift / size.displacement);
         MotionStep {
-            size: turn.max(shift),
+            size: size.larger(),
             part: part.min(motion.largest_step_fraction()),
         }
     }

@@ -129,7 +129,7 @@ pub(in crate::scenario) fn line_number_at(text: &[u8], at: usize) -> usize {
 
 /// The offending line with a caret below, to be put after a message; empty
 /// where the line is too long to be read.
-pub(in crate::scenario) fn line_with_caret(text: &str, span: Range<usize>) -> String {
+pub(super) fn line_with_caret(text: &str, span: Range<usize>) -> String {
     let at = span.start.min(text.len());
     let (Some(before), Some(after)) = (text.get(..at), text.get(at..)) else {
         return String::new();
@@ -153,7 +153,7 @@ pub(in crate::scenario) fn line_with_caret(text: &str, span: Range<usize>) -> St
 }
 
 /// `text` on one line, cut off where it is long.
-pub(in crate::scenario) fn shorten_excerpt(text: &str) -> String {
+pub(super) fn shorten_excerpt(text: &str) -> String {
     let mut short = String::new();
     for word in text.split_whitespace() {
         if !short.is_empty() {

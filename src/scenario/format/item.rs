@@ -128,7 +128,7 @@ impl<'e> EntryValue<'e> {
         self.part.key
     }
 
-    /// One of the lists of a table, if this is a table that has it.
+    /// A list of a profile or a schedule, if this value is one and has the list.
     pub fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
         let value = self.value.get(list)?;
         let list = Some(list);
@@ -474,7 +474,7 @@ impl<'e> EntryValue<'e> {
         }
     }
 
-    /// A load in time; of some keys, or one that is always the same.
+    /// A vector at given times; for some keys also one vector for all times.
     pub fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
@@ -488,7 +488,7 @@ impl<'e> EntryValue<'e> {
         Ok(Schedule { at, value })
     }
 
-    /// A fraction of the length behind the base.
+    /// A place along a rod: a fraction of its length, greater than 0.
     pub fn fraction(&self) -> ScenarioResult<f64> {
         let at = self.number_in(NumberRange::Finite)?;
         self.refuse_unless(

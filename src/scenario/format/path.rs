@@ -18,19 +18,19 @@ const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
 pub struct EntryPath {
     /// The key of the entry.
     pub key: Key,
-    /// Which of its tables, counted from 0, if there may be several; else 0.
+    /// Which of the tables with this key, counted from 0, if there may be several; else 0.
     pub(crate) row: usize,
     /// Which list of a profile or schedule.
     pub(crate) list: Option<&'static str>,
-    /// Which entry of the list, which of that, and so on, counted from 0.
+    /// Indices within the value or its list, the outermost first, counted from 0.
     pub(crate) indices: [Option<usize>; 3],
-    /// Whether its numbers are multiplied instead of replaced.
+    /// Whether all numbers of the target are multiplied instead of replaced.
     pub(crate) scale: bool,
 }
 
 impl EntryPath {
     /// The whole value of a key in one of its tables.
-    pub(in crate::scenario) fn whole_entry(key: Key, row: usize) -> EntryPath {
+    pub(super) fn whole_entry(key: Key, row: usize) -> EntryPath {
         EntryPath {
             key,
             row,
@@ -157,7 +157,7 @@ impl EntryPath {
     }
 
     /// Whether the path names the whole value of its key.
-    pub(in crate::scenario) fn is_whole(&self) -> bool {
+    pub(super) fn is_whole(&self) -> bool {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
 
@@ -167,7 +167,7 @@ impl EntryPath {
     }
 
     /// How many of the indices of a vector for each rod are in vain where one `value` holds for all.
-    pub(in crate::scenario) fn shared_indices(&self, value: &Value) -> usize {
+    pub(super) fn shared_indices(&self, value: &Value) -> usize {
         let is_vector = matches!(
             self.key.form(),
             ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
@@ -298,7 +298,7 @@ const SPELLING: SpellingLimits = SpellingLimits {
 /// another table, or the nearest spelling.
 pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
-    // The name of a unit is none of a number.
+    // `units.mass` does not mean `load.point.mass`.
     let of_numbers = |key: &Key| key.table_path().name == name && !path.starts_with("units.");
     if let Some(key) = Key::all().find(of_numbers) {
         return Some(key.path());

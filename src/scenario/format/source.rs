@@ -25,26 +25,26 @@ pub(in crate::scenario) struct ScenarioSource {
 }
 
 /// A text that was parsed.
-pub(in crate::scenario) struct ParsedText {
+pub(super) struct ParsedText {
     pub source: ScenarioSource,
     pub table: Table,
 }
 
 /// The places of a key and of its value in the text.
-pub(in crate::scenario) struct EntrySpans {
+pub(super) struct EntrySpans {
     pub key: Range<usize>,
     pub value: Range<usize>,
 }
 
 impl ScenarioSource {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
-    pub fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
-        // A mark that some editors write.
+    pub(super) fn parse(text: &str, file: &str) -> ScenarioResult<ParsedText> {
+        // The byte order mark, which some editors write.
         let text = text.trim_start_matches('\u{feff}');
         let mut source = ScenarioSource {
             file: file.into(),
             text: text.into(),
-            // No TOML begins like this.
+            // TOML never begins with a brace.
             has_lines: !text.trim_start().starts_with('{'),
             tables: Vec::new(),
         };
@@ -67,7 +67,7 @@ impl ScenarioSource {
 
     /// The places of a key, and of its value or a part of that; in one of its tables if there are
     /// several.
-    pub fn find_entry_spans(
+    pub(super) fn find_entry_spans(
         &self,
         path: TablePath,
         row: usize,
@@ -91,7 +91,7 @@ impl ScenarioSource {
     }
 
     /// A value as it is written, shortened.
-    pub fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
+    pub(super) fn displayed_value(&self, spans: Option<&EntrySpans>, value: &Value) -> String {
         let written = spans.and_then(|spans| self.text.get(spans.value.clone()));
         written.map_or_else(|| shorten_excerpt(&value.to_string()), shorten_excerpt)
     }
@@ -214,7 +214,7 @@ fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
         let error = refuse(None, problem);
         return Err(ScenarioError { key, ..error });
     }
-    // Unlike the document, these refuse a key that is there twice.
+    // Unlike the generic JSON above, tables refuse a key that is there twice.
     let form = match input {
         Some(_) => serde_json::from_str(text).map(|ResultInput { input }| input),
         None => serde_json::from_str(text),

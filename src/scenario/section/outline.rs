@@ -55,7 +55,7 @@ words! {
         Circle = "circle",
         /// An ellipse with its width along d2 and its thickness along d3.
         Ellipse = "ellipse",
-        /// A rectangle with the same sides.
+        /// A rectangle with its width along d2 and its thickness along d3.
         Rectangle = "rectangle",
     }
 }
@@ -145,7 +145,8 @@ impl SectionDimensions {
         of(self) - self.hole().map_or(0.0, of)
     }
 
-    /// Where the torsion constant of a rectangle lies between its bounds.
+    /// Where the torsion constant of a hollow rectangle lies between its bounds: 0 at the lower one, 1 at
+    /// the upper one.
     pub fn torsion_interpolation(self, wall: f64) -> f64 {
         let (long, short) = (
             self.width.max(self.thickness),

@@ -1,9 +1,8 @@
-//! The coarse map under the curves of a boundary: the index of equilibria at the centres of
-//! cells, each continued from a neighbouring cell, independently of the curves.
+//! The coarse map under the curves of a boundary: the Morse index of equilibria at the centers of cells,
+//! each continued from a neighboring cell, independently of the curves.
 //!
-//! The index along a straight path through the plane, as implied by the curves.
-//!
-//! Whether critical points of branches in the plane lie on a known curve.
+//! A path contradicts the curves if its critical points are not where the curves cross it, or if its end
+//! has another index than they imply; such paths lead to curves that are not known yet.
 
 use crate::branch::boundary::{
     BoundarySeed, CodimensionTwoKind, ConfirmedEquilibrium, ContinuedBoundary, ParameterPath,
@@ -23,7 +22,6 @@ pub const MOST_CELLS_PER_SIDE: usize = 256;
 /// The cells of a map, as far as they have been computed.
 pub struct IndexMapSweep<'p> {
     plane: &'p TwoParameterProblem<'p>,
-    /// Columns and rows.
     columns_and_rows: [usize; 2],
     /// The equilibria found in the last sweep, from which others may be reached.
     frontier: Vec<Option<ConfirmedEquilibrium>>,
@@ -55,7 +53,6 @@ impl<'p> IndexMapSweep<'p> {
         }
     }
 
-    /// The centre of a cell.
     fn cell_center(&self, cell: usize) -> [f64; 2] {
         let at = [
             cell % self.columns_and_rows[0],
@@ -64,7 +61,6 @@ impl<'p> IndexMapSweep<'p> {
         [0, 1].map(|i| (at[i] as f64 + 0.5) / self.columns_and_rows[i] as f64)
     }
 
-    /// The neighbours of a cell.
     fn neighbouring_cells(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
         let [columns, rows] = self.columns_and_rows;
         let (column, row) = (cell % columns, cell / columns);
@@ -100,7 +96,7 @@ impl<'p> IndexMapSweep<'p> {
             if let Some(from) = now.take_if(|from| from.solution.params != to) {
                 let mut path = follow_path(self.plane, &from, to);
                 now = path.end.take();
-                unexplained.extend(self.record_path((&from, to, now.as_ref()), cell, path, curves));
+                unexplained.extend(self.record_path(&from, to, now.as_ref(), cell, path, curves));
             }
         }
         self.frontier[cell] = now;
@@ -157,8 +153,14 @@ impl<'p> IndexMapSweep<'p> {
             for (from, mut path) in paths {
                 let (to, end) = (self.cell_center(*cell), path.end.take());
                 if let Some(from) = &before[from] {
-                    let ends = (from, to, end.as_ref());
-                    unexplained.extend(self.record_path(ends, *cell, path, curves));
+                    unexplained.extend(self.record_path(
+                        from,
+                        to,
+                        end.as_ref(),
+                        *cell,
+                        path,
+                        curves,
+                    ));
                 }
                 self.frontier[*cell] = end;
             }
@@ -186,11 +188,9 @@ impl<'p> IndexMapSweep<'p> {
     /// Records a path to a cell; returns it if it contradicts the curves.
     fn record_path(
         &mut self,
-        (from, to, end): (
-            &ConfirmedEquilibrium,
-            [f64; 2],
-            Option<&ConfirmedEquilibrium>,
-        ),
+        from: &ConfirmedEquilibrium,
+        to: [f64; 2],
+        end: Option<&ConfirmedEquilibrium>,
         cell: usize,
         mut path: ParameterPath,
         curves: &[ContinuedBoundary],
@@ -413,7 +413,6 @@ fn largest_tip_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 /// the same.
 const SAME_POINT_DISTANCE: f64 = 1e-6;
 
-/// Iterations for the nearest point.
 const NEAREST_POINT_ITERATIONS: usize = 20;
 
 /// Points of a curve closer than this are merged for interpolation: their errors would dominate

@@ -1,8 +1,7 @@
 //! `trace` over two parameters: the boundary of stability as curves in their plane.
 //!
-//! Computation of a boundary.
-//!
-//! The result of a boundary.
+//! Curves begin at the critical points of a trace along the first parameter, and at those of the paths by
+//! which the cells of a map are reached.
 
 mod map;
 
@@ -18,7 +17,9 @@ use crate::shape::serialize_tips;
 use crate::study::ParameterKeys;
 use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
 use crate::study::remark::BoundaryRemark;
-use crate::study::trace::{Trace, TraceError, TraceRequest, trace_with_points};
+use crate::study::trace::{
+    PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest, trace_with_points,
+};
 use crate::study::vary::ParameterSweep;
 use glam::DVec3;
 use serde::ser::Serializer;
@@ -126,7 +127,7 @@ pub fn trace_stability_boundary(
         seeds_tried: 0,
         progress,
     };
-    for (critical, refined) in &begun.critical_points {
+    for RefinedCriticalPoint { critical, refined } in &begun.critical_points {
         let seed = BoundarySeed {
             critical,
             refined,
@@ -135,7 +136,7 @@ pub fn trace_stability_boundary(
         };
         run.follow_unknown_curve(&seed, &mut boundary);
     }
-    if let (Some(size), Some((point, grid))) = (request.map, begun.first_point) {
+    if let (Some(size), Some(PointOnGrid { point, grid })) = (request.map, begun.first_point) {
         let kinks = plane.first_leaf().kinks();
         let first = ConfirmedEquilibrium {
             grid: coarsened(&grid, point.state.segments(), kinks),
@@ -408,7 +409,7 @@ pub struct StabilityBoundary {
     /// The parameters.
     #[serde(rename = "vary")]
     pub keys: [ParameterKeys; 2],
-    /// Their values at the ends of their ranges.
+    /// Values of the parameters at the ends of their ranges.
     pub ranges: [[f64; 2]; 2],
     /// Whether their logarithms are spaced evenly.
     #[serde(skip)]
@@ -436,7 +437,7 @@ pub struct StabilityBoundary {
     /// The map under them, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<BoundaryMap>,
-    /// Matrices factorised to follow and verify the curves, without those of softened leaves,
+    /// Matrices factorized to follow and verify the curves, without those of softened leaves,
     /// and to follow the first trace and the paths between the cells of the map.
     pub factorizations: usize,
     /// Total time, in seconds.
@@ -510,9 +511,9 @@ pub struct BoundaryPoint {
 /// Cells of the plane of two parameters, of equal size on the scales of the axes.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct BoundaryMap {
-    /// Values of the first parameter at the centres of the cells.
+    /// Values of the first parameter at the centers of the cells.
     pub first: Vec<f64>,
-    /// Those of the second.
+    /// Values of the second parameter there.
     pub second: Vec<f64>,
     /// Morse index of equilibria continued from cell to cell, beginning with that at
     /// the start of the first parameter's range; row by row of the second; none where branches

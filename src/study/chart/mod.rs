@@ -1,16 +1,7 @@
 //! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
-//! measured together against one reference.
+//! measured together against one reference; and cost against the number of veins at one accuracy.
 //!
-//! The contents of a chart: contenders and their accuracy settings.
-//!
-//! The runs of one contender with one setting on a leaf.
-//!
-//! Fair timing: all settings take turns, so that a varying load of the machine affects
-//! them equally.
-//!
-//! The Pareto front of speed and accuracy.
-//!
-//! Cost against the number of veins, at a fixed accuracy.
+//! All settings take turns, so that a varying load of the machine affects them equally.
 
 mod remark;
 mod result;
@@ -26,7 +17,8 @@ pub use crate::study::chart::result::{
     Chart, ChartOutcome, ChartRow, FastestByAccuracy, PeerMeasurement, PeerProgram,
     ReferenceSolution,
 };
-use crate::study::judge::{MethodSolution, run_timed};
+use crate::study::chart::result::{FoundReference, PeerRows};
+use crate::study::judge::{MethodSolution, Timed, run_timed};
 use crate::study::remark::SolutionRemark;
 use crate::{read_and_write, shooting};
 use serde::{Serialize, Serializer};
@@ -87,13 +79,15 @@ pub fn chart(
     let (reference, rows, rounds) = run_on_one_thread(options.seconds, || {
         let rounds = time_runs(&mut all, options.seconds, progress);
         let found = result::find_reference(scenario, result::reference_stations(&all))?;
-        let (reference, answer) = found.unzip();
-        Ok((reference, result::chart_rows(&all, answer.as_ref()), rounds))
+        let rows = result::chart_rows(&all, found.as_ref().map(|it| &it.solution));
+        Ok((found.map(|it| it.reference), rows, rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);
-    let (peers, others) =
-        result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
+    let PeerRows {
+        peers,
+        remarks: others,
+    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
     let mut remarks = result::chart_remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {
@@ -232,7 +226,6 @@ pub struct RepeatedRuns<'s> {
 }
 
 impl<'s> RepeatedRuns<'s> {
-    /// Before the first run.
     pub fn new(scenario: &'s Scenario, contender: SolverConfig, knob: AccuracySetting) -> Self {
         RepeatedRuns {
             scenario,
@@ -260,7 +253,7 @@ impl<'s> RepeatedRuns<'s> {
     }
 
     /// Runs once; also returns the time from the checked scenario to the result, in seconds.
-    pub fn run_once(&self) -> Result<(MethodSolution, f64), RelaxError> {
+    pub fn run_once(&self) -> Result<Timed<MethodSolution>, RelaxError> {
         let (tolerance, segments) = match self.setting {
             AccuracySetting::Tolerance(tolerance) => (Some(tolerance), None),
             AccuracySetting::Segments(segments) => (None, Some(segments)),
@@ -275,9 +268,7 @@ impl<'s> RepeatedRuns<'s> {
             tolerance,
             ..Options::default()
         };
-        let (answer, seconds) =
-            run_timed(|| MethodSolution::from_relaxation(self.scenario, &options));
-        Ok((answer?, seconds))
+        run_timed(|| MethodSolution::from_relaxation(self.scenario, &options)).transpose()
     }
 }
 
@@ -286,13 +277,13 @@ impl<'s> RepeatedRuns<'s> {
 fn shoot_from_relaxed_leaf(
     scenario: &Scenario,
     accuracy: f64,
-) -> Result<(MethodSolution, f64), RelaxError> {
+) -> Result<Timed<MethodSolution>, RelaxError> {
     shooting::check_models(scenario, true)?;
     let options = Options {
         tolerance: Some(START_TOLERANCE),
         ..Options::default()
     };
-    let (found, seconds) = run_timed(|| {
+    let found = run_timed(|| {
         let rest = MethodSolution::from_relaxation(scenario, &options)?;
         let precision = shooting::RequiredPrecision::EstimatedError(accuracy);
         let asked =
@@ -302,7 +293,8 @@ fn shoot_from_relaxed_leaf(
             .then(|| shooting::solve(scenario, &asked, &mut |_| {}));
         Ok::<_, RelaxError>((rest, shot))
     });
-    let (rest, shot) = found?;
+    let seconds = found.seconds;
+    let (rest, shot) = found.result?;
     let answer = match shot {
         None => rest,
         Some(Ok(solution)) => {
@@ -329,7 +321,10 @@ fn shoot_from_relaxed_leaf(
             ..rest
         },
     };
-    Ok((answer, seconds))
+    Ok(Timed {
+        result: answer,
+        seconds,
+    })
 }
 
 /// How often a setting is run.
@@ -387,7 +382,7 @@ pub struct TimingSpread {
 }
 
 impl TimingSpread {
-    /// Of measurements in ascending order; `None` without any.
+    /// The spread of measurements in ascending order; `None` without any.
     pub fn from_sorted(sorted: &[f64]) -> Option<Self> {
         let last = sorted.len().checked_sub(1)?;
         let at = |part: f64| {
@@ -407,7 +402,7 @@ impl TimingSpread {
     }
 }
 
-/// The same keys without a measurement: all null, and no run.
+/// A spread as JSON; without a measurement the same keys are null, with no run.
 pub fn serialize_spread<S: Serializer>(
     spread: &Option<TimingSpread>,
     serializer: S,
@@ -426,10 +421,10 @@ pub fn serialize_spread<S: Serializer>(
     }
 }
 
-/// Runs all settings once, in order, and those that are not slow [`FEWEST`] times;
+/// Runs all settings once, in order, and those that are not slow a few times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
-/// the budget (or [`SLOW`]), those after it are not run. Returns the number of rounds.
+/// the budget (or is slow), those after it are not run. Returns the number of rounds.
 pub fn time_runs(
     all: &mut [RepeatedRuns],
     budget: f64,
@@ -451,21 +446,21 @@ pub fn time_runs(
         if too_slow.contains(&runs.contender) {
             continue;
         }
-        runs.first_result = Some(run(runs, 1, TIMING.fewest_runs).map(|(answer, time)| {
-            runs.seconds.push(time);
-            if time > longest {
+        runs.first_result = Some(run(runs, 1, TIMING.fewest_runs).map(|found| {
+            runs.seconds.push(found.seconds);
+            if found.seconds > longest {
                 too_slow.push(runs.contender);
             }
-            answer
+            found.result
         }));
     }
     let mut run_again = |runs: &mut RepeatedRuns, round: usize, rounds: usize| {
         if runs.seconds[0] < TIMING.short_seconds {
             let _ = run(runs, round, rounds);
         }
-        // It succeeded before, and does so again.
-        if let Ok((_, time)) = run(runs, round, rounds) {
-            runs.seconds.push(time);
+        // The run succeeded before, and does so again.
+        if let Ok(found) = run(runs, round, rounds) {
+            runs.seconds.push(found.seconds);
         }
     };
     let is_fast = |runs: &RepeatedRuns| {
@@ -576,7 +571,7 @@ pub fn scaling(
     let mut leaves: Vec<&Scenario> = leaves.iter().collect();
     leaves.sort_by_key(|leaf| leaf.rods.len());
     leaves.dedup_by_key(|leaf| leaf.rods.len());
-    let (rows, unconfirmed) = run_on_one_thread(options.seconds, || {
+    let MeasuredScaling { rows, unconfirmed } = run_on_one_thread(options.seconds, || {
         measure_scaling(&leaves, tolerance, options, progress)
     })?;
     let first = leaves.first();
@@ -588,7 +583,12 @@ pub fn scaling(
     })
 }
 
-type MeasuredScaling = (Vec<ScalingRow>, Vec<usize>);
+/// Cost against the number of veins, before it is named.
+struct MeasuredScaling {
+    rows: Vec<ScalingRow>,
+    /// Numbers of veins whose reference is not confirmed.
+    unconfirmed: Vec<usize>,
+}
 
 /// A leaf, its reference, and the coarsest grid that is accurate enough for it.
 struct ScalingLeaf<'s> {
@@ -607,10 +607,11 @@ fn measure_scaling(
     let any_grid = contenders.any(|contender| contender.one_grid);
     let mut unconfirmed = Vec::new();
     let leaves = leaves.iter().map(|&scenario| {
-        let (found, reference) = result::find_reference(scenario, Vec::new())?.unzip();
-        if !found.is_some_and(|found| found.confirmed) {
+        let found = result::find_reference(scenario, Vec::new())?;
+        if !(found.as_ref()).is_some_and(|found| found.reference.confirmed) {
             unconfirmed.push(scenario.rods.len());
         }
+        let reference = found.map(|found: FoundReference| found.solution);
         let grid = match &reference {
             Some(reference) if any_grid => coarsest_accurate_grid(scenario, reference, tolerance),
             _ => None,
@@ -646,7 +647,7 @@ fn measure_scaling(
         rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
     rows.sort_by_key(|found| (found.row.contender.number(), found.rods));
-    Ok((rows, unconfirmed))
+    Ok(MeasuredScaling { rows, unconfirmed })
 }
 
 /// The coarsest single grid whose error is within the tolerance.
@@ -662,7 +663,7 @@ fn coarsest_accurate_grid(
     };
     let accurate = |&segments: &usize| {
         let mut run = RepeatedRuns::new(scenario, grids, AccuracySetting::Segments(segments));
-        run.first_result = Some(run.run_once().map(|(answer, _)| answer));
+        run.first_result = Some(run.run_once().map(|found| found.result));
         let error = run.distance_from_reference(Some(reference));
         error.is_some_and(|error| error <= tolerance)
     };

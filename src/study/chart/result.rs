@@ -1,11 +1,7 @@
-//! The result of a chart: `chart.json`.
+//! The result of a chart, `chart.json`: rows with true errors, the reference against which these are
+//! measured, and measurements of other programs.
 //!
-//! Rows of a chart from the results of runs: true errors, and runs that ended in another
-//! equilibrium.
-//!
-//! The solution against which all others are measured.
-//!
-//! Measurements of other programs, next to ours.
+//! A run that ended in another equilibrium than the reference is told apart from an inaccurate one.
 
 use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
@@ -72,7 +68,7 @@ pub struct ChartRow {
     pub seconds: Option<TimingSpread>,
     /// Steps or iterations of a run; these counts are `None` if it did not run.
     pub steps: Option<usize>,
-    /// Its factorisations.
+    /// Its factorizations.
     pub factorizations: Option<usize>,
     /// Its evaluations of all forces of the leaf.
     pub force_evaluations: Option<usize>,
@@ -250,7 +246,7 @@ impl Chart {
     }
 }
 
-/// Errors above this are not due to discretisation if the run's own estimate is
+/// Errors above this are not due to discretization if the run's own estimate is
 /// less than half as large: it is another equilibrium.
 const OTHER_EQUILIBRIUM_ERROR: f64 = 1e-2;
 
@@ -273,7 +269,6 @@ pub fn reference_stations(all: &[RepeatedRuns]) -> Vec<f64> {
     wanted
 }
 
-/// The rows of one leaf.
 pub fn chart_rows(all: &[RepeatedRuns], reference: Option<&MethodSolution>) -> Vec<ChartRow> {
     let errors: Vec<Option<f64>> = all
         .iter()
@@ -438,6 +433,12 @@ pub struct ReferenceSolution {
     pub neutral: Option<String>,
 }
 
+/// The reference of a scenario, and what is told of it.
+pub struct FoundReference {
+    pub reference: ReferenceSolution,
+    pub solution: MethodSolution,
+}
+
 /// Finds the reference of a scenario, at the `wanted` stations if shooting
 /// succeeds. `None` if neither method finds an equilibrium.
 ///
@@ -446,7 +447,7 @@ pub struct ReferenceSolution {
 pub fn find_reference(
     scenario: &Scenario,
     wanted: Vec<f64>,
-) -> Result<Option<(ReferenceSolution, MethodSolution)>, RelaxError> {
+) -> Result<Option<FoundReference>, RelaxError> {
     let relaxed = most_accurate_relaxation(scenario)?;
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
     let ends = [0.0, 1.0].into_iter();
@@ -474,7 +475,7 @@ pub fn find_reference(
         difference: None,
         neutral,
     };
-    let (told, answer) = match (relaxed, shot) {
+    let ChosenReference { told, solution } = match (relaxed, shot) {
         (Some(leaf), Ok(shot)) => {
             let distance = leaf.largest_distance(&shot);
             reference.difference = distance.map(|distance| distance / unit);
@@ -485,12 +486,16 @@ pub fn find_reference(
         (Some(leaf), Err(failure)) => {
             let why = &failure.reason;
             let told = format!("the relaxed leaf: shooting does not confirm it, {why}");
-            (told, leaf)
+            ChosenReference {
+                told,
+                solution: leaf,
+            }
         }
-        (None, Ok(shot)) => (
-            "the boundary-value solution from arcs: the relaxation does not come to rest".into(),
-            shot,
-        ),
+        (None, Ok(shot)) => ChosenReference {
+            told: "the boundary-value solution from arcs: the relaxation does not come to rest"
+                .into(),
+            solution: shot,
+        },
         (None, Err(_)) => return Ok(None),
     };
     let estimates = [reference.relaxation_estimate, reference.shooting_estimate];
@@ -500,7 +505,10 @@ pub fn find_reference(
         Some(difference) if reference.confirmed => better.max(difference),
         _ => better,
     };
-    Ok(Some((reference, answer)))
+    Ok(Some(FoundReference {
+        reference,
+        solution,
+    }))
 }
 
 /// The most accurate relaxation that comes to rest.
@@ -525,13 +533,19 @@ fn most_accurate_relaxation(scenario: &Scenario) -> Result<Option<MethodSolution
         .or(Some(first)))
 }
 
+/// The solution that is the reference, and a sentence on which it is.
+struct ChosenReference {
+    told: String,
+    solution: MethodSolution,
+}
+
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one with the smaller error estimate.
 fn choose_reference(
     leaf: MethodSolution,
     shot: MethodSolution,
     confirmed: bool,
-) -> (String, MethodSolution) {
+) -> ChosenReference {
     let leaf_is_better = leaf.error_bound() < shot.error_bound();
     let told = match (confirmed, leaf_is_better) {
         (true, _) => "relaxation and shooting agree within their error estimates",
@@ -539,7 +553,10 @@ fn choose_reference(
         (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
     };
     let takes_leaf = !confirmed && leaf_is_better;
-    (told.into(), if takes_leaf { leaf } else { shot })
+    ChosenReference {
+        told: told.into(),
+        solution: if takes_leaf { leaf } else { shot },
+    }
 }
 
 /// First words of outcomes that are equilibria.
@@ -596,14 +613,21 @@ impl PeerProgram {
     }
 }
 
-/// The rows for a leaf, rows with equal settings combined, and remarks on
-/// the others. Errors become relative to the longest rod.
+/// Measurements of other programs on a leaf.
+pub struct PeerRows {
+    /// Rows with equal settings are combined; errors are relative to the longest rod.
+    pub peers: Vec<PeerProgram>,
+    /// On the rows that are left out.
+    pub remarks: Vec<ChartRemark>,
+}
+
+/// The rows for a leaf of this name and number of rods.
 pub fn combine_peer_measurements(
     rows: &[PeerMeasurement],
     scenario: &str,
     rods: usize,
     longest: f64,
-) -> (Vec<PeerProgram>, Vec<ChartRemark>) {
+) -> PeerRows {
     let mut peers: Vec<PeerProgram> = Vec::new();
     let mut times: Vec<Vec<f64>> = Vec::new();
     let (mut other, mut silent) = (0, 0);
@@ -649,10 +673,10 @@ pub fn combine_peer_measurements(
     }
     let of_another_leaf = (other > 0).then_some(ChartRemark::PeersOfAnotherLeaf { rows: other });
     let without_error = (silent > 0).then_some(ChartRemark::PeersWithoutError { rows: silent });
-    (
+    PeerRows {
         peers,
-        of_another_leaf.into_iter().chain(without_error).collect(),
-    )
+        remarks: of_another_leaf.into_iter().chain(without_error).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -831,7 +855,8 @@ mod reference_tests {
         "#;
         let scenario = Scenario::from_toml(leaf).unwrap();
         let relaxed = most_accurate_relaxation(&scenario).unwrap().unwrap();
-        let (_, mut elsewhere) = find_reference(&scenario, Vec::new()).unwrap().unwrap();
+        let found = find_reference(&scenario, Vec::new()).unwrap().unwrap();
+        let mut elsewhere = found.solution;
         for node in elsewhere.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
             node.position.z += 1e-6;
         }
@@ -839,7 +864,7 @@ mod reference_tests {
             elsewhere.error_estimate = Some(error);
             let apart = relaxed.largest_distance(&elsewhere).unwrap();
             assert!(!relaxed.agrees_within_errors(&elsewhere, apart));
-            let (_, taken) = choose_reference(relaxed.clone(), elsewhere.clone(), false);
+            let taken = choose_reference(relaxed.clone(), elsewhere.clone(), false).solution;
             assert_eq!(taken.rods == elsewhere.rods, is_taken);
         }
         // An estimate as large as the difference confirms little, but validly.
@@ -881,7 +906,7 @@ mod peers_tests {
             "a,tree,5,n=20,2,1e-3,converged",
         ]
         .map(row);
-        let (peers, remarks) = combine_peer_measurements(&rows, "leaf", 5, 2.0);
+        let PeerRows { peers, remarks } = combine_peer_measurements(&rows, "leaf", 5, 2.0);
         let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
         let names: Vec<(&str, &str)> = names.collect();
         assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);

@@ -40,7 +40,7 @@ impl MeasuredQuantity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum DatumDimension {
     Length,
-    /// Of photographs.
+    /// Lengths in photographs.
     Pixel,
     Force,
     Frequency,
@@ -98,7 +98,6 @@ pub(super) type ObservedCoordinates = [Option<f64>; COORDINATE_COLUMNS.len()];
 /// The column of the names of experiments.
 pub(super) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
 
-/// Columns of points on veins.
 pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
     "rod",
     "x",
@@ -312,7 +311,7 @@ impl FromStr for RowFilter {
 
 /// How files of data are read.
 #[derive(Clone, Debug)]
-pub struct DataReadingOptions {
+pub struct DataFileOptions {
     /// Columns that have other names in the files.
     pub columns: Vec<MeasuredColumn>,
     /// The first row is read, and then each that is so many further.
@@ -321,9 +320,9 @@ pub struct DataReadingOptions {
     pub rows: Vec<RowFilter>,
 }
 
-impl Default for DataReadingOptions {
+impl Default for DataFileOptions {
     fn default() -> Self {
-        DataReadingOptions {
+        DataFileOptions {
             columns: Vec::new(),
             every: NonZeroUsize::MIN,
             rows: Vec::new(),

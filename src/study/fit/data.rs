@@ -6,7 +6,7 @@
 use crate::study::ParameterKeys;
 use crate::study::fit::FitError;
 use crate::study::fit::columns::{
-    COORDINATE_COLUMNS, DataReadingOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
+    COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
     MeasuredColumn, MeasuredQuantity, ObservedCoordinates, TRACED_POINT_COLUMNS,
 };
 use crate::study::fit::table::{DataTable, line_error};
@@ -102,7 +102,7 @@ pub struct DataFile {
 #[derive(Clone, Debug, Default)]
 pub struct Data {
     /// How files are read.
-    pub reading: DataReadingOptions,
+    pub reading: DataFileOptions,
     /// The files.
     pub files: Vec<DataFile>,
     /// Experiments.
@@ -205,7 +205,7 @@ impl Data {
                 Some(column) => table.number(row, column),
                 None => Ok(None),
             };
-            // Of one vein, every point is on that.
+            // A leaf of one vein needs no column: every point is on that vein.
             let rod = match column("rod") {
                 Some(column) => table.number(row, column)?,
                 None => Some(1.0),
@@ -265,9 +265,9 @@ pub fn read_candidate_experiments(
     file: &str,
     columns: &[MeasuredColumn],
 ) -> Result<Vec<Experiment>, FitError> {
-    let reading = DataReadingOptions {
+    let reading = DataFileOptions {
         columns: columns.to_vec(),
-        ..DataReadingOptions::default()
+        ..DataFileOptions::default()
     };
     read_experiments(&DataTable::parse(table, file, &reading)?, true, 0)
 }
@@ -476,7 +476,6 @@ pub(super) fn experiment_cases(data: Data) -> Result<Vec<ExperimentCase>, FitErr
     Ok(cases)
 }
 
-/// The experiments with data.
 fn observed_experiments(data: Data) -> Result<Vec<ObservedExperiment>, FitError> {
     let observed = |experiment: Experiment| ObservedExperiment {
         number: 0,

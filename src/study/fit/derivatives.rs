@@ -57,7 +57,7 @@ impl FitModel<'_> {
         }
     }
 
-    /// The same for one leaf. Leaves that differ by loads only share their derivatives.
+    /// Computes the derivatives of the components of one leaf. Leaves that differ by loads only share their derivatives.
     fn differentiate_case<'s>(
         &'s self,
         case: usize,
@@ -147,7 +147,7 @@ fn leaf_rates<'c>(
 fn photo_rates(changes: &[ScenarioDerivative]) -> Vec<PhotoParameterDerivative> {
     let rate = |change: &ScenarioDerivative| {
         let photos = change.iter();
-        let photos = photos.filter_map(|(weight, it)| Some((*weight, it.photo.as_ref()?)));
+        let photos = photos.filter_map(|it| Some((it.weight, it.term.photo.as_ref()?)));
         PhotoParameterDerivative::from_terms(photos)
     };
     changes.iter().map(rate).collect()

@@ -1,14 +1,9 @@
-//! Intervals of the free numbers: from the curvature at the minimum if the sum of
-//! squares is quadratic, else from its profile.
+//! Intervals of the free numbers: from the curvature at the minimum if the sum of squares is quadratic,
+//! else from its profile, the least sum for each value of one number.
 //!
-//! Ends of the intervals of numbers for which the sum of squares is not quadratic: from
-//! a few points around the minimum, with derivatives at few of them.
-//!
-//! Ends of intervals by whole fits: the number is held at one distance from the minimum after
-//! another, and all others are fitted again.
-//!
-//! Residuals near a minimum, and the least sum of squares for a given displacement of one
-//! number.
+//! The ends of a profile are first sought from a few points around the minimum, with derivatives at few of
+//! them; if that fails, by whole fits: the number is held at one distance from the minimum after another,
+//! and all others are fitted again.
 
 use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::least_squares::{
@@ -302,7 +297,6 @@ struct EndpointSearch<'s, 'j, 'm, 'a> {
     /// Present estimate of the distance of the end.
     distance: f64,
     curvature: DVector<f64>,
-    /// The previous point.
     previous: ProfileRoot,
     /// Where derivatives are known, if not only at the minimum.
     derivatives_elsewhere: Option<DifferentiatedPoint>,
@@ -325,7 +319,6 @@ struct ProfileCorrection {
     gain: f64,
 }
 
-/// The search fails.
 struct EndpointSearchFailure;
 
 /// The result at a point: the end if this is it, or none, if another point follows.
@@ -394,7 +387,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         corrected && (self.normalized_root(least) - 1.0).abs() < ENDPOINT_SEARCH.accuracy
     }
 
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     fn normalized_root(&self, least: &ConstrainedMinimum) -> f64 {
         least.excess.max(0.0).sqrt() / self.neighbourhood.stats.coverage_factor
     }
@@ -416,7 +409,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         let stagnates = self.derivatives_elsewhere.is_some()
             && gain > ENDPOINT_SEARCH.failed_correction * self.last.gain;
         if stagnates || self.is_converged(&least) {
-            // With the derivatives there it may be reduced further.
+            // With the derivatives there the sum may be reduced further.
             self.derivatives_elsewhere = Some(
                 self.neighbourhood
                     .gauss_newton_model_at(point)
@@ -507,10 +500,9 @@ pub(super) struct LikelihoodProfile<'s, 'm, 'a> {
     pub runaways: &'s [usize],
 }
 
-/// A point of a profile.
 struct ProfilePoint {
     distance: f64,
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     root: f64,
     /// None at the minimum.
     point: Option<FitPoint>,
@@ -606,7 +598,7 @@ impl LikelihoodProfile<'_, '_, '_> {
         })
     }
 
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     fn normalized_root(&self, least: &FitPoint) -> f64 {
         normalized_excess(self.stats, least).max(0.0).sqrt() / self.stats.coverage_factor
     }
@@ -691,7 +683,6 @@ impl LikelihoodProfile<'_, '_, '_> {
         there
     }
 
-    /// The initial values.
     fn initial_values(&self) -> Vec<f64> {
         let coordinates = self.stats.model.coordinates.iter();
         coordinates.map(|free| free.initial).collect()
@@ -754,7 +745,6 @@ impl LikelihoodProfile<'_, '_, '_> {
     }
 }
 
-/// The neighbourhood of a minimum.
 pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
     pub stats: &'j FitStatistics<'m, 'a>,
     /// Numbers at a bound, which stay fixed.
@@ -762,7 +752,7 @@ pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
 }
 
 /// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
-/// regularised, so that combinations to which the data are insensitive do not change.
+/// regularized, so that combinations to which the data are insensitive do not change.
 pub(super) struct GaussNewtonModel {
     jacobian: DMatrix<f64>,
     curvature: DMatrix<f64>,
@@ -778,7 +768,7 @@ pub(super) struct DifferentiatedPoint {
 pub(super) struct ConstrainedMinimum {
     /// Its excess over the minimum, in squared spreads.
     pub excess: f64,
-    /// The same if the other numbers do not change.
+    /// Its excess if the other numbers do not change.
     pub excess_without_correction: f64,
     /// The change of the other numbers.
     pub correction: DVector<f64>,
@@ -861,7 +851,7 @@ impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
         })
     }
 
-    /// The least sum of squares over all numbers but the `k`th, linearised where the residuals
+    /// The least sum of squares over all numbers but the `k`th, linearized where the residuals
     /// are these, with a step no longer than `longest`.
     pub fn constrained_minimum(
         &self,
@@ -906,7 +896,7 @@ impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
 
 impl ConstrainedMinimum {
     /// The change of the number at which the least sum exceeds the minimum by `above`, with
-    /// linearised residuals: the farther of two solutions, or the minimum of the excess if there
+    /// linearized residuals: the farther of two solutions, or the minimum of the excess if there
     /// are none.
     pub fn step_to_excess(&self, above: f64, sign: f64) -> f64 {
         let root = self.half_slope.powi(2) - self.half_curvature * (self.excess - above);

@@ -1,12 +1,11 @@
 //! Whether residuals are systematic: smooth along a column of the data, or along a vein, in place of
-//! scattered, as where a machine has slack or the shape at rest is another.
+//! scattered, as where a machine has slack or the shape at rest is another; and whether the data
+//! contradict the model.
 //!
 //! Residuals are tested for lack of fit against the first cosines along each series of data, less
 //! what the free numbers could explain of them: the sum of squares along these over that of all other
 //! residuals has Fisher's distribution if errors are independent and normal (Neill and Johnson 1984, Testing
 //! for lack of fit in regression, a review). All series together have one level.
-//!
-//! Whether the data contradict the model at a minimum.
 
 use crate::scenario::longest;
 use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
@@ -256,7 +255,7 @@ fn f_distribution_tail(ratio: f64, freedom: usize, of: Option<usize>) -> f64 {
     incomplete_beta(x, 1.0 - x, 0.5 * other, 0.5 * one)
 }
 
-/// The regularised incomplete beta function at `x`, of which `y` is the complement.
+/// The regularized incomplete beta function at `x`, of which `y` is the complement.
 fn incomplete_beta(x: f64, y: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 || y <= 0.0 {
         return if x <= 0.0 { 0.0 } else { 1.0 };

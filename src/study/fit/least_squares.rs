@@ -102,7 +102,6 @@ pub(super) struct GaussNewtonResult {
 pub(super) struct GaussNewtonIteration<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
-    /// Coordinates that are held fixed.
     pub held: Vec<bool>,
     pub most_steps: usize,
     /// Gain that the longest step may still promise at the end, as a part of a datum's variance.
@@ -138,9 +137,9 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, point: FitPoint) -> GaussNewtonResult {
+    pub fn run(&mut self, mut point: FitPoint) -> GaussNewtonResult {
         let mut evaluations = 0;
-        let (point, outcome) = self.iterate(point, &mut evaluations);
+        let outcome = self.iterate(&mut point, &mut evaluations);
         GaussNewtonResult {
             point,
             outcome,
@@ -148,34 +147,30 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
         }
     }
 
-    fn iterate(
-        &mut self,
-        mut point: FitPoint,
-        evaluations: &mut usize,
-    ) -> (FitPoint, GaussNewtonOutcome) {
-        if let Err(lost) = self.model.differentiate_data(&mut point) {
-            return (point, GaussNewtonOutcome::Stuck(Some(lost)));
+    fn iterate(&mut self, point: &mut FitPoint, evaluations: &mut usize) -> GaussNewtonOutcome {
+        if let Err(lost) = self.model.differentiate_data(point) {
+            return GaussNewtonOutcome::Stuck(Some(lost));
         }
         let mut radius = GAUSS_NEWTON.initial_radius;
         let mut small = 0;
         for step in 0..self.most_steps {
-            let residuals = self.weighting.residuals(&point);
+            let residuals = self.weighting.residuals(point);
             let bound = self.weighting.huber_bound(&residuals);
             let sum = self.weighting.huber_sum(&residuals, bound);
             (self.progress)(step, sum);
-            let linear = self.linearize_residuals(&point, &residuals);
-            let variance = linear.datum_variance(&point, sum);
+            let linear = self.linearize_residuals(point, &residuals);
+            let variance = linear.datum_variance(point, sum);
             let longest = self.bounded_update(
                 &point.theta,
                 &linear.trust_region_step(LONGEST_COORDINATE_STEP),
             );
             let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
             if open < self.gain_tolerance * variance {
-                return (point, GaussNewtonOutcome::Converged);
+                return GaussNewtonOutcome::Converged;
             }
             let besides = self.excluded_minimum.as_ref();
             if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
-                return (point, GaussNewtonOutcome::Stuck(None));
+                return GaussNewtonOutcome::Stuck(None);
             }
             self.jumps.clear();
             let nearly = open < GAUSS_NEWTON.uncertain_gain * variance;
@@ -195,22 +190,23 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                     && predicted >= GAUSS_NEWTON.converged_gain * variance
                     && radius >= GAUSS_NEWTON.least_radius;
                 if !number || !worth {
-                    return (point, end(lost));
+                    return end(lost);
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, GaussNewtonOutcome::BudgetExhausted);
+                    return GaussNewtonOutcome::BudgetExhausted;
                 }
                 *evaluations += 1;
-                match self.model.continue_leaves(&point, &theta) {
+                match self.model.continue_leaves(point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
                         let gained = sum - self.weighting.huber_sum(&found, bound);
                         if self.reuses_derivatives
                             && gained > 0.0
-                            && self.is_minimum(&point, &theta, &found)
+                            && self.is_minimum(point, &theta, &found)
                         {
-                            trial.take_gradients(&mut point);
-                            return (trial, GaussNewtonOutcome::Converged);
+                            trial.take_gradients(point);
+                            *point = trial;
+                            return GaussNewtonOutcome::Converged;
                         }
                         if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
@@ -219,15 +215,15 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             } else if ratio > 0.75 {
                                 radius = radius.max(2.0 * size).min(LONGEST_COORDINATE_STEP);
                             }
-                            point = trial;
+                            *point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, GaussNewtonOutcome::Converged);
+                                return GaussNewtonOutcome::Converged;
                             }
                             break;
                         }
                         if nearly {
-                            return (point, GaussNewtonOutcome::Converged);
+                            return GaussNewtonOutcome::Converged;
                         }
                         lost = None;
                     }
@@ -241,10 +237,10 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, GaussNewtonOutcome::StepLimit)
+        GaussNewtonOutcome::StepLimit
     }
 
-    /// The linearised residuals in the coordinates that may move.
+    /// The linearized residuals in the coordinates that may move.
     fn linearize_residuals(
         &self,
         point: &FitPoint,
@@ -310,7 +306,7 @@ fn coordinate_change(from: &[f64], to: &[f64]) -> DVector<f64> {
     DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
 }
 
-/// Weighted residuals, linearised, along their singular directions.
+/// Weighted residuals, linearized, along their singular directions.
 struct LinearizedResiduals {
     /// Singular values, ascending, and their directions as columns.
     singular_values: Vec<f64>,
@@ -338,7 +334,7 @@ impl LinearizedResiduals {
         }
     }
 
-    /// The step within a radius that minimises the sum of squares.
+    /// The step within a radius that minimizes the sum of squares.
     fn trust_region_step(&self, radius: f64) -> DVector<f64> {
         let along = |damping: f64| {
             let part = |k: usize, slope: f64| match k < self.insensitive_count {

@@ -13,15 +13,15 @@ use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_
 use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
-use crate::study::fit::model::{FitModel, FitPoint, Weighting, round_to_three_digits};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::remark::FitRemark;
 use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
 };
 use crate::study::fit::{
-    Fit, FitCoordinate, FitError, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual,
-    FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
+    ExperimentConditions, Fit, FitCoordinate, FitError, FitLeaf, FitOutcome, FitParameter,
+    FitResidual, FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
 };
 use std::collections::BTreeMap;
 
@@ -101,7 +101,10 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<FitMinimum, FitError> {
         let (model, weighting) = (self.model, self.weighting);
-        let (mut coarse, mut point) = model.coarse_model(first, weighting)?;
+        let CoarseModel {
+            model: mut coarse,
+            mut point,
+        } = model.coarse_model(first, weighting)?;
         let mut work = FitWork::default();
         let mut attempts = 0;
         let mut jumps = 0;
@@ -142,7 +145,10 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             {
                 jumps += 1;
                 attempts -= 1;
-                (coarse, point) = model.coarse_model(&there, weighting)?;
+                CoarseModel {
+                    model: coarse,
+                    point,
+                } = model.coarse_model(&there, weighting)?;
                 continue;
             }
             let of_search =
@@ -346,7 +352,7 @@ fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<FitRemark
     let mut remarks = Vec::new();
     match end {
         GaussNewtonOutcome::Converged => {}
-        // That is said at the end.
+        // The used-up budget is told once, by the search for the best minimum.
         GaussNewtonOutcome::BudgetExhausted => {}
         GaussNewtonOutcome::StepLimit => remarks.push(FitRemark::StepLimit),
         GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => {
@@ -453,7 +459,7 @@ fn unidentifiable_combinations(
             let parts: Vec<_> = parts
                 .filter(|(_, part)| part.abs() > NEGLIGIBLE_COEFFICIENT)
                 .collect();
-            // Of a number alone its profile decides.
+            // Whether a single number is determined its profile decides.
             if !matches!(parts[..], [(k, _)] if parameters[k].determined) {
                 let exactly = false;
                 open.push(UnidentifiableCombination {
@@ -485,10 +491,10 @@ fn experiments_in_data_order<'s>(stats: &'s FitStatistics) -> Vec<&'s ObservedEx
     observed
 }
 
-fn fit_experiments(stats: &FitStatistics) -> Vec<FitExperiment> {
+fn fit_experiments(stats: &FitStatistics) -> Vec<ExperimentConditions> {
     let experiment = |observed: &ObservedExperiment| {
         let settings = observed.experiment.settings.iter();
-        FitExperiment {
+        ExperimentConditions {
             experiment: observed.experiment.name.clone(),
             settings: settings
                 .map(|(keys, value)| (keys.to_string(), *value))
@@ -677,7 +683,7 @@ fn combination_sentence(
             format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
-            // Of numbers that are not logarithms the combination is the tangent.
+            // In numbers that are not logarithms the combination is a tangent.
             let change = |(k, part): &(usize, f64)| match free[*k].is_logarithmic {
                 true => format!(
                     "{} in proportion to t^{}",

@@ -1,8 +1,8 @@
 //! Which minimum is the answer: where the search begins, where it begins again if it ends without a
 //! good one, and other minima that fit the data as well.
 //!
-//! Other values from which a search may begin: in decades around given ones, near them, and those
-//! that exchange or mirror what the data may not distinguish.
+//! Searches begin in decades around given values, near them, and at values that exchange or mirror what
+//! the data may not distinguish.
 
 use crate::run::Instant;
 use crate::study::fit::data::Experiment;
@@ -10,7 +10,7 @@ use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
-use crate::study::fit::model::{FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
 use crate::study::fit::remark::FitRemark;
 use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
 use crate::study::fit::{
@@ -47,7 +47,6 @@ const GLOBAL_SEARCH: GlobalSearchLimits = GlobalSearchLimits {
     same_values: 1e-3,
 };
 
-/// Where a search begins.
 pub(super) struct FitStart {
     pub point: FitPoint,
     /// The values of the scenario, if it does not begin there although all leaves come to rest.
@@ -151,7 +150,7 @@ impl FitStart {
 
 /// The minimum near some values, on coarse grids.
 struct CoarseMinimum {
-    /// None if there is none.
+    /// None if the search does not converge.
     minimum: Option<EvaluatedStart>,
     /// How often the leaves were relaxed.
     evaluations: usize,
@@ -176,7 +175,11 @@ fn find_coarse_minimum(
     let Ok(first) = first.relax_leaves_within_steps(theta, MOST_RELAXATION_STEPS) else {
         return CoarseMinimum::NO_LEAVES;
     };
-    let Ok((coarse, point)) = model.coarse_model(&first, weighting) else {
+    let Ok(CoarseModel {
+        model: coarse,
+        point,
+    }) = model.coarse_model(&first, weighting)
+    else {
         return CoarseMinimum::NO_LEAVES;
     };
     let mut quietly = |_, _| {};
@@ -205,7 +208,6 @@ struct AlternativeMinima {
     tried: Vec<String>,
 }
 
-/// Searches for the best minimum.
 pub(super) struct GlobalFitSearch<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -565,7 +567,7 @@ impl<'a> Multistart<'a> {
         sum.is_finite().then_some(EvaluatedStart { theta, sum })
     }
 
-    /// Those of these values at which all leaves come to rest, by ascending sums of squares.
+    /// The values, of all given ones, at which all leaves come to rest, by ascending sums of squares.
     pub fn ranked_starts(&self, all: Vec<Vec<f64>>) -> Vec<EvaluatedStart> {
         let found = all.into_par_iter().map(|theta| self.evaluate_start(theta));
         let mut found: Vec<EvaluatedStart> =

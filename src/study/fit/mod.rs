@@ -2,12 +2,8 @@
 //! traced veins, and what the data determine about each number and what they do not.
 //!
 //! The leaves of all experiments are followed from equilibrium to equilibrium, with
-//! derivatives from their linearised equations, so that a fit does not jump between
+//! derivatives from their linearized equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
-//!
-//! The result of a fit.
-//!
-//! The free numbers of a fit.
 
 mod columns;
 mod data;
@@ -29,8 +25,7 @@ use crate::run::{Instant, Limit};
 use crate::scenario::units::LENGTH;
 
 pub use crate::study::fit::columns::{
-    ComparisonOperator, DataReadingOptions, MeasuredColumn, MeasuredQuantity, RowCondition,
-    RowFilter,
+    ComparisonOperator, DataFileOptions, MeasuredColumn, MeasuredQuantity, RowCondition, RowFilter,
 };
 pub use crate::study::fit::data::{
     Data, DataFile, DataOrigin, Experiment, MeasuredValue, TracedVeinPoint,
@@ -141,7 +136,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             step: 0,
             sum: f64::INFINITY,
             known: None,
-            budget: Some(FitBudget {
+            budget: Some(FitCostLimit {
                 evaluations: most,
                 leaves,
                 seconds: seconds * most as f64,
@@ -296,7 +291,7 @@ pub struct SystematicResiduals {
 
 /// An experiment with data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FitExperiment {
+pub struct ExperimentConditions {
     /// Its name.
     pub experiment: String,
     /// What was set, by keys.
@@ -364,12 +359,12 @@ pub struct FitStep {
     /// Once the minimum is found: the number of known intervals, and that of all numbers.
     pub known: Option<(usize, usize)>,
     /// Before the first step: what the fit takes at most.
-    pub budget: Option<FitBudget>,
+    pub budget: Option<FitCostLimit>,
 }
 
 /// What a fit takes at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitBudget {
+pub struct FitCostLimit {
     /// Number of times that the leaves of all experiments are relaxed or followed.
     pub evaluations: usize,
     /// Number of these leaves.
@@ -433,7 +428,7 @@ pub struct Fit {
     #[serde(skip)]
     pub files: Vec<DataFile>,
     /// The experiments in the order of the data.
-    pub experiments: Vec<FitExperiment>,
+    pub experiments: Vec<ExperimentConditions>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.
@@ -482,9 +477,9 @@ const LARGEST_DISTANCE_FROM_INITIAL: f64 = 6.907_755_278_982_137;
 /// A column of the data whose zero may be unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OffsetColumn {
-    /// Of what was set in experiments.
+    /// A number that was set in experiments.
     Setting(ParameterKeys),
-    /// Of what was measured in experiments.
+    /// A result that was measured in experiments.
     Result(MeasuredQuantity),
 }
 

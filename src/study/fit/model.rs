@@ -4,6 +4,7 @@
 //! A search uses leaves that are only as accurate as its data, on a few coarse grids; the last steps
 //! use all grids. [`Weighting`] makes residuals of predictions and data.
 
+use crate::leaf::Weighted;
 use crate::newton::SolverCounts;
 use crate::relax::{
     ContinuationFailure, GridPolicy, LARGEST_TOLERANCE, NestedEquilibrium, Options,
@@ -22,17 +23,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
-pub(super) type ScenarioDerivative = Vec<(f64, Scenario)>;
+pub(super) type ScenarioDerivative = Vec<Weighted<Scenario>>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;
 
-/// Error of an iteration on them: of positions, in standard deviations.
+/// Iteration error of positions on coarse grids, in standard deviations.
 const COARSE_ITERATION_ERROR: f64 = 10.0 * INSIGNIFICANT_PREDICTION_ERROR;
 
-/// Largest number of grids of a leaf.
+/// Largest number of coarse grids of a leaf.
 const MOST_COARSE_GRIDS: usize = 2;
 
+/// Largest number of steps in which leaves that are only compared come to rest: soft leaves far from
+/// the data may take thousands.
 pub(super) const MOST_RELAXATION_STEPS: usize = 400;
 
 /// The largest tolerance of leaves from which a search starts.
@@ -61,7 +64,7 @@ impl EvaluationBudget {
     }
 }
 
-/// Data common to all points of a fit.
+/// The leaves of all experiments as a function of the free numbers.
 #[derive(Clone)]
 pub(super) struct FitModel<'a> {
     pub base: &'a BaseScenario,
@@ -77,7 +80,6 @@ pub(super) struct FitModel<'a> {
     pub budget: Arc<EvaluationBudget>,
 }
 
-/// The leaves of all experiments.
 pub(super) struct FitPoint {
     pub theta: Vec<f64>,
     pub case_solutions: Vec<CaseSolution>,
@@ -123,6 +125,12 @@ fn is_scenario_linear(coordinates: &[FitCoordinate]) -> bool {
             apart && keys.is_scenario_linear()
         })
     })
+}
+
+/// A model on a few coarse grids, and its leaves there.
+pub(super) struct CoarseModel<'a> {
+    pub model: FitModel<'a>,
+    pub point: FitPoint,
 }
 
 impl<'a> FitModel<'a> {
@@ -227,7 +235,7 @@ impl<'a> FitModel<'a> {
         settings.chain(entries).collect()
     }
 
-    /// Where the number that a coordinate changes stands among [`Model::values`]; none if it changes
+    /// Where the number that a coordinate changes stands among [`FitModel::scenario_values`]; none if it changes
     /// nothing in this experiment's leaf.
     pub(super) fn scenario_value_index(&self, case: &ExperimentCase, k: usize) -> Option<usize> {
         match &self.coordinates[k].number {
@@ -262,7 +270,6 @@ impl<'a> FitModel<'a> {
         Ok(found)
     }
 
-    /// The scenario of an experiment.
     pub(super) fn case_scenario(
         &self,
         case: &ExperimentCase,
@@ -288,7 +295,7 @@ impl<'a> FitModel<'a> {
         self.assemble_point(theta, find)
     }
 
-    /// The same in no more than so many steps of each leaf.
+    /// The leaves relaxed from their usual starts, each in no more than so many steps.
     pub fn relax_leaves_within_steps(
         &self,
         theta: &[f64],
@@ -347,7 +354,7 @@ impl<'a> FitModel<'a> {
             .collect()
     }
 
-    /// These in words.
+    /// The numbers and their values in words, for messages.
     pub fn values_in_words(&self, theta: &[f64]) -> String {
         let numbers = self.named_values(theta);
         let each = numbers
@@ -365,7 +372,7 @@ impl<'a> FitModel<'a> {
         self.continue_leaves_on_grids(from, theta, self.grids)
     }
 
-    /// The same on these grids.
+    /// The leaves at other values, followed on these grids.
     pub fn continue_leaves_on_grids(
         &self,
         from: &FitPoint,
@@ -471,7 +478,7 @@ impl<'a> FitModel<'a> {
         &self,
         accurate: &FitPoint,
         weighting: Weighting,
-    ) -> Result<(FitModel<'a>, FitPoint), FitError> {
+    ) -> Result<CoarseModel<'a>, FitError> {
         let length = self.base.scenario().scale().length;
         let sd = |component: &ScalarDatum| component.sd.unwrap_or(weighting.assumed_deviation);
         let in_lengths = |component: &ScalarDatum| match component.quantity.dimension() {
@@ -508,7 +515,7 @@ impl<'a> FitModel<'a> {
                 .map_err(lost)
         };
         let point = self.assemble_point(&accurate.theta, coarse)?;
-        Ok((model, point))
+        Ok(CoarseModel { model, point })
     }
 
     pub fn equilibrium_tolerance(&self) -> f64 {
@@ -630,7 +637,6 @@ const HUBER_TUNING_CONSTANT: f64 = 1.345;
 /// leaf, until it is estimated from the residuals.
 pub(super) const ASSUMED_DEVIATION_PER_LENGTH: f64 = 1e-3;
 
-/// Weights of residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighting {
     /// Replaces unknown standard deviations.
@@ -639,7 +645,6 @@ pub(super) struct Weighting {
     pub is_robust: bool,
 }
 
-/// Derivatives of weighted residuals.
 pub(super) struct WeightedDerivatives {
     /// Square roots of the weights of residuals.
     pub roots: DVector<f64>,
@@ -656,7 +661,7 @@ impl Weighting {
         DVector::from_vec(residual.collect())
     }
 
-    /// Their derivatives; zero if they are not known.
+    /// Derivatives of the residuals, a row for each datum; zero if they are not known.
     pub fn jacobian(&self, point: &FitPoint) -> DMatrix<f64> {
         let components = point.components();
         let sd: Vec<f64> = components

@@ -75,7 +75,6 @@ impl CaseSolution {
         Ok(found)
     }
 
-    /// The components of an experiment.
     fn experiment_data<'v>(
         &'v self,
         of: &ObservedExperiment,
@@ -185,11 +184,12 @@ impl CaseSolution {
             MeasuredQuantity::Reaction(axis) => {
                 let force = self
                     .equilibrium
-                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).0);
+                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).force);
                 force[axis] * self.force_unit()
             }
             MeasuredQuantity::Grip(grip, axis) => {
-                let force = |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip][0];
+                let force =
+                    |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip].force;
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Frequency(mode) => {
@@ -220,7 +220,6 @@ impl CaseSolution {
     }
 }
 
-/// One scalar datum.
 #[derive(Clone, Debug)]
 pub(super) struct ScalarDatum {
     /// The number of its experiment.
@@ -252,7 +251,7 @@ impl ScalarDatum {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum DatumQuantity {
     Result(MeasuredQuantity),
-    /// One of [`COORDINATES`] of a point on a rod, at this fraction of its length.
+    /// One of [`COORDINATE_COLUMNS`] of a point on a rod, at this fraction of its length.
     Vein {
         rod: usize,
         coordinate: usize,
@@ -305,7 +304,6 @@ impl<'p> ObservationModel<'p> {
         }
     }
 
-    /// A coordinate of a point.
     pub fn project_point(&self, coordinate: usize, point: DVec3) -> f64 {
         let (row, offset) = self.linear_forms[coordinate];
         row.dot(point) + offset
@@ -347,7 +345,6 @@ const NEAREST_POINT_ITERATIONS: usize = 60;
 
 const NEAREST_POINT_ACCURACY: f64 = 1e-10;
 
-/// A point of a vein.
 #[derive(Clone, Copy)]
 pub(super) struct VeinPoint {
     /// Fraction of the length; outside 0 to 1 on a straight extension.
@@ -363,7 +360,6 @@ struct PointWithTangent {
     tangent: DVec3,
 }
 
-/// A vein as a curve.
 pub(super) struct VeinInterpolant<'a> {
     equilibrium: &'a NestedEquilibrium,
     rod: usize,
@@ -497,7 +493,7 @@ impl<'a> VeinInterpolant<'a> {
 /// Relative accuracy of the predicted state from which a leaf is relaxed.
 const PREDICTED_STATE_ACCURACY: f64 = 1e-3;
 
-/// The linearised equations of a leaf at rest on every grid, and the force rates of the free
+/// The linearized equations of a leaf at rest on every grid, and the force rates of the free
 /// numbers.
 pub(super) struct ParameterResponses {
     linearized: Mutex<Vec<Linearized>>,
@@ -513,7 +509,7 @@ fn singular_matrix_failure() -> ContinuationFailure {
 }
 
 impl ParameterResponses {
-    /// The linearised equations at a leaf at rest.
+    /// The linearized equations at a leaf at rest.
     pub fn new(
         at: &NestedEquilibrium,
         rates: &[LeafParameterDerivative],

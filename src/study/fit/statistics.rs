@@ -1,8 +1,8 @@
-//! Statistics of a minimum: deviations, correlations, bands.
+//! Statistics of a minimum: deviations, correlations, bands, and which candidate experiment would be most
+//! informative.
 //!
-//! Singular directions of derivatives, and quantiles of Student's distribution.
-//!
-//! Which candidate experiment would be most informative.
+//! All follow from the singular values of the weighted derivatives: combinations of the free numbers with
+//! the smallest ones are those to which the data are insensitive.
 
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Data, Experiment};
@@ -25,7 +25,6 @@ pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
 /// is not determined.
 const INSENSITIVE_COMPONENT: f64 = 1e-3;
 
-/// The minimum and its statistics.
 pub(super) struct FitStatistics<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -48,9 +47,7 @@ pub(super) struct FitStatistics<'m, 'a> {
     pub coverage_factor: f64,
 }
 
-/// Uncertainty of a coordinate.
 pub(super) struct CoordinateUncertainty {
-    /// Standard deviation.
     pub deviation: f64,
     /// Changes of all coordinates correlated with a change of this one by one.
     pub correlated_changes: DVector<f64>,
@@ -101,7 +98,6 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
     }
 
-    /// The uncertainty of a coordinate.
     pub fn uncertainty(&self, k: usize) -> CoordinateUncertainty {
         let sensitive = self.insensitive_count..self.singular_values.len();
         let mut along = DVector::zeros(self.singular_values.len());

@@ -1,11 +1,10 @@
-//! One cell: the reference, and each method's answer with its verdict.
+//! One cell of a map: the reference, and each method's answer with its verdict; and the jumps of the leaf
+//! between neighboring cells.
 //!
-//! Explicit motion with one time step, stable or not: the answer of a plain simulation
-//! of the damped leaf.
+//! Explicit motion has one time step, stable or not: its answer is that of a plain simulation of the damped
+//! leaf.
 //!
-//! Jumps: neighbouring cells in which the leaf rests in different equilibria.
-//!
-//! Pairs of cells whose answers are farther apart than those of the neighbouring pairs are
+//! Pairs of cells whose answers are farther apart than those of the neighboring pairs are
 //! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
 //! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
@@ -21,8 +20,9 @@ use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::Undulation;
 use crate::shooting::{ShootingFailureReason, ShootingStart};
+use crate::simulate::DEFAULT_MOTION_SEGMENTS;
 use crate::study::judge::{
-    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, eigenvalue_grid,
+    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, Timed, eigenvalue_grid,
     morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
 use crate::study::map::remark::{MapMotionFailure, MapRemark};
@@ -60,7 +60,7 @@ pub struct MapCell<'a> {
     /// Time limit for all cells.
     total_limit: &'a Limit,
     /// The default method's answer and its seconds: the start of shooting from rest.
-    relaxed_answer: (CellSolution, f64),
+    relaxed_answer: Timed<CellSolution>,
     reference: Option<MethodSolution>,
     confidence: ReferenceConfidence,
 }
@@ -98,19 +98,23 @@ impl<'a> MapCell<'a> {
             confidence: ReferenceConfidence::None,
         };
         let sharp = (REFERENCE_TOLERANCE_RATIO * tolerance).max(LEAST_REFERENCE_TOLERANCE);
-        let (shot, _) = run_within_limit(limit, all, |limit| {
+        let shot = run_within_limit(limit, all, |limit| {
             cell.shoot_from_relaxed_leaf(sharp, limit)
-        });
-        if let Ok(relaxed) = &cell.relaxed_answer.0 {
-            let (confidence, reference) = choose_reference(relaxed, shot.ok());
-            (cell.confidence, cell.reference) = (confidence, Some(reference));
+        })
+        .result;
+        if let Ok(relaxed) = &cell.relaxed_answer.result {
+            let chosen = choose_reference(relaxed, shot.ok());
+            (cell.confidence, cell.reference) = (chosen.confidence, Some(chosen.solution));
         }
         cell
     }
 
     /// Solves by a method and judges the answer.
     pub fn solve_by_method(&self, cell: usize, method: MapMethod) -> MapRow {
-        let (found, seconds) = self.timed_solution(method);
+        let Timed {
+            result: found,
+            seconds,
+        } = self.timed_solution(method);
         let blank = MapRow {
             seconds,
             cell,
@@ -151,7 +155,7 @@ impl<'a> MapCell<'a> {
         }
     }
 
-    fn timed_solution(&self, method: MapMethod) -> (CellSolution, f64) {
+    fn timed_solution(&self, method: MapMethod) -> Timed<CellSolution> {
         let segments = self.solver_settings.segments;
         let (scenario, tolerance) = (self.scenario, self.tolerance);
         let is_relaxed = |method: Method| method.semi_implicit().is_some() && segments.is_none();
@@ -193,7 +197,7 @@ impl<'a> MapCell<'a> {
         intervals: Option<usize>,
         limit: &Limit,
     ) -> CellSolution {
-        let segments = match &self.relaxed_answer.0 {
+        let segments = match &self.relaxed_answer.result {
             Ok(relaxed) => relaxed.stations.len() - 1,
             Err(_) => LEAST_EIGENVALUE_SEGMENTS,
         };
@@ -240,7 +244,8 @@ impl<'a> MapCell<'a> {
             index: morse_index_near(
                 self.scenario,
                 grid,
-                (&answer.stations, &answer.rods),
+                &answer.stations,
+                &answer.rods,
                 answer.error_bound(),
             ),
             remark: Some(remark),
@@ -249,7 +254,7 @@ impl<'a> MapCell<'a> {
     }
 
     fn shoot_from_relaxed_leaf(&self, accuracy: f64, limit: &Limit) -> CellSolution {
-        match &self.relaxed_answer.0 {
+        match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
             Err((outcome, why)) => {
                 let why = why.clone().map(Box::new);
@@ -294,10 +299,10 @@ impl<'a> MapCell<'a> {
         reference: &MethodSolution,
         distance: f64,
     ) -> bool {
-        let (near, _) = run_within_limit(self.limit, self.total_limit, |limit| {
+        let near = run_within_limit(self.limit, self.total_limit, |limit| {
             self.solve_by_shooting(answer.shooting_start(), self.tolerance, None, limit)
         });
-        match near {
+        match near.result {
             Ok(near) if near.largest_distance(answer) < Some(distance) => {
                 near.largest_distance(reference) > Some(0.5 * distance)
             }
@@ -307,11 +312,14 @@ impl<'a> MapCell<'a> {
 }
 
 /// The outcome on a grid that takes longer than the limit in any case.
-fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<(CellSolution, f64)> {
+fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<Timed<CellSolution>> {
     let (nodes, seconds) = (segments.saturating_mul(rods), limit.as_secs_f64());
     let late = nodes as f64 * LEAST_SECONDS_PER_NODE > seconds;
     let why = Some(MapRemark::TooManyNodes { nodes, seconds });
-    late.then_some((Err((MapOutcome::OutOfTime, why)), 0.0))
+    late.then_some(Timed {
+        result: Err((MapOutcome::OutOfTime, why)),
+        seconds: 0.0,
+    })
 }
 
 /// Runs a method with a time limit; also returns the seconds it took.
@@ -320,20 +328,18 @@ fn run_within_limit(
     limit: Duration,
     all: &Limit,
     run: impl FnOnce(&Limit) -> CellSolution,
-) -> (CellSolution, f64) {
+) -> Timed<CellSolution> {
     let until = Limit {
         deadline: Some(Instant::now() + limit),
         ..all.clone()
     };
-    let (found, seconds) = run_timed(|| run(&until));
+    let mut found = run_timed(|| run(&until));
     let allowed = limit.as_secs_f64();
-    match seconds > allowed {
-        true => {
-            let late = MapRemark::OutOfTime { seconds: allowed };
-            (Err((MapOutcome::OutOfTime, Some(late))), seconds)
-        }
-        false => (found, seconds),
+    if found.seconds > allowed {
+        let late = MapRemark::OutOfTime { seconds: allowed };
+        found.result = Err((MapOutcome::OutOfTime, Some(late)));
     }
+    found
 }
 
 /// Relaxes, perhaps on one grid. That has no error estimate of its own: a finer grid gives one.
@@ -378,27 +384,34 @@ pub fn relax_with_error_estimate(
     Ok(answer)
 }
 
+/// The solution against which the answers in a cell are judged.
+struct CellReference {
+    confidence: ReferenceConfidence,
+    solution: MethodSolution,
+}
+
 /// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
 /// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
 /// if not, only if that is stable.
-fn choose_reference(
-    relaxed: &MethodSolution,
-    shot: Option<MethodSolution>,
-) -> (ReferenceConfidence, MethodSolution) {
+fn choose_reference(relaxed: &MethodSolution, shot: Option<MethodSolution>) -> CellReference {
+    let unconfirmed = |solution: MethodSolution| CellReference {
+        confidence: ReferenceConfidence::Unconfirmed,
+        solution,
+    };
     let Some(shot) = shot else {
-        return (ReferenceConfidence::Unconfirmed, relaxed.clone());
+        return unconfirmed(relaxed.clone());
     };
     let distance = relaxed.largest_distance(&shot);
     let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&shot, distance));
     match (same && shot.index == relaxed.index, shot.index) {
-        (true, _) => (ReferenceConfidence::Confirmed, shot),
-        (false, Some(0)) => (ReferenceConfidence::Unconfirmed, shot),
-        (false, _) => (ReferenceConfidence::Unconfirmed, relaxed.clone()),
+        (true, _) => CellReference {
+            confidence: ReferenceConfidence::Confirmed,
+            solution: shot,
+        },
+        (false, Some(0)) => unconfirmed(shot),
+        (false, _) => unconfirmed(relaxed.clone()),
     }
 }
-
-/// Default number of segments per rod: as in a simulation.
-const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// Largest number of stations at which answers are compared.
 const MOST_COMPARED_STATIONS: usize = 4096;
@@ -443,7 +456,7 @@ pub fn solve_by_explicit_motion(
         let step = stepped.clone();
         Err((outcome, Some(MapRemark::MotionFailed { motion, step })))
     };
-    let (duration, _) = physics.duration_and_interval();
+    let duration = physics.times().duration;
     while motion.time() < duration {
         let until = motion.time() + STEPS_PER_TIME_CHECK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
@@ -570,7 +583,7 @@ pub struct MapJump {
     pub key: String,
     /// The varied values of one cell.
     pub from: Vec<String>,
-    /// Those of the other.
+    /// The varied values of the other cell.
     pub to: Vec<String>,
     /// The two values of the key between which it jumps.
     pub between: [f64; 2],

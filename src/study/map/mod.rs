@@ -5,10 +5,6 @@
 //! leaf, and the solution of the boundary-value problem that starts from it,
 //! both at a hundredth of the tolerance. If they agree within their estimates the
 //! reference is confirmed. All answers are measured against it.
-//!
-//! Requests for maps, and their validation.
-//!
-//! The result of one method in one cell: a closed set of words, and numbers.
 
 mod cell;
 mod remark;
@@ -124,7 +120,7 @@ pub fn map(
     let done = Mutex::new(done);
     let work = || {
         while let Some(&cell) = next() {
-            let rows = request.solve(cell, &request.methods);
+            let rows = request.solve_cell(cell, &request.methods);
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             if !(*done)(rows) {
                 *left.lock().unwrap_or_else(PoisonError::into_inner) = [].iter();
@@ -297,7 +293,7 @@ impl MapRequest {
             .collect()
     }
 
-    /// The same as texts, as in tables.
+    /// The varied values of a cell as texts, as in tables.
     pub fn texts(&self, cell: usize) -> Vec<String> {
         let values = self.values(cell).into_iter();
         values.map(|(keys, value)| keys.text(value)).collect()
@@ -309,8 +305,14 @@ impl MapRequest {
         cell::longest_stable_step(&self.base.scenario_with_values(&self.values(cell)).ok()?)
     }
 
-    /// Solves one cell by these methods.
+    /// Renamed to [`MapRequest::solve_cell`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
     pub fn solve(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
+        self.solve_cell(cell, methods)
+    }
+
+    /// Solves one cell by these methods.
+    pub fn solve_cell(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
         let varied = match self.base.scenario_with_values(&self.values(cell)) {
             Ok(varied) => varied,
             Err(refused) => {
@@ -519,7 +521,7 @@ pub struct MapRow {
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_waves: Option<f64>,
-    /// Their amplitude.
+    /// Amplitude of the waves along the margins.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_amplitude: Option<f64>,
     /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
@@ -544,7 +546,7 @@ fn on_one_line(remark: Option<&MapRemark>) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// As in Rust's notation, from which every bit can be read.
+/// Numbers as Rust writes them, from which every bit can be read.
 fn serialize_exact_number<S: Serializer>(
     value: &Option<f64>,
     serializer: S,

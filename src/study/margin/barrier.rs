@@ -61,13 +61,18 @@ struct MountainPass {
     height: f64,
 }
 
-/// The lowest pass found from these start points and along the softest modes; also
-/// the number of start points.
+/// The lowest pass, if there is one, and from how many points it was sought.
+pub(super) struct LowestBarrier {
+    pub barrier: Option<Barrier>,
+    pub searches: usize,
+}
+
+/// The lowest pass found from these start points and along the softest modes.
 pub(super) fn lowest_energy_barrier(
     stable: &StableLeaf,
     mut starts: Vec<SaddleSearchStart>,
     weight: f64,
-) -> (Option<Barrier>, usize) {
+) -> LowestBarrier {
     starts.extend(starts_along_modes(stable).unwrap_or_default());
     let all = &stable.searches.total_count;
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
@@ -77,19 +82,28 @@ pub(super) fn lowest_energy_barrier(
     for _ in 0..BARRIER.most_refinements {
         let found = lowest_pass_from_starts(stable, &starts, weight);
         if found.is_some() || stable.limit.reached() {
-            return (found, count);
+            return LowestBarrier {
+                barrier: found,
+                searches: count,
+            };
         }
         let finer: Option<_> = starts
             .iter()
             .map(|it| start_on_halved_grid(stable, it))
             .collect();
-        match finer {
-            Some(finer) => starts = finer,
-            None => return (None, count),
-        }
+        let Some(finer) = finer else {
+            return LowestBarrier {
+                barrier: None,
+                searches: count,
+            };
+        };
+        starts = finer;
         all.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
     }
-    (lowest_pass_from_starts(stable, &starts, weight), count)
+    LowestBarrier {
+        barrier: lowest_pass_from_starts(stable, &starts, weight),
+        searches: count,
+    }
 }
 
 /// The lowest pass found from these start points on their grids.
@@ -128,7 +142,7 @@ fn start_on_halved_grid(
     })
 }
 
-/// Both directions along the softest modes of the leaf.
+/// Start points at the leaf in both directions along its softest modes.
 fn starts_along_modes(stable: &StableLeaf) -> Option<Vec<SaddleSearchStart>> {
     let mut equations = BranchEquations::new(stable.family, stable.grid.clone());
     let point = equations.correct(&stable.state, 0.0, None).ok()?;

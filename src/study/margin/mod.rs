@@ -1,6 +1,8 @@
 //! How far a stable leaf is from losing its stability.
 //!
-//! The force at the tip at which a leaf loses its stability.
+//! A force on the tip is increased along each axis, both ways, and the leaf followed until it becomes
+//! unstable; saddles are sought from there and along the softest modes, and the lowest is the barrier to
+//! another equilibrium.
 
 mod barrier;
 
@@ -192,7 +194,7 @@ fn stability_margin(
     let Ok(family) = LeafFamily::new(&make, [0.0, 1.0], false) else {
         return Ok(Margin::none(MarginRemark::UnresolvedEigenvalue));
     };
-    let (grid, state) = match continuation_grid(&family, levels) {
+    let LeafOnGrid { grid, point, .. } = match continuation_grid(&family, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
@@ -206,7 +208,7 @@ fn stability_margin(
         family: &family,
         rest,
         grid,
-        state,
+        state: point.state,
         accuracy: tolerance.max(PUSH_BRANCH.accuracy),
         largest_force: largest_tip_force(scenario, weight),
         limit: &options.limit,
@@ -234,7 +236,8 @@ fn stability_margin(
         let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
         a.total_cmp(&b)
     });
-    let (barrier, climbs) = barrier::lowest_energy_barrier(&stable, starts, weight);
+    let barrier::LowestBarrier { barrier, searches } =
+        barrier::lowest_energy_barrier(&stable, starts, weight);
     let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
         true => Some(MarginRemark::OutOfTime),
@@ -249,7 +252,7 @@ fn stability_margin(
         largest_push: (!held).then_some(stable.largest_force),
         pushes,
         barrier,
-        climbs,
+        climbs: searches,
         remark,
         wall_seconds: clock.elapsed().as_secs_f64(),
     })
@@ -298,7 +301,7 @@ fn is_softest_eigenvalue_resolved(grids: &[LeafOnGrid]) -> bool {
 fn continuation_grid(
     family: &LeafFamily,
     levels: &[GridLevel],
-) -> Result<(Grid, State), MarginRemark> {
+) -> Result<LeafOnGrid, MarginRemark> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
@@ -318,9 +321,12 @@ fn continuation_grid(
             LeafOnGrid::from_point(&mut equations, &point)
                 .map_err(|_| MarginRemark::UnresolvedEigenvalue)?,
         );
-        for grids in [2, 3].map(|count| grids.len().checked_sub(count).map(|k| &grids[k..])) {
-            if let Some(grids) = grids.filter(|grids| is_softest_eigenvalue_resolved(grids)) {
-                return Ok((grids[0].grid.clone(), grids[0].point.state.clone()));
+        for first in [2, 3]
+            .into_iter()
+            .filter_map(|count| grids.len().checked_sub(count))
+        {
+            if is_softest_eigenvalue_resolved(&grids[first..]) {
+                return Ok(grids.swap_remove(first));
             }
         }
         if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_CONTINUATION_NODES
@@ -485,7 +491,7 @@ fn find_critical_tip_force(
         error: Some(error),
         per_weight: (weight > 0.0).then(|| force / weight),
         then: Some(then),
-        neighbour: equilibrium_beyond_fold(stable, &mut grids, (critical, refined), &starts),
+        neighbour: equilibrium_beyond_fold(stable, &mut grids, critical, refined, &starts),
         tips: family.tips(&refined.tips),
         ..unknown
     };
@@ -590,7 +596,8 @@ fn postcritical_behavior(
 fn equilibrium_beyond_fold(
     stable: &StableLeaf,
     grids: &mut NestedBranchEquations,
-    (critical, fold): (&CriticalPoint, &ExtrapolatedPoint),
+    critical: &CriticalPoint,
+    fold: &ExtrapolatedPoint,
     starts: &[SaddleSearchStart],
 ) -> Option<Neighbour> {
     let start = starts

@@ -62,7 +62,7 @@ pub struct Trace {
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if what varied is a tip force or the position of held tips.
     pub law: Option<ForceDisplacementLine>,
-    /// Number of matrices factorised by the continuation.
+    /// Number of matrices factorized by the continuation.
     pub factorizations: usize,
     /// Total time, in seconds.
     pub wall_seconds: f64,
@@ -233,9 +233,15 @@ impl Serialize for BranchEnd {
 
 impl TraceBranch {
     /// How often its Morse index grows along it: at a critical point, or between two points.
-    pub fn destabilizations(&self) -> usize {
+    pub fn index_increase_count(&self) -> usize {
         let pairs = self.points.windows(2);
         pairs.filter(|pair| pair[1].index > pair[0].index).count()
+    }
+
+    /// Renamed to [`TraceBranch::index_increase_count`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
+    pub fn destabilizations(&self) -> usize {
+        self.index_increase_count()
     }
 
     /// Its remarks in one sentence, if there are any.
@@ -250,7 +256,7 @@ impl TraceBranch {
     }
 }
 
-/// Also with the numbers of its first, last and critical points.
+/// A branch as JSON: with its first, last and critical points, and the number of all.
 impl Serialize for TraceBranch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let critical: Vec<&TracePoint> = self.critical_points().map(|(_, point)| point).collect();

@@ -1,15 +1,14 @@
-//! Two axes around a panel: grid, frame, ticks and names, with curves and markers
-//! inside. Every panel of numbers is drawn with them.
+//! Panels with two axes: grid, frame, ticks and names, with curves and markers inside. Every panel of
+//! numbers is drawn with them.
 //!
-//! An axis: maps values to fractions of its length, and places round ticks.
-//!
-//! Round numbers, for ticks and scales.
+//! An axis, linear or logarithmic, maps values to fractions of its length, and has ticks at round numbers as
+//! close as their labels can be read.
 
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Color, Drawing, DrawingPath, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PageRectangle, PathStep,
-    Stroke, TEXT_COLOR, TextAnchor, draw_panel_title, rectangle_path, smooth_curve,
+    Color, Drawing, DrawingPath, FONT_SIZE, FRAME_COLOR, GRID_COLOR, NOTE_COLOR, PageRectangle,
+    PathStep, Stroke, TEXT_COLOR, TextAnchor, draw_panel_title, rectangle_path, smooth_curve,
 };
 use crate::report::numbers::{
     digit_times_power_text, format_decimals, power_of_ten_text, superscript, time_power_text,
@@ -85,7 +84,7 @@ impl PanelAxes {
         let end = self.cell.opposite_corner();
         let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
             true => Stroke::new(FRAME_COLOR, 0.8),
-            false => Stroke::new(GRID, 0.7),
+            false => Stroke::new(GRID_COLOR, 0.7),
         };
         for tick in self.across.ticks(size.x, AxisOrientation::Horizontal) {
             let top = corner.with_x(corner.x + tick.fraction * size.x);
@@ -98,7 +97,7 @@ impl PanelAxes {
         self.draw_without_grid(page);
     }
 
-    /// Draws all but the grid.
+    /// Draws frame, ticks and names, without the grid.
     pub fn draw_without_grid(&self, page: &mut Drawing) {
         let PageRectangle { corner, size } = self.cell;
         let (middle, end) = (self.cell.middle(), self.cell.opposite_corner());
@@ -282,7 +281,7 @@ struct AxisRange {
     /// Padding at both ends, as a fraction of a linear extent and in decades.
     linear_padding: f64,
     logarithmic_padding: f64,
-    /// Smaller values are below rounding.
+    /// Decades that are shown below the largest value: smaller ones are rounding.
     most_decades: f64,
     /// Larger values are diverged and not drawn.
     largest_value: f64,
@@ -300,10 +299,10 @@ const POWERS_WITHOUT_FACTOR: Range<f64> = -2.0..4.0;
 
 /// Least distances of ticks, in pixels.
 struct TickSpacing {
-    /// Across and up.
+    /// Distance of ticks across and up, on linear and logarithmic axes.
     linear: [f64; 2],
     logarithmic: [f64; 2],
-    /// Between labels.
+    /// Gap between the labels of neighboring ticks.
     label_gap: f64,
     /// A wider decade is subdivided.
     subdivided_decade: f64,
@@ -391,6 +390,15 @@ impl Axis {
         }
     }
 
+    /// An axis from 0 to 1 without ticks, for rows that are placed by their number.
+    pub fn blank() -> Self {
+        Axis {
+            ticks: TickPlacement::WholeNumbers(Vec::new()),
+            labelled: false,
+            ..Axis::linear("", 0.0, 1.0)
+        }
+    }
+
     /// A linear axis that covers these values, with padding.
     pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) =
@@ -406,7 +414,7 @@ impl Axis {
         }
     }
 
-    /// The same axis with at least this extent: smaller variations are rounding.
+    /// Widens the axis to at least this extent: smaller variations are rounding.
     pub fn with_least_extent(self, extent: f64) -> Self {
         let lacking = extent - (self.end - self.start);
         if lacking.is_nan() || lacking <= 0.0 {
@@ -483,7 +491,7 @@ impl Axis {
         (at - self.start) / (self.end - self.start)
     }
 
-    /// As many ticks as are readable on an axis of this length.
+    /// As many ticks as can be read on an axis of this length in pixels.
     pub fn ticks(&self, length: f64, direction: AxisOrientation) -> Vec<Tick> {
         let default = match self.ticks {
             TickPlacement::RoundNumbers if self.sign.is_none() => TICK_SPACING.linear,
@@ -580,7 +588,7 @@ impl Axis {
     }
 
     /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
-    pub fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
+    fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
         let divided = length > TICK_SPACING.subdivided_decade * (high - low)
             && !matches!(self.ticks, TickPlacement::WholeNumbers(_));

@@ -43,9 +43,8 @@ struct RequestedLabel {
 
 pub struct LabelPlacement {
     cell: PageRectangle,
-    /// Points on curves.
+    /// Points on curves that labels keep clear of.
     curve_points: Vec<DVec2>,
-    /// Labels drawn so far.
     drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
     requested_labels: Vec<RequestedLabel>,
@@ -93,7 +92,6 @@ impl LabelPlacement {
         }
     }
 
-    /// Draws all requested labels.
     pub fn draw_requested(&mut self, page: &mut Drawing) {
         self.curve_points
             .extend(self.requested_labels.iter().map(|label| label.at));
@@ -219,6 +217,12 @@ pub fn draw_header(
     page.draw_label(base, &notes, FONT_SIZE.text, TextAnchor::Start, NOTE_COLOR);
 }
 
+/// What keys call supports.
+pub const SUPPORT_NAMES: [(SupportKind, &str); 2] = [
+    (SupportKind::Clamped, "clamp"),
+    (SupportKind::Pinned, "pinned"),
+];
+
 /// Draws the key at the right end of the header; returns where it starts.
 fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 {
     const LEGEND_MIDDLE: f64 = 32.0;
@@ -255,11 +259,6 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
         text_before(page, &mut x, "vein 1");
         x -= 16.0;
     }
-    let held = |how: SupportKind| {
-        let mut grips = veins.grips.iter();
-        let ends = veins.base_support == how || veins.tip_support == Some(how);
-        ends || grips.any(|grip| grip.support == how)
-    };
     let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
     let mut entry = |page: &mut Drawing, name: &str, marker: &dyn Fn(&mut Drawing, DVec2)| {
         text_before(page, &mut x, name);
@@ -269,11 +268,8 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
     if veins.tip_support.is_none() {
         entry(page, tips, &draw_tip_marker);
     }
-    for (how, name) in [
-        (SupportKind::Clamped, "clamp"),
-        (SupportKind::Pinned, "pinned"),
-    ] {
-        if held(how) {
+    for (how, name) in SUPPORT_NAMES {
+        if veins.has_held_ends(how) || veins.has_grips(how) {
             entry(page, name, &|page, at| draw_support_marker(page, at, how));
         }
     }

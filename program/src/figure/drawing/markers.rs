@@ -74,14 +74,14 @@ pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
     }
 }
 
-/// Marks a point of a second solution, in a colour that no vein has.
+/// Marks a point of a second solution, in a color that no vein has.
 pub fn draw_second_solution_dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.draw_shape(circle_path(at, radius), SECOND_SOLUTION_COLOR, None);
 }
 
 /// The arrow of a direction in a corner of a panel, in pixels.
 struct CornerArrow {
-    /// Of a direction in the plane of the page.
+    /// Length of the arrow of a direction in the plane of the page.
     length: f64,
     /// A projection that is a shorter part of its direction is drawn end-on.
     end_on: f64,
@@ -252,7 +252,7 @@ impl ForceArrow {
 
 /// The curved arrow of a moment.
 struct MomentArc {
-    /// As a part of the leaf's largest extent.
+    /// Radius of the arc, as a part of the leaf's largest extent.
     radius: f64,
     /// Along the arrow, and pieces of which it is drawn.
     angle: f64,
@@ -271,7 +271,7 @@ const MOMENT_ARC: MomentArc = MomentArc {
 /// A dead moment on a rod.
 pub struct MomentArrow {
     pub position: DVec3,
-    /// Of length one.
+    /// Unit vector about which the moment turns.
     pub axis: DVec3,
     pub size: f64,
 }

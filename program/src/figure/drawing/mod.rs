@@ -1,5 +1,5 @@
 //! A page with its elements, shapes and labels, on which every figure is drawn: sizes, panels,
-//! colours, and smooth curves. The unit is 1/96 inch, x points to the right and y down.
+//! colors, and smooth curves. The unit is 1/96 inch, x points to the right and y down.
 
 pub(super) mod axes;
 pub(crate) mod formats;
@@ -175,7 +175,7 @@ impl Drawing {
         });
     }
 
-    /// Adds a label that is vertically centred at `at`.
+    /// Adds a label that is vertically centered at `at`.
     pub fn draw_centered_label(
         &mut self,
         at: DVec2,
@@ -254,7 +254,7 @@ pub struct PageSizes {
     /// Room above a panel, for its title, and below, for its axis.
     pub panel_title: f64,
     pub panel_axis: f64,
-    /// Below the last panel.
+    /// Margin below the last panel.
     pub bottom_margin: f64,
 }
 
@@ -342,7 +342,7 @@ impl PageRectangle {
     }
 }
 
-/// A panel's title: its letter, and a text in a colour.
+/// A panel's title: its letter, and a text in a color.
 #[derive(Clone, Copy)]
 pub struct PanelCaption<'t> {
     pub letter: &'t str,
@@ -389,17 +389,17 @@ pub const NOTE_COLOR: Color = Color(84, 84, 92);
 
 pub const FRAME_COLOR: Color = Color(120, 120, 128);
 
-pub const GRID: Color = Color(226, 227, 232);
+pub const GRID_COLOR: Color = Color(226, 227, 232);
 
 /// The floor of the panel in space.
-pub const FLOOR: Color = Color(247, 247, 249);
+pub const FLOOR_COLOR: Color = Color(247, 247, 249);
 
-/// Shadows on that floor.
+/// Shadows of veins on the floor of the panel in space.
 pub const SHADOW_COLOR: Color = Color(212, 213, 220);
 
 pub const SECOND_SOLUTION_COLOR: Color = Color(213, 60, 30);
 
-/// Colours that the colour-blind can distinguish, too (after Okabe and Ito).
+/// Colors that the color-blind can distinguish, too (after Okabe and Ito).
 pub const BLUE: Color = Color(0, 114, 178);
 
 pub const SKY: Color = Color(86, 170, 225);
@@ -416,7 +416,7 @@ const BROWN: Color = Color(120, 80, 45);
 
 pub const SLATE: Color = Color(60, 60, 66);
 
-/// Colours of the curves in one panel, in this order.
+/// Colors of the curves in one panel, in this order.
 pub const CURVE_COLORS: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 
 /// Viridis (Smith and van der Walt, matplotlib), equally spaced.
@@ -437,7 +437,7 @@ const VIRIDIS_COLORS: [Color; 11] = [
 /// The bright end of viridis is left out: thin yellow lines vanish on white.
 const BRIGHTEST_VIRIDIS_FRACTION: f64 = 0.88;
 
-/// The colour of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
+/// The color of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
 pub fn vein_color(t: f64) -> Color {
     let place = BRIGHTEST_VIRIDIS_FRACTION * t.clamp(0.0, 1.0) * (VIRIDIS_COLORS.len() - 1) as f64;
     let left = (place as usize).min(VIRIDIS_COLORS.len() - 2);
@@ -449,7 +449,7 @@ pub fn vein_color(t: f64) -> Color {
     Color(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }
 
-/// The colour of one of `count` veins.
+/// The color of one of `count` veins.
 pub fn color_of_vein(index: usize, count: usize) -> Color {
     match count {
         0 | 1 => vein_color(0.3),

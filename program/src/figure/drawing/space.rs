@@ -8,8 +8,9 @@ use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::markers::{ProjectedDirection, draw_direction_arrow};
 use crate::figure::drawing::veins::{BezierPiece, DrawnVein, DrawnVeins, draw_leaf_markers};
 use crate::figure::drawing::{
-    Drawing, FLOOR, FONT_SIZE, FRAME_COLOR, GRID, NOTE_COLOR, PAGE, PageRectangle, PanelCaption,
-    PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, polygon_path, polyline_path,
+    Drawing, FLOOR_COLOR, FONT_SIZE, FRAME_COLOR, GRID_COLOR, NOTE_COLOR, PAGE, PageRectangle,
+    PanelCaption, PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, polygon_path,
+    polyline_path,
 };
 use crate::figure::scenario::{DirectionArrow, FigureSetting};
 use crate::report::numbers::format_four_digits;
@@ -50,7 +51,7 @@ pub struct BoxMargins {
 
 impl BoxMargins {
     /// Pixels that are left to the box, of a cell of this size.
-    pub fn inner_size(self, size: DVec2) -> DVec2 {
+    fn inner_size(self, size: DVec2) -> DVec2 {
         size - DVec2::new(self.left + self.right, self.below)
     }
 }
@@ -96,14 +97,14 @@ pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     [middle - half, middle + half]
 }
 
-/// A parallel projection.
+/// A parallel projection of space onto the page.
 pub struct ParallelProjection {
     right: DVec3,
     up: DVec3,
     pub toward: DVec3,
     /// Pixels per length.
     scale: f64,
-    /// The origin on the page.
+    /// Where the origin of space is on the page.
     origin: DVec2,
 }
 
@@ -119,7 +120,7 @@ impl ParallelProjection {
         }
     }
 
-    pub fn from_view(view: ViewAngles) -> Self {
+    fn from_view(view: ViewAngles) -> Self {
         let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let right = DVec3::new(-sin_a, cos_a, 0.0);
@@ -127,7 +128,7 @@ impl ParallelProjection {
     }
 
     /// Shows a point at a place on the page.
-    pub fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
+    fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
         self.scale = scale;
         self.origin += at - self.project_point(point);
         self
@@ -142,7 +143,7 @@ impl ParallelProjection {
     }
 
     /// Width and height of a box on the page.
-    pub fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
+    fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
         let corners = || box_corners(bounds).map(|corner| self.project_point(corner));
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
@@ -173,7 +174,7 @@ fn box_corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     (0..8).map(move |k| DVec3::new(side(k, 0), side(k, 1), side(k, 2)))
 }
 
-/// One axis along an edge of the box.
+/// An axis along an edge of the box.
 struct AxisEdge {
     axis: usize,
     from: DVec3,
@@ -272,7 +273,7 @@ impl<'s> SpacePanel<'s> {
         let far = DVec3::new(low.x, high.y, low.z);
         let right = near.with_y(high.y);
         let floor = [low, near, right, far].map(|corner| self.project_point(corner));
-        page.draw_shape(polygon_path(&floor), FLOOR, None);
+        page.draw_shape(polygon_path(&floor), FLOOR_COLOR, None);
         for edge in &self.edges {
             for &EdgeTick { point: start, .. } in &edge.ticks {
                 let line = [
@@ -281,7 +282,7 @@ impl<'s> SpacePanel<'s> {
                     start + edge.grid_line_offsets[1],
                 ];
                 let line = line.map(|point| self.project_point(point));
-                page.draw_stroke(polyline_path(&line), Stroke::new(GRID, 0.7));
+                page.draw_stroke(polyline_path(&line), Stroke::new(GRID_COLOR, 0.7));
             }
         }
         let top = |corner: DVec3| corner.with_z(high.z);
@@ -330,7 +331,7 @@ impl<'s> SpacePanel<'s> {
 
     /// Draws the names of all axes at a distance from their edges, with units if values
     /// are shown.
-    pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
+    fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
             let widths = widths.map(|tick| Font::embedded().text_width(&tick.text, FONT_SIZE.tick));
@@ -462,13 +463,12 @@ pub fn draw_plane_panel(
 
 /// Sizes of small panels, in pixels.
 struct SmallPanelSizes {
-    /// Panels in a row.
     columns: usize,
     gap: f64,
     /// Least and largest height.
     lowest: f64,
     highest: f64,
-    /// Below the last row.
+    /// Room below the last row.
     bottom: f64,
     /// Least distance between grid lines.
     grid_spacing: f64,
@@ -578,7 +578,7 @@ impl<'s> SmallPanels<'s> {
     }
 
     /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
-    /// title in a colour. The first also shows the names of the axes and gravity, and each the wind
+    /// title in a color. The first also shows the names of the axes and gravity, and each the wind
     /// if that changes.
     pub fn draw_empty_panel(
         &self,

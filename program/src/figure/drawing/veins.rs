@@ -15,7 +15,7 @@ use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::{Scenario, SupportKind};
 use leafdyn::simulate::{Record, ShapeSnapshot};
 
-/// Of a wider leaf only some veins are drawn: more could not be distinguished.
+/// Of a leaf of more veins only some are drawn: more could not be distinguished.
 const MOST_VEINS_DRAWN: usize = 200;
 
 /// Largest distance of a drawn curve from the computed points, in lengths: a
@@ -36,7 +36,7 @@ struct DotLimits {
     fewest: usize,
 }
 
-const DOTS: DotLimits = DotLimits {
+const SECOND_SOLUTION_DOTS: DotLimits = DotLimits {
     veins: 24,
     most: 160,
     per_extent: 14.0,
@@ -104,7 +104,17 @@ impl DrawnVeins {
         )
     }
 
-    /// Where the veins that are drawn begin.
+    /// Whether bases or tips are held like this.
+    pub fn has_held_ends(&self, how: SupportKind) -> bool {
+        self.base_support == how || self.tip_support == Some(how)
+    }
+
+    /// Whether a grip holds like this.
+    pub fn has_grips(&self, how: SupportKind) -> bool {
+        self.grips.iter().any(|grip| grip.support == how)
+    }
+
+    /// Where the drawn veins begin.
     pub fn bases(&self) -> impl Iterator<Item = DVec3> {
         let first = |vein: &DrawnVein| vein.pieces.first().map_or(DVec3::ZERO, |piece| piece[0]);
         self.veins.iter().map(first)
@@ -121,7 +131,7 @@ impl DrawnVeins {
             .with_loads(scenario, &loads, &record.stations, &still.curves)
     }
 
-    /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
+    /// Adds what the grips of a scenario hold and where moments act, on curves through nodes at these
     /// stations.
     fn with_loads(
         mut self,
@@ -148,7 +158,7 @@ impl DrawnVeins {
         self
     }
 
-    /// With bases and tips that are held as in a scenario.
+    /// Adds how a scenario holds the bases and the tips.
     pub fn with_supports(self, scenario: &Scenario) -> Self {
         let marks = support_marks(scenario);
         let held = |part| {
@@ -208,12 +218,13 @@ impl DrawnVeins {
     /// Adds a second solution as dots, on as many veins and at as many nodes as can be
     /// distinguished.
     pub fn add_second_solution(&mut self, rods: &[RodShape]) {
-        let every = self.count.div_ceil(DOTS.veins).max(1);
-        let most = (DOTS.most / rods.len().div_ceil(every).max(1)).max(DOTS.fewest);
+        let every = self.count.div_ceil(SECOND_SOLUTION_DOTS.veins).max(1);
+        let most = (SECOND_SOLUTION_DOTS.most / rods.len().div_ceil(every).max(1))
+            .max(SECOND_SOLUTION_DOTS.fewest);
         // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.largest_extent();
-        let wanted = (DOTS.per_extent * lengths).ceil() as usize;
-        let dots = wanted.clamp(DOTS.fewest, most);
+        let wanted = (SECOND_SOLUTION_DOTS.per_extent * lengths).ceil() as usize;
+        let dots = wanted.clamp(SECOND_SOLUTION_DOTS.fewest, most);
         for rod in rods.iter().step_by(every) {
             let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
             // The base is under the clamp's marker.
@@ -243,7 +254,6 @@ impl DrawnVeins {
         notes
     }
 
-    /// The ends of all pieces.
     pub fn piece_ends(&self) -> impl Iterator<Item = DVec3> {
         let pieces = self.veins.iter().flat_map(|vein| &vein.pieces);
         pieces.flat_map(|piece| [piece[0], piece[3]])
@@ -255,7 +265,7 @@ impl DrawnVeins {
         if extent > 1e-9 { extent } else { 1.0 }
     }
 
-    /// A line width that keeps neighbouring veins apart.
+    /// A line width that keeps neighboring veins apart.
     pub fn line_width(&self) -> f64 {
         match self.veins.len() {
             0..=2 => 2.0,
@@ -412,7 +422,7 @@ fn bezier_point(piece: &BezierPiece, t: f64) -> DVec3 {
     s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
 }
 
-/// One piece per segment through equally spaced points, with tangents from
+/// Cubic pieces, one per segment, through equally spaced points, with tangents from
 /// differences: of fourth order inside, of second order next to the ends.
 fn interpolate_pieces(points: &[DVec3]) -> Vec<BezierPiece> {
     let p = points;
