@@ -100,7 +100,7 @@ fn find_rest<'a>(
                 LoadingEnd::GivenUp(failure) => Err(failure),
             },
             _ => {
-                let (found, end) = solve_planned(problem, half, &attempt, effort);
+                let MadeAttempt { found, end } = solve_planned(problem, half, &attempt, effort);
                 effort.log(attempt.strategy, attempt.extent, attempt.segments, end);
                 if found.is_ok() && end == AttemptEnd::Accepted {
                     return found;
@@ -118,13 +118,19 @@ fn find_rest<'a>(
     }
 }
 
+/// An attempt to bring a leaf to rest, and what came of it.
+struct MadeAttempt {
+    found: RelaxationResult,
+    end: AttemptEnd,
+}
+
 /// Makes an attempt from arcs, or from the start of the request, of the `half` or of the whole.
 fn solve_planned<'a>(
     problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
     attempt: &PlannedAttempt,
     effort: &mut WorkLog,
-) -> (RelaxationResult, AttemptEnd) {
+) -> MadeAttempt {
     let part = RelaxationProblem {
         stays_in_valley: attempt.strategy == Strategy::FirstValley,
         ..problem.reduced_to_half(half)
@@ -141,7 +147,10 @@ fn solve_planned<'a>(
         false => problem.undisturbed_path(),
     };
     let whole = found.map(|found| found.mirrored_to_whole(&part));
-    (result_with_path(whole, path), end)
+    MadeAttempt {
+        found: result_with_path(whole, path),
+        end,
+    }
 }
 
 /// Whether an equilibrium is accepted by this rule, or why not.

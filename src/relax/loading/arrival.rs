@@ -309,8 +309,10 @@ fn follow_path_on_grid(
     let most = before + (left / nodes).min(WORK.loading_evaluations);
     let mut walk = LoadPath::new(
         &leaf,
-        (&mut effort.work, &mut progress),
-        (&problem.options.limit, most),
+        &mut effort.work,
+        &mut progress,
+        &problem.options.limit,
+        most,
     );
     walk.bias_direction = problem.options.bias_direction;
     let end = walk.run(last);
