@@ -53,7 +53,7 @@ const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
     rounding_growth: 4.0,
 };
 
-/// The lowest modes of a settled leaf.
+/// The lowest modes of a leaf at rest.
 pub struct LowestModes {
     pub modes: Vec<Mode>,
     /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
@@ -369,7 +369,7 @@ impl GridModes<'_> {
         self.pairs.iter().map(on_grid).collect()
     }
 
-    /// Normalised shapes at the nodes of the same or a coarser grid: the largest displacement
+    /// Normalized shapes at the nodes of the same or a coarser grid: the largest displacement
     /// is the longest rod's length, and the last of the largest components is positive.
     fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<NodalModeShape> {
         let length = coarse.leaf.scale.length;
@@ -462,34 +462,34 @@ const BAR: EigenvalueBar = EigenvalueBar {
 };
 
 /// An extrapolated eigenvalue.
-pub struct ExtrapolatedEigenvalue {
-    pub value: f64,
+struct ExtrapolatedEigenvalue {
+    value: f64,
     /// If there are at least two grids.
-    pub error: Option<f64>,
+    error: Option<f64>,
     /// Its number on the finest grid.
-    pub number: usize,
+    number: usize,
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
-pub struct EigenvalueSeries {
+struct EigenvalueSeries {
     /// Number of the listed eigenvalues that are negative on the finest grid.
-    pub index: usize,
+    index: usize,
     /// Whether their signs on a single grid are enough.
-    pub trusts_single_grid: bool,
-    pub grids: Vec<Vec<f64>>,
-    pub tolerance: f64,
+    trusts_single_grid: bool,
+    grids: Vec<Vec<f64>>,
+    tolerance: f64,
     /// Relative error of frequencies that is small enough.
-    pub wanted_relative_error: f64,
+    wanted_relative_error: f64,
     /// Rounding error of an eigenvalue on the finest grid.
-    pub rounding: f64,
+    rounding: f64,
     /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
     /// doubt.
-    pub turns: bool,
+    turns: bool,
 }
 
 impl EigenvalueSeries {
     /// Adds the eigenvalues on a grid twice as fine as the last.
-    pub fn push(&mut self, pairs: &[Eigenpair]) {
+    fn push(&mut self, pairs: &[Eigenpair]) {
         let values = pairs.iter().map(|pair| pair.eigenvalue);
         self.grids.push(values.collect());
     }
@@ -542,7 +542,7 @@ impl EigenvalueSeries {
 
     /// Extrapolated values, ascending, and their errors if there are at least two grids: the
     /// geometric mean of its own bound, which may be small by chance, and the largest of all.
-    pub fn values(&self) -> Vec<ExtrapolatedEigenvalue> {
+    fn values(&self) -> Vec<ExtrapolatedEigenvalue> {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.extrapolate_eigenvalue(k))
             .collect();
@@ -567,7 +567,7 @@ impl EigenvalueSeries {
     }
 
     /// Whether the relative error of all frequencies is as small as wanted.
-    pub fn accurate(&self) -> bool {
+    fn accurate(&self) -> bool {
         let known = |(k, it): (usize, ExtrapolatedEigenvalue)| {
             let wanted = 2.0 * self.wanted_relative_error * self.unit(k);
             it.error
@@ -578,14 +578,14 @@ impl EigenvalueSeries {
 
     /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
     /// grid.
-    pub fn negative_count(&self) -> Option<usize> {
+    fn negative_count(&self) -> Option<usize> {
         let negative = |sum, sign: Option<bool>| Some(sum + usize::from(sign?));
         self.signs().into_iter().try_fold(0, negative)
     }
 
     /// Whether each eigenvalue, ascending, is negative, if that is certain; on a single grid
     /// whether it is there.
-    pub fn signs(&self) -> Vec<Option<bool>> {
+    fn signs(&self) -> Vec<Option<bool>> {
         let alone = |k: usize| {
             BAR.rounding * self.rounding + BAR.iterations * self.tolerance * self.unit(k)
         };
@@ -600,7 +600,7 @@ impl EigenvalueSeries {
 
     /// The largest ratio of a positive eigenvalue on a grid and what it is at least without errors
     /// of grids, either way, of those that are larger than their errors; at least one.
-    pub fn bifurcation_error_factor(&self, grid: usize) -> f64 {
+    fn bifurcation_error_factor(&self, grid: usize) -> f64 {
         let ratio = |it: ExtrapolatedEigenvalue| {
             let on_grid = *self.grids[grid].get(it.number)?;
             let least = it.value - it.error?;
@@ -616,7 +616,7 @@ impl EigenvalueSeries {
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
     /// finest grid. One that is zero to the tolerance may have either sign, and of a leaf that
     /// can turn one that is zero to rounding.
-    pub fn undecided_size(&self) -> Option<f64> {
+    fn undecided_size(&self) -> Option<f64> {
         let unknown = |(k, it): (usize, ExtrapolatedEigenvalue)| {
             let size = it.value.abs();
             let Some(error) = it.error else {

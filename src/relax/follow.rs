@@ -142,7 +142,7 @@ fn relax_with_progress(
 }
 
 /// A state of a level in the units of another leaf, with the base rotations of that leaf.
-pub(super) fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) -> State {
+fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);

@@ -345,7 +345,7 @@ pub fn relax_from(
 }
 
 /// Refuses the shape of another leaf, and one that is no shape.
-pub(super) fn check_start(
+fn check_start(
     scenario: &Scenario,
     stations: &[f64],
     rods: &[RodShape],
@@ -371,7 +371,7 @@ pub(super) fn check_start(
 }
 
 /// A rod at other stations: on chords, with the directors turned evenly from node to node.
-pub(super) fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
+fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
     let node = |&sigma: &f64| {
         let next = stations.partition_point(|&at| at < sigma);
         let next = next.clamp(1, stations.len() - 1);

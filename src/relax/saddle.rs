@@ -55,7 +55,7 @@ pub struct Saddle {
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the Hessian of its
 /// energy (the symmetric part of it, under a dead moment). Eigenvalues (with respect to the
-/// masses) between -`shift` and zero do not count. `None` if the factorisation does not fit
+/// masses) between -`shift` and zero do not count. `None` if the factorization does not fit
 /// into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
@@ -148,7 +148,7 @@ pub struct IndexBounds {
     pub close: f64,
 }
 
-/// The bounds of the Morse index of a state at rest. `None` if the factorisation does not fit
+/// The bounds of the Morse index of a state at rest. `None` if the factorization does not fit
 /// into memory.
 pub fn bounds(
     leaf: &DiscreteLeaf,
@@ -354,7 +354,7 @@ pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddl
 /// (along e2) and forward, in this order of importance, more so away from the base and, with
 /// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
 /// would turn out of any other on its way.
-pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
+fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
     let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
     let given = GIVEN_BIAS_WEIGHT * leaning.normalize_or_zero();
     let everywhere = given + down + 0.5 * left + 0.25 * forward;

@@ -459,7 +459,7 @@ impl NeighbouringEquilibria {
 
     /// The derivatives of the eigenvalues of several modes. NaN where a multiple eigenvalue splits: its modes change
     /// differently, and the lower one is another mode on either side.
-    pub fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
+    fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
         let mut rates: Vec<f64> = modes
             .iter()
             .map(|mode| self.eigenvalue_rate(mode))
@@ -485,12 +485,12 @@ impl NeighbouringEquilibria {
     }
 
     /// The derivatives of the moments of the rods on a clamp.
-    pub fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+    fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
         self.vector_derivatives(level, |leaf, state| leaf.reaction(state).moments)
     }
 
     /// The derivatives of the moments on grips about their middles.
-    pub fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+    fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
         self.vector_derivatives(level, |leaf, state| {
             let reactions = leaf.grip_reactions(state).into_iter();
             reactions.map(|on_grip| on_grip.moment).collect()
@@ -652,7 +652,7 @@ const CONJUGATE_GRADIENT_ACCURACY: f64 = 3e-3;
 
 const BEST_CONJUGATE_GRADIENT_ACCURACY: f64 = 1e-11;
 
-/// A settled leaf (all rods, in space) with its equations linearized and factorized once for
+/// A leaf at rest (all rods, in space) with its equations linearized and factorized once for
 /// all right-hand sides.
 pub(crate) struct Linearized {
     system: System,
@@ -799,7 +799,7 @@ fn response(
 }
 
 /// The state, moved along a response.
-pub(crate) fn displace_along_response(
+fn displace_along_response(
     level: &GridLevel,
     rate: &LeafParameterDerivative,
     response: &LinearResponse,

@@ -152,7 +152,7 @@ fn relax_from_rest(
 }
 
 /// The work of shooting in terms of a relaxation: Newton corrections count as steps,
-/// linearisations as factorisations, evaluations of all slopes as force evaluations.
+/// linearizations as factorizations, evaluations of all slopes as force evaluations.
 impl From<shooting::ShootingCounts> for SolverCounts {
     fn from(work: shooting::ShootingCounts) -> Self {
         SolverCounts {

@@ -731,7 +731,7 @@ mod tests {
         load = { gravity = [0.0, 0.0, -1.0] }
     "#;
 
-    /// The linear equations are factorised once for all rounds, and each of these leaves less
+    /// The linear equations are factorized once for all rounds, and each of these leaves less
     /// than a thirtieth of the error, for rods that are rigid in stretch or not.
     #[test]
     fn every_round_leaves_a_small_part() {

@@ -176,7 +176,7 @@ impl NestedEquilibrium {
 
     /// Takes the leaf on its finest grid out of the list.
     pub fn take_finest(&mut self) -> GridLevel {
-        let finest = self.levels.pop().expect("the leaf has settled");
+        let finest = self.levels.pop().expect("the leaf is at rest on a grid");
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
         finest
     }

@@ -55,7 +55,7 @@ pub fn load_slowly<'a>(
         let segments = grid.segments();
         let LoadPathEnd {
             level,
-            path: walked,
+            path: followed_path,
         } = match follow_load_path(problem, grid, effort) {
             Ok(arrived) => arrived,
             Err(failure) => {
@@ -65,7 +65,7 @@ pub fn load_slowly<'a>(
             }
         };
         grid = level.leaf.grid.refined();
-        path = Some(walked);
+        path = Some(followed_path);
         let mut begun = NestedEquilibrium::without_grids(problem);
         let StateOnGrid { grid: on, state } =
             state_on_requested_grid(problem, &mut begun.history, level, effort);
@@ -307,25 +307,25 @@ fn follow_path_on_grid(
     };
     let (before, nodes) = (effort.work.force_evaluations, leaf.rods() * segments);
     let most = before + (left / nodes).min(WORK.loading_evaluations);
-    let mut walk = LoadPath::new(
+    let mut loading = LoadPath::new(
         &leaf,
         &mut effort.work,
         &mut progress,
         &problem.options.limit,
         most,
     );
-    walk.bias_direction = problem.options.bias_direction;
-    let end = walk.run(last);
-    let events = std::mem::take(&mut walk.events);
+    loading.bias_direction = problem.options.bias_direction;
+    let end = loading.run(last);
+    let events = std::mem::take(&mut loading.events);
     let reached = PathPosition {
-        stage: walk.stage,
-        lambda: walk.lambda,
+        stage: loading.stage,
+        lambda: loading.lambda,
     };
-    let evaluations = walk.work.force_evaluations - before;
+    let evaluations = loading.work.force_evaluations - before;
     // On coarse grids slow loading is cheap, and yet not repeated often.
     let least = WORK.loading_node_evaluations / WORK.loading_evaluations;
     effort.loading_node_evaluations += evaluations * nodes.max(least);
-    let mut state = walk.last();
+    let mut state = loading.last();
     if leaf.tips_move_together() {
         state.join_tips();
     }
@@ -454,7 +454,7 @@ fn predict_and_solve(
     finer: Grid,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    let level = found.levels.last().expect("the leaf has settled");
+    let level = found.levels.last().expect("the leaf is at rest on a grid");
     let mut state = prolong(&level.leaf, &level.state);
     let guess = match found.levels_for_prediction().as_slice() {
         [_] => InitialGuess::Coarser(state),

@@ -545,7 +545,7 @@ impl<'a> LoadedLeaf<'a> {
     }
 
     /// Puts the tips of a state predicted for the present part where they are exactly.
-    pub fn place_tips(&self, state: &mut State) {
+    fn place_tips(&self, state: &mut State) {
         if let (TipMotion::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
             let common = |j: usize| state.tip(j) - offsets[j].tip_offset(self.lambda);
             let mean = (0..offsets.len()).map(common).sum::<DVec3>() / offsets.len() as f64;

@@ -61,7 +61,7 @@ pub struct GripReaction {
 
 /// Errors of forces on a grid that are not errors of the grid.
 #[derive(Clone, Copy)]
-pub(in crate::relax) struct ForceNoise {
+struct ForceNoise {
     /// By unfinished iterations, as a part of the force.
     relative: f64,
     /// By rounding of positions, in units of A/L^2.

@@ -141,8 +141,8 @@ pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
     scenario.neutral_directions(|j| rods[j].nodes.iter().map(|node| node.position))
 }
 
-/// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
-/// belongs to it.
+/// How the leaf came to its equilibrium. What finer grids than that of slow loading make of its end
+/// belongs to the path.
 fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     let mut path = found.path.clone()?;
     if let Path::Loaded { events, .. } | Path::Held { events } = &mut path
@@ -497,7 +497,7 @@ fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<EquilibriumDou
 }
 
 /// Smallest number of parts into which the stations of a result divide a vein.
-pub(crate) const MIN_STATION_PARTS: usize = 16;
+const MIN_STATION_PARTS: usize = 16;
 
 impl Equilibrium {
     /// The leaf at stations that divide every vein into `parts` equal parts; `None`: at the
@@ -622,7 +622,7 @@ impl Equilibrium {
 }
 
 /// Nodes of the finest grid, with all segments halved until there are enough.
-pub(crate) fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
+fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
     let mut stations = shape.curve_stations.clone();
     while (2..=MIN_STATION_PARTS).contains(&stations.len()) {
         let middles = stations

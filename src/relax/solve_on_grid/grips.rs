@@ -95,27 +95,27 @@ pub fn move_grips(
     };
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
-    let mut walk = SupportContinuation {
+    let mut continuation = SupportContinuation {
         leaf,
         system: System::new(leaf),
         held: GridRelaxation::new(state, ACCURACY, &mut effort.work, ignored, limit),
         keeps_unstable: problem.keeps_unstable(),
         events: Vec::new(),
     };
-    walk.relax_held_leaf(&holders);
+    continuation.relax_held_leaf(&holders);
     // Out of time, the leaf is placed where it is held from where it came to.
     let _ = steps.follow(|step| {
         if limit.reached() {
             return StepEnd::Ended(());
         }
-        match walk.step(&holders, step.to, step.is_shortest) {
+        match continuation.step(&holders, step.to, step.is_shortest) {
             true => StepEnd::Made {
                 growth: STEPS.growth,
             },
             false => StepEnd::TooLong(()),
         }
     });
-    let SupportContinuation { held, events, .. } = walk;
+    let SupportContinuation { held, events, .. } = continuation;
     let (mut state, near_rest, moved) = (held.state, held.near_rest, held.left_convex_valley);
     effort.node_evaluations +=
         leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
