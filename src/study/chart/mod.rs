@@ -3,6 +3,7 @@
 //!
 //! All settings take turns, so that a varying load of the machine affects them equally.
 
+mod reference;
 mod remark;
 mod result;
 
@@ -12,12 +13,13 @@ use crate::relax::{
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
 use crate::shooting::ShootingFailureReason;
+use crate::study::chart::reference::FoundReference;
+pub use crate::study::chart::reference::ReferenceSolution;
 pub use crate::study::chart::remark::{ChartRemark, ChartRowRemark};
+use crate::study::chart::result::PeerRows;
 pub use crate::study::chart::result::{
     Chart, ChartOutcome, ChartRow, FastestByAccuracy, PeerMeasurement, PeerProgram,
-    ReferenceSolution,
 };
-use crate::study::chart::result::{FoundReference, PeerRows};
 use crate::study::judge::{MethodSolution, Timed, run_timed};
 use crate::study::remark::SolutionRemark;
 use crate::{read_and_write, shooting};
@@ -78,7 +80,7 @@ pub fn chart(
     let mut all: Vec<RepeatedRuns> = options.contenders.iter().flat_map(each).collect();
     let (reference, rows, rounds) = run_on_one_thread(options.seconds, || {
         let rounds = time_runs(&mut all, options.seconds, progress);
-        let found = result::find_reference(scenario, result::reference_stations(&all))?;
+        let found = reference::find_reference(scenario, result::reference_stations(&all))?;
         let rows = result::chart_rows(&all, found.as_ref().map(|it| &it.solution));
         Ok((found.map(|it| it.reference), rows, rounds))
     })?;
@@ -607,7 +609,7 @@ fn measure_scaling(
     let any_grid = contenders.any(|contender| contender.one_grid);
     let mut unconfirmed = Vec::new();
     let leaves = leaves.iter().map(|&scenario| {
-        let found = result::find_reference(scenario, Vec::new())?;
+        let found = reference::find_reference(scenario, Vec::new())?;
         if !(found.as_ref()).is_some_and(|found| found.reference.confirmed) {
             unconfirmed.push(scenario.rods.len());
         }

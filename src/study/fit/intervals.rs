@@ -5,17 +5,16 @@
 //! them; if that fails, by whole fits: the number is held at one distance from the minimum after another,
 //! and all others are fitted again.
 
-use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::least_squares::{
     GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
 use crate::study::fit::model::{FitPoint, MOST_RELAXATION_STEPS};
-use crate::study::fit::prediction::CaseSolution;
 use crate::study::fit::statistics::{
-    BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY,
+    BETTER_MINIMUM_EXCESS, ConstrainedMinimum, DifferentiatedPoint, EvaluatedPoint, FitStatistics,
+    GaussNewtonModel, MinimumNeighbourhood, UNDETERMINED_UNCERTAINTY, normalized_excess,
 };
 use crate::study::fit::{FitParameter, FitStep};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// The free numbers with their intervals. The shape of the sum of squares away from
 /// the minimum is taken from `shape`, which may be a minimum on coarser grids.
@@ -206,12 +205,6 @@ pub(super) enum ProfileEndpoint {
     Open,
     /// Beyond this distance, up to which it does not, the other numbers could not be fitted.
     Lost(f64),
-}
-
-/// A point near a minimum, with its residuals.
-pub(super) struct EvaluatedPoint {
-    pub residuals: DVector<f64>,
-    pub point: FitPoint,
 }
 
 /// The ends of an interval below and above, from a few points around the minimum; as errors,
@@ -508,14 +501,6 @@ struct ProfilePoint {
     point: Option<FitPoint>,
 }
 
-/// Excess of the sum of squares over the minimum, in squared spreads.
-pub(super) fn normalized_excess(stats: &FitStatistics, point: &FitPoint) -> f64 {
-    let residuals = stats.weighting.residuals(point);
-    let bound = stats.weighting.huber_bound(&stats.residuals);
-    let sum = |residuals: &DVector<f64>| stats.weighting.huber_sum(residuals, bound);
-    (sum(&residuals) - sum(&stats.residuals)) / stats.residual_deviation.powi(2)
-}
-
 impl LikelihoodProfile<'_, '_, '_> {
     /// The end of an interval: where the excess of the profile (the least sum of squares over all
     /// other numbers) is that at the end of a normal one. `first` is a guess of its distance, with
@@ -742,164 +727,5 @@ impl LikelihoodProfile<'_, '_, '_> {
             }
         }
         None
-    }
-}
-
-pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
-    pub stats: &'j FitStatistics<'m, 'a>,
-    /// Numbers at a bound, which stay fixed.
-    fixed: Vec<bool>,
-}
-
-/// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
-/// regularized, so that combinations to which the data are insensitive do not change.
-pub(super) struct GaussNewtonModel {
-    jacobian: DMatrix<f64>,
-    curvature: DMatrix<f64>,
-}
-
-/// A point with derivatives.
-pub(super) struct DifferentiatedPoint {
-    point: FitPoint,
-    model: GaussNewtonModel,
-}
-
-/// The least sum of squares with one number fixed away from the minimum.
-pub(super) struct ConstrainedMinimum {
-    /// Its excess over the minimum, in squared spreads.
-    pub excess: f64,
-    /// Its excess if the other numbers do not change.
-    pub excess_without_correction: f64,
-    /// The change of the other numbers.
-    pub correction: DVector<f64>,
-    /// Half of its first derivative, and half of its second derivative.
-    half_slope: f64,
-    half_curvature: f64,
-}
-
-impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
-    /// `None` if residuals have different weights, or derivatives are not known.
-    pub fn new(stats: &'j FitStatistics<'m, 'a>) -> Option<Self> {
-        let differentiated = |case: &CaseSolution| case.responses.is_some();
-        if stats.weighting.is_robust || !stats.point.case_solutions.iter().all(differentiated) {
-            return None;
-        }
-        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
-        let fixed = coordinates.map(|(free, theta)| free.active_bound(*theta).is_some());
-        Some(MinimumNeighbourhood {
-            stats,
-            fixed: fixed.collect(),
-        })
-    }
-
-    pub fn gauss_newton_model(&self) -> GaussNewtonModel {
-        self.gauss_newton_from_jacobian(self.stats.jacobian.clone())
-    }
-
-    /// Derivatives at another point, which stores them.
-    pub fn gauss_newton_model_at(
-        &self,
-        mut there: FitPoint,
-    ) -> Result<DifferentiatedPoint, ContinuationFailure> {
-        self.stats.model.differentiate_data(&mut there)?;
-        let jacobian = self.stats.weighting.jacobian(&there);
-        Ok(DifferentiatedPoint {
-            model: self.gauss_newton_from_jacobian(jacobian),
-            point: there,
-        })
-    }
-
-    fn gauss_newton_from_jacobian(&self, mut jacobian: DMatrix<f64>) -> GaussNewtonModel {
-        let stats = self.stats;
-        for k in (0..self.fixed.len()).filter(|&k| self.fixed[k]) {
-            jacobian.column_mut(k).fill(0.0);
-        }
-        let count = stats.singular_values.len();
-        let least = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
-        let curvature = jacobian.tr_mul(&jacobian) / stats.residual_deviation.powi(2)
-            + DMatrix::identity(count, count) * least;
-        GaussNewtonModel {
-            jacobian,
-            curvature,
-        }
-    }
-
-    /// The values after a change from the minimum, clamped to the bounds.
-    pub fn bounded_update(&self, change: &DVector<f64>) -> Vec<f64> {
-        let theta = &self.stats.point.theta;
-        let mut moved = self.stats.model.bounded_update(theta, 1.0, change);
-        for k in (0..theta.len()).filter(|&k| self.fixed[k]) {
-            moved[k] = theta[k];
-        }
-        moved
-    }
-
-    /// The residuals for other values, and their point, followed from a point with
-    /// derivatives.
-    pub fn residuals(
-        &self,
-        from: &FitPoint,
-        theta: &[f64],
-    ) -> Result<EvaluatedPoint, ContinuationFailure> {
-        let stats = self.stats;
-        let there = stats
-            .model
-            .continue_leaves_on_grids(from, theta, GridPolicy::These)?;
-        Ok(EvaluatedPoint {
-            residuals: stats.weighting.residuals(&there),
-            point: there,
-        })
-    }
-
-    /// The least sum of squares over all numbers but the `k`th, linearized where the residuals
-    /// are these, with a step no longer than `longest`.
-    pub fn constrained_minimum(
-        &self,
-        slopes: &GaussNewtonModel,
-        k: usize,
-        residuals: &DVector<f64>,
-        longest: f64,
-    ) -> Option<ConstrainedMinimum> {
-        let stats = self.stats;
-        let mut curvature = slopes.curvature.clone();
-        let mut coupled = -curvature.column(k);
-        coupled[k] = 1.0;
-        curvature.row_mut(k).fill(0.0);
-        curvature.column_mut(k).fill(0.0);
-        curvature[(k, k)] = 1.0;
-        let variance = stats.residual_deviation.powi(2);
-        let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
-        slope[k] = 0.0;
-        let inverse = curvature.clone().cholesky()?;
-        let along = inverse.solve(&coupled);
-        let mut correction = -inverse.solve(&slope);
-        let corrected = residuals + &slopes.jacobian * &correction;
-        let change = &slopes.jacobian * &along;
-        let mut damping = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
-        while correction.norm() > longest {
-            damping *= 2.0;
-            let count = curvature.nrows();
-            let damped = &curvature + DMatrix::identity(count, count) * damping;
-            correction = -damped.cholesky()?.solve(&slope);
-        }
-        let least = stats.residuals.norm_squared();
-        let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
-        Some(ConstrainedMinimum {
-            excess: above(&corrected),
-            excess_without_correction: above(residuals),
-            half_slope: corrected.dot(&change) / variance,
-            half_curvature: change.norm_squared() / variance,
-            correction,
-        })
-    }
-}
-
-impl ConstrainedMinimum {
-    /// The change of the number at which the least sum exceeds the minimum by `above`, with
-    /// linearized residuals: the farther of two solutions, or the minimum of the excess if there
-    /// are none.
-    pub fn step_to_excess(&self, above: f64, sign: f64) -> f64 {
-        let root = self.half_slope.powi(2) - self.half_curvature * (self.excess - above);
-        (sign * root.max(0.0).sqrt() - self.half_slope) / self.half_curvature
     }
 }

@@ -2,14 +2,16 @@
 //! informative.
 //!
 //! All follow from the singular values of the weighted derivatives: combinations of the free numbers with
-//! the smallest ones are those to which the data are insensitive.
+//! the smallest ones are those to which the data are insensitive. [`MinimumNeighbourhood`] has the
+//! residuals near a minimum, and the least sum of squares for a given displacement of one number.
 
+use crate::relax::{ContinuationFailure, GridPolicy};
 use crate::study::fit::columns::DatumDimension;
 use crate::study::fit::data::{Data, Experiment};
 use crate::study::fit::model::{
     EvaluationBudget, FitModel, FitPoint, WeightedDerivatives, Weighting,
 };
-use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
+use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
 use crate::study::fit::remark::FitCandidateRemark;
 use crate::study::fit::{FitCandidate, FitError};
 use nalgebra::{DMatrix, DVector};
@@ -301,6 +303,179 @@ pub(super) fn student_quantile_95(freedom: usize) -> f64 {
         + z * (3.0 * z2.powi(3) + 19.0 * z2 * z2 + 17.0 * z2 - 15.0) / (384.0 * n.powi(3))
         + z * (79.0 * z2.powi(4) + 776.0 * z2.powi(3) + 1482.0 * z2 * z2 - 1920.0 * z2 - 945.0)
             / (92160.0 * n.powi(4))
+}
+
+/// Excess of the sum of squares over the minimum, in squared spreads.
+pub(super) fn normalized_excess(stats: &FitStatistics, point: &FitPoint) -> f64 {
+    let residuals = stats.weighting.residuals(point);
+    let bound = stats.weighting.huber_bound(&stats.residuals);
+    let sum = |residuals: &DVector<f64>| stats.weighting.huber_sum(residuals, bound);
+    (sum(&residuals) - sum(&stats.residuals)) / stats.residual_deviation.powi(2)
+}
+
+/// A point near a minimum, with its residuals.
+pub(super) struct EvaluatedPoint {
+    pub residuals: DVector<f64>,
+    pub point: FitPoint,
+}
+
+pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
+    pub stats: &'j FitStatistics<'m, 'a>,
+    /// Numbers at a bound, which stay fixed.
+    fixed: Vec<bool>,
+}
+
+/// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
+/// regularized, so that combinations to which the data are insensitive do not change.
+pub(super) struct GaussNewtonModel {
+    jacobian: DMatrix<f64>,
+    curvature: DMatrix<f64>,
+}
+
+/// A point with derivatives.
+pub(super) struct DifferentiatedPoint {
+    pub point: FitPoint,
+    pub model: GaussNewtonModel,
+}
+
+/// The least sum of squares with one number fixed away from the minimum.
+pub(super) struct ConstrainedMinimum {
+    /// Its excess over the minimum, in squared spreads.
+    pub excess: f64,
+    /// Its excess if the other numbers do not change.
+    pub excess_without_correction: f64,
+    /// The change of the other numbers.
+    pub correction: DVector<f64>,
+    /// Half of its first derivative, and half of its second derivative.
+    half_slope: f64,
+    half_curvature: f64,
+}
+
+impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
+    /// `None` if residuals have different weights, or derivatives are not known.
+    pub fn new(stats: &'j FitStatistics<'m, 'a>) -> Option<Self> {
+        let differentiated = |case: &CaseSolution| case.responses.is_some();
+        if stats.weighting.is_robust || !stats.point.case_solutions.iter().all(differentiated) {
+            return None;
+        }
+        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+        let fixed = coordinates.map(|(free, theta)| free.active_bound(*theta).is_some());
+        Some(MinimumNeighbourhood {
+            stats,
+            fixed: fixed.collect(),
+        })
+    }
+
+    pub fn gauss_newton_model(&self) -> GaussNewtonModel {
+        self.gauss_newton_from_jacobian(self.stats.jacobian.clone())
+    }
+
+    /// Derivatives at another point, which stores them.
+    pub fn gauss_newton_model_at(
+        &self,
+        mut there: FitPoint,
+    ) -> Result<DifferentiatedPoint, ContinuationFailure> {
+        self.stats.model.differentiate_data(&mut there)?;
+        let jacobian = self.stats.weighting.jacobian(&there);
+        Ok(DifferentiatedPoint {
+            model: self.gauss_newton_from_jacobian(jacobian),
+            point: there,
+        })
+    }
+
+    fn gauss_newton_from_jacobian(&self, mut jacobian: DMatrix<f64>) -> GaussNewtonModel {
+        let stats = self.stats;
+        for k in (0..self.fixed.len()).filter(|&k| self.fixed[k]) {
+            jacobian.column_mut(k).fill(0.0);
+        }
+        let count = stats.singular_values.len();
+        let least = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
+        let curvature = jacobian.tr_mul(&jacobian) / stats.residual_deviation.powi(2)
+            + DMatrix::identity(count, count) * least;
+        GaussNewtonModel {
+            jacobian,
+            curvature,
+        }
+    }
+
+    /// The values after a change from the minimum, clamped to the bounds.
+    pub fn bounded_update(&self, change: &DVector<f64>) -> Vec<f64> {
+        let theta = &self.stats.point.theta;
+        let mut moved = self.stats.model.bounded_update(theta, 1.0, change);
+        for k in (0..theta.len()).filter(|&k| self.fixed[k]) {
+            moved[k] = theta[k];
+        }
+        moved
+    }
+
+    /// The residuals for other values, and their point, followed from a point with
+    /// derivatives.
+    pub fn residuals(
+        &self,
+        from: &FitPoint,
+        theta: &[f64],
+    ) -> Result<EvaluatedPoint, ContinuationFailure> {
+        let stats = self.stats;
+        let there = stats
+            .model
+            .continue_leaves_on_grids(from, theta, GridPolicy::These)?;
+        Ok(EvaluatedPoint {
+            residuals: stats.weighting.residuals(&there),
+            point: there,
+        })
+    }
+
+    /// The least sum of squares over all numbers but the `k`th, linearized where the residuals
+    /// are these, with a step no longer than `longest`.
+    pub fn constrained_minimum(
+        &self,
+        slopes: &GaussNewtonModel,
+        k: usize,
+        residuals: &DVector<f64>,
+        longest: f64,
+    ) -> Option<ConstrainedMinimum> {
+        let stats = self.stats;
+        let mut curvature = slopes.curvature.clone();
+        let mut coupled = -curvature.column(k);
+        coupled[k] = 1.0;
+        curvature.row_mut(k).fill(0.0);
+        curvature.column_mut(k).fill(0.0);
+        curvature[(k, k)] = 1.0;
+        let variance = stats.residual_deviation.powi(2);
+        let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
+        slope[k] = 0.0;
+        let inverse = curvature.clone().cholesky()?;
+        let along = inverse.solve(&coupled);
+        let mut correction = -inverse.solve(&slope);
+        let corrected = residuals + &slopes.jacobian * &correction;
+        let change = &slopes.jacobian * &along;
+        let mut damping = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
+        while correction.norm() > longest {
+            damping *= 2.0;
+            let count = curvature.nrows();
+            let damped = &curvature + DMatrix::identity(count, count) * damping;
+            correction = -damped.cholesky()?.solve(&slope);
+        }
+        let least = stats.residuals.norm_squared();
+        let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
+        Some(ConstrainedMinimum {
+            excess: above(&corrected),
+            excess_without_correction: above(residuals),
+            half_slope: corrected.dot(&change) / variance,
+            half_curvature: change.norm_squared() / variance,
+            correction,
+        })
+    }
+}
+
+impl ConstrainedMinimum {
+    /// The change of the number at which the least sum exceeds the minimum by `above`, with
+    /// linearized residuals: the farther of two solutions, or the minimum of the excess if there
+    /// are none.
+    pub fn step_to_excess(&self, above: f64, sign: f64) -> f64 {
+        let root = self.half_slope.powi(2) - self.half_curvature * (self.excess - above);
+        (sign * root.max(0.0).sqrt() - self.half_slope) / self.half_curvature
+    }
 }
 
 /// Prior of a coordinate: 95 % within a factor of ten up and down.
