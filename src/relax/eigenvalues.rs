@@ -7,7 +7,7 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
-use crate::modes::{Eigenpair, ModeRequest};
+use crate::modes::{Eigenpair, ModeRequest, ModesBelow};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
@@ -145,7 +145,7 @@ pub fn lowest(
     let on = |level: &GridLevel, near: &[Vec<Increment>]| {
         let wanted = ModeRequest {
             count,
-            modes_below: above,
+            modes_below: above.map(|(count, shift)| ModesBelow { count, shift }),
             accuracy: (ACCURACY * tolerance.sqrt())
                 .clamp(EIGENVECTOR_ACCURACY_BOUNDS.0, EIGENVECTOR_ACCURACY_BOUNDS.1),
             approximate_modes: near,

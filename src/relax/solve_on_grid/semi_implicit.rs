@@ -19,7 +19,8 @@ use crate::leaf::{
 };
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
-    SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
+    RequiredAccuracy, SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error,
+    satisfies_lengths,
 };
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
@@ -174,7 +175,8 @@ impl GridRelaxation<'_> {
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 let rounding = stalled.increment_rounding(leaf, &self.state, size);
-                rest = remaining_error(size, previous, tolerances, (accuracy, rounding), first);
+                let required = RequiredAccuracy { accuracy, rounding };
+                rest = remaining_error(size, previous, tolerances, required, first);
             } else {
                 motion.newton_step_size = f64::INFINITY;
             }
