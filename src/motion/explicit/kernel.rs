@@ -433,7 +433,10 @@ impl PackStep<'_> {
             let before = Vectors::load(simd, &p, at);
             let after = moment.mul_add(half_kick, before.scale(keep));
             after.store(&mut p, at);
-            let (r, w) = quaternion(simd, &q, at);
+            let Quaternions {
+                vector: r,
+                scalar: w,
+            } = quaternion(simd, &q, at);
             let (y, z) = (r.y + r.y, r.z + r.z);
             let d1 = Vectors::new(
                 r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
@@ -588,10 +591,11 @@ fn rotation_vector_series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
     }
 }
 
-/// The directors of the quaternion `s` of any length, `twice` being 2/|s|^2: with additions in
+/// The directors of the quaternion s of any length, `twice` being 2/|s|^2: with additions in
 /// place of some multiplications, of which there are more here.
 #[inline(always)]
-fn directors<S: Simd>((s, sw): Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 3] {
+fn directors<S: Simd>(quaternions: Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 3] {
+    let (s, sw) = (quaternions.vector, quaternions.scalar);
     let one = Lanes::splat(twice.simd, 1.0);
     let r = s.scale(twice);
     let (xx, yy, zz) = (s.x * r.x, s.y * r.y, s.z * r.z);
@@ -669,8 +673,9 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
     );
     let mut at = 0;
     while at + S::F64_LANES <= count {
-        let (a, aw) = quaternion(simd, &q0, at);
-        let (b, bw) = quaternion(simd, &q1, at);
+        let (q0, q1) = (quaternion(simd, &q0, at), quaternion(simd, &q1, at));
+        let (a, aw) = (q0.vector, q0.scalar);
+        let (b, bw) = (q1.vector, q1.scalar);
         let (d, dw) = (b - a, bw - aw);
         let delta = d.x.mul_add(d.x, d.y * d.y) + d.z.mul_add(d.z, dw * dw);
         let inverse = (four - delta).max(least).recip();
@@ -718,7 +723,11 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
         let shear = Lanes::load(simd, shear, at);
         let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, stretch_excess[c], at));
-        let directors = directors((a + b, aw + bw), twice);
+        let sum = Quaternions {
+            vector: a + b,
+            scalar: aw + bw,
+        };
+        let directors = directors(sum, twice);
         let n = if ROUND {
             let [d1, ..] = directors;
             let rest_force = Lanes::load(simd, rest_force[0], at);
@@ -758,5 +767,8 @@ fn quaternion<S: Simd>(simd: S, q: &[impl Deref<Target = [f64]>; 4], at: usize) 
         Lanes::load(simd, &q[1], at),
         Lanes::load(simd, &q[2], at),
     );
-    (vector, Lanes::load(simd, &q[3], at))
+    Quaternions {
+        vector,
+        scalar: Lanes::load(simd, &q[3], at),
+    }
 }
