@@ -1,10 +1,8 @@
-//! Formats numbers for people.
-//!
-//! The largest of several sizes, by which solvers decide.
+//! Numbers as people read them, and the largest of several sizes, by which solvers decide.
 //!
 //! `f64::max` ignores what is not a number: an error, a correction or a residual that cannot be
-//! computed would count as zero. Here it counts as infinite, so that it is neither within a
-//! tolerance nor finite.
+//! computed would count as zero. In [`larger`] and [`largest`] it counts as infinite, so that it is neither
+//! within a tolerance nor finite.
 
 /// Formats an upper bound with two digits, rounded up so that it stays a bound, as in
 /// `3.1×10⁻⁹`.

@@ -1,5 +1,5 @@
 //! Rotations as unit quaternions and rotation vectors: exponential, logarithm,
-//! geodesic midpoint, and the derivatives that a rod element needs.
+//! geodesic midpoint, and the derivatives that a rod element needs; one by one, or in lanes.
 //!
 //! Increments are spatial: a rotation q becomes exp(theta) q.
 
@@ -56,7 +56,7 @@ const SINC: [f64; 9] = [
     1.0 / 355_687_428_096_000.0,
 ];
 
-/// Up to this squared half angle they are accurate to rounding: a rotation by 1.09.
+/// Squared half angle up to which these series are accurate to rounding: a rotation by 1.09.
 const SERIES_LIMIT: f64 = 0.3;
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being y/sin y of a half angle
@@ -76,7 +76,7 @@ pub const HALF_ANGLE_POLYNOMIAL: [f64; 11] = [
     1.5773720034975787e-07,
 ];
 
-/// Up to there: a rotation by 1.68, a little more than what counts as resolved.
+/// Largest delta for this polynomial: a rotation by 1.68, a little more than what counts as resolved.
 const POLYNOMIAL_LIMIT: f64 = 2.0 / 3.0;
 
 /// The unit quaternion of the rotation vector `theta` (angle times axis).

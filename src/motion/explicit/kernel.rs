@@ -575,9 +575,10 @@ fn forces<S: Simd>(
 /// Smallest |s|^2: between two rods, whose segment has no stiffness, it could be zero.
 const MIN_SQUARED_NORM: f64 = 1e-8;
 
-/// Up to this delta, of a segment bent by 0.2, so many terms of B are accurate to rounding.
+/// Delta (of a segment bent by 0.2) up to which [`SERIES_TERMS`] terms of B are accurate to rounding.
 const SERIES_DELTA_LIMIT: f64 = 0.01;
 
+/// Number of terms of B for segments that bend little.
 const SERIES_TERMS: usize = 5;
 
 /// B(delta), the slope of sigma.
