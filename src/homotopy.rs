@@ -4,7 +4,7 @@
 /// A step longer than the shortest by no more than this factor counts as the shortest.
 const SHORTEST_STEP_TOLERANCE: f64 = 1.01;
 
-/// How far along the path, and the next step.
+/// How far along its path a change is, and its next step.
 #[derive(Clone, Copy, Debug)]
 pub struct Homotopy {
     /// The part that is reached.
@@ -15,7 +15,7 @@ pub struct Homotopy {
 }
 
 impl Homotopy {
-    /// At the beginning, with the length of the first step and the limits of all others.
+    /// The beginning of a path, with the length of the first step and the limits of all others.
     pub fn new(first: f64, [shortest, longest]: [f64; 2]) -> Self {
         Homotopy {
             lambda: 0.0,

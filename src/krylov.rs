@@ -18,11 +18,10 @@ pub struct KrylovLimits {
     pub stagnation: Option<StagnationLimit>,
 }
 
-/// The search ends where so many directions in a row leave more than a part of the residual.
+/// The search ends where so many directions in a row leave more than this remainder of the residual.
 #[derive(Clone, Copy, Debug)]
 pub struct StagnationLimit {
     pub directions: usize,
-    /// Part of the residual.
     pub remainder: f64,
 }
 

@@ -10,7 +10,7 @@ use pulp::{Scalar, Simd};
 /// A point of a centerline, and the rotation of the directors there.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
-    /// Position.
+    /// Position of the point.
     pub position: DVec3,
     /// Rotation of the directors: R e_i = d_i.
     pub rotation: DQuat,
@@ -25,9 +25,7 @@ pub fn angle_about(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
 /// Quaternions in lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Quaternions<S: Simd> {
-    /// Vector parts.
     pub vector: Vectors<S>,
-    /// Scalar parts.
     pub scalar: Lanes<S>,
 }
 
@@ -248,12 +246,12 @@ pub struct MidpointRotation<S: Simd> {
 pub struct DerivativeMatrix<S: Simd> {
     pub diagonal: Vectors<S>,
     pub multiple: Lanes<S>,
-    /// The vector v.
+    /// The vector v of the dyad.
     pub dyad: Vectors<S>,
 }
 
 impl<S: Simd> MidpointRotation<S> {
-    /// Between two rotations given as unit quaternions of any sign.
+    /// The rotation between two rotations given as unit quaternions of any sign.
     #[inline(always)]
     pub fn between([left, right]: [Quaternions<S>; 2]) -> Self {
         let (a, aw) = (left.vector, left.scalar);
@@ -296,7 +294,7 @@ impl<S: Simd> MidpointRotation<S> {
 }
 
 impl<S: Simd> RelativeRotation<S> {
-    /// S a.
+    /// S a, S being the derivative of the rotation vector.
     #[inline(always)]
     pub fn apply_derivative(&self, a: Vectors<S>) -> Vectors<S> {
         self.w.mul_add(self.k * self.w.dot(a), a.scale(self.sigma))

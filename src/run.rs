@@ -49,7 +49,7 @@ impl Limit {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{option} = {value}: {reason}")]
 pub struct RefusedOption {
-    /// Its name, words with `_` between them.
+    /// Name of the option, words with `_` between them.
     pub option: &'static str,
     /// The value.
     pub value: String,

@@ -364,7 +364,7 @@ impl Undulation {
         sum / self.veins.len().max(1) as f64
     }
 
-    /// Its handedness.
+    /// The handedness of the twist.
     pub fn hand(&self) -> Handedness {
         match self.twist() {
             twist if twist > LEAST_TWIST => Handedness::Right,
@@ -392,7 +392,7 @@ fn twist(line: &Centerline) -> f64 {
 /// A half-wave between two inflections.
 #[derive(Clone, Copy, Debug)]
 struct HalfWave {
-    /// Its ends: indices of nodes plus fractions of the segments after them.
+    /// Ends of the half-wave: indices of nodes plus fractions of the segments after them.
     ends: [f64; 2],
     /// Height of its extremum over the chord.
     height: f64,

@@ -12,7 +12,7 @@ struct LanczosLimits {
     /// Largest dimension of the Krylov space, and its increase for every pair wanted.
     dimension: usize,
     dimension_per_pair: usize,
-    /// If some pairs have converged and the next one would take more checks than this, a
+    /// Further checks that the next pair may take after some have converged: with more of them a
     /// closer shift is cheaper.
     further_checks: f64,
     /// A direction reduced by orthogonalization below this part of its length is rounding: the
@@ -50,15 +50,15 @@ pub struct LanczosResult {
 /// Eigenpairs of a tridiagonal matrix, eigenvalues descending.
 struct RitzPairs {
     values: Vec<f64>,
-    /// One in each column.
+    /// Eigenvectors, one in each column.
     vectors: DMatrix<f64>,
 }
 
 /// The Lanczos method about a shift.
 pub struct Lanczos<'a> {
-    /// M v.
+    /// Multiplies a vector by the mass matrix M.
     pub mass_product: &'a dyn Fn(&[f64]) -> Vec<f64>,
-    /// Sigma.
+    /// The shift sigma.
     pub shift: f64,
     /// Solves (K - sigma M) x = b in place.
     pub solve: &'a mut dyn FnMut(&mut [f64]),

@@ -32,7 +32,7 @@ struct MatrixSoftening {
     /// Stiffness, in A/L^2, to which stiffer rods are softened. The eigenvalues do not change to first
     /// order.
     stiffness: f64,
-    /// That stiffness is at least this multiple of the largest force carried.
+    /// Least ratio of [`MatrixSoftening::stiffness`] to the largest force carried.
     force_ratio: f64,
     /// Ratio of the softenings from which the first-order effect on modes is computed.
     comparison_ratio: f64,
@@ -64,7 +64,7 @@ struct ModeSearch {
     /// the factor of this distance for the next attempt.
     closer_shift: f64,
     closer_shift_growth: f64,
-    /// That distance is at least so many times the error of the bound on these eigenvalues.
+    /// Least distance of a closer shift over the error of the bound on clustered eigenvalues.
     closer_shift_errors: f64,
     /// Eigenvectors of this accuracy or less are found with solutions that are not refined.
     unrefined_accuracy: f64,
@@ -92,7 +92,7 @@ const SEARCH: ModeSearch = ModeSearch {
 /// A mode and its eigenvalue.
 #[derive(Clone, Debug)]
 pub struct Eigenpair {
-    /// Lambda.
+    /// Eigenvalue lambda, in A/(rho L^4).
     pub eigenvalue: f64,
     /// Turns and shifts of all nodes, rod after rod, base to tip.
     pub shape: Vec<Increment>,
@@ -484,7 +484,7 @@ impl Vibration<'_> {
     }
 }
 
-/// Inertia of a node.
+/// Block of a node in the mass matrix.
 struct NodeMassBlock {
     rod: usize,
     /// Number of the node on its rod.
@@ -528,7 +528,7 @@ impl MassMatrix {
         MassMatrix { nodes }
     }
 
-    /// M v.
+    /// The mass matrix times a vector.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; v.len()];
         for node in &self.nodes {
@@ -632,7 +632,7 @@ fn rotational_second_variation(segment: &Segment, section: &Section, a: DVec3, b
 /// Accuracy of eigenvectors for the derivatives of eigenvalues.
 const DERIVATIVE_ACCURACY: f64 = 1e-9;
 
-/// As [`lowest`](crate::modes::lowest), with the shapes and forces of the leaf without softening:
+/// The modes of [`lowest`](crate::modes::lowest), with the shapes and forces of the leaf without softening:
 /// derivatives of an eigenvalue, unlike the eigenvalue itself, depend on errors of these
 /// in first order. The effect of softening is removed by means of the modes of a softer leaf.
 pub fn unsoftened_modes(

@@ -19,7 +19,7 @@ pub struct IncrementCriteria {
     pub neutral_step: f64,
     /// Force or moment up to which a node is balanced.
     pub balanced_residual: f64,
-    /// So many such increments in a row are no convergence.
+    /// Increments in a row that count as rounding in a neutral mode before they count as no convergence.
     most_stalled: usize,
     /// Increments below this are used to measure quadratic convergence.
     asymptotic: f64,

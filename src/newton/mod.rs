@@ -90,7 +90,7 @@ impl Add for SolverCounts {
 /// Why an iteration or a motion on one grid did not reach a stable equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EquilibriumFailure {
-    /// At rest although the energy has a direction of descent there.
+    /// The leaf is at rest although its energy has a direction of descent there.
     Saddle,
     /// A segment bends by more than the grid can resolve.
     Unresolved,
@@ -107,7 +107,7 @@ pub enum EquilibriumFailure {
 pub enum LinearSolveFailure {
     /// The matrix is not positive definite.
     Indefinite,
-    /// It does not fit into the memory that is allowed.
+    /// The matrix does not fit into the memory that is allowed.
     Memory,
 }
 
@@ -149,7 +149,7 @@ pub struct DefiniteSolver {
 }
 
 impl DefiniteSolver {
-    /// With the convergence of Newton's method observed before.
+    /// A solver with the convergence of Newton's method observed before.
     pub fn with_contraction(contraction: Contraction) -> Self {
         DefiniteSolver {
             contraction,
@@ -211,20 +211,20 @@ impl DefiniteSolver {
 
 /// The linear equations of an iteration, and its limits on increments.
 pub enum NewtonEquations<'s> {
-    /// With pivots of any sign, by a sparse factorization whose pattern is reused; increments
+    /// Equations with pivots of any sign, by a sparse factorization whose pattern is reused; increments
     /// are shortened to the given size. Converges to an equilibrium nearby, stable or not,
     /// like a solver of boundary-value problems.
     Indefinite { largest: f64 },
-    /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
+    /// Equations of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
-    /// Of a leaf on which forces act that have no potential, with their derivatives: the matrix is
+    /// Equations of a leaf on which forces act that have no potential, with their derivatives: the matrix is
     /// unsymmetric, and pivots without them have any sign. An increment above the given size ends
     /// the iteration.
     Following {
         forces: &'s dyn FollowerForces,
         largest: f64,
     },
-    /// With a positive definite matrix, shifted where necessary if it may be; an increment above
+    /// Equations with a positive definite matrix, shifted where necessary if it may be; an increment above
     /// the given size ends the iteration.
     Definite {
         solver: &'s mut DefiniteSolver,
@@ -234,7 +234,7 @@ pub enum NewtonEquations<'s> {
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
     },
-    /// With springs of `rate` times the masses that hold the nodes at their places in `at`: a
+    /// Equations with springs of `rate` times the masses that hold the nodes at their places in `at`: a
     /// step of implicit Euler without inertia, or of the proximal point method. The matrix
     /// must be positive definite; an increment above the given size ends the iteration.
     Proximal {

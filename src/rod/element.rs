@@ -6,7 +6,8 @@ use crate::rotation::{DerivativeMatrix, MidpointRotation, RelativeRotation};
 use crate::simd::{Lanes, Vectors};
 use pulp::Simd;
 
-/// Several segments: see [`Segment`](crate::rod::Segment).
+/// Midpoint elements of several segments, one in each lane, with the variables of
+/// [`Segment`](crate::rod::Segment).
 #[derive(Clone, Copy)]
 pub struct Element<S: Simd> {
     pub(super) frame: [Vectors<S>; 3],
@@ -131,9 +132,8 @@ impl<S: Simd> Element<S> {
         self.w.cross(a) - self.nu.cross(sections.compliance * a)
     }
 
-    /// With the condensing stiffness k; the second derivatives with respect to the rotation of the
-    /// midpoint are ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2
-    /// + \[nu\] diag(c) \[nu\]).
+    /// The [`MidpointHessian`]; its derivatives with respect to the rotation of the midpoint are
+    /// ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2 + \[nu\] diag(c) \[nu\]).
     #[inline(always)]
     fn midpoint_hessian(&self, sections: &LaneSections<S>) -> MidpointHessian<S> {
         let (nu, w, c, k) = (self.nu, self.w, sections.compliance, sections.condensing);
@@ -168,7 +168,7 @@ impl<S: Simd> Element<S> {
         }
     }
 
-    /// As [`Element::midpoint_hessian`] for segments that carry the forces of their strains: the limit of
+    /// The [`MidpointHessian`] of segments that carry the forces of their strains: the limit of
     /// exact condensation, k = 1/c, in which c drops out, so that k may be zero,
     ///
     /// diag(k) D = \[nu\] - diag(k) \[w\],
@@ -239,7 +239,7 @@ impl<S: Simd> Element<S> {
         self.second_derivatives_from_midpoint(sections, self.midpoint_hessian(sections))
     }
 
-    /// As [`Element::second`] for segments that carry the forces of their strains.
+    /// Second derivatives as [`Element::second`], of segments that carry the forces of their strains.
     #[inline(always)]
     pub fn second_strained(&self, sections: &LaneSections<S>) -> SecondDerivatives<S> {
         self.second_derivatives_from_midpoint(sections, self.strained_midpoint_hessian(sections))

@@ -9,18 +9,16 @@ use pulp::{Scalar, Simd};
 /// Moment and force on a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// Moment.
     pub moment: DVec3,
-    /// Force.
     pub force: DVec3,
 }
 
 /// The two nodes of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct NodePair {
-    /// Positions of the nodes.
+    /// Positions, first and second node.
     pub x: [DVec3; 2],
-    /// Rotations of the nodes.
+    /// Rotations of the directors as unit quaternions.
     pub q: [DQuat; 2],
 }
 
@@ -36,24 +34,22 @@ impl From<&NodePair> for LaneNodes<Scalar> {
 /// The derivative of a section with respect to a parameter.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SectionParameterDerivative {
-    /// Of its reference length.
+    /// Derivative of the reference length.
     pub ds: f64,
-    /// Of its couple stiffness.
+    /// Derivative of the couple stiffness.
     pub couple_stiffness: DVec3,
-    /// Of its rest curvature.
+    /// Derivative of the rest curvature.
     pub rest_curvature: DVec3,
-    /// Of its rest strain.
+    /// Derivative of the rest strain.
     pub rest_strain: DVec3,
-    /// Of its compliance.
+    /// Derivative of the compliance.
     pub compliance: DVec3,
 }
 
 /// The two nodes of several segments.
 #[derive(Clone, Copy)]
 pub struct LaneNodes<S: Simd> {
-    /// Positions.
     pub x: [Vectors<S>; 2],
-    /// Rotations.
     pub q: [Quaternions<S>; 2],
 }
 

@@ -11,12 +11,12 @@ use pulp::Scalar;
 /// force fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentParameterDerivative {
-    /// Of the derivatives of Pi with respect to the rotations of its nodes; that with
+    /// Derivative of the derivatives of Pi with respect to the rotations of its nodes; that with
     /// respect to their positions does not change.
     pub gradient: [DVec3; 2],
-    /// Of its gap, the residual of the constitutive law.
+    /// Derivative of the gap, the residual of the constitutive law.
     pub gap: DVec3,
-    /// Of Pi itself, the elastic energy at rest.
+    /// Derivative of Pi itself, the elastic energy at rest.
     pub energy: f64,
 }
 
@@ -172,7 +172,7 @@ impl Segment {
         self.element().gradient(&section.into()).into()
     }
 
-    /// As [`Segment::gradient`], with the force condensed out: the right-hand side for
+    /// First derivatives as [`Segment::gradient`], with the force condensed out: the right-hand side for
     /// [`Segment::hessian`].
     pub fn condensed_gradient(&self, section: &Section) -> SegmentGradient {
         self.element().condensed(&section.into()).into()

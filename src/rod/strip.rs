@@ -49,7 +49,6 @@ pub struct StripHessian {
 /// parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct StripLoads {
-    /// Energy.
     pub energy: f64,
     /// Moments and forces on the nodes.
     pub on_nodes: [Wrench; 2],
@@ -79,12 +78,12 @@ impl TissueStrip {
         }
     }
 
-    /// Whether it resists anything.
+    /// Whether the strip resists any strain.
     pub fn has_stiffness(&self) -> bool {
         self.stiffness != DVec3::ZERO || self.fold_stiffness != 0.0
     }
 
-    /// The difference from another strip.
+    /// The difference of the data from those of another strip.
     pub fn difference_from(&self, other: &TissueStrip) -> TissueStrip {
         TissueStrip {
             stiffness: self.stiffness - other.stiffness,
@@ -94,7 +93,7 @@ impl TissueStrip {
         }
     }
 
-    /// Adds `times` another strip.
+    /// Adds `times` the data of another strip.
     pub fn add(&mut self, times: f64, other: &TissueStrip) {
         self.stiffness += times * other.stiffness;
         self.fold_stiffness += times * other.fold_stiffness;
@@ -180,7 +179,7 @@ impl TissueStrip {
         }
     }
 
-    /// Its energy, and the moment and force that it exerts on either node.
+    /// The energy of the strip, and the moment and force that it exerts on either node.
     pub fn loads(&self, ends: &NodePair) -> StripLoads {
         let StripElement { element, sections } = self.strained_element(ends);
         let StripStrains { e, theta } = self.strains(&element);
@@ -191,7 +190,7 @@ impl TissueStrip {
         }
     }
 
-    /// The change of its energy and of its loads by a change of the strip.
+    /// The change of the strip's energy and loads with its data, at the given `rate`.
     pub fn parameter_derivative(&self, ends: &NodePair, rate: &TissueStrip) -> StripLoads {
         let StripElement {
             mut element,
@@ -213,7 +212,7 @@ impl TissueStrip {
         }
     }
 
-    /// The second derivatives of its energy.
+    /// The second derivatives of the strip's energy.
     pub fn hessian(&self, ends: &NodePair) -> StripHessian {
         let force = self.force(ends);
         self.condensed_hessian(ends, force)

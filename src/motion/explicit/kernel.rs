@@ -118,7 +118,7 @@ impl BlockForces {
 /// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
 pub struct PackStep<'a> {
     pub layout: PackLayout,
-    /// Which pack.
+    /// Number of the pack.
     pub pack: usize,
     /// Positions of the whole leaf.
     pub positions: &'a [AlignedArray; 3],
@@ -224,10 +224,10 @@ impl pulp::WithSimd for PackStep<'_> {
     }
 }
 
-/// Only the forces of a pack's segments, written to `forces`.
+/// Computes the forces of a pack's segments without moving its nodes, and appends them to `forces`.
 pub struct PackForces<'a> {
     pub layout: PackLayout,
-    /// Which pack.
+    /// Number of the pack.
     pub pack: usize,
     pub positions: &'a [AlignedArray; 3],
     pub motion: &'a PackMotion,
@@ -316,7 +316,7 @@ impl PackStep<'_> {
         }
     }
 
-    /// Velocities and positions.
+    /// Kicks the velocities and drifts the positions of a block.
     #[inline(always)]
     fn translate_nodes<S: Simd, const COUPLED: bool, const APPLIED: bool>(
         &mut self,
@@ -392,7 +392,7 @@ impl PackStep<'_> {
         energy
     }
 
-    /// Angular momenta and rotations.
+    /// Kicks the angular momenta and drifts the rotations of a block.
     #[inline(always)]
     fn rotate_nodes<S: Simd, const NORMALIZE: bool>(
         &mut self,
