@@ -379,7 +379,8 @@ impl Vibration<'_> {
     }
 
     /// The matrix at a shift closer to the next eigenvalues, if many are close together:
-    /// somewhat below `bound`, but above no eigenvalue that is not found yet.
+    /// somewhat below `bound`, but above no eigenvalue that is not found yet. `Some(None)` if there is no
+    /// such shift, `None` if memory is short.
     fn closer_shift(
         &self,
         system: &mut System,
