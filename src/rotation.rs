@@ -137,10 +137,8 @@ fn to_quaternion(q: Quaternions<Scalar>) -> DQuat {
 
 /// The rotation vector of the unit quaternion `q`, of length at most pi.
 pub fn log(q: DQuat) -> DVec3 {
-    let Quaternions {
-        vector: w,
-        scalar: cos,
-    } = from_quaternion(if q.w < 0.0 { -q } else { q });
+    let q = from_quaternion(if q.w < 0.0 { -q } else { q });
+    let (w, cos) = (q.vector, q.scalar);
     let off = cos - Lanes::from(1.0);
     let [sigma, ..] = half_angle_series(off.mul_add(off, w.dot(w)));
     w.scale(sigma + sigma).into()

@@ -467,10 +467,7 @@ impl<S: Simd> LaneFields<S> {
     /// The derivatives of the fields with respect to sigma under a load, of the lanes from `part` on.
     #[inline(always)]
     fn slopes(&self, laws: &GroupLaws, load: LaneNodeForces<S>, part: usize) -> Self {
-        let Quaternions {
-            vector: q,
-            scalar: w,
-        } = self.q;
+        let (q, w) = (self.q.vector, self.q.scalar);
         let number = |group: &NumberGroup| Lanes::load_group(w.simd, group, part);
         let vector = |[x, y, z]: &[NumberGroup; 3]| Vectors::new(number(x), number(y), number(z));
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));

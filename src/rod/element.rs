@@ -2,7 +2,7 @@
 //! respect to the variables of the strains and to the unknowns of the two nodes.
 
 use crate::rod::section::{LaneNodes, LaneSections};
-use crate::rotation::{DerivativeMatrix, MidpointRotation, RelativeRotation};
+use crate::rotation::{MidpointRotation, RelativeRotation};
 use crate::simd::{Lanes, Vectors};
 use pulp::Simd;
 
@@ -263,12 +263,9 @@ impl<S: Simd> Element<S> {
         let moment = lab(self.relative.apply_derivative(self.m)).scale(half);
         let y = tau.cross(g).scale(eighth);
         let bending = sections.couple_stiffness.scale(sections.per_ds);
-        let DerivativeMatrix {
-            diagonal,
-            multiple,
-            dyad: v,
-        } = self.relative.second_derivatives(bending, self.m);
-        let (diagonal, v, w) = (self.diagonal_to_lab(diagonal), lab(v), lab(self.relative.w));
+        let matrix = self.relative.second_derivatives(bending, self.m);
+        let diagonal = self.diagonal_to_lab(matrix.diagonal);
+        let (v, w) = (lab(matrix.dyad), lab(self.relative.w));
 
         // P [tau], and [tau] P [tau].
         let q = [p[0].cross(tau), p[1].cross(tau), p[2].cross(tau)];
@@ -298,7 +295,7 @@ impl<S: Simd> Element<S> {
         }
         let delta_eta = transposed(eta_delta);
         for r in 0..3 {
-            let row = q_tau[r].neg_mul_add(quarter, diagonal[r] + unit(r, multiple));
+            let row = q_tau[r].neg_mul_add(quarter, diagonal[r] + unit(r, matrix.multiple));
             let row = tau.mul_add(y_rows[r], y.mul_add(tau_rows[r], row));
             let delta_delta = w.mul_add(v_rows[r], v.mul_add(w_rows[r], row));
             let eta_eta = p[r].scale(quarter);

@@ -180,10 +180,7 @@ impl pulp::WithSimd for PackStep<'_> {
         let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
         self.block.begin_pack();
         for span in block_spans(layout, rods.len(), S::F64_LANES) {
-            let ArraySpan {
-                first: start,
-                count,
-            } = span;
+            let (start, count) = (span.first, span.count);
             let nodes = BlockNodes {
                 span,
                 first: layout.node_index(rods.start, start),
@@ -246,10 +243,7 @@ impl pulp::WithSimd for PackForces<'_> {
         let mut block = BlockForces::new();
         let sums = &mut SegmentSums::zero(simd);
         for span in block_spans(layout, rods.len(), S::F64_LANES) {
-            let ArraySpan {
-                first: start,
-                count,
-            } = span;
+            let (start, count) = (span.first, span.count);
             let nodes = BlockNodes {
                 span,
                 first: layout.node_index(rods.start, start),
@@ -324,10 +318,7 @@ impl PackStep<'_> {
         span: ArraySpan,
         coupling: [[f64; 3]; 2],
     ) -> Lanes<S> {
-        let ArraySpan {
-            first: start,
-            count: nodes,
-        } = span;
+        let (start, nodes) = (span.first, span.count);
         let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
@@ -399,10 +390,7 @@ impl PackStep<'_> {
         simd: S,
         span: ArraySpan,
     ) -> Lanes<S> {
-        let ArraySpan {
-            first: start,
-            count: nodes,
-        } = span;
+        let (start, nodes) = (span.first, span.count);
         let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
@@ -433,10 +421,8 @@ impl PackStep<'_> {
             let before = Vectors::load(simd, &p, at);
             let after = moment.mul_add(half_kick, before.scale(keep));
             after.store(&mut p, at);
-            let Quaternions {
-                vector: r,
-                scalar: w,
-            } = quaternion(simd, &q, at);
+            let rotation = quaternion(simd, &q, at);
+            let (r, w) = (rotation.vector, rotation.scalar);
             let (y, z) = (r.y + r.y, r.z + r.z);
             let d1 = Vectors::new(
                 r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
@@ -629,10 +615,7 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
         law,
         ..
     } = nodes;
-    let ArraySpan {
-        first: start,
-        count,
-    } = span;
+    let (start, count) = (span.first, span.count);
     let (x0, x1) = (
         array_chunks(nodes.x, ArraySpan::new(nodes.first, count)),
         array_chunks(nodes.x, ArraySpan::new(nodes.first + 1, count)),
