@@ -12,7 +12,7 @@ use crate::branch::{
     is_finite, largest, prolong_field, scale_field, scaled_sum,
 };
 use crate::leaf::{BorderedSolution, DirectSolver, Grid, MatrixFactors, NodalField, State, System};
-use crate::newton::{Contraction, remaining_error};
+use crate::newton::{Contraction, RequiredAccuracy, remaining_error};
 use crate::numbers::larger;
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
@@ -314,14 +314,11 @@ pub(super) fn factorize_matrix(
 /// Whether the iteration has converged with a Newton step of this size after `previous`.
 pub(super) fn has_converged(size: f64, previous: f64) -> bool {
     let first = Contraction::default().error_after_first(size, 0.0);
-    remaining_error(
-        size,
-        previous,
-        [0.0; 2],
-        (ACCURACY, ROUNDING_INCREMENT),
-        first,
-    )
-    .is_some()
+    let required = RequiredAccuracy {
+        accuracy: ACCURACY,
+        rounding: ROUNDING_INCREMENT,
+    };
+    remaining_error(size, previous, [0.0; 2], required, first).is_some()
 }
 
 /// Singular values below this, relative to the largest, count as zero.

@@ -12,7 +12,7 @@
 //! addition, and e = e0 + G e is solved by [`solve_minimal_residual`]. G is small but for the rods whose
 //! strain is determined, so that few solutions are enough at any stiffness.
 
-use crate::krylov::{KrylovLimits, solve_minimal_residual};
+use crate::krylov::{KrylovLimits, StagnationLimit, solve_minimal_residual};
 use crate::leaf::derivative::parameter::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
@@ -31,7 +31,10 @@ const LAW_COMPLETION_LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-9,
     most: 40,
     singular_value_limit: 1e-8,
-    stagnation_limit: Some((3, 0.99)),
+    stagnation: Some(StagnationLimit {
+        directions: 3,
+        remainder: 0.99,
+    }),
 };
 
 impl DiscreteLeaf {

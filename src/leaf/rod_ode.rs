@@ -434,7 +434,10 @@ impl<S: Simd> LaneFields<S> {
         let vector = |k: usize| Vectors::new(number(k), number(k + 1), number(k + 2));
         LaneFields {
             x: vector(POSITION),
-            q: (vector(QUATERNION), number(QUATERNION_W)),
+            q: Quaternions {
+                vector: vector(QUATERNION),
+                scalar: number(QUATERNION_W),
+            },
             n: vector(FORCE),
             m: vector(MOMENT),
             energy: number(ENERGY),
@@ -446,7 +449,7 @@ impl<S: Simd> LaneFields<S> {
     fn store_group(self, group: &mut GroupFields, part: usize) {
         let vectors = [
             (POSITION, self.x),
-            (QUATERNION, self.q.0),
+            (QUATERNION, self.q.vector),
             (FORCE, self.n),
             (MOMENT, self.m),
         ];
@@ -455,14 +458,14 @@ impl<S: Simd> LaneFields<S> {
                 component.store_group(&mut group[first + k], part);
             }
         }
-        self.q.1.store_group(&mut group[QUATERNION_W], part);
+        self.q.scalar.store_group(&mut group[QUATERNION_W], part);
         self.energy.store_group(&mut group[ENERGY], part);
     }
 
     /// The derivatives of the fields with respect to sigma under a load, of the lanes from `part` on.
     #[inline(always)]
     fn slopes(&self, laws: &GroupLaws, load: LaneNodeForces<S>, part: usize) -> Self {
-        let (q, w) = self.q;
+        let (q, w) = (self.q.vector, self.q.scalar);
         let vector = |group: &[NumberGroup; 3]| Vectors::load_group(w.simd, group, part);
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
@@ -479,7 +482,10 @@ impl<S: Simd> LaneFields<S> {
         let turn = u.from_director_components(frame).scale(length * half);
         LaneFields {
             x: tangent,
-            q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
+            q: Quaternions {
+                vector: turn.scale(w) + turn.cross(q),
+                scalar: -turn.dot(q),
+            },
             n: -load.force,
             m: self.n.cross(tangent),
             energy: half * length * (n.dot(strain) + m.dot(bend)) + load.energy,

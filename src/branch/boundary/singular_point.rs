@@ -15,7 +15,7 @@ use crate::branch::{
     add_scaled, combine_fields, dot, equations, increments_between, scale_field, scaled_sum,
 };
 use crate::leaf::NodalField;
-use crate::newton::{Contraction, remaining_error};
+use crate::newton::{Contraction, RequiredAccuracy, remaining_error};
 use crate::numbers::{larger, largest};
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -583,7 +583,10 @@ impl BoundaryPointSearch {
                 true => contraction.error_after_first(size, 0.0),
                 false => f64::INFINITY,
             };
-            let accuracy = (self.accuracy, ROUNDING_INCREMENT);
+            let required = RequiredAccuracy {
+                accuracy: self.accuracy,
+                rounding: ROUNDING_INCREMENT,
+            };
             // With less accurate derivatives, increments cannot shrink faster than these are known;
             // and as the forces in segments follow their strains one iteration later, what the
             // first increment left may be subtracted twice by the second.
@@ -591,7 +594,7 @@ impl BoundaryPointSearch {
                 1 => 1.0,
                 _ => EIGENVALUE_SLOPE_ACCURACY.max(size / previous),
             };
-            if let Some(left) = remaining_error(size, previous, [slopes; 2], accuracy, first) {
+            if let Some(left) = remaining_error(size, previous, [slopes; 2], required, first) {
                 let moved = manifold.difference(&self.solution, &solution);
                 let distance = manifold.direction_product(&moved, &self.across);
                 sample.solution = solution;

@@ -14,7 +14,8 @@
 use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
-    SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
+    RequiredAccuracy, SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error,
+    satisfies_lengths,
 };
 use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
@@ -166,7 +167,8 @@ impl GridRelaxation<'_> {
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 let rounding = stalled.increment_rounding(leaf, &self.state, size);
-                rest = remaining_error(size, previous, tolerances, (accuracy, rounding), first);
+                let required = RequiredAccuracy { accuracy, rounding };
+                rest = remaining_error(size, previous, tolerances, required, first);
             } else {
                 motion.newton_step_size = f64::INFINITY;
             }
