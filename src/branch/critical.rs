@@ -1,11 +1,10 @@
-//! Critical points, at which the index changes: folds and branch points.
+//! Critical points of a branch on one grid: folds and branch points, at which the index changes,
+//! and vertices of pitchforks, where the branch turns back because another one crosses it.
 //!
-//! The vertex of a pitchfork: where a branch turns back because another one crosses it.
-//!
-//! No eigenvalue changes its sign along the branch that turns back, and the nearer its points are to
-//! the vertex, the nearer to singular is the matrix. So they are not sought there: the vertex
-//! is interpolated from points on either side, and the singular point is that of the other branch,
-//! with the bordered matrix, which is regular.
+//! At a vertex no eigenvalue changes its sign along the branch that turns back, and the nearer its
+//! points are to the vertex, the nearer to singular is the matrix. The vertex is therefore
+//! interpolated from points on either side; the singular point is that of the other branch, with
+//! the bordered matrix, which is regular.
 
 use crate::branch::equations::{BorderedLinearization, BranchEquations, CorrectorFailure};
 use crate::branch::family::eigenvalue_rounding;
@@ -109,25 +108,24 @@ pub fn locate_critical_points(
     {
         return Err(CorrectorFailure::NotConverged);
     }
-    let mut found: Vec<(f64, CriticalPoint)> = Vec::new();
+    let mut found: Vec<LocatedZero> = Vec::new();
     for which in 0..ends[0].eigenvalues.len() {
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
         let large = values[0].abs().max(values[1].abs()) > NEUTRAL_EIGENVALUE;
         if values[0] * values[1] < 0.0 && large {
-            let (at, critical) = search.find_eigenvalue_zero(which, [0.0, step], values)?;
-            match found
-                .iter_mut()
-                .find(|(s, _)| (s - at).abs() < COINCIDENT_ZERO_TOLERANCE * step)
-            {
-                Some((_, same)) => same.modes.extend(critical.modes),
-                None => found.push((at, critical)),
+            let zero = search.find_eigenvalue_zero(which, [0.0, step], values)?;
+            match found.iter_mut().find(|other| {
+                (other.distance - zero.distance).abs() < COINCIDENT_ZERO_TOLERANCE * step
+            }) {
+                Some(same) => same.critical.modes.extend(zero.critical.modes),
+                None => found.push(zero),
             }
         }
     }
-    found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     // Each accounts for its part of the change of the index, in their order along the branch.
     let mut before = a.index;
-    for (_, critical) in &mut found {
+    for LocatedZero { critical, .. } in &mut found {
         let change = critical.modes.len();
         let after = match b.index > a.index {
             true => before + change,
@@ -139,21 +137,31 @@ pub fn locate_critical_points(
             critical.kind = CriticalKind::Branching;
         }
     }
-    Ok(found.into_iter().map(|(_, critical)| critical).collect())
+    Ok(found.into_iter().map(|zero| zero.critical).collect())
+}
+
+/// The zero of an eigenvalue of H along a branch.
+struct LocatedZero {
+    /// Its distance along the tangent from the point where the search began.
+    distance: f64,
+    critical: CriticalPoint,
 }
 
 /// Evaluates points along the tangent of one, and the eigenvalues of H there.
-pub(super) struct CriticalPointSearch<'s, 'a> {
-    pub equations: &'s mut BranchEquations<'a>,
-    pub from: &'s EquilibriumPoint,
-    pub soft: &'s [NodalField],
-    /// The parameter of a fold is known better than its shape.
-    pub parameter_only: bool,
+struct CriticalPointSearch<'s, 'a> {
+    equations: &'s mut BranchEquations<'a>,
+    from: &'s EquilibriumPoint,
+    /// The modes of the border.
+    soft: &'s [NodalField],
+    /// Whether the parameter alone is sought to rounding: at a fold it is known better than the
+    /// shape.
+    parameter_only: bool,
 }
 
-pub(super) struct EvaluatedEigenvalues {
+/// The eigenvalues of H at a point.
+struct EvaluatedEigenvalues {
     sample: BorderedLinearization,
-    pub eigenvalues: Vec<f64>,
+    eigenvalues: Vec<f64>,
     /// Eigenvectors of H, in the order of the eigenvalues.
     vectors: Vec<Vec<f64>>,
 }
@@ -162,7 +170,7 @@ pub(super) struct EvaluatedEigenvalues {
 const ROUNDING_FORCING: f64 = 1e-6;
 
 impl CriticalPointSearch<'_, '_> {
-    pub fn eigenvalues_at_distance(
+    fn eigenvalues_at_distance(
         &mut self,
         distance: f64,
     ) -> Result<EvaluatedEigenvalues, CorrectorFailure> {
@@ -183,12 +191,12 @@ impl CriticalPointSearch<'_, '_> {
     }
 
     /// The zero of one eigenvalue by the Anderson-Bjorck method.
-    pub fn find_eigenvalue_zero(
+    fn find_eigenvalue_zero(
         &mut self,
         which: usize,
         mut distance: [f64; 2],
         mut value: [f64; 2],
-    ) -> Result<(f64, CriticalPoint), CorrectorFailure> {
+    ) -> Result<LocatedZero, CorrectorFailure> {
         let whole = distance[1] - distance[0];
         let largest = larger(value[0].abs(), value[1].abs());
         let mut slope = (value[1] - value[0]) / whole;
@@ -232,7 +240,10 @@ impl CriticalPointSearch<'_, '_> {
         if !vanishes {
             return Err(CorrectorFailure::NotConverged);
         }
-        Ok((at, self.critical_point_at_zero(best, which, slope)))
+        Ok(LocatedZero {
+            distance: at,
+            critical: self.critical_point_at_zero(best, which, slope),
+        })
     }
 
     /// The critical point from what was evaluated at a zero.
@@ -279,7 +290,7 @@ impl CriticalPoint {
         self.indices[0] == self.indices[1]
     }
 
-    /// Whether this is the same point, found again after a step that the walk gave up.
+    /// Whether this vertex is the same point, found again after a step that was rejected.
     pub fn is_same_point(&self, other: &CriticalPoint) -> bool {
         let apart = self.state.largest_displacement_to(&other.state);
         larger(apart, (self.fraction - other.fraction).abs()) < SAME_VERTEX_DISTANCE
@@ -367,7 +378,7 @@ impl CriticalPoint {
     }
 
     /// A direction along which another branch may leave: the first neutral mode
-    /// orthogonalised against this branch; at the vertex of a pitchfork the tangent, that of the
+    /// orthogonalized against this branch; at the vertex of a pitchfork the tangent, that of the
     /// other branch.
     pub fn branching_direction(&self, equations: &BranchEquations) -> BranchDirection {
         if self.is_vertex() {
@@ -405,7 +416,7 @@ pub fn locate_pitchfork_vertex(
     let across = crossing_direction(equations, &vertex, &soft)?;
     let mut stuck = CorrectorFailure::NotConverged;
     for beside in VERTEX_SEARCH_DISTANCES {
-        match locate_on_crossing_branch(equations, (&vertex, &across), &soft, beside) {
+        match locate_on_crossing_branch(equations, &vertex, &across, &soft, beside) {
             Ok(mut critical) => {
                 let shift = vertex.state.largest_displacement_to(&critical.state);
                 let apart = larger(shift, (critical.fraction - vertex.fraction).abs());
@@ -490,7 +501,8 @@ fn crossing_direction(
 /// The singular point of a branch that has this direction at a vertex, at most so far from that.
 fn locate_on_crossing_branch(
     equations: &mut BranchEquations,
-    (vertex, across): (&EquilibriumPoint, &BranchDirection),
+    vertex: &EquilibriumPoint,
+    across: &BranchDirection,
     soft: &[NodalField],
     beside: f64,
 ) -> Result<CriticalPoint, CorrectorFailure> {
@@ -521,7 +533,10 @@ fn locate_on_crossing_branch(
         .collect();
     // Eigenvalues of other modes keep their signs.
     match changing[..] {
-        [which] => Ok(search.find_eigenvalue_zero(which, ends, values[which])?.1),
+        [which] => {
+            let zero = search.find_eigenvalue_zero(which, ends, values[which])?;
+            Ok(zero.critical)
+        }
         _ => Err(CorrectorFailure::NotConverged),
     }
 }

@@ -1,6 +1,6 @@
 //! From a stable equilibrium uphill to a saddle, and downhill from there.
 //!
-//! Along a direction v the energy is maximised, across it minimised:
+//! Along a direction v the energy is maximized, across it minimized:
 //! with the matrix bordered by the mass matrix times v (as at a critical point),
 //! the solution for the border's unit vector is the direction X of the valley floor, and
 //! -H its curvature. While this is positive, steps go along X, by a given length or
@@ -52,6 +52,20 @@ const EIGENVALUE_SHIFT_FACTOR: f64 = 1.05;
 /// Number of modes in the search for the softest.
 const SOFT_MODE_COUNT: usize = 3;
 
+/// A step along the valley floor, in lengths of X, and the curvature where it began.
+#[derive(Clone, Copy)]
+struct FloorStep {
+    curvature: f64,
+    length: f64,
+}
+
+/// A step downhill.
+struct DescentStep {
+    state: State,
+    /// Whether it was a step of Newton's method, short enough to end the descent.
+    near_equilibrium: bool,
+}
+
 /// The valley floor in a direction.
 struct Valley {
     /// X, and the force and the curvature of the energy along it.
@@ -70,10 +84,10 @@ impl Valley {
     }
 
     /// Distance to the maximum of the energy along the floor, where its slope is minus the force,
-    /// for a cubic, which the energy is near a fold; `before`: the curvature `by` so much before.
-    /// Infinite if there is none.
-    fn distance_to_maximum(&self, (before, by): (f64, f64)) -> f64 {
-        let change = (self.curvature - before) / by;
+    /// for a cubic, which the energy is near a fold, given the step before. Infinite if there is
+    /// none.
+    fn distance_to_maximum(&self, before: FloorStep) -> f64 {
+        let change = (self.curvature - before.curvature) / before.length;
         let square = self.curvature * self.curvature + 2.0 * change * self.force;
         match change < 0.0 && square >= 0.0 {
             true => -(self.curvature + square.sqrt()) / change,
@@ -97,8 +111,7 @@ impl BranchEquations<'_> {
             state: state.clone(),
             params: [fraction],
         };
-        // The last step along the floor, and the curvature before it.
-        let mut before: Option<(f64, f64)> = None;
+        let mut before: Option<FloorStep> = None;
         for _ in 0..STEPS {
             if stop() {
                 return None;
@@ -124,7 +137,10 @@ impl BranchEquations<'_> {
                     None => shortest,
                     Some(before) => valley.distance_to_maximum(before).clamp(shortest, longest),
                 };
-                before = Some((valley.curvature, length));
+                before = Some(FloorStep {
+                    curvature: valley.curvature,
+                    length,
+                });
                 add_scaled(&mut step, length, &valley.along);
                 direction = self.normalize_by_mass(&valley.along);
             }
@@ -147,12 +163,12 @@ impl BranchEquations<'_> {
         let modes = self.soft_modes(point, SOFT_MODE_COUNT)?;
         let linear = self.assemble(&mut point.solution(), false)?;
         let border = [self.multiply_by_mass(&modes[0])];
-        let (solved, _) = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
-        Ok(-solved.h[(0, 0)] / self.mass)
+        let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
+        Ok(-solved.responses.h[(0, 0)] / self.mass)
     }
 
     /// The equilibria to which the leaf descends from a saddle along its unstable mode, on the side
-    /// of `direction` and on the other: see [`Equations::descend`].
+    /// of `direction` and on the other: see [`BranchEquations::descend`].
     pub fn descend_both_sides(
         &mut self,
         saddle: &EquilibriumPoint,
@@ -189,11 +205,11 @@ impl BranchEquations<'_> {
                 true => None,
                 false => self.descend_step(&mut now, &mut direction, &mut length),
             };
-            let Some((next, near)) = next else {
+            let Some(next) = next else {
                 return Err(now.state);
             };
-            now.state = next;
-            if near {
+            now.state = next.state;
+            if next.near_equilibrium {
                 let rest = self.correct(&now.state, fraction, None).ok();
                 return rest.filter(|point| point.index == 0).ok_or(now.state);
             }
@@ -201,13 +217,13 @@ impl BranchEquations<'_> {
         Err(now.state)
     }
 
-    /// A step down the valley floor; the flag says whether it was a short Newton step.
+    /// A step down the valley floor.
     fn descend_step(
         &mut self,
         now: &mut ParametrizedState,
         direction: &mut NodalField,
         length: &mut f64,
-    ) -> Option<(State, bool)> {
+    ) -> Option<DescentStep> {
         let linear = self.assemble(now, false).ok()?;
         let valley = self.valley(direction, &linear)?;
         let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
@@ -226,7 +242,10 @@ impl BranchEquations<'_> {
         let next = self
             .state_after_increments(&now.state, now.params, &step, 1.0)
             .ok()?;
-        Some((next, newton && size < FINAL_CORRECTION_INCREMENT))
+        Some(DescentStep {
+            state: next,
+            near_equilibrium: newton && size < FINAL_CORRECTION_INCREMENT,
+        })
     }
 
     /// The valley along `direction`, from the assembled matrix.
@@ -235,7 +254,7 @@ impl BranchEquations<'_> {
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
             let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
-            let (mut solved, _) = solved.ok()?;
+            let mut solved = solved.ok()?.responses;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {
                 let along = solved.modes.swap_remove(0);

@@ -11,7 +11,7 @@ use crate::branch::continuation::{Branch, BranchEnd, ContinuationOptions};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::CriticalPoint;
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::family::LeafFamily;
+use crate::branch::family::{LeafFamily, PARAMETER_ROUNDING};
 use crate::branch::refine::{refine_critical, verify_regular_point};
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::numbers::larger;
@@ -126,7 +126,7 @@ impl<'a> NestedBranchEquations<'a> {
             let equations = self.on_grid_of(&now);
             (known.branch).extend_to(equations, how, before + ahead, progress);
             let leaves = &equations.leaves;
-            let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
+            let doubt = known.verify(leaves.family, &leaves.grid, accuracy, how.critical_grids);
             if known.points.len() > before {
                 tries = 0;
             }
@@ -187,7 +187,8 @@ impl VerifiedBranch {
         &mut self,
         family: &LeafFamily,
         grid: &Grid,
-        (accuracy, grids): (f64, usize),
+        accuracy: f64,
+        grids: usize,
     ) -> Option<VerificationFailure> {
         let mut singular = std::mem::take(&mut self.beyond);
         let critical = &self.branch.critical[self.critical.len() + singular.len()..];
@@ -331,9 +332,6 @@ const SWITCHING_DISTANCE_FACTOR: f64 = 0.3;
 
 const MAX_SWITCHING_REDUCTIONS: i32 = 8;
 
-/// Fractions of the range by which a point may be beyond an end of it, due to rounding.
-const RANGE_END_ROUNDING: f64 = 1e-12;
-
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
 /// the first one, at least twice as fine as the stations of the relaxation, on which the index
@@ -349,8 +347,7 @@ pub fn begin_branch<'a>(
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST_RELAXATION_GRID);
     let least = segments.unwrap_or(2 * coarsest);
-    let rest_at = (rest, fraction);
-    find_first_point(family, rest_at, least, segments.is_some()).or_else(|stuck| {
+    find_first_point(family, rest, fraction, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();
@@ -365,12 +362,10 @@ pub fn begin_branch<'a>(
         let mut tips = rest.tips.iter().zip(&alone.tips);
         let near = SAME_TIPS_TOLERANCE * family.scale().length;
         match tips.all(|(a, b)| a.distance(*b) < near) {
-            true => find_first_point(
-                family,
-                (&alone, fraction),
-                alone.shape.stations.len() - 1,
-                true,
-            ),
+            true => {
+                let least = alone.shape.stations.len() - 1;
+                find_first_point(family, &alone, fraction, least, true)
+            }
             false => Err(stuck),
         }
     })
@@ -380,7 +375,8 @@ pub fn begin_branch<'a>(
 /// with the index of `rest`.
 fn find_first_point<'a>(
     family: &'a LeafFamily<'a>,
-    (rest, fraction): (&Equilibrium, f64),
+    rest: &Equilibrium,
+    fraction: f64,
     least: usize,
     any_index: bool,
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
@@ -455,7 +451,7 @@ fn first_point_off_branch(
             .equilibrium_along_direction(equations, direction, away)
             .ok()?;
         let beyond = larger(-point.fraction, point.fraction - 1.0);
-        (beyond <= RANGE_END_ROUNDING).then_some(point)
+        (beyond <= PARAMETER_ROUNDING).then_some(point)
     };
     let mut nearest = None;
     for (k, away) in BRANCH_SWITCHING_DISTANCES.into_iter().enumerate() {

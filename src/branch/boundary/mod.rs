@@ -27,11 +27,9 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 //!
-//! Equilibria at points of the parameter plane, each continued from a neighbouring one.
-//!
-//! Leaves on either side of a stability boundary.
-//!
-//! Transfer of boundary points to finer and coarser grids.
+//! This file has what surrounds a boundary: equilibria at points of the parameter plane, each
+//! continued along a straight path from another; leaves on either side of a boundary, for pictures;
+//! and the transfer of boundary points to finer and coarser grids.
 
 mod codimension_two;
 mod continuation;
@@ -48,7 +46,7 @@ pub use crate::branch::boundary::singular_point::{
     BoundarySeed, TwoParameterProblem, TwoParameterState,
 };
 use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
-use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
+use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions, follow_branch};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
@@ -62,8 +60,8 @@ use crate::scenario::Scenario;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// The longest step, as a part of the path, and the largest number of points on it.
-const LONGEST: f64 = 1.0;
+/// The longest step on a path, as a part of it, and the largest number of points.
+const LONGEST_PATH_STEP: f64 = 1.0;
 
 const MAX_PATH_POINTS: usize = 100;
 
@@ -72,9 +70,6 @@ const FINEST_PATH_GRID: usize = 1024;
 
 /// Segments of the coarsest grid for counting an index again.
 const COARSEST_INDEX_GRID: usize = 256;
-
-/// Least number of grids for a critical point.
-const CRITICAL_GRIDS: usize = 4;
 
 /// An equilibrium at a point of the parameter plane.
 #[derive(Clone, Debug)]
@@ -191,7 +186,7 @@ fn follow_on_grid(
     let turned = |points: &[EquilibriumPoint]| points[points.len() - 1].tangent.params[0] < 0.0;
     let how = ContinuationOptions {
         stop_criterion: Some(&turned),
-        ..ContinuationOptions::new(LONGEST, MAX_PATH_POINTS)
+        ..ContinuationOptions::new(LONGEST_PATH_STEP, MAX_PATH_POINTS)
     };
     let before = equations.factorizations;
     let branch = follow_branch(equations, first, &how, &mut |_, _| {});
@@ -249,11 +244,12 @@ pub fn leaves_beside_boundary(
     point: &VerifiedBoundaryPoint,
     along: [f64; 2],
 ) -> Option<[BoundaryNeighbour; 2]> {
-    let (grid, point) = &point_on_picture_grid(plane, point);
+    let GridBoundaryPoint { grid, point } = &point_on_picture_grid(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
     let at = |away: f64, indices: RangeInclusive<usize>| {
-        equilibrium_across_boundary(plane, grid, point, along, (away, &indices))
+        equilibrium_across_boundary(plane, grid, point, along, away)
+            .filter(|found| indices.contains(&found.index))
     };
     let low = NEIGHBOUR_DISTANCES
         .iter()
@@ -278,32 +274,38 @@ pub fn leaves_beside_boundary(
     Some([low, high])
 }
 
+/// A point of a boundary and the grid of its state.
+pub struct GridBoundaryPoint<P> {
+    pub grid: Grid,
+    pub point: P,
+}
+
 /// The point on the coarsest grid that pictures allow.
 fn point_on_picture_grid(
     plane: &TwoParameterProblem,
     point: &VerifiedBoundaryPoint,
-) -> (Grid, VerifiedBoundaryPoint) {
+) -> GridBoundaryPoint<VerifiedBoundaryPoint> {
     let mut grid = Grid::from_stations(&point.stations, plane.first_leaf().kinks());
     let mut point = point.clone();
     while grid.segments() > FINEST_PICTURE_GRID
-        && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
+        && let Some(coarse) = coarser_grid(plane, &grid)
     {
         point.across.increments = restrict_field(
             &point.across.increments,
             usize::from(!plane.first_leaf().hinged()),
         );
-        (grid, point.state) = (coarse, state);
+        (grid, point.state) = (coarse, restrict(&point.state));
     }
-    (grid, point)
+    GridBoundaryPoint { grid, point }
 }
 
-/// The equilibrium at a distance across the boundary, if its index is one of these.
+/// The equilibrium at a distance `away` from the boundary, across it, if it is in the ranges.
 fn equilibrium_across_boundary(
     plane: &TwoParameterProblem,
     grid: &Grid,
     point: &VerifiedBoundaryPoint,
     along: [f64; 2],
-    (away, indices): (f64, &RangeInclusive<usize>),
+    away: f64,
 ) -> Option<BoundaryNeighbour> {
     let mut manifold = TwoParameterEquations::new(plane, grid.clone());
     let along = TwoParameterDirection {
@@ -322,13 +324,11 @@ fn equilibrium_across_boundary(
     let found = manifold.correct_bordered(start, normals, &[], Some(&rates), false);
     let found = found.ok()?;
     let index = found.solved.negative;
-    (indices.contains(&index) && is_in_parameter_range(found.solution.params)).then_some(
-        BoundaryNeighbour {
-            solution: found.solution,
-            index,
-            fallen_from: None,
-        },
-    )
+    is_in_parameter_range(found.solution.params).then_some(BoundaryNeighbour {
+        solution: found.solution,
+        index,
+        fallen_from: None,
+    })
 }
 
 /// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with
@@ -376,15 +376,21 @@ fn is_in_parameter_range(params: [f64; 2]) -> bool {
     params.iter().all(|part| (0.0..=1.0).contains(part))
 }
 
-/// Segments of the coarsest.
+/// Segments of the coarsest grid to which a point of a boundary is transferred.
 const COARSEST_BOUNDARY_GRID: usize = 8;
+
+/// A point of a boundary with the equations on its grid.
+pub struct FinerBoundaryPoint<'a> {
+    pub manifold: TwoParameterEquations<'a>,
+    pub point: SingularPoint,
+}
 
 /// Initial guess for a boundary point on the grid with all segments halved, with its
 /// directions.
 pub fn boundary_point_on_finer<'a>(
     manifold: &mut TwoParameterEquations<'a>,
     point: &SingularPoint,
-) -> Result<(TwoParameterEquations<'a>, SingularPoint), CorrectorFailure> {
+) -> Result<FinerBoundaryPoint<'a>, CorrectorFailure> {
     let state = prolong(
         manifold.leaves.leaf_at(point.solution.params)?,
         &point.solution.state,
@@ -398,7 +404,10 @@ pub fn boundary_point_on_finer<'a>(
         normal: finer.normalize_direction(point.normal),
         ..point
     };
-    Ok((finer, point))
+    Ok(FinerBoundaryPoint {
+        manifold: finer,
+        point,
+    })
 }
 
 /// Initial guess for the point on the grid with every second node.
@@ -406,11 +415,15 @@ pub fn boundary_point_on_coarser(
     plane: &TwoParameterProblem,
     grid: &Grid,
     point: &SingularPoint,
-) -> Option<(Grid, SingularPoint)> {
-    let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
+) -> Option<GridBoundaryPoint<SingularPoint>> {
+    let coarse = coarser_grid(plane, grid)?;
     let first = usize::from(!plane.first_leaf().hinged());
+    let state = restrict(&point.solution.state);
     let point = transferred(point, state, |field| restrict_field(field, first));
-    Some((coarse, point))
+    Some(GridBoundaryPoint {
+        grid: coarse,
+        point,
+    })
 }
 
 /// The point on the grid of this state, to which `field` transfers increments.
@@ -435,19 +448,15 @@ fn transferred(
     }
 }
 
-/// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
-/// not its refinement.
-pub fn state_on_coarser(
-    plane: &TwoParameterProblem,
-    grid: &Grid,
-    state: &State,
-) -> Option<(Grid, State)> {
-    let half = state.segments() / 2;
-    if half < COARSEST_BOUNDARY_GRID || 2 * half != state.segments() {
+/// The grid with every second node; none if that would be too coarse, or if `grid` is not its
+/// refinement.
+fn coarser_grid(plane: &TwoParameterProblem, grid: &Grid) -> Option<Grid> {
+    let half = grid.segments() / 2;
+    if half < COARSEST_BOUNDARY_GRID || 2 * half != grid.segments() {
         return None;
     }
     let coarse = coarsened(grid, half, plane.first_leaf().kinks());
-    (coarse.refined() == *grid).then(|| (coarse, restrict(state)))
+    (coarse.refined() == *grid).then_some(coarse)
 }
 
 /// The grid of so many segments that this one refines.

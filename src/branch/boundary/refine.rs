@@ -8,8 +8,8 @@
 
 use crate::branch::boundary::codimension_two::{CodimensionTwoKind, locate_codimension_two};
 use crate::branch::boundary::singular_point::{
-    BoundaryPointSearch, SingularPoint, TwoParameterDirection, TwoParameterEquations,
-    TwoParameterProblem, TwoParameterState,
+    BoundaryPointSearch, BoundarySearchTolerance, SingularPoint, TwoParameterDirection,
+    TwoParameterEquations, TwoParameterProblem, TwoParameterState,
 };
 use crate::branch::boundary::{boundary_point_on_coarser, boundary_point_on_finer};
 use crate::branch::convergence::{
@@ -48,11 +48,12 @@ const FIRST_REGULARIZATION: f64 = 1e-3;
 
 const REGULARIZATION_ERROR_RATIO: f64 = 0.5;
 
-/// Accuracy of a point on its grid, as a part of the ranges, and the largest distance from the
-/// initial guess of the previous grid.
-const ACCURACY: f64 = 1e-13;
-
-const LARGEST_GUESS_DISTANCE: f64 = 0.5;
+/// The search for a point from where it is on the previous grid: to rounding, as extrapolation
+/// over grids magnifies what remains.
+const RELOCATION_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
+    accuracy: 1e-13,
+    largest_distance: 0.5,
+};
 
 /// Least angle (its sine) between the boundary and the line on which its point is sought, and the
 /// least derivative of one parameter along the boundary relative to the other.
@@ -121,13 +122,13 @@ pub fn refine(
     let mut manifold = TwoParameterEquations::new(plane, grid.clone());
     let leaf = manifold.leaves.leaf_at(step.point.solution.params)?;
     if is_nearly_rigid(leaf)
-        && let Some((grid, point)) = boundary_point_on_coarser(plane, grid, &step.point)
+        && let Some(coarser) = boundary_point_on_coarser(plane, grid, &step.point)
     {
         let step = UnverifiedBoundaryPoint {
-            point,
+            point: coarser.point,
             ..step.clone()
         };
-        if let Ok(verified) = refine(plane, &grid, &step, accuracy) {
+        if let Ok(verified) = refine(plane, &coarser.grid, &step, accuracy) {
             return Ok(verified);
         }
     }
@@ -205,18 +206,20 @@ impl<'a> NestedBoundaryPoint<'a> {
         near: &SingularPoint,
         start: TwoParameterState,
     ) -> Result<SingularPoint, CorrectorFailure> {
-        let accuracy = ITERATION_ERROR_FRACTION * self.sought_error();
+        let tolerance = BoundarySearchTolerance {
+            accuracy: ITERATION_ERROR_FRACTION * self.sought_error(),
+            ..RELOCATION_TOLERANCE
+        };
         let (manifold, given) = (&mut self.manifold, self.condition.fixed_parameter);
-        let search = near.search(manifold, given, start, (accuracy, LARGEST_GUESS_DISTANCE));
+        let search = near.search(manifold, given, start, tolerance);
         let frozen = near.kind == CriticalKind::Branching;
         let found = search.newton(manifold, frozen, &mut self.contraction);
-        let (found, left) = found.or_else(|_| {
+        let found = found.or_else(|_| {
             let search = search_from_previous_grid(manifold, near, given);
-            search.secant(manifold).map(|found| (found, 0.0))
+            search.secant(manifold)
         })?;
-        let point = near.with_search_result(manifold, found);
-        self.table.iteration_error = larger(self.table.iteration_error, left);
-        Ok(point)
+        self.table.iteration_error = larger(self.table.iteration_error, found.iteration_error);
+        Ok(near.with_search_result(manifold, found))
     }
 }
 
@@ -225,9 +228,9 @@ impl NestedGridPoint for NestedBoundaryPoint<'_> {
 
     fn locate(&mut self, level: usize) -> Result<Relocation, VerificationFailure> {
         let near = if level > 0 {
-            let (finer, near) = boundary_point_on_finer(&mut self.manifold, &self.located.point)?;
-            self.manifold = finer;
-            near
+            let finer = boundary_point_on_finer(&mut self.manifold, &self.located.point)?;
+            self.manifold = finer.manifold;
+            finer.point
         } else {
             self.located.point.clone()
         };
@@ -312,8 +315,10 @@ impl NestedGridPoint for NestedBoundaryPoint<'_> {
 fn fixable_parameter(manifold: &TwoParameterEquations, point: &SingularPoint) -> Option<usize> {
     let [first, second] = point.tangent.params.map(f64::abs);
     let sine = |which: usize| {
-        let (across, _) = point.crossing_at_fixed_parameter(manifold, which);
-        manifold.direction_product(&across, &point.normal).abs()
+        let crossing = point.crossing(manifold, Some(which));
+        manifold
+            .direction_product(&crossing.direction, &point.normal)
+            .abs()
     };
     let order = if second >= SMALLEST_PARAMETER_RATE_RATIO * first {
         [1, 0]
@@ -336,10 +341,10 @@ fn relocated(
     condition: BoundaryPointCondition,
 ) -> Result<LocatedBoundaryPoint, CorrectorFailure> {
     if let Some(special) = condition.special {
-        let (point, slope) = locate_codimension_two(manifold, near, special)?;
+        let found = locate_codimension_two(manifold, near, special)?;
         return Ok(LocatedBoundaryPoint {
-            point,
-            slope_along: (special == CodimensionTwoKind::Crossing).then_some(slope),
+            point: found.point,
+            slope_along: (special == CodimensionTwoKind::Crossing).then_some(found.slope),
         });
     }
     let search = search_from_previous_grid(manifold, near, condition.fixed_parameter);
@@ -376,12 +381,7 @@ fn search_from_previous_grid(
     near: &SingularPoint,
     given: Option<usize>,
 ) -> BoundaryPointSearch {
-    near.search(
-        manifold,
-        given,
-        near.solution.clone(),
-        (ACCURACY, LARGEST_GUESS_DISTANCE),
-    )
+    near.search(manifold, given, near.solution.clone(), RELOCATION_TOLERANCE)
 }
 
 /// The parameters at a point of a nearly rigid leaf on its first grid: the softening is reduced
@@ -434,7 +434,7 @@ fn unregularized_parameters(
                     ..near.clone()
                 };
                 locate_codimension_two(&mut soft, &near, special)?
-                    .0
+                    .point
                     .solution
             }
             None => search.secant(&mut soft)?.sample.solution,
@@ -489,7 +489,7 @@ pub struct VerifiedBoundaryPoint {
     /// Morse indices where the first parameter is smaller and where it is larger; at a fold,
     /// of the two branches that meet there.
     pub indices: [usize; 2],
-    /// Matrices factorised for it, without those of softened leaves.
+    /// Matrices factorized for it, without those of softened leaves.
     pub factorizations: usize,
 }
 
@@ -557,17 +557,14 @@ impl BoundaryConvergenceTable {
         segments: f64,
     ) -> Result<[f64; 2], CorrectorFailure> {
         let point = &located.point;
-        let (across, slope) = match self.fixed_parameter {
-            Some(FixedParameter { which, .. }) => {
-                point.crossing_at_fixed_parameter(manifold, which)
-            }
-            None => (point.normal.clone(), point.slope),
-        };
+        let fixed = self.fixed_parameter.map(|fixed| fixed.which);
+        let crossing = point.crossing(manifold, fixed);
+        let slope = crossing.slope;
         let leaf = manifold.leaves.leaf_at(point.solution.params)?;
         let stiffest = stiffest_condensed(leaf).min(1.0 / softening);
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
-            let own = (rounding / slope * across.params[i]).abs();
+            let own = (rounding / slope * crossing.direction.params[i]).abs();
             let along = (located.slope_along)
                 .map_or(0.0, |slope| rounding / slope * point.tangent.params[i]);
             own + along.abs()
@@ -636,8 +633,8 @@ impl BoundaryConvergenceTable {
         let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral_modes));
         let forward = match point.kind {
             CriticalKind::Branching => {
-                let (across, slope) = point.crossing_at_fixed_parameter(manifold, 1);
-                slope * across.params[0] > 0.0
+                let crossing = point.crossing(manifold, Some(1));
+                crossing.slope * crossing.direction.params[0] > 0.0
             }
             CriticalKind::Fold => true,
         };

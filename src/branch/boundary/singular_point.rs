@@ -1,13 +1,15 @@
-//! A point of a boundary: an equilibrium at which the matrix is singular.
+//! A point of a boundary on one grid: an equilibrium on the manifold of leaves that differ in two
+//! parameters, at which the matrix is singular.
 //!
-//! The search for a point of a boundary: the zero of an eigenvalue across it.
-//!
-//! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
+//! It is sought across the boundary, as the zero of an eigenvalue of H: by a secant method with
+//! Newton's method back to the manifold, or by Newton's method for both together.
 
 use crate::branch;
 use crate::branch::convergence::ExtrapolatedPoint;
 use crate::branch::critical::{CriticalKind, CriticalPoint};
-use crate::branch::equations::{BranchEquations, CorrectorFailure, ITERATIONS, STIFF};
+use crate::branch::equations::{
+    AugmentingFunction, BranchEquations, CorrectorFailure, ITERATIONS, STIFF,
+};
 use crate::branch::family::{
     LeafFamily, OutOfRange, force_parameter_derivative, unbalanced_forces,
 };
@@ -28,7 +30,7 @@ const ROUNDING_FORCING: f64 = 1e-5;
 
 /// Eigenvalues that differ by more than this, relative to their derivative with respect to
 /// arclength, do not vanish together.
-const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
+pub const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
 
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
@@ -56,6 +58,26 @@ pub struct SingularPoint {
     /// The direction of the curve of folds in the parameter plane.
     pub fold_direction: [f64; 2],
 }
+
+/// A direction on the solution manifold across a boundary.
+pub struct BoundaryCrossing {
+    pub direction: TwoParameterDirection,
+    /// Derivative of the vanishing eigenvalue along it.
+    pub slope: f64,
+}
+
+/// How accurately a point of a boundary is sought, and how far (arclength on the manifold).
+#[derive(Clone, Copy)]
+pub struct BoundarySearchTolerance {
+    pub accuracy: f64,
+    pub largest_distance: f64,
+}
+
+/// The first point of a boundary is near the critical point of the branch.
+const FIRST_POINT_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
+    accuracy: 1e-11,
+    largest_distance: 0.1,
+};
 
 /// A critical point of a branch in the parameter plane.
 #[derive(Clone, Copy)]
@@ -119,37 +141,31 @@ impl SingularPoint {
             fold_speed: 0.0,
             fold_direction: [0.0; 2],
         };
-        let search = like.search(manifold, None, like.solution.clone(), (1e-11, 0.1));
+        let search = like.search(manifold, None, like.solution.clone(), FIRST_POINT_TOLERANCE);
         let found = search.secant(manifold)?;
         like.with_own_directions(manifold, found)
     }
 
     /// The search for a point of the boundary near this one, from `solution`: in the plane normal
-    /// to the tangent here or, if a parameter is `given`, with its value constant. To this
-    /// accuracy, and not further than this.
+    /// to the tangent here or, if a parameter is `given`, with its value constant.
     pub fn search(
         &self,
         manifold: &TwoParameterEquations,
         given: Option<usize>,
         solution: TwoParameterState,
-        (accuracy, furthest): (f64, f64),
+        tolerance: BoundarySearchTolerance,
     ) -> BoundaryPointSearch {
-        let (across, slope, along) = match given {
-            Some(which) => {
-                let (across, slope) = self.crossing_at_fixed_parameter(manifold, which);
-                (across, slope, manifold.unit_parameter(which))
-            }
-            None => (self.normal.clone(), self.slope, self.tangent.clone()),
+        let along = match given {
+            Some(which) => manifold.unit_parameter(which),
+            None => self.tangent.clone(),
         };
         BoundaryPointSearch {
             solution,
-            across,
-            slope,
+            crossing: self.crossing(manifold, given),
             along,
             soft: self.border_modes.clone(),
             neutral: self.neutral_modes,
-            accuracy,
-            furthest,
+            tolerance,
         }
     }
 
@@ -169,7 +185,8 @@ impl SingularPoint {
         }
     }
 
-    /// The same with its own directions; the tangent is oriented as here.
+    /// The boundary point that was found from this one, with directions of its own; the tangent
+    /// is oriented as here.
     pub fn with_own_directions(
         &self,
         manifold: &mut TwoParameterEquations,
@@ -352,22 +369,30 @@ impl SingularPoint {
         ParameterForcing { largest, free }
     }
 
-    /// The direction on the manifold, across the boundary, in which one of the parameters
-    /// is constant, and the derivative of the eigenvalue along it.
-    pub fn crossing_at_fixed_parameter(
+    /// The direction across the boundary: in which this parameter is constant, if one is given,
+    /// else that of the normal.
+    pub fn crossing(
         &self,
         manifold: &TwoParameterEquations,
-        which: usize,
-    ) -> (TwoParameterDirection, f64) {
+        fixed_parameter: Option<usize>,
+    ) -> BoundaryCrossing {
+        let Some(which) = fixed_parameter else {
+            return BoundaryCrossing {
+                direction: self.normal.clone(),
+                slope: self.slope,
+            };
+        };
         let parts = [self.tangent.params[which], -self.normal.params[which]];
         let both = [self.normal.clone(), self.tangent.clone()];
         let across =
             manifold.normalize_direction(TwoParameterDirection::linear_combination(parts, &both));
-        let slope = self.slope * manifold.direction_product(&across, &self.normal);
-        (across, slope)
+        BoundaryCrossing {
+            slope: self.slope * manifold.direction_product(&across, &self.normal),
+            direction: across,
+        }
     }
 
-    /// The same point with the opposite orientation along the boundary.
+    /// This point with the opposite orientation along the boundary.
     pub fn reversed(&self) -> SingularPoint {
         SingularPoint {
             tangent: self.tangent.reversed(),
@@ -467,19 +492,16 @@ impl BorderEigenvalues {
 
 /// A search for a point of a boundary.
 pub struct BoundaryPointSearch {
-    /// From here,
+    /// Where it starts.
     pub solution: TwoParameterState,
-    /// in this direction, along which the eigenvalue has this derivative,
-    pub across: TwoParameterDirection,
-    pub slope: f64,
-    /// in the plane normal to this,
-    pub along: TwoParameterDirection,
-    /// with these modes in the border, the first `neutral` of which become neutral,
-    pub soft: Vec<NodalField>,
-    pub neutral: usize,
-    /// to this accuracy, and not further than this.
-    pub accuracy: f64,
-    pub furthest: f64,
+    /// The direction in which the point is sought.
+    crossing: BoundaryCrossing,
+    /// The normal of the plane in which the point is sought.
+    along: TwoParameterDirection,
+    /// The modes of the border, the first `neutral` of which become neutral.
+    soft: Vec<NodalField>,
+    neutral: usize,
+    tolerance: BoundarySearchTolerance,
 }
 
 /// A boundary point without its directions.
@@ -488,6 +510,8 @@ pub struct BoundarySearchResult {
     pub eigen: BorderEigenvalues,
     /// Distance from the start of the search.
     pub distance: f64,
+    /// Estimated iteration error of Newton's method; a secant method iterates to rounding.
+    pub iteration_error: f64,
 }
 
 /// The eigenvalues of H; the first `neutral` modes of the border become neutral.
@@ -502,14 +526,17 @@ pub fn border_eigenvalues(sample: &TwoParameterLinearization, neutral: usize) ->
     let segments = sample.solution.state.segments() as f64;
     let rounding = sample.noise * segments * segments;
     let apart = largest(coupling.iter().map(|v| v.abs())) <= rounding;
-    let mut pairs = match apart {
-        true => [eigenpairs(h, 0..own), eigenpairs(h, own..count)].concat(),
+    let mut pairs: Vec<EigenPair> = match apart {
+        true => (eigenpairs(h, 0..own).into_iter())
+            .chain(eigenpairs(h, own..count))
+            .collect(),
         false => eigenpairs(h, 0..count),
     };
     // The neutral modes come first in the border.
     let weight = |vector: &[f64]| -> f64 { vector[..own].iter().map(|v| v * v).sum() };
-    pairs.sort_by(|(_, a), (_, b)| weight(b).total_cmp(&weight(a)));
-    let (values, vectors): (Vec<f64>, Vec<Vec<f64>>) = pairs.into_iter().unzip();
+    pairs.sort_by(|a, b| weight(&b.vector).total_cmp(&weight(&a.vector)));
+    let values: Vec<f64> = pairs.iter().map(|pair| pair.value).collect();
+    let vectors = pairs.into_iter().map(|pair| pair.vector).collect();
     let (own, others) = values.split_at(own);
     let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
     let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
@@ -522,8 +549,14 @@ pub fn border_eigenvalues(sample: &TwoParameterLinearization, neutral: usize) ->
     }
 }
 
+/// An eigenvalue of H and its eigenvector.
+struct EigenPair {
+    value: f64,
+    vector: Vec<f64>,
+}
+
 /// Eigenvalues and eigenvectors of the part of a symmetric matrix in these rows and columns.
-fn eigenpairs(h: &DMatrix<f64>, rows: Range<usize>) -> Vec<(f64, Vec<f64>)> {
+fn eigenpairs(h: &DMatrix<f64>, rows: Range<usize>) -> Vec<EigenPair> {
     let (first, count) = (rows.start, rows.len());
     let all = h
         .view((first, first), (count, count))
@@ -533,15 +566,17 @@ fn eigenpairs(h: &DMatrix<f64>, rows: Range<usize>) -> Vec<(f64, Vec<f64>)> {
         let mut vector = vec![0.0; h.nrows()];
         let own = all.eigenvectors.column(k);
         vector[rows.clone()].copy_from_slice(own.as_slice());
-        (all.eigenvalues[k], vector)
+        EigenPair {
+            value: all.eigenvalues[k],
+            vector,
+        }
     };
     (0..count).map(pair).collect()
 }
 
 impl BoundaryPointSearch {
-    /// The same point by Newton's method for the state and the zero of the eigenvalue
-    /// together, from a good initial guess; also returns the estimated iteration error. At branch
-    /// points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
+    /// The point by Newton's method for the state and the zero of the eigenvalue together, from a
+    /// good initial guess. At branch points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
     /// not excite them. For an asymmetric branch this does not find the point: with a singular
     /// matrix, the amplitude of the mode is undetermined.
     pub fn newton(
@@ -549,7 +584,7 @@ impl BoundaryPointSearch {
         manifold: &mut TwoParameterEquations,
         frozen: bool,
         contraction: &mut Contraction,
-    ) -> Result<(BoundarySearchResult, f64), CorrectorFailure> {
+    ) -> Result<BoundarySearchResult, CorrectorFailure> {
         let border = manifold.multiply_all_by_mass(&self.soft);
         let along = manifold.multiply_by_mass(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
@@ -566,15 +601,22 @@ impl BoundaryPointSearch {
             if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
                 break;
             }
-            let (slope, numbers) =
-                self.eigenvalue_gradient(manifold, &sample, &eigen, &border, frozen)?;
-            let value = eigen.value / self.slope;
+            let gradient = self.eigenvalue_gradient(manifold, &sample, &eigen, &border, frozen)?;
             let functions = [
-                (&along, self.along.params.as_slice(), 0.0),
-                (&slope, numbers.as_slice(), value),
+                AugmentingFunction {
+                    state_gradient: &along,
+                    parameter_gradient: &self.along.params,
+                    value: 0.0,
+                },
+                AugmentingFunction {
+                    state_gradient: &gradient.state,
+                    parameter_gradient: &gradient.params,
+                    value: eigen.value / self.crossing.slope,
+                },
             ];
-            let (next, size) = manifold.newton_step(&sample, &functions)?;
-            solution = next;
+            let next = manifold.newton_step(&sample, &functions)?;
+            let size = next.size;
+            solution = next.solution;
             if previous > ROUNDING_INCREMENT {
                 contraction.update(size, previous);
             }
@@ -583,7 +625,7 @@ impl BoundaryPointSearch {
                 true => contraction.error_after_first(size, 0.0),
                 false => f64::INFINITY,
             };
-            let accuracy = (self.accuracy, ROUNDING_INCREMENT);
+            let accuracy = (self.tolerance.accuracy, ROUNDING_INCREMENT);
             // With less accurate derivatives, increments cannot shrink faster than these are known;
             // and as the forces in segments follow their strains one iteration later, what the
             // first increment left may be subtracted twice by the second.
@@ -593,14 +635,14 @@ impl BoundaryPointSearch {
             };
             if let Some(left) = remaining_error(size, previous, [slopes; 2], accuracy, first) {
                 let moved = manifold.difference(&self.solution, &solution);
-                let distance = manifold.direction_product(&moved, &self.across);
+                let distance = manifold.direction_product(&moved, &self.crossing.direction);
                 sample.solution = solution;
-                let found = BoundarySearchResult {
+                return Ok(BoundarySearchResult {
                     sample,
                     eigen,
                     distance,
-                };
-                return Ok((found, left));
+                    iteration_error: left,
+                });
             }
             previous = size;
         }
@@ -615,19 +657,19 @@ impl BoundaryPointSearch {
         eigen: &BorderEigenvalues,
         border: &[NodalField],
         frozen: bool,
-    ) -> Result<(NodalField, [f64; 2]), CorrectorFailure> {
+    ) -> Result<TwoParameterGradient, CorrectorFailure> {
         let own = &eigen.vectors[..self.neutral];
         let modes = own
             .iter()
             .map(|it| combine_fields(it, &sample.solved.modes));
         let modes: Vec<NodalField> = modes.collect();
-        let part = 1.0 / (self.slope * self.neutral as f64);
+        let part = 1.0 / (self.crossing.slope * self.neutral as f64);
         let mut all = scale_field(&modes[0], 0.0);
         let mut numbers = [0.0; 2];
         for mode in &modes {
-            let (change, rates) = manifold.curvature_change(&sample.solution, mode)?;
-            add_scaled(&mut all, part, &change);
-            for (number, rate) in numbers.iter_mut().zip(rates) {
+            let change = manifold.curvature_change(&sample.solution, mode)?;
+            add_scaled(&mut all, part, &change.state);
+            for (number, rate) in numbers.iter_mut().zip(change.params) {
                 *number += part * rate;
             }
         }
@@ -637,7 +679,10 @@ impl BoundaryPointSearch {
                 add_scaled(&mut all, -along, &combine_fields(vector, border));
             }
         }
-        Ok((all, numbers))
+        Ok(TwoParameterGradient {
+            state: all,
+            params: numbers,
+        })
     }
 
     /// The zero of the eigenvalue by a secant method.
@@ -652,8 +697,9 @@ impl BoundaryPointSearch {
                       step: f64,
                       distance: f64|
          -> Result<BoundarySearchResult, CorrectorFailure> {
-            let solution = manifold.displace_along_direction(from, &self.across, step)?;
-            let normals = [&self.along, &self.across];
+            let across = &self.crossing.direction;
+            let solution = manifold.displace_along_direction(from, across, step)?;
+            let normals = [&self.along, across];
             let sample =
                 manifold.correct_bordered(solution, normals, &border, Some(&rates), false)?;
             let eigen = border_eigenvalues(&sample, self.neutral);
@@ -661,18 +707,19 @@ impl BoundaryPointSearch {
                 sample,
                 eigen,
                 distance,
+                iteration_error: 0.0,
             })
         };
-        let (mut distance, mut slope) = (0.0, self.slope);
+        let (mut distance, mut slope) = (0.0, self.crossing.slope);
         let mut best = at(&self.solution, 0.0, distance)?;
         let (mut value, mut last) = (best.eigen.value, best.sample.solution.clone());
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
-            if !step.is_finite() || (distance + step).abs() > self.furthest {
+            if !step.is_finite() || (distance + step).abs() > self.tolerance.largest_distance {
                 return Err(CorrectorFailure::NotConverged);
             }
-            if step.abs() < self.accuracy {
+            if step.abs() < self.tolerance.accuracy {
                 return Ok(best);
             }
             let next = at(&last, step, distance + step)?;
@@ -707,6 +754,14 @@ pub type TwoParameterState = branch::ParametrizedState<2>;
 pub type TwoParameterDirection = branch::BranchDirection<2>;
 
 pub type TwoParameterLinearization = equations::BorderedLinearization<2>;
+
+/// Derivatives of a function of the state and of both parameters.
+pub struct TwoParameterGradient {
+    /// With respect to the increments of the nodes.
+    pub state: NodalField,
+    /// With respect to the parameters, as fractions of their ranges.
+    pub params: [f64; 2],
+}
 
 impl TwoParameterDirection {
     /// The linear combination of two directions.
@@ -794,7 +849,7 @@ impl TwoParameterEquations<'_> {
         &mut self,
         solution: &TwoParameterState,
         mode: &NodalField,
-    ) -> Result<(NodalField, [f64; 2]), CorrectorFailure> {
+    ) -> Result<TwoParameterGradient, CorrectorFailure> {
         let way = TwoParameterDirection {
             increments: mode.clone(),
             params: [0.0; 2],
@@ -819,7 +874,10 @@ impl TwoParameterEquations<'_> {
         }
         // Last, so that the system holds the increments of this state again.
         self.forces(solution)?;
-        Ok((change, numbers))
+        Ok(TwoParameterGradient {
+            state: change,
+            params: numbers,
+        })
     }
 
     /// A solution with the segment forces computed from its strains.
