@@ -141,7 +141,7 @@ pub enum BranchEnd {
 }
 
 impl BranchEnd {
-    /// That of a branch which has reached this end of the range.
+    /// How a branch ends at this end of the range, 0 or 1.
     fn at_range_end(edge: f64) -> Self {
         match edge {
             1.0 => BranchEnd::RangeEndReached,
@@ -153,7 +153,7 @@ impl BranchEnd {
 /// A branch on one grid, or on finer and finer ones.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// Its points, in order.
+    /// The points in order.
     pub points: Vec<EquilibriumPoint>,
     /// Critical points, each with the number of the point before it.
     pub critical: Vec<(usize, CriticalPoint)>,

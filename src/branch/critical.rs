@@ -18,14 +18,23 @@ use crate::numbers::larger;
 /// Additional modes in the border: others may be nearly neutral.
 pub(super) const EXTRA_BORDER_MODES: usize = 2;
 
-/// Largest number of evaluations in the search for a zero.
-const EVALUATIONS: usize = 40;
+/// How the zero of an eigenvalue, or of another function, along a curve is sought by a secant
+/// method.
+pub(super) struct SecantLimits {
+    /// Largest number of evaluations.
+    pub evaluations: usize,
+    /// A step below this is the last (arclength).
+    pub accuracy: f64,
+    /// Over a shorter step rounding errors make a difference quotient worse than that before.
+    pub shortest_slope_difference: f64,
+}
 
-/// Accuracy of a zero, as a part of the step that contains it.
-const ACCURACY: f64 = 1e-13;
-
-/// Differences over less than this part of a step do not give a reliable slope.
-const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-6;
+/// The search for a critical point: lengths are parts of the step that contains it.
+const SECANT: SecantLimits = SecantLimits {
+    evaluations: 40,
+    accuracy: 1e-13,
+    shortest_slope_difference: 1e-6,
+};
 
 /// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
 const NEUTRAL_EIGENVALUE: f64 = 1e-6;
@@ -202,12 +211,12 @@ impl CriticalPointSearch<'_, '_> {
         let mut slope = (value[1] - value[0]) / whole;
         let mut best: Option<(f64, EvaluatedEigenvalues)> = None;
         let (mut last, mut last_value) = (distance[1], value[1]);
-        for _ in 0..EVALUATIONS {
+        for _ in 0..SECANT.evaluations {
             let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
             let next = self.eigenvalues_at_distance(at)?;
             let now = next.eigenvalues[which];
-            let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
-            if (at - last).abs() > SHORTEST_SLOPE_DIFFERENCE * whole {
+            let done = (at - last).abs() < SECANT.accuracy * whole || now == 0.0;
+            if (at - last).abs() > SECANT.shortest_slope_difference * whole {
                 slope = (now - last_value) / (at - last);
             }
             let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
@@ -296,7 +305,7 @@ impl CriticalPoint {
         larger(apart, (self.fraction - other.fraction).abs()) < SAME_VERTEX_DISTANCE
     }
 
-    /// The same critical point on another grid or of a softened matrix, by a secant method from
+    /// This critical point on another grid or of a softened matrix, by a secant method from
     /// the known state.
     pub fn relocate(
         &self,
@@ -321,22 +330,22 @@ impl CriticalPoint {
             CriticalKind::Fold => {
                 let stiffest = search.equations.stiffest_condensed([self.fraction])?;
                 let rounding = eigenvalue_rounding(stiffest, self.state.segments());
-                (rounding / self.eigenvalue_slope.abs()).max(ACCURACY)
+                (rounding / self.eigenvalue_slope.abs()).max(SECANT.accuracy)
             }
-            CriticalKind::Branching => ACCURACY,
+            CriticalKind::Branching => SECANT.accuracy,
         };
         let (mut distance, mut slope) = (0.0, self.eigenvalue_slope);
         let mut best = search.eigenvalues_at_distance(distance)?;
         let mut value = best.eigenvalues[self.eigenvalue_position];
         let mut worse = 0;
-        for _ in 0..EVALUATIONS {
+        for _ in 0..SECANT.evaluations {
             let step = -value / slope;
             if !step.is_finite() || step.abs() > 1.0 {
                 return Err(CorrectorFailure::NotConverged);
             }
             let next = search.eigenvalues_at_distance(distance + step)?;
             let after = next.eigenvalues[self.eigenvalue_position];
-            if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
+            if step.abs() > SECANT.shortest_slope_difference {
                 slope = (after - value) / step;
             }
             (distance, value) = (distance + step, after);

@@ -24,17 +24,10 @@
 //! accuracy asked for. Otherwise the branch is continued on a finer grid
 //! from the last verified point.
 //!
-//! Linear algebra on fields of nodal increments and forces.
-//!
-//! Why a branch ends, or does not begin.
-//!
-//! The equations of branches: leaves that differ in parameters, linearised and solved.
-//!
-//! Along a branch on one grid: where it begins, its steps, and Newton's method back to it.
-//!
-//! Points of a branch on finer and finer grids, which verify them.
-//!
-//! Folds, branch points, and the vertices of pitchforks on one grid.
+//! Equations (`equations`) of a family of leaves (`family`) are solved at a step (`correct`);
+//! steps make a branch on one grid (`continuation`) with its critical points (`critical`);
+//! points are verified on finer grids (`convergence`, `refine`), and so is the branch
+//! (`verified_branch`). This file has points, directions, and the algebra of their fields.
 
 pub(crate) mod boundary;
 mod continuation;
@@ -76,7 +69,7 @@ pub struct EquilibriumPoint {
 }
 
 impl EquilibriumPoint {
-    /// Its state and parameter.
+    /// State and parameter, without direction and index.
     fn solution(&self) -> ParametrizedState {
         ParametrizedState {
             state: self.state.clone(),
@@ -205,7 +198,7 @@ fn prolong_rod(rod: &[Increment], first: usize) -> Vec<Increment> {
         if k.is_multiple_of(2) {
             return at(k / 2);
         }
-        // Four neighbouring nodes; at the ends, the nearest four.
+        // Four neighboring nodes; at the ends, the nearest four.
         let mut sum = [0.0; 6];
         for (i, weight) in Stencil::<4>::new(0, n + 1, k as f64 / 2.0).terms() {
             let value = at(i);

@@ -104,12 +104,12 @@ struct FinerGridPoint<'a> {
     displacement: f64,
     /// Cosine between the tangents on both grids.
     tangent_cosine: f64,
-    /// As in [`ConvergedPoint`].
+    /// Displacement by the last iteration, as of a [`ConvergedPoint`].
     unfinished: f64,
 }
 
 impl FinerGridPoint<'_> {
-    /// Its comparison with the point on the previous grid; the index should be this.
+    /// Compares the point with that on the previous grid; `index` is what its index should be.
     fn relocation(&self, index: usize) -> Relocation {
         Relocation {
             displacement: self.displacement,
@@ -273,7 +273,7 @@ impl NestedGridPoint for IndexCount<'_> {
 /// A point on the grid with every second node.
 struct CoarserGridPoint {
     row: GridQuantities,
-    /// Its plane on the next finer grid, if it was sought in one.
+    /// The plane in which it was sought, if it was, on the next finer grid.
     plane: Option<ArclengthConstraint>,
 }
 

@@ -19,35 +19,52 @@ use crate::branch::{
 };
 use crate::leaf::{NodalField, State};
 
-/// Largest number of steps of a climb, and the longest step (radians, lengths).
-const STEPS: usize = 60;
+/// Steps uphill to a saddle and downhill from it; lengths are largest increments of any node
+/// (radians, lengths).
+struct ValleySteps {
+    /// Largest number of steps of a climb and of a descent.
+    most_climbing: usize,
+    most_descending: usize,
+    /// The longest step: longer ones leave the valley.
+    longest: f64,
+    /// The first step of a climb, and the shortest to the maximum of the cubic.
+    first_climbing: f64,
+    /// The perturbation with which a descent begins, also the length of its first step, and the
+    /// growth factor of the next.
+    first_descending: f64,
+    descent_growth: f64,
+    /// A step of Newton's method below this is the last: a correction to the equilibrium follows.
+    final_newton: f64,
+}
 
-const LONGEST: f64 = 0.2;
+const STEPS: ValleySteps = ValleySteps {
+    most_climbing: 60,
+    most_descending: 200,
+    longest: 0.2,
+    first_climbing: 0.01,
+    first_descending: 0.01,
+    descent_growth: 1.5,
+    final_newton: 1e-2,
+};
 
-/// The first step, and the shortest of the cubic model, in the same measure.
-const FIRST: f64 = 0.01;
+/// Shifts (squared frequencies, times the mass matrix) that make the matrix across the path
+/// positive definite.
+struct MatrixShifts {
+    /// The first tried, and the one at which a climb is abandoned.
+    first: f64,
+    largest: f64,
+    /// Factor by which the shift for the lowest mode exceeds the magnitude of its eigenvalue.
+    eigenvalue_factor: f64,
+}
 
-/// Largest number of steps of a descent, its initial perturbation, and the growth of its steps.
-const MAX_DESCENT_STEPS: usize = 200;
+const SHIFTS: MatrixShifts = MatrixShifts {
+    first: 1.0,
+    largest: 1e6,
+    eigenvalue_factor: 1.05,
+};
 
-const DESCENT_PERTURBATION: f64 = 0.01;
-
-const GROWTH: f64 = 1.5;
-
-/// Increments below this end with a Newton correction to the equilibrium.
-const FINAL_CORRECTION_INCREMENT: f64 = 1e-2;
-
-/// Shift (in squared frequencies, times the mass matrix) that makes the matrix across the
-/// path positive definite: the first tried, and that at which a climb is abandoned.
-const FIRST_SHIFT: f64 = 1.0;
-
-const LARGEST_SHIFT: f64 = 1e6;
-
-/// Steps of inverse iteration for the lowest mode, and the factor by which the second shift
-/// exceeds the magnitude of its eigenvalue.
+/// Steps of inverse iteration for the lowest mode with one shift.
 const INVERSE_ITERATIONS: usize = 4;
-
-const EIGENVALUE_SHIFT_FACTOR: f64 = 1.05;
 
 /// Number of modes in the search for the softest.
 const SOFT_MODE_COUNT: usize = 3;
@@ -112,7 +129,7 @@ impl BranchEquations<'_> {
             params: [fraction],
         };
         let mut before: Option<FloorStep> = None;
-        for _ in 0..STEPS {
+        for _ in 0..STEPS.most_climbing {
             if stop() {
                 return None;
             }
@@ -130,9 +147,10 @@ impl BranchEquations<'_> {
                 false => valley.across.clone(),
             };
             let size = largest(&increments);
-            let mut step = scale_field(&increments, (LONGEST / size).min(1.0));
-            if !newton && largest(&valley.across) < LONGEST {
-                let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(&valley.along));
+            let mut step = scale_field(&increments, (STEPS.longest / size).min(1.0));
+            if !newton && largest(&valley.across) < STEPS.longest {
+                let [shortest, longest] =
+                    [STEPS.first_climbing, STEPS.longest].map(|by| by / largest(&valley.along));
                 let length = match before {
                     None => shortest,
                     Some(before) => valley.distance_to_maximum(before).clamp(shortest, longest),
@@ -147,7 +165,7 @@ impl BranchEquations<'_> {
             now.state = self
                 .state_after_increments(&now.state, now.params, &step, 1.0)
                 .ok()?;
-            if newton && size < FINAL_CORRECTION_INCREMENT {
+            if newton && size < STEPS.final_newton {
                 let point = self.correct(&now.state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
@@ -194,13 +212,14 @@ impl BranchEquations<'_> {
         direction: &NodalField,
         stop: &dyn Fn() -> bool,
     ) -> Result<EquilibriumPoint, State> {
-        let (mut direction, mut length) = (self.normalize_by_mass(direction), DESCENT_PERTURBATION);
-        let push = scale_field(&direction, DESCENT_PERTURBATION / largest(&direction));
+        let (mut direction, mut length) =
+            (self.normalize_by_mass(direction), STEPS.first_descending);
+        let push = scale_field(&direction, STEPS.first_descending / largest(&direction));
         let params = [fraction];
         let pushed = self.state_after_increments(state, params, &push, 1.0);
         let state = pushed.map_err(|_| state.clone())?;
         let mut now = ParametrizedState { state, params };
-        for _ in 0..MAX_DESCENT_STEPS {
+        for _ in 0..STEPS.most_descending {
             let next = match stop() {
                 true => None,
                 false => self.descend_step(&mut now, &mut direction, &mut length),
@@ -229,22 +248,22 @@ impl BranchEquations<'_> {
         let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
         let increments = if newton {
             valley.newton()
-        } else if largest(&valley.across) < LONGEST {
+        } else if largest(&valley.across) < STEPS.longest {
             let part = length.copysign(valley.force) / largest(&valley.along);
-            *length = (GROWTH * *length).min(LONGEST);
+            *length = (STEPS.descent_growth * *length).min(STEPS.longest);
             scaled_sum(&valley.across, part, &valley.along)
         } else {
             valley.across
         };
         *direction = self.normalize_by_mass(&valley.along);
         let size = largest(&increments);
-        let step = scale_field(&increments, (LONGEST / size).min(1.0));
+        let step = scale_field(&increments, (STEPS.longest / size).min(1.0));
         let next = self
             .state_after_increments(&now.state, now.params, &step, 1.0)
             .ok()?;
         Some(DescentStep {
             state: next,
-            near_equilibrium: newton && size < FINAL_CORRECTION_INCREMENT,
+            near_equilibrium: newton && size < STEPS.final_newton,
         })
     }
 
@@ -252,7 +271,7 @@ impl BranchEquations<'_> {
     fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<Valley> {
         let border = [self.multiply_by_mass(direction)];
         let mut shift = linear.shift;
-        while shift < LARGEST_SHIFT {
+        while shift < SHIFTS.largest {
             let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
             let mut solved = solved.ok()?.responses;
             // One negative eigenvalue is due to the border.
@@ -267,7 +286,7 @@ impl BranchEquations<'_> {
                     shift,
                 });
             }
-            shift = (4.0 * shift).max(FIRST_SHIFT);
+            shift = (4.0 * shift).max(SHIFTS.first);
         }
         None
     }
@@ -277,12 +296,12 @@ impl BranchEquations<'_> {
     fn lowest_mode(&mut self, direction: &NodalField) -> Option<NodalField> {
         let pattern = self.pattern(0).ok()?;
         let mut mode = direction.clone();
-        let mut shift = FIRST_SHIFT;
+        let mut shift = SHIFTS.first;
         for _ in 0..2 {
             let mut factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
             while factor.negative_eigenvalue_count() > 0 {
                 shift *= 2.0;
-                if shift > LARGEST_SHIFT {
+                if shift > SHIFTS.largest {
                     return None;
                 }
                 factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
@@ -295,7 +314,7 @@ impl BranchEquations<'_> {
                 eigenvalue = 1.0 / (self.mass * self.mass_product(&mode, &next)) - shift;
                 mode = self.normalize_by_mass(&next);
             }
-            shift = EIGENVALUE_SHIFT_FACTOR * eigenvalue.abs();
+            shift = SHIFTS.eigenvalue_factor * eigenvalue.abs();
         }
         let same = self.mass_product(&mode, direction) >= 0.0;
         Some(if same { mode } else { scale_field(&mode, -1.0) })

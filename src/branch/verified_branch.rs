@@ -22,28 +22,39 @@ use crate::relax::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// The finest grid to follow a branch on, in segments and in nodes.
-const FINEST_CONTINUATION_GRID: usize = 512;
+/// How much work a verified branch may take.
+struct VerifiedBranchBudget {
+    /// Largest number of segments of the grid on which the branch is followed, and of its nodes:
+    /// each doubling makes verification, on still finer grids, as much more expensive.
+    finest_segments: usize,
+    most_nodes: usize,
+    /// Least and largest number of points computed before they are verified in parallel: points
+    /// after the first that is not verified are lost.
+    least_batch: usize,
+    largest_batch: usize,
+    /// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
+    finest_grid_attempts: usize,
+    finest_grid_step_factor: f64,
+    /// Largest number of consecutive points dropped next to a critical point: the critical point
+    /// lies elsewhere on every grid, so that a point may be before it on one and beyond it on
+    /// another.
+    consecutive_dropped_points: usize,
+}
 
-const MOST_NODES: usize = 20_000;
+const BUDGET: VerifiedBranchBudget = VerifiedBranchBudget {
+    finest_segments: 512,
+    most_nodes: 20_000,
+    least_batch: 2,
+    largest_batch: 16,
+    finest_grid_attempts: 4,
+    finest_grid_step_factor: 0.4,
+    consecutive_dropped_points: 4,
+};
 
-/// Least and largest number of points computed before they are verified in parallel.
-const MIN_VERIFICATION_BATCH: usize = 2;
-
-const MAX_VERIFICATION_BATCH: usize = 16;
-
-/// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
-const MAX_FINEST_GRID_ATTEMPTS: usize = 4;
-
-const FINEST_GRID_STEP_FACTOR: f64 = 0.4;
-
-/// Largest number of consecutive points dropped next to a critical point: that lies elsewhere
-/// on every grid, so that a point may be before it on one grid and beyond it on another.
-const MAX_CONSECUTIVE_DROPPED_POINTS: usize = 4;
-
-/// From the grid on which they were found to the finest, neighbouring points move alike: the
-/// difference is at most this part of their distance plus this part of the larger displacement,
-/// plus `SMALL`. The part is large, since they are sought in different planes.
+/// From the grid on which they were found to the finest, neighboring points move alike: their
+/// displacements differ by at most this part of the distance of the points, plus this part of the
+/// larger displacement, plus `NEGLIGIBLE_DISPLACEMENT_DIFFERENCE` (lengths). The part is large,
+/// since the points are sought in different planes.
 const SIMILAR_DISPLACEMENT_FRACTION: f64 = 0.8;
 
 const NEGLIGIBLE_DISPLACEMENT_DIFFERENCE: f64 = 1e-6;
@@ -60,9 +71,9 @@ pub struct VerifiedBranch {
     pub branch: Branch,
     /// How it ended.
     pub end: BranchEnd,
-    /// Its points, extrapolated over grids.
+    /// The points of the branch, extrapolated over grids.
     pub points: Vec<ExtrapolatedPoint>,
-    /// Its critical points, likewise.
+    /// The critical points of the branch, extrapolated over grids.
     pub critical: Vec<ExtrapolatedPoint>,
     /// What was found of critical points beyond the last point.
     beyond: Vec<Result<ExtrapolatedPoint, VerificationFailure>>,
@@ -85,7 +96,7 @@ impl<'a> NestedBranchEquations<'a> {
     /// Creates the next finer grid if needed; false if that is too fine.
     fn refine(&mut self, state: &State) -> bool {
         let finer = 2 * state.segments();
-        if finer > FINEST_CONTINUATION_GRID || finer * state.rods() > MOST_NODES {
+        if finer > BUDGET.finest_segments || finer * state.rods() > BUDGET.most_nodes {
             return false;
         }
         let last = &self.equations[self.equations.len() - 1];
@@ -96,7 +107,7 @@ impl<'a> NestedBranchEquations<'a> {
         true
     }
 
-    /// Number of matrices factorised so far.
+    /// Number of matrices factorized so far.
     pub fn factorizations(&self) -> usize {
         self.equations.iter().map(|it| it.factorizations).sum()
     }
@@ -119,7 +130,7 @@ impl<'a> NestedBranchEquations<'a> {
             critical: Vec::new(),
             beyond: Vec::new(),
         };
-        let (mut ahead, mut tries) = (MAX_VERIFICATION_BATCH / 2, 0);
+        let (mut ahead, mut tries) = (BUDGET.largest_batch / 2, 0);
         loop {
             let now = &known.branch.points[known.branch.points.len() - 1];
             let (before, now) = (known.points.len(), now.state.clone());
@@ -138,7 +149,7 @@ impl<'a> NestedBranchEquations<'a> {
             }
             match (doubt, &known.branch.end) {
                 (None, None) => {
-                    ahead = (2 * ahead).min(MAX_VERIFICATION_BATCH);
+                    ahead = (2 * ahead).min(BUDGET.largest_batch);
                     continue;
                 }
                 (Some(_), _)
@@ -154,7 +165,7 @@ impl<'a> NestedBranchEquations<'a> {
                 }
             }
             let end = known.branch.end.clone();
-            ahead = MIN_VERIFICATION_BATCH;
+            ahead = BUDGET.least_batch;
             tries += 1;
             let last = known.points.len().saturating_sub(1);
             known.branch.truncate_at(last);
@@ -163,10 +174,12 @@ impl<'a> NestedBranchEquations<'a> {
             known.branch.shorten(if refined {
                 1.0
             } else {
-                FINEST_GRID_STEP_FACTOR
+                BUDGET.finest_grid_step_factor
             });
             if !refined
-                && (tries > MAX_FINEST_GRID_ATTEMPTS || known.points.is_empty() || doubt.is_none())
+                && (tries > BUDGET.finest_grid_attempts
+                    || known.points.is_empty()
+                    || doubt.is_none())
             {
                 known.end = match (doubt, end) {
                     (None, Some(end)) => end,
@@ -213,7 +226,7 @@ impl VerifiedBranch {
             let number = self.points.len();
             let near = number > 0 && self.branch.is_near_critical(number);
             let near = near && matches!(point, Err(VerificationFailure::OtherIndex));
-            if near && dropped < MAX_CONSECUTIVE_DROPPED_POINTS {
+            if near && dropped < BUDGET.consecutive_dropped_points {
                 if number + 1 < self.branch.points.len() {
                     self.branch.drop_point(number);
                     dropped += 1;
@@ -326,8 +339,8 @@ const COARSEST_RELAXATION_GRID: usize = 8;
 /// Distances from the branch point at which the other branch is sought, in this order.
 const BRANCH_SWITCHING_DISTANCES: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
-/// Where the first of these distances leads out of the range of the parameter, it is shortened by
-/// this factor, fewer times than that.
+/// Where the first of `BRANCH_SWITCHING_DISTANCES` leads out of the range of the parameter, it is
+/// shortened by this factor, at most `MAX_SWITCHING_REDUCTIONS` - 1 times.
 const SWITCHING_DISTANCE_FACTOR: f64 = 0.3;
 
 const MAX_SWITCHING_REDUCTIONS: i32 = 8;

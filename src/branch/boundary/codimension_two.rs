@@ -1,20 +1,21 @@
 //! Special points of a boundary: cusps, and crossings with another boundary.
+//!
+//! A test function vanishes there, the speed of the fold in the parameter plane or another
+//! eigenvalue of H; its zero along the boundary is found by a secant method.
 
 use crate::branch::boundary::singular_point::{
     BoundarySearchTolerance, COINCIDENT_EIGENVALUE_TOLERANCE, SingularPoint, TwoParameterEquations,
 };
-use crate::branch::critical::CriticalKind;
+use crate::branch::critical::{CriticalKind, SecantLimits};
 use crate::branch::equations::CorrectorFailure;
 
-/// Largest number of evaluations in the search along the boundary.
-const EVALUATIONS: usize = 25;
-
-/// Accuracy along the boundary: at a cusp the parameters are accurate to its square; at a
-/// crossing it is that of the parameters.
-const CODIMENSION_TWO_ACCURACY: f64 = 1e-11;
-
-/// Differences over less than this do not give a reliable slope.
-const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-7;
+/// The search along the boundary: at a cusp the parameters are accurate to the square of the
+/// accuracy; at a crossing they are as accurate.
+const SECANT: SecantLimits = SecantLimits {
+    evaluations: 25,
+    accuracy: 1e-11,
+    shortest_slope_difference: 1e-7,
+};
 
 /// Largest distance of the special point from its initial guess, along the boundary; and that of
 /// a point of the boundary from its prediction, across it.
@@ -125,7 +126,7 @@ fn secant_codimension_two(
     let mut best = now.clone();
     let (mut at, mut value) = (0.0, special.test_function(now));
     let mut worse = 0;
-    for _ in 0..EVALUATIONS {
+    for _ in 0..SECANT.evaluations {
         let step = -value / slope;
         if !step.is_finite() || !(least..=most).contains(&(at + step)) {
             return Err(CorrectorFailure::NotConverged);
@@ -133,7 +134,7 @@ fn secant_codimension_two(
         let next = boundary_point_at_distance(manifold, now, at + step, SEARCH_POINT_TOLERANCE)?;
         let next = next.point;
         let after = special.test_function(&next);
-        if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
+        if step.abs() > SECANT.shortest_slope_difference {
             slope = (after - value) / step;
         }
         (at, value) = (at + step, after);
@@ -141,7 +142,7 @@ fn secant_codimension_two(
             true => best = next,
             false => worse += 1,
         }
-        if step.abs() < CODIMENSION_TWO_ACCURACY || worse > 1 {
+        if step.abs() < SECANT.accuracy || worse > 1 {
             return Ok(CodimensionTwoPoint {
                 kind: special,
                 point: best,

@@ -66,7 +66,7 @@ const SMALLEST_PARAMETER_RATE_RATIO: f64 = 0.1;
 pub struct BoundaryAccuracy {
     pub tips: f64,
     pub numbers: f64,
-    /// That of the parameters for which further grids are tried.
+    /// Accuracy of the parameters for which further grids are tried.
     pub sought: f64,
 }
 
@@ -493,7 +493,7 @@ pub struct VerifiedBoundaryPoint {
     pub factorizations: usize,
 }
 
-/// Both parameters at a point on a grid.
+/// Both parameters at a point on a grid, without softening of the matrix.
 #[derive(Default)]
 struct BoundaryParameters {
     values: [f64; 2],

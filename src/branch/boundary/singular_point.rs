@@ -46,7 +46,7 @@ pub struct SingularPoint {
     /// to where there are more negative eigenvalues.
     pub tangent: TwoParameterDirection,
     pub normal: TwoParameterDirection,
-    /// Derivative of the eigenvalue of H along the latter.
+    /// Derivative of the eigenvalue of H along the normal.
     pub slope: f64,
     /// Morse index beyond the boundary, on the side of the normal.
     pub index: usize,
@@ -83,7 +83,7 @@ const FIRST_POINT_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
 #[derive(Clone, Copy)]
 pub struct BoundarySeed<'c> {
     pub critical: &'c CriticalPoint,
-    /// The same extrapolated over grids.
+    /// The critical point extrapolated over grids.
     pub refined: &'c ExtrapolatedPoint,
     /// Both parameters at the start of the branch, as fractions of their ranges,
     pub from: [f64; 2],
