@@ -95,7 +95,7 @@ pub struct ContinuationOptions<'a> {
     /// The longest step; the range of the parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest_step: f64,
-    /// Largest number of points.
+    /// Largest number of points of the branch, the first included.
     pub max_points: usize,
     /// Least number of grids for a critical point.
     pub critical_grids: usize,
@@ -104,7 +104,8 @@ pub struct ContinuationOptions<'a> {
 }
 
 impl ContinuationOptions<'_> {
-    /// Without a stopping criterion.
+    /// Follows a branch with steps up to `longest` to at most so many points, without a criterion
+    /// for stopping.
     pub fn new(longest: f64, most: usize) -> Self {
         ContinuationOptions {
             longest_step: longest,
@@ -122,7 +123,7 @@ pub enum BranchEnd {
     RangeEndReached,
     /// Back at the start of the range.
     RangeStartReached,
-    /// Where it began.
+    /// At the point where it began: it is closed.
     LoopClosed,
     /// On a boundary that was followed before.
     KnownBoundaryMet,
@@ -153,7 +154,7 @@ impl BranchEnd {
 /// A branch on one grid, or on finer and finer ones.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// The points in order.
+    /// The points in the order in which the branch was followed.
     pub points: Vec<EquilibriumPoint>,
     /// Critical points, each with the number of the point before it.
     pub critical: Vec<(usize, CriticalPoint)>,
@@ -162,7 +163,7 @@ pub struct Branch {
     /// Vertices of pitchforks at which no branch was found to cross, by the number of the point
     /// before.
     pub unmatched_vertices: Vec<usize>,
-    /// How it ended, once it has.
+    /// Why the branch ends, once it does.
     pub end: Option<BranchEnd>,
     /// The first point on the present grid, if it was found there.
     first: Option<EquilibriumPoint>,
@@ -186,7 +187,7 @@ pub fn follow_branch(
 }
 
 impl Branch {
-    /// A branch with one point.
+    /// A branch with one point, not yet followed.
     pub fn new(first: EquilibriumPoint, how: &ContinuationOptions) -> Self {
         Branch {
             points: vec![first.clone()],
@@ -253,7 +254,7 @@ impl Branch {
         self.step *= part;
     }
 
-    /// Drops a point between two others.
+    /// Drops a point between two others: critical points on both sides are then between these.
     pub fn drop_point(&mut self, number: usize) {
         self.points.remove(number);
         self.steps[number - 1] += self.steps.remove(number);
@@ -391,7 +392,7 @@ impl ContinuationOptions<'_> {
     }
 }
 
-/// The difference of two points.
+/// The direction, not normalized, from one point to another.
 fn direction_between(
     equations: &BranchEquations,
     a: &EquilibriumPoint,

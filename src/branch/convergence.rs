@@ -44,7 +44,12 @@ pub(super) trait NestedGridPoint {
     fn segments(&self) -> usize;
 
     /// Between how many grids the search must end.
-    fn grid_limits(&self) -> GridLimits;
+    fn grid_limits(&self) -> GridLimits {
+        GridLimits {
+            least: 1,
+            most: MAX_GRIDS,
+        }
+    }
 
     /// Adds the values of the point on the present grid to its convergence table.
     fn tabulate(&mut self, level: usize) -> Result<(), VerificationFailure>;
@@ -208,7 +213,7 @@ pub(super) struct PointQuantities {
     pub points: Vec<f64>,
     pub fraction: f64,
     pub energy: f64,
-    /// The forces on the holders.
+    /// The forces on the holder of held tips and on grips, in the family's units.
     pub reactions: Vec<DVec3>,
 }
 

@@ -87,7 +87,7 @@ struct CorrectorStep {
     law_forces: Vec<DVec3>,
     /// The rate of the increments with the parameter.
     rate: NodalField,
-    /// Negative eigenvalues, if they were counted.
+    /// The number of negative eigenvalues, if the factorization counts them.
     counted: Option<usize>,
 }
 
@@ -290,7 +290,7 @@ impl BranchEquations<'_> {
         Ok(index)
     }
 
-    /// Number of eigenvalues below minus `shift`.
+    /// The number of eigenvalues (squared frequencies) below minus `shift`.
     fn index_below(
         &mut self,
         solution: &ParametrizedState,
@@ -313,7 +313,7 @@ impl BranchEquations<'_> {
     }
 }
 
-/// A point found by a step.
+/// A point of a branch found by a step from another, and the step that has led to it.
 pub struct SteppedPoint {
     pub point: EquilibriumPoint,
     /// Length of the step along the tangent at its start.

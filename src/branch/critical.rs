@@ -21,7 +21,7 @@ pub(super) const EXTRA_BORDER_MODES: usize = 2;
 /// How the zero of an eigenvalue, or of another function, along a curve is sought by a secant
 /// method.
 pub(super) struct SecantLimits {
-    /// Largest number of evaluations.
+    /// Largest number of evaluations of the function, each by Newton's method.
     pub evaluations: usize,
     /// A step below this is the last (arclength).
     pub accuracy: f64,
@@ -56,12 +56,12 @@ const SEARCH_END_TOLERANCE: f64 = 0.05;
 /// Two vertices nearer to each other than this are the same.
 const SAME_VERTEX_DISTANCE: f64 = 1e-4;
 
-/// Kind of a critical point.
+/// What a branch does where its matrix is singular.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CriticalKind {
     /// The branch turns back in the parameter.
     Fold,
-    /// Other branches cross.
+    /// Other branches cross the branch.
     Branching,
 }
 
@@ -75,9 +75,9 @@ pub struct CriticalPoint {
     pub kind: CriticalKind,
     /// Morse index before and after; the same at the vertex of a pitchfork.
     pub indices: [usize; 2],
-    /// The neutral modes, of mass one.
+    /// The modes with eigenvalue zero, of mass one.
     pub modes: Vec<NodalField>,
-    /// All modes used for the border.
+    /// The modes of the border: the neutral and others that are nearly so.
     pub border_modes: Vec<NodalField>,
     /// Position of the vanishing one among the sorted eigenvalues of H, and its derivative with
     /// respect to arclength along the tangent.
@@ -160,7 +160,7 @@ struct LocatedZero {
 struct CriticalPointSearch<'s, 'a> {
     equations: &'s mut BranchEquations<'a>,
     from: &'s EquilibriumPoint,
-    /// The modes of the border.
+    /// The modes that border the matrix.
     soft: &'s [NodalField],
     /// Whether the parameter alone is sought to rounding: at a fold it is known better than the
     /// shape.

@@ -65,7 +65,7 @@ pub(super) struct AssembledForces {
 /// The forces by which the law of nearly rigid segments is completed; none without such segments.
 #[derive(Default)]
 pub(super) struct LawCompletion {
-    /// Those on the nodes, if there are any.
+    /// Forces on the nodes by which the increments are completed, if there are any.
     nodal_forces: Option<NodalField>,
     pub segment_forces: Vec<DVec3>,
 }
@@ -104,7 +104,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:
-    /// see [`Leaves::softened`].
+    /// see [`Leaves::with_regularization`].
     pub(super) fn regularize(&mut self, softening: f64) {
         let (family, grid) = (self.leaves.family, self.grid().clone());
         self.regularized_leaves = Some(Leaves::with_regularization(family, grid, softening));
@@ -139,13 +139,14 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         self.system.rods()
     }
 
-    /// Inner product of two directions.
+    /// Inner product of two directions: over the mass matrix, per unit of the leaf's mass, plus that
+    /// of the parameters' parts.
     pub fn direction_product(&self, a: &BranchDirection<N>, b: &BranchDirection<N>) -> f64 {
         let params = a.params.iter().zip(b.params).map(|(a, b)| a * b);
         self.mass_product(&a.increments, &b.increments) + params.sum::<f64>()
     }
 
-    /// Scales a direction to length one.
+    /// Scales a direction to length one in the inner product of directions.
     pub fn normalize_direction(&self, direction: BranchDirection<N>) -> BranchDirection<N> {
         let length = self.direction_product(&direction, &direction).sqrt();
         BranchDirection {
@@ -304,7 +305,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
     }
 }
 
-/// The leaves whose matrices are assembled.
+/// The leaves whose matrices are assembled: the softened ones, if `soft` and there are such.
 fn leaves_to_assemble<'l, 'a, const N: usize>(
     leaves: &'l mut Leaves<'a, N>,
     softened: &'l mut Option<Leaves<'a, N>>,
@@ -574,7 +575,7 @@ pub(super) struct AugmentingFunction<'f> {
     pub value: f64,
 }
 
-/// Newton's step of the bordered equations.
+/// Newton's step of the bordered equations, augmented by as many functions as parameters.
 struct BorderedNewtonStep {
     increments: NodalField,
     parameter_changes: Vec<f64>,
@@ -596,10 +597,10 @@ pub(super) struct BorderedSolve {
 
 /// Solutions of the bordered equations at some state.
 pub struct BorderedResponses {
-    /// For the forces, and for their rates with respect to each parameter.
+    /// Solutions for the forces, and for their rates with respect to each parameter.
     pub forces: BorderedSolution,
     pub rates: Vec<BorderedSolution>,
-    /// H and X of the border.
+    /// The blocks H and X of the solution for the unit vectors of the border.
     pub h: DMatrix<f64>,
     pub modes: Vec<NodalField>,
     /// Negative eigenvalues of the bordered matrix: those of the matrix and those of H

@@ -44,13 +44,13 @@ pub struct LeafFamily<'a, const N: usize = 1> {
     first: Leaf,
     /// A leaf with coupled veins, if there is one at an end of a range.
     coupled: Leaf,
-    /// Sparsity patterns of their matrices.
+    /// Sparsity patterns of the matrices of the leaves.
     pub patterns: Arc<SparsityPatternCache>,
     /// When branches of these leaves are followed no further: every Newton iteration checks it.
     pub limit: Limit,
 }
 
-/// The range of a parameter.
+/// The range of a parameter, linear or logarithmic.
 #[derive(Clone, Copy)]
 pub struct ParameterRange {
     /// Values at the fractions 0 and 1.
@@ -60,7 +60,7 @@ pub struct ParameterRange {
 }
 
 impl ParameterRange {
-    /// The value at a fraction.
+    /// The value at a fraction of the range.
     fn value(self, fraction: f64) -> f64 {
         // At an end, rounding must not lead beyond: there may be no leaf.
         match fraction {
@@ -70,7 +70,7 @@ impl ParameterRange {
         }
     }
 
-    /// The fraction at a value.
+    /// The fraction of the range at a value of the parameter.
     pub fn fraction(self, value: f64) -> f64 {
         let [from, to] = self.ends;
         match self.log {
@@ -196,12 +196,12 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
         std::array::from_fn(|i| self.ranges[i].value(params[i]))
     }
 
-    /// The scenario at fractions.
+    /// The scenario at fractions of the ranges.
     pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
         (self.make_scenario)(self.values(params)).map_err(OutOfRange)
     }
 
-    /// The leaf at fractions.
+    /// The leaf at fractions of the ranges.
     pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
         Ok(Leaf::with_scale(
             Arc::new(self.scenario(params)?),

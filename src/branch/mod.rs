@@ -83,7 +83,7 @@ impl EquilibriumPoint {
 pub struct ParametrizedState<const N: usize = 1> {
     /// The state of the leaf.
     pub state: State,
-    /// The parameters.
+    /// The parameters, as fractions of their ranges.
     pub params: [f64; N],
 }
 
@@ -97,7 +97,7 @@ pub struct BranchDirection<const N: usize = 1> {
 }
 
 impl<const N: usize> BranchDirection<N> {
-    /// The opposite direction.
+    /// The direction with all changes of the opposite sign.
     pub fn reversed(&self) -> Self {
         BranchDirection {
             increments: scale_field(&self.increments, -1.0),
@@ -105,13 +105,13 @@ impl<const N: usize> BranchDirection<N> {
         }
     }
 
-    /// Parameters `step` further along it than these.
+    /// The parameters after a step of this length from `params` along the direction.
     fn parameters_after_step(&self, params: [f64; N], step: f64) -> [f64; N] {
         std::array::from_fn(|i| params[i] + step * self.params[i])
     }
 }
 
-/// The work of forces on increments.
+/// The work of forces (and torques) on increments of the nodes, both by rod, node and component.
 pub fn dot(forces: &NodalField, increments: &NodalField) -> f64 {
     let mut sum = 0.0;
     for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
@@ -151,6 +151,7 @@ pub fn combine_fields(parts: &[f64], fields: &[NodalField]) -> NodalField {
     sum
 }
 
+/// The largest component of any node (radians, lengths).
 pub fn largest(a: &NodalField) -> f64 {
     crate::numbers::largest(a.iter().flatten().flatten().map(|v| v.abs()))
 }
@@ -163,6 +164,7 @@ pub fn increments_between(a: &State, b: &State, first: usize) -> NodalField {
     field
 }
 
+/// Whether no component is infinite or not a number.
 pub fn is_finite(a: &NodalField) -> bool {
     a.iter().flatten().flatten().all(|v| v.is_finite())
 }
@@ -211,7 +213,7 @@ fn prolong_rod(rod: &[Increment], first: usize) -> Vec<Increment> {
     (first..=2 * n).map(node).collect()
 }
 
-/// Why no point is found.
+/// Why no point of a branch is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CorrectorFailure {
     /// The parameter has left its range.

@@ -317,7 +317,7 @@ fn on_coarser(
 /// A regular point that is verified on finer and finer grids.
 struct NestedRegularPoint<'a> {
     equations: BranchEquations<'a>,
-    /// The point on the present grid.
+    /// Where the point is on the present grid.
     point: EquilibriumPoint,
     /// The index that all grids must have.
     index: usize,
@@ -380,13 +380,6 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
 
     fn segments(&self) -> usize {
         self.equations.grid().segments()
-    }
-
-    fn grid_limits(&self) -> GridLimits {
-        GridLimits {
-            least: 1,
-            most: MAX_GRIDS,
-        }
     }
 
     fn tabulate(&mut self, level: usize) -> Result<(), VerificationFailure> {
@@ -484,7 +477,7 @@ pub fn refine_critical(
 /// A critical point that is verified on finer and finer grids.
 struct NestedCriticalPoint<'a> {
     equations: BranchEquations<'a>,
-    /// The point on the present grid.
+    /// Where the point is on the present grid.
     critical: CriticalPoint,
     /// The compliance by which the matrix of a nearly rigid leaf is softened.
     regularization: f64,
@@ -531,13 +524,6 @@ impl NestedGridPoint for NestedCriticalPoint<'_> {
 
     fn segments(&self) -> usize {
         self.equations.grid().segments()
-    }
-
-    fn grid_limits(&self) -> GridLimits {
-        GridLimits {
-            least: 1,
-            most: MAX_GRIDS,
-        }
     }
 
     fn tabulate(&mut self, _: usize) -> Result<(), VerificationFailure> {
@@ -687,12 +673,12 @@ fn extrapolate_regularization(
     })
 }
 
-/// A branch at a branch point.
+/// A branch interpolated at a branch point from points on both sides.
 struct InterpolatedBranchPoint {
     values: PointQuantities,
     /// A bound on the error of the tips.
     error: f64,
-    /// Derivatives of the values with respect to the fraction.
+    /// Derivatives of the values with respect to the fraction of the parameter.
     slope: PointQuantities,
 }
 

@@ -76,20 +76,20 @@ struct FloorStep {
     length: f64,
 }
 
-/// A step downhill.
+/// A step of the descent from a saddle.
 struct DescentStep {
     state: State,
     /// Whether it was a step of Newton's method, short enough to end the descent.
     near_equilibrium: bool,
 }
 
-/// The valley floor in a direction.
+/// The valley floor in a direction at a state.
 struct Valley {
     /// X, and the force and the curvature of the energy along it.
     along: NodalField,
     force: f64,
     curvature: f64,
-    /// Newton's step across it.
+    /// Newton's step across the floor.
     across: NodalField,
     shift: f64,
 }
@@ -236,7 +236,8 @@ impl BranchEquations<'_> {
         Err(now.state)
     }
 
-    /// A step down the valley floor.
+    /// A step down the valley floor from `now`, after which `direction` is that of the floor and
+    /// `length` that of the next step.
     fn descend_step(
         &mut self,
         now: &mut ParametrizedState,
@@ -320,7 +321,7 @@ impl BranchEquations<'_> {
         Some(if same { mode } else { scale_field(&mode, -1.0) })
     }
 
-    /// Scales a direction to mass one.
+    /// Scales increments to unit product over the mass matrix, per unit of the leaf's mass.
     fn normalize_by_mass(&self, direction: &NodalField) -> NodalField {
         scale_field(
             direction,

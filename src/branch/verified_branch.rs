@@ -65,11 +65,11 @@ pub struct NestedBranchEquations<'a> {
     equations: Vec<BranchEquations<'a>>,
 }
 
-/// A branch with only verified points.
+/// A branch of which every point is verified on finer grids.
 pub struct VerifiedBranch {
     /// The branch as found on its grids.
     pub branch: Branch,
-    /// How it ended.
+    /// Why the branch ends.
     pub end: BranchEnd,
     /// The points of the branch, extrapolated over grids.
     pub points: Vec<ExtrapolatedPoint>,
@@ -80,7 +80,7 @@ pub struct VerifiedBranch {
 }
 
 impl<'a> NestedBranchEquations<'a> {
-    /// Starts with one grid.
+    /// The equations on the first grid alone; finer ones follow where they are needed.
     pub fn new(family: &'a LeafFamily<'a>, grid: Grid) -> Self {
         NestedBranchEquations {
             equations: vec![BranchEquations::new(family, grid)],

@@ -21,13 +21,13 @@ const SECANT: SecantLimits = SecantLimits {
 /// a point of the boundary from its prediction, across it.
 const LARGEST_SEARCH_DISTANCE: f64 = 0.3;
 
-/// Points of the boundary during the search along it.
+/// The search for points of the boundary at which the test function is evaluated.
 const SEARCH_POINT_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
     accuracy: 1e-13,
     largest_distance: LARGEST_SEARCH_DISTANCE,
 };
 
-/// Points at a given parameter.
+/// The search for a point of the boundary at a value of one parameter, from its prediction.
 const GIVEN_PARAMETER_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
     accuracy: 1e-12,
     largest_distance: 0.5,

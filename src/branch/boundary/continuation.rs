@@ -73,18 +73,19 @@ struct ParameterLimit {
     /// The first parameter, 0, or the second, 1.
     which: usize,
     value: f64,
-    /// Length of the step to it.
+    /// Arclength of the step to this value.
     distance: f64,
 }
 
-/// A boundary followed in one direction.
+/// A boundary that is followed in one direction: all points so far, the first of which are
+/// verified.
 pub struct BoundaryContinuation<'a, 'h> {
     plane: &'a TwoParameterProblem<'a>,
     options: &'h BoundaryContinuationOptions,
     /// The second parameter at the starting point.
     initial_second_parameter: f64,
     first: SingularPoint,
-    /// Length of the next step.
+    /// Arclength of the next step on the manifold.
     step: f64,
     steps: Vec<UnverifiedBoundaryPoint>,
     verified: Vec<VerifiedBoundaryPoint>,

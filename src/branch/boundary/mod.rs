@@ -77,7 +77,7 @@ pub struct ConfirmedEquilibrium {
     /// State and parameters on a grid, and that grid.
     pub solution: TwoParameterState,
     pub grid: Grid,
-    /// Morse index, confirmed on finer grids.
+    /// Morse index, on which three grids in a row agree.
     pub index: usize,
 }
 
@@ -220,19 +220,20 @@ pub fn refine_on_path(
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }
 
-/// Distances from the boundary at which they are sought, in this order: arclengths on the
-/// solution manifold, or fractions of the ranges.
+/// Distances from the boundary at which neighboring leaves are sought, in this order: arclengths
+/// on the solution manifold, or fractions of the ranges.
 const NEIGHBOUR_DISTANCES: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 
 /// The finest grid used for pictures, in segments.
 const FINEST_PICTURE_GRID: usize = 64;
 
-/// A leaf next to a boundary.
+/// An equilibrium next to a boundary of stability, for a picture.
 pub struct BoundaryNeighbour {
     pub solution: TwoParameterState,
     pub index: usize,
-    /// If it is where the leaf of the other, stable side comes to rest beyond the boundary, the
-    /// initial state of that fall: the unstable equilibrium at a branch point, or the fold.
+    /// The initial state of the fall, where this is the equilibrium to which the leaf of the other,
+    /// stable side falls beyond the boundary: the unstable equilibrium at a branch point, or the
+    /// fold.
     pub fallen_from: Option<State>,
 }
 

@@ -84,10 +84,9 @@ impl BoundaryAccuracy {
     }
 }
 
-/// A point to be verified.
+/// A point of a boundary found on one grid, to be verified on finer ones.
 #[derive(Clone, Debug)]
 pub struct UnverifiedBoundaryPoint {
-    /// Where it is on a grid.
     pub point: SingularPoint,
     pub special: Option<CodimensionTwoKind>,
     /// The parameter that is fixed: at an end of its range.
@@ -493,7 +492,8 @@ pub struct VerifiedBoundaryPoint {
     pub factorizations: usize,
 }
 
-/// Both parameters at a point on a grid, without softening of the matrix.
+/// Both parameters at a point on a grid; those of a softened matrix are extrapolated to no
+/// softening.
 #[derive(Default)]
 struct BoundaryParameters {
     values: [f64; 2],
@@ -504,7 +504,7 @@ struct BoundaryParameters {
 }
 
 impl BoundaryParameters {
-    /// Without softening.
+    /// Parameters of a leaf whose matrix is not softened.
     fn without_regularization(values: [f64; 2]) -> Self {
         BoundaryParameters {
             values,
@@ -521,7 +521,8 @@ struct FixedParameter {
     value: f64,
 }
 
-/// The values to be extrapolated.
+/// Tips and parameters of a point of a boundary on finer and finer grids, and what their errors
+/// consist of besides those of extrapolation.
 #[derive(Default)]
 struct BoundaryConvergenceTable {
     tips: Richardson,
@@ -534,7 +535,7 @@ struct BoundaryConvergenceTable {
     amplified: f64,
     /// Errors of the parameters due to softening.
     regularization_errors: [f64; 2],
-    /// Largest iteration error of Newton's method.
+    /// Largest iteration error of Newton's method on any grid (lengths, fractions of ranges).
     iteration_error: f64,
 }
 
@@ -614,7 +615,7 @@ impl BoundaryConvergenceTable {
         given.map(|fixed| fixed.value)
     }
 
-    /// Whether the errors of both parameters are below this, or below rounding.
+    /// Whether the error of each parameter is at most `enough`, or at most its rounding error.
     fn is_exact(&self, enough: f64) -> bool {
         let mut errors = self.errors().into_iter().zip(self.rounded);
         errors.all(|(error, rounded)| error <= enough.max(rounded))

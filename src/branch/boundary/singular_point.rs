@@ -50,10 +50,10 @@ pub struct SingularPoint {
     pub slope: f64,
     /// Morse index beyond the boundary, on the side of the normal.
     pub index: usize,
-    /// The other eigenvalues of H.
+    /// The eigenvalues of H of the modes that do not become neutral here.
     pub others: Vec<f64>,
     /// At a fold: the derivative of the parameters with respect to arclength along the boundary,
-    /// as the component along `heading`; it changes sign at a cusp.
+    /// as the component along `fold_direction`; it changes sign at a cusp.
     pub fold_speed: f64,
     /// The direction of the curve of folds in the parameter plane.
     pub fold_direction: [f64; 2],
@@ -459,10 +459,11 @@ fn orthonormalize_modes<'m>(
 /// Eigenvalues below this, or below their rounding error, belong to neutral modes.
 pub const NEUTRAL_EIGENVALUE: f64 = 1e-7;
 
-/// Largest number of evaluations in the search for a zero.
+/// Largest number of evaluations of the eigenvalue in the secant method.
 const EVALUATIONS: usize = 30;
 
-/// Differences over less than this do not give a reliable slope.
+/// Over a shorter step across the boundary rounding errors make a difference quotient of the
+/// eigenvalue worse than the one before.
 const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-6;
 
 /// Relative accuracy of the derivative of the eigenvalue in the combined Newton method; and the
@@ -471,15 +472,16 @@ const EIGENVALUE_SLOPE_ACCURACY: f64 = 1e-3;
 
 const ROUNDING_INCREMENT: f64 = 1e-9;
 
-/// Eigenvalues of H at one evaluation.
+/// Eigenvalues of H at a state, those that become neutral together and the others.
 pub struct BorderEigenvalues {
     /// The mean of those that become neutral, and the largest difference between them.
     pub value: f64,
     pub spread: f64,
-    /// Eigenvectors of H: first theirs, then the others; and the eigenvalues of the others.
+    /// Eigenvectors of H, first of the modes that become neutral, then of the others; and the
+    /// eigenvalues of the others.
     pub vectors: Vec<Vec<f64>>,
     pub others: Vec<f64>,
-    /// Their rounding error: that of the forces on so many segments.
+    /// Rounding error of the eigenvalues: that of the forces times the square of the segments.
     pub rounding: f64,
 }
 
@@ -492,7 +494,7 @@ impl BorderEigenvalues {
 
 /// A search for a point of a boundary.
 pub struct BoundaryPointSearch {
-    /// Where it starts.
+    /// State and parameters from which the search starts.
     pub solution: TwoParameterState,
     /// The direction in which the point is sought.
     crossing: BoundaryCrossing,
@@ -504,7 +506,7 @@ pub struct BoundaryPointSearch {
     tolerance: BoundarySearchTolerance,
 }
 
-/// A boundary point without its directions.
+/// A point of a boundary that a search has found, without the directions of the boundary.
 pub struct BoundarySearchResult {
     pub sample: TwoParameterLinearization,
     pub eigen: BorderEigenvalues,
@@ -789,7 +791,7 @@ impl TwoParameterEquations<'_> {
         }
     }
 
-    /// What leads from one solution to another.
+    /// The direction, not normalized, from one solution to another.
     pub fn difference(
         &self,
         a: &TwoParameterState,
