@@ -10,10 +10,10 @@ use crate::branch::critical::{
     CriticalKind, CriticalPoint, locate_critical_points, locate_pitchfork_vertex,
 };
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::refine::on_finer;
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, add_scaled, increments_between, scaled_sum,
 };
+use crate::branch::refine::on_finer;
 use crate::numbers::larger;
 
 /// How steps along a branch or a boundary are chosen and judged. Halving the turn or the

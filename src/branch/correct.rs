@@ -9,7 +9,7 @@ use crate::branch::equations::{
 use crate::branch::family::{
     CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports,
 };
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
     inject_forces, is_finite, largest, scaled_sum,
 };

@@ -8,7 +8,7 @@
 
 use crate::branch::equations::{BorderedLinearization, BranchEquations, CorrectorFailure};
 use crate::branch::family::eigenvalue_rounding;
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, add_scaled, combine_fields, dot, increments_between,
     scale_field, scaled_sum,
 };

@@ -4,16 +4,17 @@
 //! border are regular, and components along the modes that the forces leave undetermined are not
 //! changed. The modes come from subspace inverse iteration.
 
-pub use crate::branch::CorrectorFailure;
 use crate::branch::family::{
     CompletedIncrements, LeafFamily, Leaves, OutOfRange, force_parameter_derivative,
     place_supports, state_after_step, stiffest_condensed, unbalanced_forces,
 };
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, combine_fields, dot,
     is_finite, largest, prolong_field, scale_field, scaled_sum,
 };
-use crate::leaf::{BorderedSolution, DirectSolver, Grid, MatrixFactors, NodalField, State, System};
+use crate::leaf::{
+    BorderedSolution, DirectError, DirectSolver, Grid, MatrixFactors, NodalField, State, System,
+};
 use crate::newton::{Contraction, remaining_error};
 use crate::numbers::larger;
 use crate::rod::RESOLVED_TURN;
@@ -36,6 +37,49 @@ const ROUNDING_INCREMENT: f64 = 1e-8;
 
 /// Rounding error of a force, in units of epsilon times the largest stiffness.
 const ROUNDING: f64 = 10.0;
+
+/// Why no point of a branch is found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CorrectorFailure {
+    /// The parameter has left its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A segment bends by more than the grid resolves.
+    #[error("a vein bends by more than a right angle within one segment")]
+    Unresolved,
+    /// Newton's method does not converge.
+    #[error("Newton's method does not lead back to the branch")]
+    NotConverged,
+    /// The matrix does not fit into memory.
+    #[error("the sparse factorisation of the leaf does not fit into memory")]
+    TooLarge,
+    /// No grid has the Morse index of the leaf.
+    #[error(
+        "no grid has as many negative eigenvalues as the leaf, which is too close to a bifurcation: start farther from it"
+    )]
+    BesideBifurcation,
+    /// Rounding may change the sign of the softest eigenvalues.
+    #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
+    Rounding,
+    /// Modes that became neutral together no longer do.
+    #[error("modes that become neutral together part")]
+    Separated,
+    /// The second parameter breaks the symmetry to which the branch point is due.
+    #[error("the second number breaks the symmetry by which branches cross")]
+    Unfolded,
+    /// The limit of the run was reached.
+    #[error("the run was stopped")]
+    Stopped,
+}
+
+impl From<DirectError> for CorrectorFailure {
+    fn from(error: DirectError) -> Self {
+        match error {
+            DirectError::Memory => CorrectorFailure::TooLarge,
+            DirectError::NotFinite => CorrectorFailure::NotConverged,
+        }
+    }
+}
 
 /// The equations of a family of leaves on a grid, with workspace.
 pub struct BranchEquations<'a, const N: usize = 1> {

@@ -5,7 +5,7 @@
 //! the parameter, and a state is displaced by increments, with the supports where the leaf at
 //! the new value of the parameter has them.
 
-use crate::branch::{scale_field, scaled_sum};
+use crate::branch::points::{scale_field, scaled_sum};
 use crate::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, NodalField, Scale, State, System};
 use crate::run::Limit;
 use crate::scenario::Scenario;

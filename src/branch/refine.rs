@@ -20,7 +20,7 @@ use crate::branch::equations::{BranchEquations, CorrectorFailure};
 use crate::branch::family::{
     LeafFamily, STIFFEST, eigenvalue_rounding, stiffest_condensed, values_on_both_sides,
 };
-use crate::branch::{BranchDirection, EquilibriumPoint, prolong_field, restrict_field};
+use crate::branch::points::{BranchDirection, EquilibriumPoint, prolong_field, restrict_field};
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::numbers::larger;
 use crate::relax::accuracy::transfer::{prolong, restrict};

@@ -14,7 +14,7 @@
 use crate::branch::equations::{
     AssembledForces, BranchEquations, CorrectorFailure, factorize_matrix,
 };
-use crate::branch::{
+use crate::branch::points::{
     EquilibriumPoint, ParametrizedState, add_scaled, largest, scale_field, scaled_sum,
 };
 use crate::leaf::{NodalField, State};

@@ -5,13 +5,13 @@
 //! verified, the branch is continued from the last one that is, with a shorter step or on the grid
 //! with all segments halved.
 
-use crate::branch::BranchDirection;
-use crate::branch::EquilibriumPoint;
 use crate::branch::continuation::{Branch, BranchEnd, ContinuationOptions};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::CriticalPoint;
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
 use crate::branch::family::{LeafFamily, PARAMETER_ROUNDING};
+use crate::branch::points::BranchDirection;
+use crate::branch::points::EquilibriumPoint;
 use crate::branch::refine::{refine_critical, verify_regular_point};
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::numbers::larger;

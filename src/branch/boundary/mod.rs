@@ -50,8 +50,8 @@ use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
+use crate::branch::points::{EquilibriumPoint, prolong_field, restrict_field};
 use crate::branch::refine::{index_at, on_finer, refine_critical};
-use crate::branch::{EquilibriumPoint, prolong_field, restrict_field};
 use crate::leaf::{Grid, NodalField, State};
 use crate::relax::accuracy::transfer::{prolong, restrict};
 use crate::relax::solve_on_grid::relax_from_state;

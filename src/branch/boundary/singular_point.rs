@@ -4,7 +4,6 @@
 //! It is sought across the boundary, as the zero of an eigenvalue of H: by a secant method with
 //! Newton's method back to the manifold, or by Newton's method for both together.
 
-use crate::branch;
 use crate::branch::convergence::ExtrapolatedPoint;
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{
@@ -13,9 +12,10 @@ use crate::branch::equations::{
 use crate::branch::family::{
     LeafFamily, OutOfRange, force_parameter_derivative, unbalanced_forces,
 };
-use crate::branch::{
-    add_scaled, combine_fields, dot, equations, increments_between, scale_field, scaled_sum,
+use crate::branch::points::{
+    add_scaled, combine_fields, dot, increments_between, scale_field, scaled_sum,
 };
+use crate::branch::{equations, points};
 use crate::leaf::NodalField;
 use crate::newton::{Contraction, remaining_error};
 use crate::numbers::{larger, largest};
@@ -751,9 +751,9 @@ pub type TwoParameterProblem<'a> = LeafFamily<'a, 2>;
 
 pub type TwoParameterEquations<'a> = BranchEquations<'a, 2>;
 
-pub type TwoParameterState = branch::ParametrizedState<2>;
+pub type TwoParameterState = points::ParametrizedState<2>;
 
-pub type TwoParameterDirection = branch::BranchDirection<2>;
+pub type TwoParameterDirection = points::BranchDirection<2>;
 
 pub type TwoParameterLinearization = equations::BorderedLinearization<2>;
 
