@@ -9,6 +9,7 @@ use crate::branch::boundary::codimension_two::{
     CodimensionTwoPoint, boundary_point_at_distance, boundary_point_at_parameter,
     codimension_two_between,
 };
+use crate::branch::boundary::grid_transfer::{FinerBoundaryPoint, boundary_point_on_finer};
 use crate::branch::boundary::refine::{
     BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, refine,
 };
@@ -16,7 +17,6 @@ use crate::branch::boundary::singular_point::{
     BoundarySearchTolerance, BoundarySeed, SingularPoint, TwoParameterEquations,
     TwoParameterProblem,
 };
-use crate::branch::boundary::{FinerBoundaryPoint, boundary_point_on_finer};
 use crate::branch::continuation::{BranchEnd, StepControl};
 use crate::branch::convergence::VerificationFailure;
 use crate::branch::critical::CriticalKind;

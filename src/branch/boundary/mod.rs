@@ -28,11 +28,12 @@
 //! extrapolated.
 //!
 //! This file has what surrounds a boundary: equilibria at points of the parameter plane, each
-//! continued along a straight path from another; leaves on either side of a boundary, for pictures;
-//! and the transfer of boundary points to finer and coarser grids.
+//! continued along a straight path from another, and leaves on either side of a boundary, for
+//! pictures.
 
 mod codimension_two;
 mod continuation;
+mod grid_transfer;
 mod refine;
 mod singular_point;
 
@@ -40,20 +41,22 @@ pub use crate::branch::boundary::codimension_two::CodimensionTwoKind;
 pub use crate::branch::boundary::continuation::{
     BoundaryContinuationOptions, ContinuedBoundary, follow_boundary,
 };
+pub use crate::branch::boundary::grid_transfer::coarsened;
+use crate::branch::boundary::grid_transfer::{GridBoundaryPoint, coarser_grid};
 pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
 pub(crate) use crate::branch::boundary::singular_point::TwoParameterDirection;
+use crate::branch::boundary::singular_point::TwoParameterEquations;
 pub use crate::branch::boundary::singular_point::{
     BoundarySeed, TwoParameterProblem, TwoParameterState,
 };
-use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
 use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions, follow_branch};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
-use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::points::{EquilibriumPoint, prolong_field, restrict_field};
+use crate::branch::equations::BranchEquations;
+use crate::branch::points::{EquilibriumPoint, restrict_field};
 use crate::branch::refine::{index_at, on_finer, refine_critical};
-use crate::leaf::{Grid, NodalField, State};
-use crate::relax::accuracy::transfer::{prolong, restrict};
+use crate::leaf::{Grid, State};
+use crate::relax::accuracy::transfer::restrict;
 use crate::relax::solve_on_grid::relax_from_state;
 use crate::run::Limit;
 use crate::scenario::Scenario;
@@ -275,12 +278,6 @@ pub fn leaves_beside_boundary(
     Some([low, high])
 }
 
-/// A point of a boundary and the grid of its state.
-pub struct GridBoundaryPoint<P> {
-    pub grid: Grid,
-    pub point: P,
-}
-
 /// The point on the coarsest grid that pictures allow.
 fn point_on_picture_grid(
     plane: &TwoParameterProblem,
@@ -375,94 +372,4 @@ fn relaxed_neighbour(
 
 fn is_in_parameter_range(params: [f64; 2]) -> bool {
     params.iter().all(|part| (0.0..=1.0).contains(part))
-}
-
-/// Segments of the coarsest grid to which a point of a boundary is transferred.
-const COARSEST_BOUNDARY_GRID: usize = 8;
-
-/// A point of a boundary with the equations on its grid.
-pub struct FinerBoundaryPoint<'a> {
-    pub manifold: TwoParameterEquations<'a>,
-    pub point: SingularPoint,
-}
-
-/// Initial guess for a boundary point on the grid with all segments halved, with its
-/// directions.
-pub fn boundary_point_on_finer<'a>(
-    manifold: &mut TwoParameterEquations<'a>,
-    point: &SingularPoint,
-) -> Result<FinerBoundaryPoint<'a>, CorrectorFailure> {
-    let state = prolong(
-        manifold.leaves.leaf_at(point.solution.params)?,
-        &point.solution.state,
-    );
-    let finer = manifold.refined();
-    let point = transferred(point, state, |field| {
-        prolong_field(field, manifold.first_node())
-    });
-    let point = SingularPoint {
-        tangent: finer.normalize_direction(point.tangent),
-        normal: finer.normalize_direction(point.normal),
-        ..point
-    };
-    Ok(FinerBoundaryPoint {
-        manifold: finer,
-        point,
-    })
-}
-
-/// Initial guess for the point on the grid with every second node.
-pub fn boundary_point_on_coarser(
-    plane: &TwoParameterProblem,
-    grid: &Grid,
-    point: &SingularPoint,
-) -> Option<GridBoundaryPoint<SingularPoint>> {
-    let coarse = coarser_grid(plane, grid)?;
-    let first = usize::from(!plane.first_leaf().hinged());
-    let state = restrict(&point.solution.state);
-    let point = transferred(point, state, |field| restrict_field(field, first));
-    Some(GridBoundaryPoint {
-        grid: coarse,
-        point,
-    })
-}
-
-/// The point on the grid of this state, to which `field` transfers increments.
-fn transferred(
-    point: &SingularPoint,
-    state: State,
-    field: impl Fn(&NodalField) -> NodalField,
-) -> SingularPoint {
-    let direction = |it: &TwoParameterDirection| TwoParameterDirection {
-        increments: field(&it.increments),
-        params: it.params,
-    };
-    SingularPoint {
-        solution: TwoParameterState {
-            state,
-            ..point.solution
-        },
-        border_modes: point.border_modes.iter().map(&field).collect(),
-        tangent: direction(&point.tangent),
-        normal: direction(&point.normal),
-        ..point.clone()
-    }
-}
-
-/// The grid with every second node; none if that would be too coarse, or if `grid` is not its
-/// refinement.
-fn coarser_grid(plane: &TwoParameterProblem, grid: &Grid) -> Option<Grid> {
-    let half = grid.segments() / 2;
-    if half < COARSEST_BOUNDARY_GRID || 2 * half != grid.segments() {
-        return None;
-    }
-    let coarse = coarsened(grid, half, plane.first_leaf().kinks());
-    (coarse.refined() == *grid).then_some(coarse)
-}
-
-/// The grid of so many segments that this one refines.
-pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
-    let stations = grid.sigma().iter().copied();
-    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
-    Grid::from_stations(&stations, kinks)
 }
