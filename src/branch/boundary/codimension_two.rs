@@ -3,9 +3,8 @@
 //! A test function vanishes there, the speed of the fold in the parameter plane or another
 //! eigenvalue of H; its zero along the boundary is found by a secant method.
 
-use crate::branch::boundary::singular_point::{
-    BoundarySearchTolerance, COINCIDENT_EIGENVALUE_TOLERANCE, SingularPoint, TwoParameterEquations,
-};
+use crate::branch::boundary::point_search::{BoundarySearchTolerance, TwoParameterEquations};
+use crate::branch::boundary::singular_point::{COINCIDENT_EIGENVALUE_TOLERANCE, SingularPoint};
 use crate::branch::critical::{CriticalKind, SecantLimits};
 use crate::branch::equations::CorrectorFailure;
 

@@ -10,13 +10,13 @@ use crate::branch::boundary::codimension_two::{
     codimension_two_between,
 };
 use crate::branch::boundary::grid_transfer::{FinerBoundaryPoint, boundary_point_on_finer};
+use crate::branch::boundary::point_search::{
+    BoundarySearchTolerance, TwoParameterEquations, TwoParameterProblem,
+};
 use crate::branch::boundary::refine::{
     BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, refine,
 };
-use crate::branch::boundary::singular_point::{
-    BoundarySearchTolerance, BoundarySeed, SingularPoint, TwoParameterEquations,
-    TwoParameterProblem,
-};
+use crate::branch::boundary::singular_point::{BoundarySeed, SingularPoint};
 use crate::branch::continuation::{BranchEnd, StepControl};
 use crate::branch::convergence::VerificationFailure;
 use crate::branch::critical::CriticalKind;

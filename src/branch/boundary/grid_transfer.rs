@@ -1,10 +1,10 @@
 //! Points of a boundary carried over to the grid with all segments halved, or with every second
 //! node: initial guesses for the point there.
 
-use crate::branch::boundary::singular_point::{
-    SingularPoint, TwoParameterDirection, TwoParameterEquations, TwoParameterProblem,
-    TwoParameterState,
+use crate::branch::boundary::point_search::{
+    TwoParameterDirection, TwoParameterEquations, TwoParameterProblem, TwoParameterState,
 };
+use crate::branch::boundary::singular_point::SingularPoint;
 use crate::branch::equations::CorrectorFailure;
 use crate::branch::points::{prolong_field, restrict_field};
 use crate::leaf::{Grid, NodalField, State};

@@ -34,6 +34,7 @@
 mod codimension_two;
 mod continuation;
 mod grid_transfer;
+mod point_search;
 mod refine;
 mod singular_point;
 
@@ -43,12 +44,11 @@ pub use crate::branch::boundary::continuation::{
 };
 pub use crate::branch::boundary::grid_transfer::coarsened;
 use crate::branch::boundary::grid_transfer::{GridBoundaryPoint, coarser_grid};
+pub(crate) use crate::branch::boundary::point_search::TwoParameterDirection;
+use crate::branch::boundary::point_search::TwoParameterEquations;
+pub use crate::branch::boundary::point_search::{TwoParameterProblem, TwoParameterState};
 pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
-pub(crate) use crate::branch::boundary::singular_point::TwoParameterDirection;
-use crate::branch::boundary::singular_point::TwoParameterEquations;
-pub use crate::branch::boundary::singular_point::{
-    BoundarySeed, TwoParameterProblem, TwoParameterState,
-};
+pub use crate::branch::boundary::singular_point::BoundarySeed;
 use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions, follow_branch};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
