@@ -7,8 +7,7 @@
 use crate::leaf::block_tridiagonal::{
     GroupIncrements, ROTATION_UNKNOWNS, group_and_lane, lane_rods,
 };
-use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::{GroupLoads, LaneRodLoads, group_loads};
+use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, group_loads};
 use crate::leaf::state::{State, add_to_increment};
 use crate::leaf::system::{AssemblyTotals, RodGroup, System, each_group, group_rods};
 use crate::numbers::{larger, largest};

@@ -2,15 +2,16 @@
 //!
 //! The grid: positions of the nodes along the rods.
 
-use crate::leaf::loads::{LaneRodLoads, NodeLoad, RodLoad, group_loads};
 use crate::leaf::state::State;
 use crate::leaf::{GrippedNode, Leaf, Loads};
+use crate::natural::Natural;
 use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip};
 use crate::rotation;
-use crate::simd::{GROUP, Vectors};
+use crate::scenario::Profile;
+use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
 use glam::DVec3;
-use pulp::Scalar;
+use pulp::{Scalar, Simd};
 use std::ops::Range;
 
 /// Radius of gyration of a vein with the tissue it carries, in units of the leaf's length: its
@@ -523,6 +524,146 @@ impl Grid {
     pub fn node_weight(&self, i: usize) -> f64 {
         let width = |i: usize| self.widths.get(i).copied().unwrap_or(0.0);
         0.5 * (width(i.wrapping_sub(1)) + width(i))
+    }
+}
+
+impl Leaf {
+    /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
+    /// ties the rods.
+    pub(crate) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
+        if !self.has_tissue() {
+            return;
+        }
+        let natural = Natural::new(self.scenario(), true);
+        for (j, sections) in sections.chunks_mut(grid.segments()).enumerate() {
+            if self.is_straight_at_rest(j) {
+                continue;
+            }
+            let mut before = natural.vein_pose(j, 0.0);
+            for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
+                let next = natural.vein_pose(j, *sigma);
+                let ((x0, q0), (x1, q1)) = (before, next);
+                let chord = (x1 - x0) / (self.scale.length * section.ds);
+                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
+                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
+                before = next;
+            }
+        }
+    }
+
+    /// Whether a rod at rest is straight and stretched alike everywhere.
+    fn is_straight_at_rest(&self, j: usize) -> bool {
+        let rod = &self.scenario().rods[j];
+        let [_, bends @ ..] = &rod.rest_curvature;
+        let even = matches!(rod.rest_stretch, Profile::Constant(_));
+        even && bends.iter().all(|of| of.max_abs() == 0.0)
+    }
+}
+
+/// Loads on a rod per weight of its nodes, except the force on its tip.
+#[derive(Clone, Copy)]
+pub struct RodLoad {
+    /// Dead load.
+    pub dead: DVec3,
+    /// Force on the tip.
+    pub tip: DVec3,
+    /// Coupling with the previous rod, with the next, and with its own mirror image.
+    pub previous: DVec3,
+    pub next: DVec3,
+    pub image: DVec3,
+}
+
+/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
+/// to the lower rod.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NodeLoad {
+    /// Moment.
+    pub moment: DVec3,
+    /// Force.
+    pub force: DVec3,
+    /// Potential energy.
+    pub energy: f64,
+}
+
+/// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
+pub type GroupLoads = [[NumberGroup; 3]; 5];
+
+/// The loads on the rods of a group.
+#[inline(always)]
+pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
+    let vectors = |of_load: fn(&RodLoad) -> DVec3| {
+        let [a, b, c, d] = of.each_ref().map(of_load);
+        [
+            NumberGroup([a.x, b.x, c.x, d.x]),
+            NumberGroup([a.y, b.y, c.y, d.y]),
+            NumberGroup([a.z, b.z, c.z, d.z]),
+        ]
+    };
+    [
+        vectors(|load| load.dead),
+        vectors(|load| load.tip),
+        vectors(|load| load.previous),
+        vectors(|load| load.next),
+        vectors(|load| load.image),
+    ]
+}
+
+/// The loads on several rods.
+#[derive(Clone, Copy)]
+pub struct LaneRodLoads<S: Simd> {
+    dead: Vectors<S>,
+    tip: Vectors<S>,
+    previous: Vectors<S>,
+    next: Vectors<S>,
+    image: Vectors<S>,
+}
+
+impl<S: Simd> LaneRodLoads<S> {
+    /// The loads on the lanes from `part` on.
+    #[inline(always)]
+    pub fn load_group(simd: S, group: &GroupLoads, part: usize) -> Self {
+        let vectors = |k: usize| {
+            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &group[k][c], part));
+            Vectors::new(x, y, z)
+        };
+        LaneRodLoads {
+            dead: vectors(0),
+            tip: vectors(1),
+            previous: vectors(2),
+            next: vectors(3),
+            image: vectors(4),
+        }
+    }
+
+    /// Forces on nodes, and their share of the potential energy (that of a gap belongs to its
+    /// lower rod), from the positions of the nodes on the previous rods, of these, and on the
+    /// next rods, and from their weights in dead loads and in the coupling.
+    #[inline(always)]
+    pub fn node_forces(
+        &self,
+        [previous, x, next]: [Vectors<S>; 3],
+        [weight, coupling_weight]: [f64; 2],
+        tip: bool,
+    ) -> (Vectors<S>, Lanes<S>) {
+        let simd = x.x.simd;
+        let (weight, half) = (Lanes::splat(simd, weight), Lanes::splat(simd, 0.5));
+        let coupling_weight = Lanes::splat(simd, coupling_weight);
+        let mut force = self.dead.scale(weight);
+        if tip {
+            force = force + self.tip;
+        }
+        let to_image = (self.image * x).scale(coupling_weight);
+        let stretch = next - x;
+        let pull = (self.next * stretch).scale(coupling_weight);
+        let energy = half * (pull.dot(stretch) + to_image.dot(x)) - force.dot(x);
+        let push = (self.previous * (x - previous)).scale(coupling_weight);
+        (force + pull - push - to_image, energy)
+    }
+
+    /// The contribution of the coupling to the diagonal of nodes, per weight.
+    #[inline(always)]
+    pub fn coupling_stiffness(&self) -> Vectors<S> {
+        self.previous + self.next + self.image
     }
 }
 

@@ -13,7 +13,7 @@
 //! rods whose strain is determined G is small, so that few solutions are enough at any stiffness.
 
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
-use crate::leaf::derivative::LinearResponse;
+use crate::leaf::derivative::parameter::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;

@@ -11,120 +11,12 @@
 //! nodes by unit moments on these and the skew S, the moments x that (1 + S C) x = S t of the
 //! rotations t without them are taken off.
 
-use crate::leaf::block_tridiagonal::{GroupIncrements, group_and_lane};
+use crate::leaf::block_tridiagonal::group_and_lane;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::system::{RodGroup, System};
-use crate::leaf::{Leaf, Loads, NODE_COINCIDENCE_TOLERANCE};
-use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
+use crate::leaf::state::State;
+use crate::leaf::system::System;
+use crate::leaf::{Leaf, Loads};
 use glam::DVec3;
-use pulp::{Arch, Simd};
-
-/// Loads on a rod per weight of its nodes, except the force on its tip.
-#[derive(Clone, Copy)]
-pub struct RodLoad {
-    /// Dead load.
-    pub dead: DVec3,
-    /// Force on the tip.
-    pub tip: DVec3,
-    /// Coupling with the previous rod, with the next, and with its own mirror image.
-    pub previous: DVec3,
-    pub next: DVec3,
-    pub image: DVec3,
-}
-
-/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
-/// to the lower rod.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct NodeLoad {
-    /// Moment.
-    pub moment: DVec3,
-    /// Force.
-    pub force: DVec3,
-    /// Potential energy.
-    pub energy: f64,
-}
-
-/// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
-pub type GroupLoads = [[NumberGroup; 3]; 5];
-
-/// The loads on the rods of a group.
-#[inline(always)]
-pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
-    let vectors = |of_load: fn(&RodLoad) -> DVec3| {
-        let [a, b, c, d] = of.each_ref().map(of_load);
-        [
-            NumberGroup([a.x, b.x, c.x, d.x]),
-            NumberGroup([a.y, b.y, c.y, d.y]),
-            NumberGroup([a.z, b.z, c.z, d.z]),
-        ]
-    };
-    [
-        vectors(|load| load.dead),
-        vectors(|load| load.tip),
-        vectors(|load| load.previous),
-        vectors(|load| load.next),
-        vectors(|load| load.image),
-    ]
-}
-
-/// The loads on several rods.
-#[derive(Clone, Copy)]
-pub struct LaneRodLoads<S: Simd> {
-    dead: Vectors<S>,
-    tip: Vectors<S>,
-    previous: Vectors<S>,
-    next: Vectors<S>,
-    image: Vectors<S>,
-}
-
-impl<S: Simd> LaneRodLoads<S> {
-    /// The loads on the lanes from `part` on.
-    #[inline(always)]
-    pub fn load_group(simd: S, group: &GroupLoads, part: usize) -> Self {
-        let vectors = |k: usize| {
-            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &group[k][c], part));
-            Vectors::new(x, y, z)
-        };
-        LaneRodLoads {
-            dead: vectors(0),
-            tip: vectors(1),
-            previous: vectors(2),
-            next: vectors(3),
-            image: vectors(4),
-        }
-    }
-
-    /// Forces on nodes, and their share of the potential energy (that of a gap belongs to its
-    /// lower rod), from the positions of the nodes on the previous rods, of these, and on the
-    /// next rods, and from their weights in dead loads and in the coupling.
-    #[inline(always)]
-    pub fn node_forces(
-        &self,
-        [previous, x, next]: [Vectors<S>; 3],
-        [weight, coupling_weight]: [f64; 2],
-        tip: bool,
-    ) -> (Vectors<S>, Lanes<S>) {
-        let simd = x.x.simd;
-        let (weight, half) = (Lanes::splat(simd, weight), Lanes::splat(simd, 0.5));
-        let coupling_weight = Lanes::splat(simd, coupling_weight);
-        let mut force = self.dead.scale(weight);
-        if tip {
-            force = force + self.tip;
-        }
-        let to_image = (self.image * x).scale(coupling_weight);
-        let stretch = next - x;
-        let pull = (self.next * stretch).scale(coupling_weight);
-        let energy = half * (pull.dot(stretch) + to_image.dot(x)) - force.dot(x);
-        let push = (self.previous * (x - previous)).scale(coupling_weight);
-        (force + pull - push - to_image, energy)
-    }
-
-    /// The contribution of the coupling to the diagonal of nodes, per weight.
-    #[inline(always)]
-    pub fn coupling_stiffness(&self) -> Vectors<S> {
-        self.previous + self.next + self.image
-    }
-}
 
 impl Loads {
     /// Whether dead moments act.
@@ -254,127 +146,93 @@ impl DiscreteLeaf {
     }
 }
 
-/// The dead moments as of the last assembly, with the workspace of their equations.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct DeadMoments {
-    /// Nodes with equations (from 0) and moments.
-    on_nodes: Vec<(usize, DVec3)>,
-    /// Their equations, row after row, each with its right-hand side last.
-    rows: Vec<f64>,
-}
+/// Fractions of the length closer to each other than this are those of one node.
+pub(crate) const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
 
-impl DeadMoments {
-    /// Replaces them.
-    pub fn replace_moments(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
-        self.on_nodes.clear();
-        self.on_nodes.extend(moments);
+impl Leaf {
+    /// Own load on rod `j` at `sigma`, per unit of sigma, without those on points.
+    pub fn own_load_density(&self, j: usize, sigma: f64) -> DVec3 {
+        let s = self.scenario();
+        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+        let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+        });
+        (weight + along) * (self.share(j) * s.rods[j].length / self.scale.force())
     }
 
-    /// Nodes (from 1) and moments.
-    pub fn nodal_moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
-        self.on_nodes.iter().copied()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.on_nodes.is_empty()
-    }
-
-    /// Writes S times the rotations of the nodes to a column of the equations.
-    fn set_column(&mut self, column: usize, rotations: &[GroupIncrements]) {
-        let width = 3 * self.on_nodes.len() + 1;
-        for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
-            let turn = node_rotation(&rotations[*node]);
-            let by = turn.cross(0.5 * *moment);
-            for c in 0..3 {
-                self.rows[(3 * a + c) * width + column] = by[c];
-            }
-        }
+    /// Rod, sigma and force of every load on a point.
+    pub fn point_loads(&self) -> impl Iterator<Item = (usize, f64, DVec3)> {
+        let (s, unit) = (self.scenario(), self.scale.force());
+        let points = s.points.iter();
+        points.map(move |it| (it.vein, it.at, DVec3::from_array(s.force_on(it)) / unit))
     }
 }
 
-fn node_rotation(increments: &GroupIncrements) -> DVec3 {
-    let [x, y, z] = [0, 1, 2].map(|c| increments[c].0[0]);
-    DVec3::new(x, y, z)
-}
+impl DiscreteLeaf {
+    /// The veins' own loads on all nodes, rod after rod; empty if there are none.
+    pub(crate) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
+        if leaf.loads.rod_load_factor == 0.0 {
+            return Vec::new();
+        }
+        let (n, sigma) = (self.segments(), self.grid.sigma());
+        let node = |(j, i)| self.grid.node_weight(i) * leaf.own_load_density(j, sigma[i]);
+        let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
+        for (j, at, force) in leaf.point_loads() {
+            loads[j * (n + 1) + self.grid.nearest(at)] += force;
+        }
+        loads
+    }
 
-impl System {
-    /// Includes the dead moments in the solution; false if the matrix with them is singular.
-    pub(super) fn correct_for_moments(&mut self) -> bool {
-        let (arch, group, dead) = (self.arch, &mut self.groups[0], &mut self.moments);
-        let size = 3 * dead.on_nodes.len();
-        dead.rows.resize(size * (size + 1), 0.0);
-        for column in 0..size {
-            let (node, axis) = (dead.on_nodes[column / 3].0, DVec3::AXES[column % 3]);
-            group.set_moment_response(arch, [(node, axis)]);
-            dead.set_column(column, &group.z);
-            dead.rows[column * (size + 1) + column] += 1.0;
-        }
-        dead.set_column(size, &group.solution);
-        if !solve_by_elimination(&mut dead.rows, size) {
-            return false;
-        }
-        let part = |k: usize| dead.rows[k * (size + 1) + size];
-        let taken = |(a, (node, _)): (usize, &(usize, DVec3))| {
-            (
-                *node,
-                DVec3::new(part(3 * a), part(3 * a + 1), part(3 * a + 2)),
-            )
-        };
-        group.set_moment_response(arch, dead.on_nodes.iter().enumerate().map(taken));
-        for (solution, z) in group.solution.iter_mut().zip(&group.z) {
-            for c in 0..6 {
-                solution[c].0[0] -= z[c].0[0];
-            }
-        }
-        true
+    /// Part of the veins' own loads that acts.
+    pub(crate) fn rod_load_factor(&self) -> f64 {
+        self.load_factor * self.loads.rod_load_factor
     }
-}
 
-impl RodGroup {
-    /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
-    fn set_moment_response(
-        &mut self,
-        arch: Arch,
-        moments: impl IntoIterator<Item = (usize, DVec3)>,
-    ) {
-        self.residual.fill(GroupIncrements::default());
-        for (node, moment) in moments {
-            for c in 0..3 {
-                self.residual[node][c].0[0] += moment[c];
-            }
-        }
-        self.matrix
-            .substitute_forward(arch, &self.residual, &mut self.z);
-        (self.matrix).substitute_backward(arch, &self.residual, &mut self.z);
+    /// Own load on node `i` of rod `j`.
+    pub fn own_load_on_node(&self, j: usize, i: usize) -> DVec3 {
+        let load = self.own_loads.get(j * (self.segments() + 1) + i);
+        load.map_or(DVec3::ZERO, |load| self.rod_load_factor() * *load)
     }
-}
 
-/// Solves `size` equations in place by Gaussian elimination with partial pivoting: the solution is
-/// left in the last column. False if they are singular, or not finite.
-fn solve_by_elimination(rows: &mut [f64], size: usize) -> bool {
-    let width = size + 1;
-    for k in 0..size {
-        let below = |i: &usize| rows[i * width + k].abs();
-        let Some(pivot) = (k..size).max_by(|a, b| below(a).total_cmp(&below(b))) else {
-            return false;
-        };
-        let largest = rows[pivot * width + k];
-        if largest == 0.0 || !largest.is_finite() {
-            return false;
+    /// The forces on points of rod `j` at `sigma`, by which its force jumps there.
+    pub fn point_force_at(&self, j: usize, sigma: f64) -> DVec3 {
+        if self.leaf.scenario().points.is_empty() {
+            return DVec3::ZERO;
         }
-        for c in k..width {
-            rows.swap(pivot * width + c, k * width + c);
+        let points = self.leaf.point_loads();
+        let here = points
+            .filter(|(rod, at, _)| *rod == j && (at - sigma).abs() < NODE_COINCIDENCE_TOLERANCE);
+        self.rod_load_factor() * here.map(|(_, _, force)| force).sum::<DVec3>()
+    }
+
+    /// Adds dead forces on all nodes to the veins' own loads.
+    pub fn add_nodal_loads(&mut self, forces: &[DVec3]) {
+        self.own_loads.resize(forces.len(), DVec3::ZERO);
+        for (own, force) in self.own_loads.iter_mut().zip(forces) {
+            *own += *force;
         }
-        for i in (0..size).filter(|i| *i != k) {
-            let factor = rows[i * width + k] / largest;
-            for c in k..width {
-                rows[i * width + c] -= factor * rows[k * width + c];
-            }
+        self.loads.rod_load_factor = 1.0;
+    }
+
+    /// Adds the veins' own loads to the moments and forces on all nodes.
+    pub fn add_own_forces(&self, nodes: &mut [[DVec3; 2]]) {
+        for (node, own) in nodes.iter_mut().zip(&self.own_loads) {
+            node[1] += self.rod_load_factor() * *own;
         }
     }
-    for k in 0..size {
-        rows[k * width + size] /= rows[k * width + k];
+
+    /// Adds the veins' own loads to the right-hand side of an assembled system; returns their
+    /// potential energy, without the bases'.
+    pub(crate) fn add_own_loads(&self, state: &State, system: &mut System) -> f64 {
+        if self.own_loads.is_empty() {
+            return 0.0;
+        }
+        let mut energy = 0.0;
+        for (j, i) in self.rod_index_pairs(1..self.segments() + 1) {
+            let force = self.own_load_on_node(j, i);
+            energy -= force.dot(state.x[state.base(j) + i]);
+            system.add_load(j, i, [DVec3::ZERO, force]);
+        }
+        energy
     }
-    (0..size).all(|k| rows[k * width + size].is_finite())
 }

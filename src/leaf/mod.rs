@@ -20,37 +20,37 @@ mod assembly;
 mod block_tridiagonal;
 mod derivative;
 mod direct;
-mod discrete;
+pub(crate) mod discrete;
 mod law;
-mod loads;
+pub(crate) mod loads;
 mod mirror;
 #[cfg(test)]
 mod not_a_number;
 pub(crate) mod rod_ode;
 mod solve;
 mod state;
-mod supports;
+pub(crate) mod supports;
 mod system;
 mod tissue;
 
 pub use crate::leaf::assembly::{FieldJump, SegmentTangent};
-pub use crate::leaf::derivative::{
+pub use crate::leaf::derivative::parameter::{
     LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
 };
-pub use crate::leaf::direct::{BorderedSolution, DirectError, DirectSolver, MatrixFactors};
+pub use crate::leaf::direct::unknowns::DirectError;
+pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid};
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,
 };
 pub use crate::leaf::rod_ode::{RodFields, RodIntegrator, StationFields};
-pub use crate::leaf::solve::DefiniteFactors;
+pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::state::{
     Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
 };
-pub use crate::leaf::system::{AssemblyTotals, LinearSolveOutcome, System};
+pub use crate::leaf::system::{AssemblyTotals, EquationWorkspace, System};
 pub use crate::leaf::tissue::HalfTurn;
-use crate::natural::Natural;
 use crate::rod::Section;
 use crate::rotation;
 pub use crate::scenario::Scale;
@@ -225,6 +225,16 @@ impl Leaf {
         !self.loads.has_moments() && !self.in_wind()
     }
 
+    /// Its scenario, shared.
+    pub(super) fn shared_scenario(&self) -> Arc<Scenario> {
+        Arc::clone(&self.scenario)
+    }
+
+    /// Whether it was made from this very scenario.
+    pub(super) fn is_of(&self, scenario: &Arc<Scenario>) -> bool {
+        Arc::ptr_eq(&self.scenario, scenario)
+    }
+
     /// Whether wind acts on it.
     pub fn in_wind(&self) -> bool {
         self.scenario.wind.is_some()
@@ -294,20 +304,6 @@ impl Leaf {
     /// Fractions of the length where some profile has a kink, ascending.
     pub fn kinks(&self) -> &[f64] {
         &self.kinks
-    }
-
-    /// Puts the tips where they are held, if they are.
-    pub fn place_held_tips(&self, state: &mut State) {
-        let Some(held) = &self.tip_support else {
-            return;
-        };
-        for j in 0..self.rods() {
-            let tip = state.base(j) + state.segments();
-            state.x[tip] = held.position;
-            if let Some(rotation) = held.rotation(j) {
-                state.q[tip] = rotation;
-            }
-        }
     }
 
     /// Length of rod `j`.
@@ -402,129 +398,5 @@ impl Leaf {
 
     fn rod(&self, j: usize) -> &Rod {
         &self.scenario.rods[j]
-    }
-}
-
-impl Leaf {
-    /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
-    /// ties the rods.
-    pub(super) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
-        if !self.has_tissue() {
-            return;
-        }
-        let natural = Natural::new(self.scenario(), true);
-        for (j, sections) in sections.chunks_mut(grid.segments()).enumerate() {
-            if self.is_straight_at_rest(j) {
-                continue;
-            }
-            let mut before = natural.vein_pose(j, 0.0);
-            for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
-                let next = natural.vein_pose(j, *sigma);
-                let ((x0, q0), (x1, q1)) = (before, next);
-                let chord = (x1 - x0) / (self.scale.length * section.ds);
-                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
-                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
-                before = next;
-            }
-        }
-    }
-
-    /// Whether a rod at rest is straight and stretched alike everywhere.
-    fn is_straight_at_rest(&self, j: usize) -> bool {
-        let rod = &self.scenario().rods[j];
-        let [_, bends @ ..] = &rod.rest_curvature;
-        let even = matches!(rod.rest_stretch, Profile::Constant(_));
-        even && bends.iter().all(|of| of.max_abs() == 0.0)
-    }
-}
-
-/// Fractions of the length closer to each other than this are those of one node.
-pub(super) const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
-
-impl Leaf {
-    /// Own load on rod `j` at `sigma`, per unit of sigma, without those on points.
-    pub fn own_load_density(&self, j: usize, sigma: f64) -> DVec3 {
-        let s = self.scenario();
-        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
-        let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
-            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
-        });
-        (weight + along) * (self.share(j) * s.rods[j].length / self.scale.force())
-    }
-
-    /// Rod, sigma and force of every load on a point.
-    pub fn point_loads(&self) -> impl Iterator<Item = (usize, f64, DVec3)> {
-        let (s, unit) = (self.scenario(), self.scale.force());
-        let points = s.points.iter();
-        points.map(move |it| (it.vein, it.at, DVec3::from_array(s.force_on(it)) / unit))
-    }
-}
-
-impl DiscreteLeaf {
-    /// The veins' own loads on all nodes, rod after rod; empty if there are none.
-    pub(super) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
-        if leaf.loads.rod_load_factor == 0.0 {
-            return Vec::new();
-        }
-        let (n, sigma) = (self.segments(), self.grid.sigma());
-        let node = |(j, i)| self.grid.node_weight(i) * leaf.own_load_density(j, sigma[i]);
-        let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
-        for (j, at, force) in leaf.point_loads() {
-            loads[j * (n + 1) + self.grid.nearest(at)] += force;
-        }
-        loads
-    }
-
-    /// Part of the veins' own loads that acts.
-    pub(super) fn rod_load_factor(&self) -> f64 {
-        self.load_factor * self.loads.rod_load_factor
-    }
-
-    /// Own load on node `i` of rod `j`.
-    pub fn own_load_on_node(&self, j: usize, i: usize) -> DVec3 {
-        let load = self.own_loads.get(j * (self.segments() + 1) + i);
-        load.map_or(DVec3::ZERO, |load| self.rod_load_factor() * *load)
-    }
-
-    /// The forces on points of rod `j` at `sigma`, by which its force jumps there.
-    pub fn point_force_at(&self, j: usize, sigma: f64) -> DVec3 {
-        if self.leaf.scenario().points.is_empty() {
-            return DVec3::ZERO;
-        }
-        let points = self.leaf.point_loads();
-        let here = points
-            .filter(|(rod, at, _)| *rod == j && (at - sigma).abs() < NODE_COINCIDENCE_TOLERANCE);
-        self.rod_load_factor() * here.map(|(_, _, force)| force).sum::<DVec3>()
-    }
-
-    /// Adds dead forces on all nodes to the veins' own loads.
-    pub fn add_nodal_loads(&mut self, forces: &[DVec3]) {
-        self.own_loads.resize(forces.len(), DVec3::ZERO);
-        for (own, force) in self.own_loads.iter_mut().zip(forces) {
-            *own += *force;
-        }
-        self.loads.rod_load_factor = 1.0;
-    }
-
-    /// Adds the veins' own loads to the moments and forces on all nodes.
-    pub fn add_own_forces(&self, nodes: &mut [[DVec3; 2]]) {
-        for (node, own) in nodes.iter_mut().zip(&self.own_loads) {
-            node[1] += self.rod_load_factor() * *own;
-        }
-    }
-
-    /// Adds the veins' own loads to the right-hand side of an assembled system; returns their
-    /// potential energy, without the bases'.
-    pub(super) fn add_own_loads(&self, state: &State, system: &mut System) -> f64 {
-        if self.own_loads.is_empty() {
-            return 0.0;
-        }
-        let mut energy = 0.0;
-        for (j, i) in self.rod_index_pairs(1..self.segments() + 1) {
-            let force = self.own_load_on_node(j, i);
-            energy -= force.dot(state.x[state.base(j) + i]);
-            system.add_load(j, i, [DVec3::ZERO, force]);
-        }
-        energy
     }
 }

@@ -11,11 +11,9 @@
 //! E' = L/2 (n.c n + m.m/A) + potential of the loads.
 
 use crate::leaf::block_tridiagonal::lane_rods;
-use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::{GroupLoads, LaneRodLoads, group_loads};
+use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, group_loads};
 use crate::natural::{Natural, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
-use crate::rod::Section;
-use crate::rod::{NodePair, TissueStrip};
+use crate::rod::{NodePair, Section, TissueStrip};
 use crate::rotation::{Quaternions, directors};
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run, widest_arch};
 use glam::{DQuat, DVec3};

@@ -3,16 +3,18 @@
 //! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
 //! at a pinned or clamped tip, at a hinged base, or by grips.
 
-use crate::leaf::GrippedNode;
 use crate::leaf::assembly::component;
 use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;
+use crate::leaf::{GrippedNode, Leaf};
 use crate::rod::UNKNOWNS;
-use crate::scenario::{Grip, SupportKind};
+use crate::rotation::outer;
+use crate::scenario::{BaseRotations, Grip, SupportKind, ZeroEnergyRotation};
 use crate::simd::NumberGroup;
 use glam::DVec3;
+use std::borrow::Cow;
 use std::ops::Range;
 
 impl DiscreteLeaf {
@@ -272,4 +274,181 @@ impl DiscreteLeaf {
             false => (component(force), component(moment)),
         }
     }
+}
+
+impl Leaf {
+    /// Puts the tips where they are held, if they are.
+    pub fn place_held_tips(&self, state: &mut State) {
+        let Some(held) = &self.tip_support else {
+            return;
+        };
+        for j in 0..self.rods() {
+            let tip = state.base(j) + state.segments();
+            state.x[tip] = held.position;
+            if let Some(rotation) = held.rotation(j) {
+                state.q[tip] = rotation;
+            }
+        }
+    }
+}
+
+/// Stiffness of the spring, A/L^3, or A/L against a rotation.
+pub(super) const PHASE_SPRING_STIFFNESS: f64 = 100.0;
+
+/// A node that turns slower than this (lengths per radian) is on the axis: straight veins do not move
+/// when they turn.
+pub(super) const AXIS_SPEED_TOLERANCE: f64 = 1e-6;
+
+/// The node at which a turn is held.
+pub(super) struct PhaseConditionNode {
+    rod: usize,
+    node: usize,
+    /// The direction in which it rotates, or else that in which it is displaced.
+    direction: [DVec3; 2],
+}
+
+impl DiscreteLeaf {
+    /// The veins that can turn, whatever their state: in half of a mirror-symmetric leaf those
+    /// whose images turn the other way.
+    fn zero_energy_rotations(&self) -> impl Iterator<Item = &ZeroEnergyRotation> {
+        let moves = |j: usize| j < self.rods() && !self.leaf.is_halved_midrib(j);
+        let half = self.leaf.is_mirror_half();
+        (self.leaf.turnings.iter()).filter(move |it| !half || it.rods.clone().all(moves))
+    }
+
+    /// The rotation and the displacement of a node by a turn at unit rate.
+    fn zero_energy_increment(
+        &self,
+        turning: &ZeroEnergyRotation,
+        state: &State,
+        k: usize,
+    ) -> [DVec3; 2] {
+        turning.node_velocity(state.x[k], state.q[k], self.leaf.scale.length)
+    }
+
+    /// The node to hold: the one that is displaced most or, where sections spin, the base. A joint tip,
+    /// which all rods share, is none.
+    fn phase_condition_node(
+        &self,
+        turning: &ZeroEnergyRotation,
+        state: &State,
+    ) -> Option<PhaseConditionNode> {
+        if turning.axis == DVec3::ZERO {
+            let rod = turning.rods.start;
+            let points = &state.x[state.base(rod)..][..=self.segments()];
+            let [spin, _] = self.zero_energy_increment(turning, state, state.base(rod));
+            let moves = turning.moves_something(points, DVec3::ZERO, AXIS_SPEED_TOLERANCE);
+            return moves.then_some(PhaseConditionNode {
+                rod,
+                node: 0,
+                direction: [spin, DVec3::ZERO],
+            });
+        }
+        let last = self.segments() - usize::from(self.tips_move_together());
+        let mut farthest = None;
+        let mut most = AXIS_SPEED_TOLERANCE;
+        for (rod, node) in rotating_nodes(turning, last) {
+            let [_, speed] = self.zero_energy_increment(turning, state, state.base(rod) + node);
+            if speed.length() > most {
+                most = speed.length();
+                farthest = Some(PhaseConditionNode {
+                    rod,
+                    node,
+                    direction: [DVec3::ZERO, speed / most],
+                });
+            }
+        }
+        farthest
+    }
+
+    /// Adds the phase conditions of veins that can turn to an assembled matrix.
+    pub fn add_phase_conditions(&self, state: &State, system: &mut System) {
+        for turning in self.zero_energy_rotations() {
+            if let Some(at) = self.phase_condition_node(turning, state) {
+                let [turn, shift] = at.direction.map(|d| PHASE_SPRING_STIFFNESS * outer(d, d));
+                system.add_displacement_spring(at.rod, at.node, shift);
+                system.add_rotation_spring(at.rod, at.node, turn);
+            }
+        }
+    }
+
+    /// Turns veins that can turn without resistance, so that of a circle of equilibria it is always
+    /// the same one, on all grids: clamped ones until their moment at the base bends them down
+    /// (towards -e3); on hinges as near as possible to where they begin in the natural leaf, or down;
+    /// and a vein that spins without a twist from there.
+    pub fn rotate_to_representative(&self, state: &mut State) {
+        for turning in self.zero_energy_rotations() {
+            if turning.axis == DVec3::ZERO && self.phase_condition_node(turning, state).is_none() {
+                continue;
+            }
+            let rods = &turning.rods;
+            let moment = |j: usize| {
+                let n = state.n[j * self.segments()];
+                let segment = self.segment(state, j, 0, n);
+                -segment.gradient(self.section(j, 0)).1
+            };
+            let begin = |j: usize| BaseRotations {
+                stress_free: self.leaf.base(j).1,
+                now: state.q[state.base(j)],
+            };
+            let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
+            let moments = (!self.leaf.hinged()).then(|| rods.clone().map(moment).sum());
+            let angle = turning.angle_to_representative(&begins, moments);
+            let [turn, back] = turning.rotations(angle);
+            let point = turning.point / self.leaf.scale.length;
+            let n = self.segments();
+            for j in rods.clone() {
+                for node in self.moving_nodes() {
+                    let k = state.base(j) + node;
+                    let [turns, shifts] = self.allows_rotation_and_displacement(j, node);
+                    if shifts || node < n {
+                        state.x[k] = point + turn * (state.x[k] - point);
+                    }
+                    if turns || node < n {
+                        state.q[k] = (turn * state.q[k] * back).normalize();
+                    }
+                }
+                let forces = &mut state.n[j * n..(j + 1) * n];
+                forces.iter_mut().for_each(|force| *force = turn * *force);
+            }
+        }
+    }
+
+    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::rotate_to_representative`].
+    pub fn circle_representative<'s>(&self, state: &'s State) -> Cow<'s, State> {
+        let mut state = Cow::Borrowed(state);
+        if self.zero_energy_rotations().next().is_some() {
+            self.rotate_to_representative(state.to_mut());
+        }
+        state
+    }
+
+    /// The turns at unit rate of veins that can: increments of the nodes of all rods.
+    pub fn zero_energy_fields(&self, state: &State) -> Vec<NodalField> {
+        let moves =
+            |turning: &&ZeroEnergyRotation| self.phase_condition_node(turning, state).is_some();
+        let turn = |turning: &ZeroEnergyRotation| {
+            let mut field = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
+            for j in turning.rods.clone() {
+                for (node, increments) in field[j].iter_mut().enumerate() {
+                    let k = state.base(j) + node + self.first_node();
+                    let [spin, velocity] = self.zero_energy_increment(turning, state, k);
+                    *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
+                }
+            }
+            field
+        };
+        self.zero_energy_rotations()
+            .filter(moves)
+            .map(turn)
+            .collect()
+    }
+}
+
+/// Rods and nodes of veins, to the node `last`.
+pub(super) fn rotating_nodes(
+    turning: &ZeroEnergyRotation,
+    last: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    (turning.rods.clone()).flat_map(move |rod| (1..=last).map(move |node| (rod, node)))
 }

@@ -16,16 +16,16 @@ use crate::leaf::block_tridiagonal::{
     set_lane_increment,
 };
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::DeadMoments;
-pub use crate::leaf::solve::LinearSolveOutcome;
 use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
 use crate::rod::NodeBlock;
+use crate::scenario::Scenario;
 use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// From this many nodes on, groups of rods are distributed over threads. Measured: below it
 /// waking the threads costs more than it saves.
@@ -69,6 +69,8 @@ pub(crate) struct RodGroup {
 /// The linear system of a leaf, with workspace for its solution.
 #[derive(Clone, Debug)]
 pub struct System {
+    /// The scenario of the leaf to which these equations belong.
+    scenario: Arc<Scenario>,
     pub(crate) groups: Vec<RodGroup>,
     pub(super) rods: usize,
     pub(super) p: Vec<Vec<GroupIncrements>>,
@@ -95,6 +97,32 @@ pub struct System {
     pub(super) law_forces: Vec<DVec3>,
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
+}
+
+/// The memory of Newton's equations, passed on from one solution to the next: equations of the same
+/// leaf on the same grid are set up in the memory of the last ones, others in new memory.
+#[derive(Debug, Default)]
+pub struct EquationWorkspace {
+    last: Option<System>,
+}
+
+impl EquationWorkspace {
+    /// Whether the last equations were those of `leaf`.
+    pub fn fits(&self, leaf: &DiscreteLeaf) -> bool {
+        self.last.as_ref().is_some_and(|last| last.belongs_to(leaf))
+    }
+
+    /// Equations of `leaf` that are to be assembled, in the memory of the last ones if that fits; it
+    /// is released otherwise.
+    pub fn equations(&mut self, leaf: &DiscreteLeaf) -> System {
+        let last = self.last.take().filter(|last| last.belongs_to(leaf));
+        last.unwrap_or_else(|| System::new(leaf))
+    }
+
+    /// Takes back the memory of equations that are not needed any more.
+    pub fn take_back(&mut self, system: System) {
+        self.last = Some(system);
+    }
 }
 
 /// Runs `f` over the groups, on all threads if `parallel`. Each group works on its
@@ -132,6 +160,7 @@ impl System {
         };
         let count = rods.div_ceil(GROUP);
         System {
+            scenario: leaf.leaf.shared_scenario(),
             groups: (0..count).map(|g| RodGroup::new(leaf, g, &gaps)).collect(),
             rods,
             p: vec![vec![GroupIncrements::default(); n]; count],
@@ -174,14 +203,19 @@ impl System {
         }
     }
 
-    /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
-    /// on a grid of as many segments.
-    pub fn new_in_memory(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
-        let fits = |spare: &System| {
-            let same = (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
-            same && spare.first == leaf.first_node()
-        };
-        spare.filter(fits).unwrap_or_else(|| System::new(leaf))
+    /// Whether these are equations of `leaf`: of the same veins, supports and coupling, on the same grid.
+    fn belongs_to(&self, leaf: &DiscreteLeaf) -> bool {
+        let nodes = leaf.moving_nodes();
+        leaf.leaf.is_of(&self.scenario)
+            && (self.rods, self.segments) == (leaf.rods(), leaf.segments())
+            && (self.first, self.joined) == (nodes.start, leaf.tips_move_together())
+            && nodes
+                .map(|i| leaf.mass_weight(i))
+                .eq(self.weights.iter().copied())
+            && match leaf.coupled() {
+                true => gap_couplings(leaf).eq(self.gaps.iter().copied()),
+                false => self.gaps.is_empty(),
+            }
     }
 
     /// Number of rods.
@@ -615,4 +649,129 @@ impl GroupKernel for DirectionUpdateKernel<'_> {
             }
         }
     }
+}
+
+/// The dead moments as of the last assembly, with the workspace of their equations.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeadMoments {
+    /// Nodes with equations (from 0) and moments.
+    on_nodes: Vec<(usize, DVec3)>,
+    /// Their equations, row after row, each with its right-hand side last.
+    rows: Vec<f64>,
+}
+
+impl DeadMoments {
+    /// Replaces them.
+    pub fn replace_moments(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
+        self.on_nodes.clear();
+        self.on_nodes.extend(moments);
+    }
+
+    /// Nodes (from 1) and moments.
+    pub fn nodal_moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        self.on_nodes.iter().copied()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.on_nodes.is_empty()
+    }
+
+    /// Writes S times the rotations of the nodes to a column of the equations.
+    fn set_column(&mut self, column: usize, rotations: &[GroupIncrements]) {
+        let width = 3 * self.on_nodes.len() + 1;
+        for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
+            let turn = node_rotation(&rotations[*node]);
+            let by = turn.cross(0.5 * *moment);
+            for c in 0..3 {
+                self.rows[(3 * a + c) * width + column] = by[c];
+            }
+        }
+    }
+}
+
+pub(super) fn node_rotation(increments: &GroupIncrements) -> DVec3 {
+    let [x, y, z] = [0, 1, 2].map(|c| increments[c].0[0]);
+    DVec3::new(x, y, z)
+}
+
+impl System {
+    /// Includes the dead moments in the solution; false if the matrix with them is singular.
+    pub(super) fn correct_for_moments(&mut self) -> bool {
+        let (arch, group, dead) = (self.arch, &mut self.groups[0], &mut self.moments);
+        let size = 3 * dead.on_nodes.len();
+        dead.rows.resize(size * (size + 1), 0.0);
+        for column in 0..size {
+            let (node, axis) = (dead.on_nodes[column / 3].0, DVec3::AXES[column % 3]);
+            group.set_moment_response(arch, [(node, axis)]);
+            dead.set_column(column, &group.z);
+            dead.rows[column * (size + 1) + column] += 1.0;
+        }
+        dead.set_column(size, &group.solution);
+        if !solve_by_elimination(&mut dead.rows, size) {
+            return false;
+        }
+        let part = |k: usize| dead.rows[k * (size + 1) + size];
+        let taken = |(a, (node, _)): (usize, &(usize, DVec3))| {
+            (
+                *node,
+                DVec3::new(part(3 * a), part(3 * a + 1), part(3 * a + 2)),
+            )
+        };
+        group.set_moment_response(arch, dead.on_nodes.iter().enumerate().map(taken));
+        for (solution, z) in group.solution.iter_mut().zip(&group.z) {
+            for c in 0..6 {
+                solution[c].0[0] -= z[c].0[0];
+            }
+        }
+        true
+    }
+}
+
+impl RodGroup {
+    /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
+    fn set_moment_response(
+        &mut self,
+        arch: Arch,
+        moments: impl IntoIterator<Item = (usize, DVec3)>,
+    ) {
+        self.residual.fill(GroupIncrements::default());
+        for (node, moment) in moments {
+            for c in 0..3 {
+                self.residual[node][c].0[0] += moment[c];
+            }
+        }
+        self.matrix
+            .substitute_forward(arch, &self.residual, &mut self.z);
+        (self.matrix).substitute_backward(arch, &self.residual, &mut self.z);
+    }
+}
+
+/// Solves `size` equations in place by Gaussian elimination with partial pivoting: the solution is
+/// left in the last column. False if they are singular, or not finite.
+pub(super) fn solve_by_elimination(rows: &mut [f64], size: usize) -> bool {
+    let width = size + 1;
+    for k in 0..size {
+        let below = |i: &usize| rows[i * width + k].abs();
+        let Some(pivot) = (k..size).max_by(|a, b| below(a).total_cmp(&below(b))) else {
+            return false;
+        };
+        let largest = rows[pivot * width + k];
+        if largest == 0.0 || !largest.is_finite() {
+            return false;
+        }
+        for c in k..width {
+            rows.swap(pivot * width + c, k * width + c);
+        }
+        for i in (0..size).filter(|i| *i != k) {
+            let factor = rows[i * width + k] / largest;
+            for c in k..width {
+                rows[i * width + c] -= factor * rows[k * width + c];
+            }
+        }
+    }
+    for k in 0..size {
+        rows[k * width + size] /= rows[k * width + k];
+    }
+    (0..size).all(|k| rows[k * width + size].is_finite())
 }

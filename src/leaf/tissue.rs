@@ -4,8 +4,7 @@
 //! What ties neighbouring rods also by moments: the blocks between their nodes.
 
 use crate::leaf::block_tridiagonal::group_and_lane;
-use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::NodeLoad;
+use crate::leaf::discrete::{DiscreteLeaf, NodeLoad};
 use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::numbers::{format_two_digits, largest};

@@ -9,7 +9,10 @@ pub(crate) mod accuracy;
 pub(crate) mod eigenvalues;
 mod follow;
 mod loading;
+mod log;
 mod path;
+mod plan;
+pub(crate) mod problem;
 mod request;
 pub(crate) mod rest;
 mod result;
@@ -20,16 +23,18 @@ pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
 use crate::memory;
-pub use crate::newton::SolverCounts;
-pub(crate) use crate::relax::accuracy::transfer::{Stencil, rod_shapes};
-pub(crate) use crate::relax::accuracy::{GridLevel, NestedEquilibrium};
+pub use crate::newton::{EquilibriumFailure, SolverCounts};
+pub(crate) use crate::relax::accuracy::NestedEquilibrium;
+pub(crate) use crate::relax::accuracy::transfer::{GridLevel, Stencil, rod_shapes};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
+pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,
 };
+pub use crate::relax::rest::relax_from;
 pub(crate) use crate::relax::rest::relax_on_grids;
 pub use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 pub(crate) use crate::relax::result::serialize_index;
@@ -48,7 +53,6 @@ pub(crate) use crate::relax::sensitivity::{
 pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
 pub(crate) use crate::relax::solve_on_grid::check_segments;
 pub(crate) use crate::relax::solve_on_grid::start::initial_state;
-pub use crate::relax::solve_on_grid::start::relax_from;
 pub(crate) use crate::relax::stability::{index_near, state_from_rod_shapes};
 use crate::run::Instant;
 pub use crate::run::{Limit, RefusedOption, UnknownWord as UnknownMethod, UnmodelledFeature};

@@ -5,26 +5,31 @@
 //!
 //! What the way to rest has cost so far, and what it leaves for reuse.
 
-use crate::leaf::{Grid, Leaf, Loads, System};
-use crate::newton::SolverCounts;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf};
+use crate::newton::EquilibriumFailure;
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
 use crate::relax::eigenvalues;
 use crate::relax::eigenvalues::EigenvalueRequest;
+use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{
-    follow_load_path, guess, load_slowly, solve_from_guesses, solve_from_start, takes_loads_stably,
+    LoadingEnd, follow_load_path, grid_of, guess, load_slowly, solve_from_guesses,
+    solve_from_start, takes_loads_stably,
 };
-use crate::relax::path::{Path, Route, Stage};
+use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
+use crate::relax::path::Path;
+use crate::relax::plan::{Acceptance, PlannedAttempt, plan};
+use crate::relax::problem::{COARSEST, RelaxationProblem, least_segments, may_solve_half};
 use crate::relax::request::{
-    Method, Options, Progress, RelaxError, SemiImplicit, check_hinge_equilibrium, check_tolerance,
+    Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
-use crate::relax::solve_on_grid::{
-    check_segments, explicit, least_segments, may_solve_half, softens,
-};
-use crate::relax::stability::{Decision, Verdict, decide};
-use crate::run::Instant;
+use crate::relax::solve_on_grid::{check_segments, explicit};
+use crate::relax::stability::{Decision, Verdict, decide, state_from_rod_shapes};
+use crate::run::{Instant, RefusedOption};
 use crate::scenario::Scenario;
+use crate::shape::{NodeState, RodShape};
+use glam::DVec3;
 
 /// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
 /// steps of Newton's method without softened rods, rests where slow loading leads, stably if its veins
@@ -65,8 +70,7 @@ pub(crate) fn relax_on_grids(
         ..RelaxationProblem::new(&leaf, options, tolerance)
     };
     let mut effort = WorkLog::new(progress);
-    let grid = Grid::new(first, leaf.kinks());
-    let found = find_rest(&problem, half.as_ref(), grid, &mut effort);
+    let found = find_rest(&problem, half.as_ref(), first, &mut effort);
     Ok(equilibrium_with_stability(
         &problem,
         found,
@@ -75,49 +79,86 @@ pub(crate) fn relax_on_grids(
     ))
 }
 
-/// Brings the leaf to rest, its `half` where that is enough.
+/// Brings the leaf to rest, its `half` where that is enough, by the first attempt of its plan that is
+/// accepted.
 fn find_rest<'a>(
     problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
-    grid: Grid,
+    segments: usize,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    let slowly = problem.loads_slowly();
-    // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
-    // the path need not be walked.
-    let in_valley = slowly
-        && matches!(problem.options.method, Method::SemiImplicit(_))
-        && !softens(problem.leaf);
-    if in_valley || !slowly && half.is_some() {
-        let reduced = RelaxationProblem {
-            stays_in_valley: in_valley,
-            ..problem.reduced_to_half(half)
+    let mut failed = None;
+    for attempt in plan(problem, half.is_some(), segments) {
+        if attempt.needs_time && problem.out_of_time() {
+            break;
+        }
+        let half = half.filter(|_| attempt.extent == Extent::Half);
+        let found = match attempt.strategy {
+            Strategy::SlowLoading => match load_slowly(problem, half, effort) {
+                LoadingEnd::Final(found) => return found,
+                LoadingEnd::GivenUp(failure) => Err(failure),
+            },
+            _ => {
+                let (found, end) = solve_planned(problem, half, &attempt, effort);
+                effort.log(attempt.strategy, attempt.extent, attempt.segments, end);
+                if found.is_ok() && end == AttemptEnd::Accepted {
+                    return found;
+                }
+                found
+            }
         };
-        let found = solve_from_start(&reduced, grid.clone(), effort);
-        if half.is_some() {
-            effort.spare_system = None;
-        }
-        if let Ok(found) = found
-            && found.is_stable()
-            && (!slowly || is_in_first_valley(&found.history))
-            && (!slowly || takes_loads_stably(problem, &found, effort))
-        {
-            let path = problem.undisturbed_path();
-            return Ok(found.mirrored_to_whole(&reduced).with_path(path));
-        }
-        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
-        // solve the full leaf.
-        effort.spare_system = None;
+        failed = found.err().or(failed);
     }
-    if slowly {
-        return load_slowly(problem, half, effort);
-    }
-    match solve_from_start(problem, grid, effort) {
-        Err(_) if problem.may_be_loaded_instead() => {
-            effort.spare_system = None;
-            load_slowly(problem, None, effort)
+    match failed {
+        Some(failure) => Err(failure),
+        None => {
+            NestedEquilibrium::without_grids(problem).into_failure(EquilibriumFailure::StepLimit)
         }
-        found => result_with_path(found, problem.undisturbed_path()),
+    }
+}
+
+/// Makes an attempt from arcs, or from the start of the request, of the `half` or of the whole.
+fn solve_planned<'a>(
+    problem: &RelaxationProblem<'a>,
+    half: Option<&'a Leaf>,
+    attempt: &PlannedAttempt,
+    effort: &mut WorkLog,
+) -> (RelaxationResult, AttemptEnd) {
+    let part = RelaxationProblem {
+        stays_in_valley: attempt.strategy == Strategy::FirstValley,
+        ..problem.reduced_to_half(half)
+    };
+    let grid = grid_of(problem.leaf, attempt.segments);
+    let found = solve_from_start(&part, grid, effort);
+    let end = match &found {
+        Ok(found) => acceptance_of(problem, attempt.acceptance, found, effort),
+        Err(failure) => AttemptEnd::Failed(failure.stop),
+    };
+    let path = match attempt.needs_time {
+        // It takes the place of slow loading.
+        true => Some(Path::Released),
+        false => problem.undisturbed_path(),
+    };
+    let whole = found.map(|found| found.mirrored_to_whole(&part));
+    (result_with_path(whole, path), end)
+}
+
+/// Whether an equilibrium is accepted by this rule, or why not.
+fn acceptance_of(
+    problem: &RelaxationProblem,
+    rule: Acceptance,
+    found: &NestedEquilibrium,
+    effort: &mut WorkLog,
+) -> AttemptEnd {
+    match rule {
+        Acceptance::AtRest => AttemptEnd::Accepted,
+        _ if !found.is_stable() => AttemptEnd::Unstable,
+        Acceptance::Stable => AttemptEnd::Accepted,
+        Acceptance::EndOfLoading if !is_in_first_valley(&found.history) => AttemptEnd::FarFromArcs,
+        Acceptance::EndOfLoading if !takes_loads_stably(problem, found, effort) => {
+            AttemptEnd::VeinsMayBuckle
+        }
+        Acceptance::EndOfLoading => AttemptEnd::Accepted,
     }
 }
 
@@ -188,6 +229,7 @@ pub(super) fn equilibrium_with_stability(
         (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
     leaf.stability.modes = modes.map(|it| it.modes);
+    leaf.attempts = std::mem::take(&mut effort.attempts);
     (leaf, found)
 }
 
@@ -244,163 +286,116 @@ const MINIMUM_INDEX_REMARK: &str = "an eigenvalue may be negative or positive fo
 const BESIDE_BIFURCATION_REMARK: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
      still stable; a load that is a little larger, or a small disturbance, shows where it goes";
 
-/// Segments of the coarsest grid, in two panels or more if profiles have kinks.
-pub const COARSEST: usize = 8;
+/// Remark on a leaf that did not come to rest from the given shape.
+pub(super) const RELAXED_ANEW_REMARK: &str =
+    "from the given start the leaf does not come to rest: it was relaxed as without one";
 
-/// The smallest tolerance for which the first grid is tried alone: below it nodes would be too
-/// few for stations between them.
-const SMALLEST_SINGLE_GRID_TOLERANCE: f64 = 5e-7;
-
-/// Largest number of corrections by the estimated error.
-const CORRECTIONS: usize = 4;
-
-/// The leaf that is to come to rest, and how.
-#[derive(Clone, Copy)]
-pub struct RelaxationProblem<'a> {
-    pub leaf: &'a Leaf,
-    /// The full leaf, if `leaf` is half of it.
-    pub whole_leaf: Option<&'a Leaf>,
-    pub options: &'a Options,
-    pub tolerance: f64,
-    /// Whether only the shape and its stability are requested, without forces on the grids,
-    /// eigenvalues or derivatives.
-    pub shape_alone: bool,
-    /// Whether to tell that the rods stay in their plane, as nothing acts out of it.
-    pub planar: bool,
-    /// Whether it fails where the leaf would have to leave the valley of its initial guess.
-    pub stays_in_valley: bool,
+/// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
+/// in the valley in which that lies, where a relaxation may find another. Where that leads nowhere it
+/// relaxes as without, and one of the doubts says so.
+///
+/// # Errors
+/// Requests that cannot be met, as of [`relax`](crate::relax::relax); other methods than the
+/// semi-implicit one, and shapes of other leaves.
+pub fn relax_from(
+    scenario: &Scenario,
+    (stations, rods): (&[f64], &[RodShape]),
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
+    check_wind_options(scenario, options)?;
+    check_hinge_equilibrium(scenario)?;
+    check_start(scenario, stations, rods)?;
+    let method = options.method;
+    let Method::SemiImplicit(how) = method else {
+        let why = "only the method semi-implicit begins from a given shape";
+        return Err(RefusedOption::new("method", method.word(), why).into());
+    };
+    let clock = Instant::now();
+    let leaf = Leaf::new(scenario);
+    let problem = RelaxationProblem::new(&leaf, options, tolerance);
+    let segments = check_segments(
+        &leaf,
+        method.segments(),
+        least_segments(method, tolerance, false),
+    )?;
+    let grid = Grid::new(segments, leaf.kinks());
+    let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+    let there = (rods.iter())
+        .map(|rod| interpolate_rod_shape(stations, rod, grid.sigma()))
+        .collect::<Vec<_>>();
+    let mut state = state_from_rod_shapes(&leaf, &discrete, &there);
+    for j in 0..leaf.rods() {
+        let base = state.base(j);
+        (state.x[base], state.q[base]) = leaf.base(j);
+    }
+    leaf.place_held_tips(&mut state);
+    let mut effort = WorkLog::new(progress);
+    let begun = NestedEquilibrium::without_grids(&problem);
+    let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
+    let (settled, end) = match &found {
+        Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
+        Ok(_) => (false, AttemptEnd::Unstable),
+        Err(failure) => (problem.out_of_time(), AttemptEnd::Failed(failure.stop)),
+    };
+    effort.log(Strategy::GivenShape, Extent::Whole, segments, end);
+    if settled {
+        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
+    }
+    let given = effort.attempts;
+    let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
+    leaf.attempts.splice(0..0, given);
+    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
+    Ok(leaf)
 }
 
-impl<'a> RelaxationProblem<'a> {
-    /// The leaf with forces and eigenvalues, wherever it comes to rest.
-    pub fn new(leaf: &'a Leaf, options: &'a Options, tolerance: f64) -> Self {
-        RelaxationProblem {
-            leaf,
-            whole_leaf: None,
-            options,
-            tolerance,
-            shape_alone: false,
-            planar: false,
-            stays_in_valley: false,
-        }
+/// Refuses the shape of another leaf, and one that is no shape.
+pub(super) fn check_start(
+    scenario: &Scenario,
+    stations: &[f64],
+    rods: &[RodShape],
+) -> Result<(), RefusedOption> {
+    let refuse = |value: String, why: String| Err(RefusedOption::new("start", value, why));
+    let (own, given) = (scenario.rods.len(), rods.len());
+    if own != given {
+        let why = format!("must have as many rods as the scenario, {own}");
+        return refuse(format!("a leaf of {given} rods"), why);
     }
-
-    /// The same for the half of the leaf, if there is one.
-    pub fn reduced_to_half(self, half: Option<&'a Leaf>) -> Self {
-        match half {
-            None => self,
-            Some(half) => RelaxationProblem {
-                leaf: half,
-                whole_leaf: Some(self.leaf),
-                ..self
-            },
-        }
+    let ascending = stations.windows(2).all(|pair| pair[0] < pair[1]);
+    let whole = stations.first() == Some(&0.0) && stations.last() == Some(&1.0);
+    let finite = |node: &NodeState| {
+        node.position.is_finite() && node.n.is_finite() && node.rotation.is_normalized()
+    };
+    let complete =
+        |rod: &RodShape| rod.nodes.len() == stations.len() && rod.nodes.iter().all(finite);
+    if !ascending || !whole || !rods.iter().all(complete) {
+        let why = "must be at rest, with numbers at all of its stations from 0 to 1";
+        return refuse("a leaf".into(), why.into());
     }
-
-    /// Segments of the fixed grid, if there is one.
-    pub fn segments(&self) -> Option<usize> {
-        self.options.method.segments()
-    }
-
-    /// Whether unstable equilibria are accepted.
-    pub fn keeps_unstable(&self) -> bool {
-        matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
-    }
-
-    /// Whether the time limit is reached or the run is cancelled.
-    pub fn out_of_time(&self) -> bool {
-        self.options.limit.reached()
-    }
-
-    /// Whether a grid is so coarse that it only serves leaves that settle in the valley they
-    /// start in.
-    pub fn too_coarse(&self, segments: usize) -> bool {
-        self.segments().is_none() && segments < COARSEST
-    }
-
-    /// Whether the leaf is loaded slowly, rather than released.
-    pub fn loads_slowly(&self) -> bool {
-        let disturbed = |how: SemiImplicit| how.keep_unstable || how.disturbance.is_some();
-        let released = match self.options.method {
-            Method::SemiImplicit(how) => disturbed(how),
-            _ => false,
-        };
-        // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
-        self.options.route == Route::LoadedLeaf
-            && !released
-            && !self.leaf.has_placed_supports()
-            && !self.leaf.hinged()
-            && self.leaf.loads != Loads::default()
-            && !self.leaf.loads.has_moments()
-    }
-
-    /// Whether a leaf that was released may be loaded slowly.
-    pub fn may_be_loaded_instead(&self) -> bool {
-        let settles = matches!(
-            self.options.method,
-            Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none()
-        );
-        settles
-            && self.options.route == Route::LoadedLeaf
-            && !self.leaf.has_placed_supports()
-            && !self.leaf.hinged()
-            && !self.leaf.loads.has_moments()
-            && !self.out_of_time()
-    }
-
-    /// The path of the leaf as far as nothing happens on it, if it has one.
-    pub fn undisturbed_path(&self) -> Option<Path> {
-        if self.loads_slowly() {
-            return Some(Path::STABLE);
-        }
-        let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let moved = self.leaf.has_placed_supports() || self.leaf.loads.has_moments();
-        (released && !moved).then_some(Path::Released)
-    }
-
-    /// The largest number of corrections.
-    pub fn corrections(&self) -> usize {
-        let grids = matches!(self.options.method, Method::SemiImplicit(_));
-        let free = !self.leaf.has_placed_supports() && self.segments().is_none();
-        match grids && free && self.shape_alone {
-            true => CORRECTIONS,
-            false => 0,
-        }
-    }
-
-    /// Whether the first grid may be enough.
-    pub fn may_use_single_grid(&self) -> bool {
-        self.corrections() > 0 && self.tolerance >= SMALLEST_SINGLE_GRID_TOLERANCE
-    }
+    Ok(())
 }
 
-/// Limit on nodes times force evaluations for a leaf to come to rest: some seconds.
-pub const BUDGET: usize = 10_000_000;
-
-/// Counts of the work on all grids, whatever becomes of them, and its progress.
-pub struct WorkLog<'o> {
-    pub progress: &'o mut dyn FnMut(&Progress),
-    pub work: SolverCounts,
-    /// Nodes times force evaluations so far.
-    pub node_evaluations: usize,
-    /// Nodes times force evaluations of all walks.
-    pub loading_node_evaluations: usize,
-    /// How far the leaf came on its path before it failed.
-    pub farthest_stage: Option<(Stage, f64)>,
-    /// The linear system of the last grid, for reuse.
-    pub spare_system: Option<System>,
-}
-
-impl<'o> WorkLog<'o> {
-    /// None so far.
-    pub fn new(progress: &'o mut dyn FnMut(&Progress)) -> Self {
-        WorkLog {
-            progress,
-            work: SolverCounts::default(),
-            node_evaluations: 0,
-            loading_node_evaluations: 0,
-            farthest_stage: None,
-            spare_system: None,
+/// A rod at other stations: on chords, with the directors turned evenly from node to node.
+pub(super) fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
+    let node = |&sigma: &f64| {
+        let next = stations.partition_point(|&at| at < sigma);
+        let next = next.clamp(1, stations.len() - 1);
+        let (a, b) = (&rod.nodes[next - 1], &rod.nodes[next]);
+        let weight = (sigma - stations[next - 1]) / (stations[next] - stations[next - 1]);
+        let mean = |of: fn(&NodeState) -> DVec3| of(a).lerp(of(b), weight);
+        NodeState {
+            position: mean(|node| node.position),
+            rotation: a.rotation.slerp(b.rotation, weight),
+            v: mean(|node| node.v),
+            u: mean(|node| node.u),
+            n: mean(|node| node.n),
+            m: mean(|node| node.m),
         }
+    };
+    RodShape {
+        length: rod.length,
+        nodes: to.iter().map(node).collect(),
     }
 }

@@ -9,14 +9,11 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
-use crate::leaf::{DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, State, System};
-use crate::newton::{
-    EquilibriumFailure, NewtonEquations, NewtonIteration, SolverCounts, is_at_saddle,
+use crate::leaf::{
+    DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, NodalField, State, System,
 };
+use crate::newton::{NewtonEquations, NewtonIteration, SolverCounts};
 use crate::numbers::larger;
-use crate::relax::loading::LoadPath;
-use crate::relax::path::StabilityLoss;
-use crate::relax::solve_on_grid::start::symmetry_breaking_field;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -315,193 +312,26 @@ pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddl
 
 /// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
 /// first, the rate below which there are no springs (beside a bifurcation a leaf moves slowly),
-/// and the rates above which the motion fails, in general and where segments are unresolved.
-const FIRST_RATE: f64 = 3.0;
 
-const LEAST_RATE: f64 = 0.02;
-
-const LARGEST_RATE: f64 = 1e12;
-
-const LARGEST_UNRESOLVED_RATE: f64 = 1e6;
-
-/// Factors by which the rate falls after the first of several successful steps and rises after
-/// the first of several failed ones, each time squared, and their limits.
-const FIRST_DECREASE: f64 = 0.8;
-
-const LARGEST_DECREASE: f64 = 1.0 / 8.0;
-
-const FIRST_INCREASE: f64 = 3.0;
-
-const LARGEST_INCREASE: f64 = 16.0;
-
-/// Newton iterations of a step, their accuracy, and the largest increment and the largest change
-/// in a step (radians, lengths): longer steps could leave the valley.
-const ITERATIONS: usize = 12;
-
-const STEP_ACCURACY: f64 = 0.1;
-
-const LARGEST_INCREMENT: f64 = 0.5;
-
-const LARGEST_CHANGE: f64 = 0.5;
-
-/// Accuracy of the equilibrium at the end of a motion.
-const REST_ACCURACY: f64 = 1e-3;
-
-/// Saddles that are left in one motion.
-const MAX_SADDLE_ESCAPES: usize = 6;
-
-/// A leaf that moves no farther (lengths, radians) has not snapped.
-const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
-
-impl LoadPath<'_> {
-    /// From the unstable equilibrium in which Newton's method has put the next state the leaf
-    /// turns to one of its sides.
-    pub fn branch_aside(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
-        let saddle = self.next.clone();
-        let leaf = &self.loading.leaf;
-        let system = &mut self.system;
-        if !find_unstable_mode(leaf, &saddle, system, self.bias_direction, self.work) {
-            return Err(EquilibriumFailure::NoDescent);
-        }
-        let mode = self.system.solution();
-        let mut found: [Option<(f64, State)>; 2] = [None, None];
-        let mut stopped = EquilibriumFailure::NoDescent;
-        for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
-            self.next.clone_from(&saddle);
-            self.system.set_solution(&mode);
-            displace(&self.loading.leaf, &mut self.next, &self.system, sign);
-            match self.relax_next_state() {
-                Ok(()) => *found = Some((self.loading.leaf.energy(&self.next), self.next.clone())),
-                Err(stop) => stopped = stop,
-            }
-        }
-        let (state, equally_open) = lower_energy_side(found).ok_or(stopped)?;
-        self.next = state;
-        self.record_event(part, StabilityLoss::Branched { equally_open });
-        Ok(())
-    }
-
-    /// From the last equilibrium before the end of the path the leaf snaps.
-    pub fn snap_through(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
-        self.carry_last(part);
-        let before = self.next.clone();
-        self.relax_next_state()?;
-        if before.distance(&self.next) > LARGEST_CONTINUOUS_MOTION {
-            self.record_event(part, StabilityLoss::Snapped);
-        }
-        Ok(())
-    }
-
-    /// Moves the next state to rest, leaving saddles.
-    fn relax_next_state(&mut self) -> Result<(), EquilibriumFailure> {
-        let leaf = &self.loading.leaf;
-        leaf.strain_forces(&mut self.next);
-        let mut rate = SpringRate::new();
-        let mut saddles = 0;
-        while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
-            let from = self.next.clone();
-            let step = NewtonIteration {
-                accuracy: if rate.now > 0.0 {
-                    STEP_ACCURACY
-                } else {
-                    REST_ACCURACY
-                },
-                iterations: ITERATIONS,
-                work: self.work,
-                progress: self.progress,
-            };
-            let proximal = NewtonEquations::Proximal {
-                solver: &mut self.solver,
-                at: &from,
-                rate: rate.now,
-                largest: LARGEST_INCREMENT,
-            };
-            let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
-            if moved.is_ok() && from.distance(&self.next) > LARGEST_CHANGE {
-                moved = Err(EquilibriumFailure::NoDescent);
-            }
-            match moved {
-                Ok(size)
-                    if rate.now == 0.0
-                        || is_at_saddle(
-                            leaf,
-                            &self.next,
-                            self.next.largest_displacement_to(&from).max(size),
-                        ) =>
-                {
-                    let shift = leaf.neutral_shift();
-                    let (state, system) = (&mut self.next, &mut self.system);
-                    let index = index(leaf, state, system, shift, self.work);
-                    // Converged to rounding a neutral mode is not unstable.
-                    if index == Some(0)
-                        || converge_saddle(leaf, state, system, self.work) == Some(0)
-                    {
-                        return Ok(());
-                    }
-                    moved = Err(EquilibriumFailure::Saddle);
-                }
-                _ => {}
-            }
-            match moved {
-                Err(EquilibriumFailure::Saddle) => {
-                    saddles += 1;
-                    if saddles > MAX_SADDLE_ESCAPES {
-                        return Err(EquilibriumFailure::Saddle);
-                    }
-                    let (state, system) = (&mut self.next, &mut self.system);
-                    escape_saddle(leaf, state, system, self.bias_direction, self.work);
-                    leaf.strain_forces(&mut self.next);
-                    rate = SpringRate::new();
-                }
-                Ok(_) => rate.decrease_after_success(),
-                Err(stop) => {
-                    self.next = from;
-                    rate.increase_after_failure();
-                    let unresolved = stop == EquilibriumFailure::Unresolved
-                        && rate.now > LARGEST_UNRESOLVED_RATE;
-                    if rate.now > LARGEST_RATE || unresolved {
-                        return Err(stop);
-                    }
-                }
-            }
-        }
-        Err(EquilibriumFailure::StepLimit)
-    }
+/// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
+/// sign that has most in common with them; of several modes of one eigenvalue, as of veins that
+/// buckle alike, to that sum of them. They move the leaf along `leaning`, down, to the left
+/// (along e2) and forward, in this order of importance, more so away from the base and, with
+/// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
+/// would turn out of any other on its way.
+pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
+    let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
+    let given = GIVEN_BIAS_WEIGHT * leaning.normalize_or_zero();
+    let everywhere = given + down + 0.5 * left + 0.25 * forward;
+    let leftwards = 0.31 * down + 0.17 * left + 0.11 * forward;
+    let node = |j: usize, i: usize| {
+        let x = state.x[state.base(j) + i];
+        let shift = (1.0 + 0.2 * x.x) * everywhere + x.y * leftwards;
+        [0.0, 0.0, 0.0, shift.x, shift.y, shift.z]
+    };
+    let rod = |j: usize| leaf.moving_nodes().map(|i| node(j, i)).collect();
+    (0..leaf.rods()).map(rod).collect()
 }
 
-/// The spring rate of the steps.
-struct SpringRate {
-    now: f64,
-    /// The factor of its last change.
-    factor: f64,
-}
-
-impl SpringRate {
-    fn new() -> Self {
-        SpringRate {
-            now: FIRST_RATE,
-            factor: 1.0,
-        }
-    }
-
-    /// After a step that succeeded.
-    fn decrease_after_success(&mut self) {
-        self.factor = match self.factor {
-            fell if fell < 1.0 => (fell * fell).max(LARGEST_DECREASE),
-            _ => FIRST_DECREASE,
-        };
-        self.now *= self.factor;
-        if self.now < LEAST_RATE {
-            self.now = 0.0;
-        }
-    }
-
-    /// After a step that failed.
-    fn increase_after_failure(&mut self) {
-        self.factor = match self.factor {
-            rose if rose > 1.0 => (rose * rose).min(LARGEST_INCREASE),
-            _ => FIRST_INCREASE,
-        };
-        self.now = self.factor * self.now.max(LEAST_RATE);
-    }
-}
+/// Weight of a given direction over that of the others.
+pub(super) const GIVEN_BIAS_WEIGHT: f64 = 10.0;

@@ -17,8 +17,8 @@ use crate::leaf::{
 };
 use crate::modes::Eigenpair;
 use crate::motion::Physics;
-use crate::relax::accuracy::GridLevel;
 use crate::relax::accuracy::richardson::{BestColumn, Richardson};
+use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
 use crate::rod::Segment;

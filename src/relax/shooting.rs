@@ -243,6 +243,7 @@ fn shoot(
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
+        attempts: Vec::new(),
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
         shape: Shape {

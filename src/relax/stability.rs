@@ -7,15 +7,16 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::SolverCounts;
+use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::distance;
-use crate::relax::accuracy::transfer::prolong;
-use crate::relax::accuracy::{GridLevel, NestedEquilibrium, positions};
+use crate::relax::accuracy::transfer::{GridLevel, positions, prolong};
 use crate::relax::eigenvalues::{
     EigenvalueRequest, LowestModes, affordable_next_grid, deciding_grid,
 };
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
+use crate::relax::log::WorkLog;
+use crate::relax::problem::RelaxationProblem;
 use crate::relax::request::{MOST_MODES, Method, Options, Progress, SemiImplicit};
-use crate::relax::rest::{RelaxationProblem, WorkLog};
 use crate::relax::saddle::bounds;
 use crate::relax::{eigenvalues, saddle};
 use crate::scenario::Scenario;

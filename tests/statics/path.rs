@@ -3,7 +3,9 @@
 //! numbered; where the path loses its stability is where theory says. `LEAVES` is how many real
 //! leaves are tried, `SEED` the first.
 
-use leafdyn::relax::{Event, Path, Route, StabilityLoss, Stage, relax};
+use leafdyn::relax::{
+    AttemptEnd, Event, Extent, Path, Route, StabilityLoss, Stage, Strategy, relax,
+};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::real;
 use leafdyn_testing::*;
@@ -278,4 +280,40 @@ fn counts_of_factorisations() {
     let mut sorted = real.clone();
     sorted.sort_unstable();
     assert!(sorted[sorted.len() / 2] <= 60, "{real:?}");
+}
+
+/// What was tried, as strategy, extent and end.
+fn attempts(leaf: &Equilibrium) -> Vec<(Strategy, Extent, AttemptEnd)> {
+    let each = leaf.attempts.iter();
+    each.map(|it| (it.strategy, it.extent, it.end)).collect()
+}
+
+/// The plan of a relaxation, read from its log: Newton's method from arcs first, of one half where
+/// that stands for the whole, and slow loading where that may lead elsewhere.
+#[test]
+fn the_log_tells_what_was_tried() {
+    let paper = scenario("paper/fig04", "load.gravity=[0, 0, -1]");
+    let accepted = |strategy| [(strategy, Extent::Half, AttemptEnd::Accepted)];
+    let first_valley = attempts(&paper.relax().unwrap());
+    assert_eq!(first_valley, accepted(Strategy::FirstValley));
+    let released = Options {
+        route: Route::Release,
+        ..Options::default()
+    };
+    let found = relax(&paper, &released, &mut |_| {}).unwrap();
+    assert_eq!(attempts(&found), accepted(Strategy::Release));
+    // A column beyond its critical load leaves the valley of the straight one.
+    let column = rod(&format!(
+        "{RIGID}; stiffness.bending_3=2; load.gravity=[-12, 0, 0]"
+    ));
+    let found = column.relax().unwrap();
+    let [
+        (Strategy::FirstValley, _, first),
+        (Strategy::SlowLoading, _, second),
+    ] = attempts(&found)[..]
+    else {
+        panic!("{:?}", found.attempts);
+    };
+    assert_ne!(first, AttemptEnd::Accepted);
+    assert_eq!(second, AttemptEnd::Accepted);
 }

@@ -46,6 +46,11 @@ pub trait ReportedResult {
         None
     }
 
+    /// What was tried for it, and what came of that.
+    fn attempt_lines(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What follows the list of the files that were written.
     fn remarks(&self) -> LabelledLines {
         LabelledLines::new()
@@ -61,12 +66,16 @@ pub trait ReportedResult {
         .concat()
     }
 
-    /// The text for the console; the work only if it is `verbose`.
+    /// The text for the console; the attempts and the work only if it is `verbose`.
     fn report(&self, units: &Units, files: Vec<String>, verbose: bool) -> String {
-        let work = label_first_line("work", self.work_line().filter(|_| verbose));
+        let (attempts, work) = match verbose {
+            true => (self.attempt_lines(), self.work_line()),
+            false => Default::default(),
+        };
         let parts = [
             self.report_lines(units),
-            work,
+            label_first_line("attempts", attempts),
+            label_first_line("work", work),
             label_first_line("written", files),
             self.remarks(),
         ];

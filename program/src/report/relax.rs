@@ -17,8 +17,8 @@ use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, st
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
-    AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event, InstabilityKind,
-    Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
+    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event,
+    InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
     COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
@@ -95,6 +95,10 @@ impl ReportedResult for Equilibrium {
 
     fn work_line(&self) -> Option<String> {
         Some(solver_work_line(self))
+    }
+
+    fn attempt_lines(&self) -> Vec<String> {
+        self.attempts.iter().map(Attempt::to_string).collect()
     }
 
     fn remarks(&self) -> LabelledLines {

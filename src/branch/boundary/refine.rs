@@ -27,9 +27,8 @@ use crate::branch::refine::{
 use crate::leaf::{Grid, State};
 use crate::newton::Contraction;
 use crate::numbers::larger;
-use crate::relax::accuracy::GridLevel;
 use crate::relax::accuracy::richardson::Richardson;
-use crate::relax::accuracy::transfer::{predict_on_finer_grid, weights};
+use crate::relax::accuracy::transfer::{GridLevel, predict_on_finer_grid, weights};
 use glam::DVec3;
 
 /// Least number of grids of a point, and largest of a point of a nearly rigid leaf.

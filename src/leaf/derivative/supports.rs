@@ -1,9 +1,8 @@
 //! Held nodes: the effect of moving their holders, and the changes of the forces on these.
 
-use crate::leaf::Leaf;
-use crate::leaf::derivative::{
+use crate::leaf::derivative::parameter::{
     LeafParameterDerivative, LinearResponse, ParameterForces, hessian_at_constant_force,
-    value_derivative,
+    increment_from_vectors,
 };
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
@@ -11,53 +10,7 @@ use crate::leaf::state::{
 };
 use crate::rod::Segment;
 use crate::rotation;
-use crate::scenario::{Clamp, Scenario};
-use glam::{DQuat, DVec3};
-
-/// The rate of change of the position and the orientation of the tips' holder, in the leaf's units.
-pub(super) struct TipSupportDerivative {
-    shift: DVec3,
-    /// Rotations of the clamps, one per rod; empty for a pinned tip.
-    turns: Vec<DVec3>,
-}
-
-impl TipSupportDerivative {
-    /// `None` if the tips are free, or their holder does not move.
-    pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
-        let held = leaf.tip_support.as_ref()?;
-        let of = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
-        let axis =
-            |axis: usize| of(&|s| s.held_tip.as_ref().map_or(0.0, |held| held.position[axis]));
-        let shift = DVec3::from_array([0, 1, 2].map(axis)) / leaf.scale.length;
-        let clamp = |s: &Scenario, j: usize| Some(s.held_tip.as_ref()?.clamps.as_ref()?[j]);
-        // The angle about e3, then the twist about the resulting d1, as in the clamp's definition.
-        let turn = |(j, own): (usize, &Clamp)| {
-            let d1 = DQuat::from_rotation_z(own.angle) * DVec3::X;
-            let angle = of(&|s| clamp(s, j).map_or(0.0, |clamp| clamp.angle));
-            let twist = of(&|s| clamp(s, j).map_or(0.0, |clamp| clamp.twist));
-            angle * DVec3::Z + twist * d1
-        };
-        let clamps = held.clamps.iter().flatten().enumerate();
-        let turns: Vec<DVec3> = clamps.map(turn).collect();
-        let moves = shift != DVec3::ZERO || turns.iter().any(|turn| *turn != DVec3::ZERO);
-        moves.then_some(TipSupportDerivative { shift, turns })
-    }
-}
-
-impl TipSupportDerivative {
-    /// The increment of the tip of rod `j`.
-    fn tip_increment(&self, j: usize) -> Increment {
-        increment_from_vectors(
-            self.turns.get(j).copied().unwrap_or(DVec3::ZERO),
-            self.shift,
-        )
-    }
-}
-
-fn increment_from_vectors(turned: DVec3, moved: DVec3) -> Increment {
-    let [a, b] = [turned.to_array(), moved.to_array()];
-    [a[0], a[1], a[2], b[0], b[1], b[2]]
-}
+use glam::DVec3;
 
 impl DiscreteLeaf {
     /// The increments of held nodes by the motion of their holders; rods without any have none.

@@ -1,6 +1,8 @@
 //! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
 
-use crate::leaf::direct::{DirectError, UnknownNumbering, for_each_matrix_entry, lower_triangle};
+use crate::leaf::direct::unknowns::{
+    DirectError, UnknownNumbering, for_each_matrix_entry, lower_triangle,
+};
 use crate::leaf::state::NodalField;
 use crate::leaf::system::System;
 use crate::memory;

@@ -19,7 +19,7 @@
 //! eigenvalues of P.
 
 use crate::leaf::block_tridiagonal::{RodBlock, group_and_lane};
-use crate::leaf::direct::UnknownNumbering;
+use crate::leaf::direct::unknowns::UnknownNumbering;
 use crate::leaf::system::System;
 use pulp::{Arch, Simd, WithSimd};
 

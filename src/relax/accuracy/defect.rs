@@ -18,13 +18,14 @@
 //! The steps of the integration along the veins in defect correction, and their error.
 
 use crate::leaf::{
-    DefiniteFactors, DiscreteLeaf, FieldJump, Grid, LinearSolveOutcome, NodalField, RodFields,
-    RodIntegrator, SegmentTangent, State, StationFields, System, displacement_part, rotation_part,
+    DefiniteFactors, DiscreteLeaf, EquationWorkspace, FieldJump, Grid, LinearSolveOutcome,
+    NodalField, RodFields, RodIntegrator, SegmentTangent, State, StationFields, System,
+    displacement_part, rotation_part,
 };
 use crate::newton::SolverCounts;
 use crate::numbers::larger;
-use crate::relax::accuracy::GridLevel;
 use crate::relax::accuracy::fields::extrapolated_node_fields;
+use crate::relax::accuracy::transfer::GridLevel;
 use crate::rotation;
 use glam::DVec3;
 
@@ -97,13 +98,13 @@ impl DefectEstimate {
 /// `None` where grips hold veins, whose forces jump there, where the linear equations cannot be
 /// solved, where tissue is so stiff that integration
 /// along the veins is unstable, or where the segments of a single level
-/// are not pairs of equal ones. The equations are factorised, if it fits in `spare`, unless
+/// are not pairs of equal ones. The equations are factorised, in the memory of the `workspace`, unless
 /// `linear` has them already.
 pub fn estimate(
     levels: &[GridLevel],
     columns: usize,
     (enough, most): (f64, usize),
-    (linear, spare): (&mut Option<FactorizedLevel>, &mut Option<System>),
+    (linear, workspace): (&mut Option<FactorizedLevel>, &mut EquationWorkspace),
     work: &mut SolverCounts,
 ) -> Option<DefectEstimate> {
     let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
@@ -125,7 +126,7 @@ pub fn estimate(
         .as_ref()
         .is_none_or(|linear| linear.level_number != grid)
     {
-        let (system, factors) = factorized(&levels[grid], spare.take(), work)?;
+        let (system, factors) = factorized(&levels[grid], workspace, work)?;
         *linear = Some(FactorizedLevel {
             level_number: grid,
             system,
@@ -209,10 +210,10 @@ pub fn estimate(
 /// which differ where rods are rigid.
 fn factorized(
     level: &GridLevel,
-    spare: Option<System>,
+    workspace: &mut EquationWorkspace,
     work: &mut SolverCounts,
 ) -> Option<(System, DefiniteFactors)> {
-    let mut system = System::new_in_memory(spare, &level.leaf);
+    let mut system = workspace.equations(&level.leaf);
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
@@ -692,7 +693,7 @@ mod tests {
             let (_, found) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
             let (mut linear, mut work) = (None, SolverCounts::default());
             let mut estimated = |enough, most| {
-                let systems = (&mut linear, &mut None);
+                let systems = (&mut linear, &mut EquationWorkspace::default());
                 estimate(&found.levels, 1, (enough, most), systems, &mut work).unwrap()
             };
             let first = estimated(0.0, 0).largest();

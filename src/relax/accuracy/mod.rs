@@ -18,8 +18,7 @@ pub(crate) mod richardson;
 pub(crate) mod transfer;
 
 use crate::leaf::{
-    DiscreteLeaf, Grid, Leaf, RodFields, State, System, whole_leaf_changes, whole_leaf_fields,
-    whole_state,
+    DiscreteLeaf, EquationWorkspace, Grid, Leaf, RodFields, whole_leaf_changes, whole_leaf_fields,
 };
 use crate::memory;
 use crate::newton::{Contraction, EquilibriumFailure, SolverCounts};
@@ -27,15 +26,12 @@ use crate::numbers::larger;
 use crate::relax::accuracy::defect::{DefectEstimate, FactorizedLevel};
 use crate::relax::accuracy::fields::finer_nodes;
 use crate::relax::accuracy::richardson::Richardson;
-use crate::relax::accuracy::transfer::{Stencil, weights};
+use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
 use crate::relax::path::Path;
+use crate::relax::problem::{COARSEST, FINEST, RelaxationProblem};
 use crate::relax::request::MAX_NODES;
-use crate::relax::rest::{COARSEST, RelaxationProblem};
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
-
-/// Segments of the finest grid.
-pub const FINEST: usize = 16_384;
 
 /// Changes of the energy below this part of it, or of the leaf's bending energy, are rounding.
 const ENERGY_NOISE: f64 = 1e-11;
@@ -526,11 +522,11 @@ impl NestedEquilibrium {
 
     /// The same with the error of the values on its only grid or of the extrapolated values
     /// estimated from their defect, and corrected if that makes them accurate enough. The
-    /// equations take the place of the `spare` ones.
+    /// equations are set up in the memory of the `workspace`.
     pub fn with_error_estimate(
         mut self,
         problem: &RelaxationProblem,
-        spare: &mut Option<System>,
+        workspace: &mut EquationWorkspace,
         work: &mut SolverCounts,
     ) -> Self {
         let most = problem.corrections();
@@ -550,7 +546,7 @@ impl NestedEquilibrium {
             }
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let (levels, systems) = (&self.levels, (&mut self.factorized_level, spare));
+        let (levels, systems) = (&self.levels, (&mut self.factorized_level, workspace));
         self.estimate =
             columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
@@ -566,39 +562,4 @@ impl NestedEquilibrium {
         let floor = self.iteration_rounding_error(segments);
         floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
-}
-
-/// A leaf settled on one grid.
-#[derive(Clone)]
-pub struct GridLevel {
-    pub leaf: DiscreteLeaf,
-    pub state: State,
-}
-
-/// The level of the whole leaf from that of its half, or from its own.
-pub fn mirror_level(reduced: &Leaf, whole: &Leaf, level: &GridLevel) -> GridLevel {
-    if !reduced.is_mirror_half() {
-        return level.clone();
-    }
-    GridLevel {
-        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
-        state: whole_state(reduced, &level.state),
-    }
-}
-
-/// Whether all nodes lie in the plane z = 0.
-pub fn is_planar_level(level: &GridLevel) -> bool {
-    level.state.x.iter().all(|x| x.z == 0.0)
-}
-
-/// Positions of all rods at every `stride`-th node, dimensionless.
-pub fn positions(level: &GridLevel, stride: usize) -> Vec<f64> {
-    let n = level.leaf.segments();
-    let nodes = |j: usize| {
-        (0..=n)
-            .step_by(stride)
-            .map(move |i| level.state.base(j) + i)
-    };
-    let nodes = (0..level.leaf.rods()).flat_map(nodes);
-    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
 }

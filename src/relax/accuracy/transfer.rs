@@ -6,8 +6,7 @@
 //!
 //! Strains and stress resultants at the nodes of a state.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State};
-use crate::relax::accuracy::GridLevel;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
@@ -525,6 +524,41 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         (force, segment(i - 1).2 - before * load.moment)
     };
     [force, moment].map(|vector| to_directors * vector)
+}
+
+/// A leaf settled on one grid.
+#[derive(Clone)]
+pub struct GridLevel {
+    pub leaf: DiscreteLeaf,
+    pub state: State,
+}
+
+/// The level of the whole leaf from that of its half, or from its own.
+pub fn mirror_level(reduced: &Leaf, whole: &Leaf, level: &GridLevel) -> GridLevel {
+    if !reduced.is_mirror_half() {
+        return level.clone();
+    }
+    GridLevel {
+        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        state: whole_state(reduced, &level.state),
+    }
+}
+
+/// Whether all nodes lie in the plane z = 0.
+pub fn is_planar_level(level: &GridLevel) -> bool {
+    level.state.x.iter().all(|x| x.z == 0.0)
+}
+
+/// Positions of all rods at every `stride`-th node, dimensionless.
+pub fn positions(level: &GridLevel, stride: usize) -> Vec<f64> {
+    let n = level.leaf.segments();
+    let nodes = |j: usize| {
+        (0..=n)
+            .step_by(stride)
+            .map(move |i| level.state.base(j) + i)
+    };
+    let nodes = (0..level.leaf.rods()).flat_map(nodes);
+    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
 }
 
 #[cfg(test)]

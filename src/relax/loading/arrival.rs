@@ -6,15 +6,17 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_state, whole_sta
 use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::numbers::largest;
 use crate::relax::accuracy::richardson::distance;
-use crate::relax::accuracy::transfer::{predict_on_finer_grid, prolong, restrict, transfer};
+use crate::relax::accuracy::transfer::{
+    GridLevel, positions, predict_on_finer_grid, prolong, restrict, transfer,
+};
 use crate::relax::accuracy::{
-    GridLevel, History, NestedEquilibrium, RelaxationFailure, RelaxationResult, positions,
-    result_with_path,
+    History, NestedEquilibrium, RelaxationFailure, RelaxationResult, result_with_path,
 };
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
+use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::{Event, Path, Stage};
+use crate::relax::problem::{BUDGET, RelaxationProblem};
 use crate::relax::request::Progress;
-use crate::relax::rest::{BUDGET, RelaxationProblem, WorkLog};
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::solve_on_grid::{
@@ -47,6 +49,14 @@ const LOADING_BUDGET: usize = BUDGET / 8;
 /// millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
 const SMALLEST_LOADING_COMPLIANCE: f64 = 1e-6;
 
+/// What slow loading came to.
+pub enum LoadingEnd {
+    /// The result of the relaxation.
+    Final(RelaxationResult),
+    /// A failure after which the leaf may be released from arcs instead.
+    GivenUp(Box<RelaxationFailure>),
+}
+
 /// Loads the leaf slowly, and brings it to rest on nested grids from where that leads; the
 /// `half` of it where it keeps its mirror symmetry. A grid that was too coarse for the walk
 /// is refined.
@@ -54,17 +64,21 @@ pub fn load_slowly<'a>(
     problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
     effort: &mut WorkLog,
-) -> RelaxationResult {
-    let leaf = problem.leaf;
-    let mut grid = coarsest_grid(leaf);
+) -> LoadingEnd {
+    let mut grid = coarsest_grid(problem.leaf);
     let mut path = problem.undisturbed_path();
     loop {
+        let segments = grid.segments();
         let LoadPathEnd {
             level,
             path: walked,
         } = match follow_load_path(problem, grid, effort) {
             Ok(arrived) => arrived,
-            Err(failure) => return release_instead(problem, failure.with_path(path), effort),
+            Err(failure) => {
+                let end = AttemptEnd::PathLost;
+                effort.log(Strategy::SlowLoading, Extent::Whole, segments, end);
+                return LoadingEnd::GivenUp(Box::new(failure.with_path(path)));
+            }
         };
         grid = level.leaf.grid.refined();
         path = Some(walked);
@@ -75,18 +89,20 @@ pub fn load_slowly<'a>(
         {
             let reduced = problem.reduced_to_half(Some(half));
             let guesses = vec![(on.clone(), half_state(half, &state))];
-            effort.spare_system = None;
             let found = solve_from_guesses(
                 &reduced,
                 NestedEquilibrium::without_grids(&reduced),
                 guesses,
                 effort,
             );
-            effort.spare_system = None;
-            if let Ok(found) = found
-                && found.is_stable()
-            {
-                return Ok(found.mirrored_to_whole(&reduced).with_path(path));
+            let end = end_of(&found, |found| match found.is_stable() {
+                true => AttemptEnd::Accepted,
+                false => AttemptEnd::Unstable,
+            });
+            effort.log(Strategy::SlowLoading, Extent::Half, on.segments(), end);
+            if let (Ok(found), AttemptEnd::Accepted) = (found, end) {
+                let whole = found.mirrored_to_whole(&reduced).with_path(path);
+                return LoadingEnd::Final(Ok(whole));
             }
             begun = NestedEquilibrium::without_grids(problem);
         }
@@ -95,23 +111,40 @@ pub fn load_slowly<'a>(
             stays_in_valley: !last,
             ..*problem
         };
+        let segments = on.segments();
         let followed = solve_from_guesses(&in_valley, begun, vec![(on, state)], effort);
         let (given_up, out_of_time) = (last && problem.segments().is_none(), problem.out_of_time());
+        let must_be_accurate = given_up || !out_of_time && !path_is_stable(&path);
+        let end = end_of(&followed, |found| {
+            match found.keeps_tolerance || !must_be_accurate {
+                true => AttemptEnd::Accepted,
+                false => AttemptEnd::Inaccurate,
+            }
+        });
+        effort.log(Strategy::SlowLoading, Extent::Whole, segments, end);
         match followed {
-            Ok(found)
-                if !found.keeps_tolerance
-                    && (given_up || !out_of_time && !path_is_stable(&path)) =>
-            {
+            Ok(found) if end == AttemptEnd::Inaccurate => {
                 let at = found.with_path(path);
                 let stop = EquilibriumFailure::StepLimit;
-                return release_instead(problem, RelaxationFailure { at, stop }, effort);
+                return LoadingEnd::GivenUp(Box::new(RelaxationFailure { at, stop }));
             }
             Err(failure) if given_up => {
-                return release_instead(problem, failure.with_path(path), effort);
+                return LoadingEnd::GivenUp(Box::new(failure.with_path(path)));
             }
-            Err(_) if !last && !out_of_time => effort.spare_system = None,
-            followed => return result_with_path(followed, path),
+            Err(_) if !last && !out_of_time => {}
+            followed => return LoadingEnd::Final(result_with_path(followed, path)),
         }
+    }
+}
+
+/// What came of an attempt, by this rule if the leaf came to rest.
+fn end_of(
+    found: &RelaxationResult,
+    rule: impl FnOnce(&NestedEquilibrium) -> AttemptEnd,
+) -> AttemptEnd {
+    match found {
+        Ok(found) => rule(found),
+        Err(failure) => AttemptEnd::Failed(failure.stop),
     }
 }
 
@@ -120,7 +153,8 @@ fn path_is_stable(path: &Option<Path>) -> bool {
     (path.as_ref()).is_some_and(|path| path.events().is_empty())
 }
 
-fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
+/// The grid of at least so many segments, with nodes at the kinks.
+pub fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
     Grid::new(segments.max(leaf.kinks().len() + 1), leaf.kinks())
 }
 
@@ -133,24 +167,6 @@ fn coarsest_grid(leaf: &Leaf) -> Grid {
         grid = grid.refined();
     }
     grid
-}
-
-/// A leaf whose path could not be followed is released from arcs.
-fn release_instead(
-    problem: &RelaxationProblem,
-    failure: RelaxationFailure,
-    effort: &mut WorkLog,
-) -> RelaxationResult {
-    // Others were released before.
-    if problem.out_of_time() || !problem.loads_slowly() {
-        return Err(Box::new(failure));
-    }
-    let grid = grid_of(problem.leaf, problem.segments().unwrap_or(COARSEST));
-    effort.spare_system = None;
-    result_with_path(
-        solve_from_start(problem, grid, effort),
-        Some(Path::Released),
-    )
 }
 
 /// Where a walk arrived, and how.
@@ -351,7 +367,6 @@ pub fn solve_from_start(
                     && finer.segments() <= FINEST_COMPARED
                     && effort.node_evaluations <= BUDGET =>
             {
-                effort.spare_system = None;
                 grid = finer;
             }
             found => return found,
@@ -403,7 +418,7 @@ pub fn refine_to_tolerance(
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     loop {
-        found = found.with_error_estimate(problem, &mut effort.spare_system, &mut effort.work);
+        found = found.with_error_estimate(problem, &mut effort.workspace, &mut effort.work);
         let mut known = false;
         if found.is_accurate() {
             (found, known) = check_stability(problem, found, false, effort)?;

@@ -6,6 +6,7 @@
 //! The leaf under a part of its loading, from the natural leaf to the leaf as it is.
 
 pub(super) mod arrival;
+pub(super) mod snap;
 
 use crate::homotopy::Homotopy;
 use crate::leaf::{DiscreteLeaf, State, System};

@@ -10,6 +10,7 @@ pub(super) mod forces;
 pub(super) mod report;
 
 use crate::newton::SolverCounts;
+use crate::relax::log::Attempt;
 use crate::relax::path::Path;
 use crate::relax::request::Method;
 use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
@@ -333,6 +334,9 @@ pub struct Equilibrium {
     /// The model that was solved.
     #[serde(flatten)]
     pub model: Model,
+    /// The attempts to bring the leaf to rest, in their order; empty for shooting.
+    #[serde(skip)]
+    pub attempts: Vec<Attempt>,
     /// Work done.
     pub work: SolverCounts,
     /// Time of the solve alone, in seconds.

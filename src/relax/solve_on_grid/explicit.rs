@@ -16,7 +16,7 @@ use crate::motion::{Explicit, Physics, Snapshot, Stopped, TimeIntegrator};
 use crate::newton::{EquilibriumFailure, SolverCounts};
 use crate::relax::request::RelaxError;
 use crate::relax::saddle;
-use crate::relax::solve_on_grid::GridRelaxation;
+use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::run::{Limit, RefusedOption};
 use crate::scenario::Rod;
 

@@ -9,10 +9,11 @@
 use crate::homotopy::Homotopy;
 use crate::leaf::{DiscreteLeaf, GrippedNode, State, System};
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
+use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
-use crate::relax::rest::{RelaxationProblem, WorkLog};
+use crate::relax::problem::RelaxationProblem;
 use crate::relax::saddle;
-use crate::relax::solve_on_grid::{FAR_FROM_REST, GridRelaxation};
+use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation};
 use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};

@@ -20,17 +20,17 @@ pub(crate) mod start;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, State, System, half_state};
 use crate::memory;
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonIteration, SolverCounts};
-use crate::relax::accuracy::{
-    FINEST, GridLevel, History, NestedEquilibrium, RelaxationFailure, is_large, mirror_level,
-};
+use crate::relax::accuracy::transfer::{GridLevel, mirror_level};
+use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationFailure, is_large};
+use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
+use crate::relax::problem::{BUDGET, FINEST, RelaxationProblem};
 use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
-use crate::relax::rest::{BUDGET, COARSEST, RelaxationProblem, WorkLog};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
 pub use crate::relax::solve_on_grid::semi_implicit::softens;
-use crate::relax::solve_on_grid::start::{disturb, initial_state};
+use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation, disturb, initial_state};
 use crate::run::{Limit, RefusedOption};
 use glam::DVec3;
 
@@ -146,8 +146,7 @@ fn find_unleaned_equilibrium(
     moved |= windy && from_start;
     if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
         let how = (near_rest, cg_tolerance);
-        effort.spare_system = None;
-        let mut system = System::new(&leaf);
+        let mut system = effort.workspace.equations(&leaf);
         let begun = from_start.then(|| (state.clone(), effort.work.steps));
         let settled =
             solve_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
@@ -155,7 +154,9 @@ fn find_unleaned_equilibrium(
             let distance = begun.distance(&settled.level.state);
             history.from_start = Some((distance, effort.work.steps - steps));
         }
-        effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
+        if !is_large(&settled.level.leaf) {
+            effort.workspace.take_back(system);
+        }
         return GridSolution {
             left_convex_valley: moved || settled.left_convex_valley,
             events,
@@ -416,12 +417,14 @@ pub fn check_stability(
     }
     let before = found.index;
     let (mut found, mut level) = found.split();
-    let mut spare = effort.spare_system.take();
-    if spare.is_none() && found.levels.is_empty() {
+    if found.levels.is_empty() && !effort.workspace.fits(&level.leaf) {
         // Further grids have equations of their own.
-        spare = found.factorized_level.take().map(|linear| linear.system);
+        let linear = found.factorized_level.take();
+        if let Some(linear) = linear {
+            effort.workspace.take_back(linear.system);
+        }
     }
-    let mut system = System::new_in_memory(spare, &level.leaf);
+    let mut system = effort.workspace.equations(&level.leaf);
     let work = &mut effort.work;
     let mut count = count_negative(problem, &level, &mut system, compared, work);
     if matches!(count.index, Some(Some(1..))) && !problem.keeps_unstable() {
@@ -491,13 +494,6 @@ pub fn relax_from_state(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -
     found.levels.pop().map(|level| level.state)
 }
 
-/// Segments of the coarsest grid for a loose tolerance: if it is at least [`LOOSE`] or only
-/// the shape is requested (forces and eigenvalues have larger errors), and the leaf settles in
-/// the valley it starts in.
-const COARSEST_LOOSE_GRID: usize = 4;
-
-const LOOSE_TOLERANCE: f64 = 1e-3;
-
 /// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
 /// of 86 were too low by a factor of two.
 const COARSEST_BLADE_GRID: usize = 16;
@@ -506,26 +502,6 @@ const COARSEST_BLADE_GRID: usize = 16;
 /// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
 /// loose tolerance.
 pub const COARSEST_TURN: f64 = 0.8;
-
-/// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
-/// saddles, and not disturbed.
-fn may_keep_start_valley(method: Method) -> bool {
-    matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
-}
-
-/// Whether half of a leaf may be solved in place of the whole.
-pub fn may_solve_half(method: Method) -> bool {
-    may_keep_start_valley(method) && matches!(method, Method::SemiImplicit(how) if !how.full_model)
-}
-
-/// Segments of the coarsest grid, unless a leaf needs more.
-pub fn least_segments(method: Method, tolerance: f64, shape_alone: bool) -> usize {
-    let loose = shape_alone || tolerance >= LOOSE_TOLERANCE;
-    match may_keep_start_valley(method) && loose {
-        true => COARSEST_LOOSE_GRID,
-        false => COARSEST,
-    }
-}
 
 /// Segments of a grid: as requested, or at least `least` and as many as the kinks of the
 /// profiles, the rest shape and the dead moments need.
@@ -575,58 +551,4 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         segments *= 2;
     }
     segments
-}
-
-/// Accuracy of the first solutions with conjugate gradients far from rest.
-pub const FAR_FROM_REST: f64 = 1e-2;
-
-/// A relaxation on one grid: its state and its parameters.
-pub struct GridRelaxation<'a> {
-    pub state: State,
-    /// Of positions and rotations.
-    pub accuracy: f64,
-    pub work: &'a mut SolverCounts,
-    /// Receives the size of every step or, with the explicit method, the largest unbalanced
-    /// force or moment.
-    pub progress: &'a mut dyn FnMut(usize, f64),
-    pub limit: &'a Limit,
-    /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
-    pub near_rest: bool,
-    /// Whether the leaf moved through states of non-convex energy.
-    pub left_convex_valley: bool,
-    /// Relative accuracy of the conjugate gradients in the first step.
-    pub cg_tolerance: f64,
-    /// How often it was pushed off saddles before: each time it is softened less, since a
-    /// softened leaf may return to the saddle.
-    pub saddle_escapes: i32,
-    pub solver: DefiniteSolver,
-    /// Count of force evaluations at which the iteration ends without success.
-    pub most_evaluations: usize,
-    /// Whether to fail at once where the energy is not convex.
-    pub convex_only: bool,
-}
-
-impl<'a> GridRelaxation<'a> {
-    /// From a state far from rest, without a limit on its work but `limit`.
-    pub fn new(
-        state: State,
-        accuracy: f64,
-        (work, progress): (&'a mut SolverCounts, &'a mut dyn FnMut(usize, f64)),
-        limit: &'a Limit,
-    ) -> Self {
-        GridRelaxation {
-            state,
-            accuracy,
-            work,
-            progress,
-            limit,
-            near_rest: false,
-            left_convex_valley: false,
-            cg_tolerance: FAR_FROM_REST,
-            saddle_escapes: 0,
-            solver: DefiniteSolver::default(),
-            most_evaluations: usize::MAX,
-            convex_only: false,
-        }
-    }
 }

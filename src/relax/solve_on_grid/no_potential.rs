@@ -26,7 +26,7 @@ use crate::leaf::{
 use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegrator, WindDrag};
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
-use crate::relax::solve_on_grid::GridRelaxation;
+use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::{RESOLVED_TURN, Section};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};

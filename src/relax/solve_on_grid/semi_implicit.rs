@@ -19,7 +19,7 @@ use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
 };
-use crate::relax::solve_on_grid::GridRelaxation;
+use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
 
 /// Largest rotation of a node in one step, radians.

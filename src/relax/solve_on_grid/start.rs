@@ -5,21 +5,10 @@
 //! The side to which a leaf turns from a saddle, the same on all grids, in all units, and in
 //! whichever order its veins are numbered.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, NodalField, State};
-use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::loading::arrival;
-use crate::relax::request::{
-    Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
-    check_wind_options,
-};
-use crate::relax::rest::{RelaxationProblem, WorkLog, equilibrium_with_stability, relax_on_grids};
-use crate::relax::result::Equilibrium;
-use crate::relax::solve_on_grid::{check_segments, least_segments};
-use crate::relax::stability::state_from_rod_shapes;
+use crate::leaf::{DiscreteLeaf, State};
+use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::rotation;
-use crate::run::{Instant, RefusedOption};
-use crate::scenario::Scenario;
-use crate::shape::{NodeState, RodShape};
+use crate::run::Limit;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -149,136 +138,56 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     }
 }
 
-/// Remark on a leaf that did not come to rest from the given shape.
-const RELAXED_ANEW_REMARK: &str =
-    "from the given start the leaf does not come to rest: it was relaxed as without one";
+/// Accuracy of the first solutions with conjugate gradients far from rest.
+pub const FAR_FROM_REST: f64 = 1e-2;
 
-/// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
-/// in the valley in which that lies, where a relaxation may find another. Where that leads nowhere it
-/// relaxes as without, and one of the doubts says so.
-///
-/// # Errors
-/// Requests that cannot be met, as of [`relax`](crate::relax::relax); other methods than the
-/// semi-implicit one, and shapes of other leaves.
-pub fn relax_from(
-    scenario: &Scenario,
-    (stations, rods): (&[f64], &[RodShape]),
-    options: &Options,
-    progress: &mut dyn FnMut(&Progress),
-) -> Result<Equilibrium, RelaxError> {
-    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    check_tolerance(tolerance)?;
-    check_wind_options(scenario, options)?;
-    check_hinge_equilibrium(scenario)?;
-    check_start(scenario, stations, rods)?;
-    let method = options.method;
-    let Method::SemiImplicit(how) = method else {
-        let why = "only the method semi-implicit begins from a given shape";
-        return Err(RefusedOption::new("method", method.word(), why).into());
-    };
-    let clock = Instant::now();
-    let leaf = Leaf::new(scenario);
-    let problem = RelaxationProblem::new(&leaf, options, tolerance);
-    let segments = check_segments(
-        &leaf,
-        method.segments(),
-        least_segments(method, tolerance, false),
-    )?;
-    let grid = Grid::new(segments, leaf.kinks());
-    let discrete = DiscreteLeaf::new(&leaf, grid.clone());
-    let there = (rods.iter())
-        .map(|rod| interpolate_rod_shape(stations, rod, grid.sigma()))
-        .collect::<Vec<_>>();
-    let mut state = state_from_rod_shapes(&leaf, &discrete, &there);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.base(j);
-    }
-    leaf.place_held_tips(&mut state);
-    let mut effort = WorkLog::new(progress);
-    let begun = NestedEquilibrium::without_grids(&problem);
-    let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
-    let settled = match &found {
-        Ok(found) => found.is_stable() || how.keep_unstable,
-        Err(_) => problem.out_of_time(),
-    };
-    if settled {
-        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
-    }
-    drop(effort);
-    let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
-    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
-    Ok(leaf)
+/// A relaxation on one grid: its state and its parameters.
+pub struct GridRelaxation<'a> {
+    pub state: State,
+    /// Of positions and rotations.
+    pub accuracy: f64,
+    pub work: &'a mut SolverCounts,
+    /// Receives the size of every step or, with the explicit method, the largest unbalanced
+    /// force or moment.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+    pub limit: &'a Limit,
+    /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
+    pub near_rest: bool,
+    /// Whether the leaf moved through states of non-convex energy.
+    pub left_convex_valley: bool,
+    /// Relative accuracy of the conjugate gradients in the first step.
+    pub cg_tolerance: f64,
+    /// How often it was pushed off saddles before: each time it is softened less, since a
+    /// softened leaf may return to the saddle.
+    pub saddle_escapes: i32,
+    pub solver: DefiniteSolver,
+    /// Count of force evaluations at which the iteration ends without success.
+    pub most_evaluations: usize,
+    /// Whether to fail at once where the energy is not convex.
+    pub convex_only: bool,
 }
 
-/// Refuses the shape of another leaf, and one that is no shape.
-fn check_start(
-    scenario: &Scenario,
-    stations: &[f64],
-    rods: &[RodShape],
-) -> Result<(), RefusedOption> {
-    let refuse = |value: String, why: String| Err(RefusedOption::new("start", value, why));
-    let (own, given) = (scenario.rods.len(), rods.len());
-    if own != given {
-        let why = format!("must have as many rods as the scenario, {own}");
-        return refuse(format!("a leaf of {given} rods"), why);
-    }
-    let ascending = stations.windows(2).all(|pair| pair[0] < pair[1]);
-    let whole = stations.first() == Some(&0.0) && stations.last() == Some(&1.0);
-    let finite = |node: &NodeState| {
-        node.position.is_finite() && node.n.is_finite() && node.rotation.is_normalized()
-    };
-    let complete =
-        |rod: &RodShape| rod.nodes.len() == stations.len() && rod.nodes.iter().all(finite);
-    if !ascending || !whole || !rods.iter().all(complete) {
-        let why = "must be at rest, with numbers at all of its stations from 0 to 1";
-        return refuse("a leaf".into(), why.into());
-    }
-    Ok(())
-}
-
-/// A rod at other stations: on chords, with the directors turned evenly from node to node.
-fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
-    let node = |&sigma: &f64| {
-        let next = stations.partition_point(|&at| at < sigma);
-        let next = next.clamp(1, stations.len() - 1);
-        let (a, b) = (&rod.nodes[next - 1], &rod.nodes[next]);
-        let weight = (sigma - stations[next - 1]) / (stations[next] - stations[next - 1]);
-        let mean = |of: fn(&NodeState) -> DVec3| of(a).lerp(of(b), weight);
-        NodeState {
-            position: mean(|node| node.position),
-            rotation: a.rotation.slerp(b.rotation, weight),
-            v: mean(|node| node.v),
-            u: mean(|node| node.u),
-            n: mean(|node| node.n),
-            m: mean(|node| node.m),
+impl<'a> GridRelaxation<'a> {
+    /// From a state far from rest, without a limit on its work but `limit`.
+    pub fn new(
+        state: State,
+        accuracy: f64,
+        (work, progress): (&'a mut SolverCounts, &'a mut dyn FnMut(usize, f64)),
+        limit: &'a Limit,
+    ) -> Self {
+        GridRelaxation {
+            state,
+            accuracy,
+            work,
+            progress,
+            limit,
+            near_rest: false,
+            left_convex_valley: false,
+            cg_tolerance: FAR_FROM_REST,
+            saddle_escapes: 0,
+            solver: DefiniteSolver::default(),
+            most_evaluations: usize::MAX,
+            convex_only: false,
         }
-    };
-    RodShape {
-        length: rod.length,
-        nodes: to.iter().map(node).collect(),
     }
-}
-
-/// Weight of a given direction over that of the others.
-const GIVEN_BIAS_WEIGHT: f64 = 10.0;
-
-/// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
-/// sign that has most in common with them; of several modes of one eigenvalue, as of veins that
-/// buckle alike, to that sum of them. They move the leaf along `leaning`, down, to the left
-/// (along e2) and forward, in this order of importance, more so away from the base and, with
-/// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
-/// would turn out of any other on its way.
-pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
-    let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
-    let given = GIVEN_BIAS_WEIGHT * leaning.normalize_or_zero();
-    let everywhere = given + down + 0.5 * left + 0.25 * forward;
-    let leftwards = 0.31 * down + 0.17 * left + 0.11 * forward;
-    let node = |j: usize, i: usize| {
-        let x = state.x[state.base(j) + i];
-        let shift = (1.0 + 0.2 * x.x) * everywhere + x.y * leftwards;
-        [0.0, 0.0, 0.0, shift.x, shift.y, shift.z]
-    };
-    let rod = |j: usize| leaf.moving_nodes().map(|i| node(j, i)).collect();
-    (0..leaf.rods()).map(rod).collect()
 }

@@ -1,0 +1,138 @@
+//! What was tried to bring a leaf to rest, what came of each attempt, and what that has cost so far.
+
+use crate::leaf::EquationWorkspace;
+use crate::newton::{EquilibriumFailure, SolverCounts};
+use crate::relax::path::Stage;
+use crate::relax::request::Progress;
+use std::fmt;
+
+/// How an attempt brings the leaf to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strategy {
+    /// Newton's method from arcs, through states of convex energy only.
+    FirstValley,
+    /// Slow loading along a path of equilibria, and rest from where it leads.
+    SlowLoading,
+    /// The method of the request from its start, wherever that leads.
+    Release,
+    /// Newton's method from a shape that is given.
+    GivenShape,
+}
+
+/// How much of a leaf is solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// All veins.
+    Whole,
+    /// One half of a leaf that is its own mirror image.
+    Half,
+}
+
+/// An attempt that was made, and what came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attempt {
+    /// How it was made.
+    pub strategy: Strategy,
+    /// How much of the leaf it solved for.
+    pub extent: Extent,
+    /// Segments of its first grid.
+    pub segments: usize,
+    /// What came of it.
+    pub end: AttemptEnd,
+}
+
+/// What came of an attempt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AttemptEnd {
+    /// The equilibrium was accepted.
+    Accepted,
+    /// The equilibrium is not stable.
+    Unstable,
+    /// The equilibrium is so far from the arcs that slow loading may lead elsewhere.
+    FarFromArcs,
+    /// The veins may lose their stability while they are loaded.
+    VeinsMayBuckle,
+    /// The path of equilibria could not be followed to its end.
+    PathLost,
+    /// No grid kept the tolerance.
+    Inaccurate,
+    /// The leaf did not come to rest.
+    Failed(EquilibriumFailure),
+}
+
+impl fmt::Display for Attempt {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let strategy = match self.strategy {
+            Strategy::FirstValley => "Newton's method from arcs",
+            Strategy::SlowLoading => "slow loading",
+            Strategy::Release => "release",
+            Strategy::GivenShape => "Newton's method from the given shape",
+        };
+        let extent = match self.extent {
+            Extent::Whole => "the whole leaf",
+            Extent::Half => "one half",
+        };
+        let end = match self.end {
+            AttemptEnd::Accepted => "accepted",
+            AttemptEnd::Unstable => "not stable",
+            AttemptEnd::FarFromArcs => "slow loading may lead elsewhere",
+            AttemptEnd::VeinsMayBuckle => "the veins may buckle while they are loaded",
+            AttemptEnd::PathLost => "the path could not be followed",
+            AttemptEnd::Inaccurate => "no grid keeps the tolerance",
+            AttemptEnd::Failed(EquilibriumFailure::Saddle) => "the leaf leaves its valley",
+            AttemptEnd::Failed(EquilibriumFailure::Unresolved) => {
+                "the grid does not resolve the leaf"
+            }
+            AttemptEnd::Failed(EquilibriumFailure::StepLimit) => "not at rest within the limits",
+            AttemptEnd::Failed(EquilibriumFailure::NoDescent) => "no step lowers the energy",
+            AttemptEnd::Failed(EquilibriumFailure::Memory) => "the matrix needs too much memory",
+        };
+        write!(
+            f,
+            "{strategy} of {extent} on {} segments: {end}",
+            self.segments
+        )
+    }
+}
+
+/// Counts of the work on all grids, whatever becomes of them, and its progress.
+pub(crate) struct WorkLog<'o> {
+    /// Told of every step.
+    pub progress: &'o mut dyn FnMut(&Progress),
+    pub work: SolverCounts,
+    /// Nodes times force evaluations so far.
+    pub node_evaluations: usize,
+    /// Nodes times force evaluations of all walks.
+    pub loading_node_evaluations: usize,
+    /// How far the leaf came on its path before it failed.
+    pub farthest_stage: Option<(Stage, f64)>,
+    /// The attempts to bring the leaf to rest.
+    pub attempts: Vec<Attempt>,
+    /// The memory of Newton's equations.
+    pub workspace: EquationWorkspace,
+}
+
+impl<'o> WorkLog<'o> {
+    /// None so far.
+    pub fn new(progress: &'o mut dyn FnMut(&Progress)) -> Self {
+        WorkLog {
+            progress,
+            work: SolverCounts::default(),
+            node_evaluations: 0,
+            loading_node_evaluations: 0,
+            farthest_stage: None,
+            attempts: Vec::new(),
+            workspace: EquationWorkspace::default(),
+        }
+    }
+
+    /// Notes an attempt.
+    pub fn log(&mut self, strategy: Strategy, extent: Extent, segments: usize, end: AttemptEnd) {
+        self.attempts.push(Attempt {
+            strategy,
+            extent,
+            segments,
+            end,
+        });
+    }
+}
