@@ -330,8 +330,8 @@ impl SteppedPoint {
         now: &EquilibriumPoint,
         step: f64,
     ) -> Result<Self, CorrectorFailure> {
-        match advance(equations, now, step) {
-            Err(CorrectorFailure::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
+        match step_along_tangent(equations, now, step) {
+            Err(CorrectorFailure::OutOfRange(out)) => step_to_range_end(equations, now, step, out),
             found => found,
         }
     }
@@ -358,7 +358,8 @@ impl SteppedPoint {
     }
 }
 
-fn advance(
+/// A step of this length along the tangent, corrected in the plane normal to that.
+fn step_along_tangent(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
     step: f64,
@@ -374,7 +375,7 @@ fn advance(
 }
 
 /// A step to the end of the range, if one of this length would leave it.
-fn advance_to_edge(
+fn step_to_range_end(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
     step: f64,

@@ -117,7 +117,7 @@ pub fn locate_critical_points(
     {
         return Err(CorrectorFailure::NotConverged);
     }
-    let mut found: Vec<LocatedZero> = Vec::new();
+    let mut found: Vec<EigenvalueZero> = Vec::new();
     for which in 0..ends[0].eigenvalues.len() {
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
         let large = values[0].abs().max(values[1].abs()) > NEUTRAL_EIGENVALUE;
@@ -134,7 +134,7 @@ pub fn locate_critical_points(
     found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     // Each accounts for its part of the change of the index, in their order along the branch.
     let mut before = a.index;
-    for LocatedZero { critical, .. } in &mut found {
+    for EigenvalueZero { critical, .. } in &mut found {
         let change = critical.modes.len();
         let after = match b.index > a.index {
             true => before + change,
@@ -150,7 +150,7 @@ pub fn locate_critical_points(
 }
 
 /// The zero of an eigenvalue of H along a branch.
-struct LocatedZero {
+struct EigenvalueZero {
     /// Its distance along the tangent from the point where the search began.
     distance: f64,
     critical: CriticalPoint,
@@ -205,7 +205,7 @@ impl CriticalPointSearch<'_, '_> {
         which: usize,
         mut distance: [f64; 2],
         mut value: [f64; 2],
-    ) -> Result<LocatedZero, CorrectorFailure> {
+    ) -> Result<EigenvalueZero, CorrectorFailure> {
         let whole = distance[1] - distance[0];
         let largest = larger(value[0].abs(), value[1].abs());
         let mut slope = (value[1] - value[0]) / whole;
@@ -249,7 +249,7 @@ impl CriticalPointSearch<'_, '_> {
         if !vanishes {
             return Err(CorrectorFailure::NotConverged);
         }
-        Ok(LocatedZero {
+        Ok(EigenvalueZero {
             distance: at,
             critical: self.critical_point_at_zero(best, which, slope),
         })

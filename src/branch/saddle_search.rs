@@ -84,7 +84,7 @@ struct DescentStep {
 }
 
 /// The valley floor in a direction at a state.
-struct Valley {
+struct ValleyFloor {
     /// X, and the force and the curvature of the energy along it.
     along: NodalField,
     force: f64,
@@ -94,7 +94,7 @@ struct Valley {
     shift: f64,
 }
 
-impl Valley {
+impl ValleyFloor {
     /// Newton's step, along the floor as well as across it.
     fn newton(&self) -> NodalField {
         scaled_sum(&self.across, self.force / self.curvature, &self.along)
@@ -269,7 +269,7 @@ impl BranchEquations<'_> {
     }
 
     /// The valley along `direction`, from the assembled matrix.
-    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<Valley> {
+    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<ValleyFloor> {
         let border = [self.multiply_by_mass(direction)];
         let mut shift = linear.shift;
         while shift < SHIFTS.largest {
@@ -279,7 +279,7 @@ impl BranchEquations<'_> {
             if solved.negative <= 1 {
                 let along = solved.modes.swap_remove(0);
                 let mass = self.mass * self.mass_product(&along, &along);
-                return Some(Valley {
+                return Some(ValleyFloor {
                     along,
                     force: solved.forces.multipliers[0],
                     curvature: -solved.h[(0, 0)] - shift * mass,

@@ -14,7 +14,7 @@ use crate::branch::boundary::point_search::{
     BoundarySearchTolerance, TwoParameterEquations, TwoParameterProblem,
 };
 use crate::branch::boundary::refine::{
-    BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, refine,
+    BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, verify_boundary_point,
 };
 use crate::branch::boundary::singular_point::{BoundarySeed, SingularPoint};
 use crate::branch::continuation::{BranchEnd, StepControl};
@@ -143,7 +143,9 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             rayon::in_place_scope(|scope| {
                 scope.spawn(|_| {
                     let each = new.par_iter();
-                    found = each.map(|it| refine(plane, &grid, it, accuracy)).collect();
+                    found = each
+                        .map(|it| verify_boundary_point(plane, &grid, it, accuracy))
+                        .collect();
                 });
                 self.extend(&mut manifold, POINTS_COMPUTED_AHEAD, progress);
             });

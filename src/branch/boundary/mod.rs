@@ -54,7 +54,7 @@ use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::BranchEquations;
 use crate::branch::points::{EquilibriumPoint, restrict_field};
-use crate::branch::refine::{index_at, on_finer, refine_critical};
+use crate::branch::refine::{confirmed_index, on_finer, refine_critical};
 use crate::leaf::{Grid, State};
 use crate::relax::accuracy::transfer::restrict;
 use crate::relax::solve_on_grid::relax_from_state;
@@ -143,7 +143,7 @@ pub fn follow_path(
         let last = follow_on_grid(&mut equations, &first, &mut path);
         let index = last
             .as_ref()
-            .and_then(|it| index_at(&mut equations, it).ok());
+            .and_then(|it| confirmed_index(&mut equations, it).ok());
         let finer = 2 * first.state.segments() <= FINEST_PATH_GRID;
         if let (Some(last), Some(index)) = (last, index)
             && (index == last.index || !finer)
@@ -175,7 +175,7 @@ pub fn recount_index(plane: &TwoParameterProblem, at: &ConfirmedEquilibrium) -> 
     while point.state.segments() < COARSEST_INDEX_GRID {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }
-    index_at(&mut equations, &point).ok()
+    confirmed_index(&mut equations, &point).ok()
 }
 
 /// The point at the end of the path on this grid, if the branch reaches it.

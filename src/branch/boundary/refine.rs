@@ -112,7 +112,7 @@ struct BoundaryPointCondition {
 /// Verifies a point on as many grids as necessary; they must agree on index and
 /// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
 /// coarser ones if possible.
-pub fn refine(
+pub fn verify_boundary_point(
     plane: &TwoParameterProblem,
     grid: &Grid,
     step: &UnverifiedBoundaryPoint,
@@ -127,7 +127,7 @@ pub fn refine(
             point: coarser.point,
             ..step.clone()
         };
-        if let Ok(verified) = refine(plane, &coarser.grid, &step, accuracy) {
+        if let Ok(verified) = verify_boundary_point(plane, &coarser.grid, &step, accuracy) {
             return Ok(verified);
         }
     }
@@ -235,14 +235,14 @@ impl NestedGridPoint for NestedBoundaryPoint<'_> {
         };
         let mut start = near.solution.clone();
         let believed = self.table.tips.best().map_or(0, |best| best.columns + 1);
-        predict_spot(&self.levels, &self.params, believed, &mut start);
+        predict_on_next_grid(&self.levels, &self.params, believed, &mut start);
         self.rigid = is_nearly_rigid(self.manifold.leaves.leaf_at(near.solution.params)?);
         self.located = match (self.condition.special, self.rigid) {
             (None, false) => LocatedBoundaryPoint {
                 point: self.newton_or_secant(&near, start)?,
                 slope_along: None,
             },
-            _ => relocated(&mut self.manifold, &near, self.condition)?,
+            _ => locate_by_secant(&mut self.manifold, &near, self.condition)?,
         };
         self.factorizations += self.manifold.factorizations;
         let point = &self.located.point;
@@ -334,7 +334,7 @@ fn fixable_parameter(manifold: &TwoParameterEquations, point: &SingularPoint) ->
 }
 
 /// The point on this grid, to rounding, by secant methods.
-fn relocated(
+fn locate_by_secant(
     manifold: &mut TwoParameterEquations,
     near: &SingularPoint,
     condition: BoundaryPointCondition,
@@ -356,7 +356,7 @@ fn relocated(
 
 /// Predicts the point on the next grid from those on at least two coarser ones: the last ones,
 /// as many as are taken to follow one error series.
-fn predict_spot(
+fn predict_on_next_grid(
     levels: &[GridLevel],
     params: &[[f64; 2]],
     believed: usize,
