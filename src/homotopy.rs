@@ -1,61 +1,117 @@
 //! A path on which a part of the loading, or of another change, grows from 0 to 1: in steps that
-//! become longer where they succeed, and shorter where they fail.
+//! become longer where they succeed, and shorter where they fail. Slow loading, holders that are moved,
+//! dead moments, a leaf that follows its scenario and shooting from arcs are such paths; each says how a
+//! step is made, and by how much longer the next may be.
 
 /// A step longer than the shortest by no more than this factor counts as the shortest.
 const SHORTEST_STEP_TOLERANCE: f64 = 1.01;
 
-/// How far along the path, and the next step.
+/// The lengths of the steps of a path, as parts of it, and the factors on them.
 #[derive(Clone, Copy, Debug)]
-pub struct Homotopy {
-    /// The part that is reached.
-    pub lambda: f64,
+pub struct StepSizes {
+    /// The first step, and the one after a path was begun again.
+    pub first: f64,
+    /// The shortest step: where the path ends, or changes, is known to this.
+    pub shortest: f64,
+    /// The longest step.
+    pub longest: f64,
+    /// The largest factor on a step after one that was made.
+    pub growth: f64,
+    /// The factor on a step after one that failed.
+    pub failure: f64,
+}
+
+/// A step that is to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct PathStep {
+    /// The part of the path that is reached.
+    pub from: f64,
+    /// The part that the step leads to.
+    pub to: f64,
+    /// Whether it cannot be shorter.
+    pub is_shortest: bool,
+}
+
+/// What came of a step.
+#[derive(Clone, Copy, Debug)]
+pub enum StepEnd<E> {
+    /// It was made, and the next may be longer by this factor.
+    Made {
+        /// The factor.
+        growth: f64,
+    },
+    /// It was made beyond a place where the path had to be begun again.
+    Restarted,
+    /// It failed, and should be shorter; if it cannot be, the path ends for this reason.
+    TooLong(E),
+    /// It failed, and should be made again as it was.
+    Again,
+    /// The path ends here.
+    Ended(E),
+}
+
+impl PathStep {
+    /// Its length.
+    pub fn length(&self) -> f64 {
+        self.to - self.from
+    }
+}
+
+impl StepSizes {
+    /// Follows a path from 0 to 1.
+    ///
+    /// # Errors
+    /// Why it ended before.
+    pub fn follow<E>(self, mut make_step: impl FnMut(&PathStep) -> StepEnd<E>) -> Result<(), E> {
+        let mut path = Homotopy {
+            lambda: 0.0,
+            step: self.first,
+            sizes: self,
+        };
+        while path.lambda < 1.0 {
+            let step = path.next();
+            match make_step(&step) {
+                StepEnd::Made { growth } => path.advance(step, growth * step.length()),
+                StepEnd::Restarted => path.advance(step, self.first),
+                StepEnd::TooLong(reason) if step.is_shortest => return Err(reason),
+                StepEnd::TooLong(_) => {
+                    path.step = (self.failure * step.length()).max(self.shortest);
+                }
+                StepEnd::Again => {}
+                StepEnd::Ended(reason) => return Err(reason),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How far along a path, and how long the next step is.
+struct Homotopy {
+    lambda: f64,
     step: f64,
-    shortest: f64,
-    longest: f64,
+    sizes: StepSizes,
 }
 
 impl Homotopy {
-    /// At the beginning, with the length of the first step and the limits of all others.
-    pub fn new(first: f64, [shortest, longest]: [f64; 2]) -> Self {
-        Homotopy {
-            lambda: 0.0,
-            step: first,
-            shortest,
-            longest,
-        }
-    }
-
-    /// The part after the next step. What would remain to the end is not left to a further step if it
-    /// is less than half of the shortest.
-    pub fn next_lambda(&self) -> f64 {
-        match self.lambda + self.step {
-            next if next < 1.0 - 0.5 * self.shortest => next,
+    /// The next step. What would remain to the end is not left to a further step if it is less than
+    /// half of the shortest.
+    fn next(&self) -> PathStep {
+        let shortest = self.sizes.shortest;
+        let to = match self.lambda + self.step {
+            next if next < 1.0 - 0.5 * shortest => next,
             _ => 1.0,
+        };
+        PathStep {
+            from: self.lambda,
+            to,
+            is_shortest: self.step <= SHORTEST_STEP_TOLERANCE * shortest,
         }
     }
 
-    /// The length of the next step.
-    pub fn next_step_length(&self) -> f64 {
-        self.next_lambda() - self.lambda
-    }
-
-    pub fn is_shortest(&self) -> bool {
-        self.step <= SHORTEST_STEP_TOLERANCE * self.shortest
-    }
-
-    /// Makes the next step; the one after it has this length, within the limits.
-    pub fn advance(&mut self, then: f64) {
-        self.lambda = self.next_lambda();
-        self.step = then.clamp(self.shortest, self.longest);
-    }
-
-    /// Shortens the next step by this factor; false if it is the shortest already.
-    pub fn shorten(&mut self, factor: f64) -> bool {
-        if self.is_shortest() {
-            return false;
-        }
-        self.step = (factor * self.next_step_length()).max(self.shortest);
-        true
+    /// Behind a step; the next has this length, within the limits.
+    fn advance(&mut self, step: PathStep, next: f64) {
+        self.lambda = step.to;
+        self.step = next.clamp(self.sizes.shortest, self.sizes.longest);
     }
 }
 
@@ -67,34 +123,46 @@ mod tests {
     #[test]
     fn equal_steps_end_at_one() {
         for count in 1..1000 {
-            let mut path = Homotopy::new(1.0 / f64::from(count), [1e-6, 1.0]);
-            let mut steps = 0;
-            while path.lambda < 1.0 {
-                path.advance(path.next_step_length());
-                steps += 1;
-            }
-            assert_eq!((steps, path.lambda), (count, 1.0));
+            let sizes = StepSizes {
+                first: 1.0 / f64::from(count),
+                shortest: 1e-6,
+                longest: 1.0,
+                growth: 1.0,
+                failure: 0.5,
+            };
+            let (mut steps, mut reached) = (0, 0.0);
+            let end: Result<(), ()> = sizes.follow(|step| {
+                (steps, reached) = (steps + 1, step.to);
+                StepEnd::Made { growth: 1.0 }
+            });
+            assert_eq!((end, steps, reached), (Ok(()), count, 1.0));
         }
     }
 
     /// Beyond 0.6 no step longer than 0.01 succeeds, beyond 0.9 none.
     #[test]
     fn steps_grow_and_become_shorter() {
-        let mut path = Homotopy::new(1.0, [1.0 / 512.0, 0.5]);
+        let sizes = StepSizes {
+            first: 0.5,
+            shortest: 1.0 / 512.0,
+            longest: 0.5,
+            growth: 2.0,
+            failure: 0.5,
+        };
         let (mut parts, mut failures) = (Vec::new(), 0);
-        loop {
-            let next = path.next_lambda();
-            if next <= 0.6 || next <= 0.9 && path.next_step_length() <= 0.01 {
-                path.advance(2.0 * path.next_step_length());
-                parts.push(path.lambda);
-            } else if path.shorten(0.5) {
-                failures += 1;
-            } else {
-                break;
+        let end = sizes.follow(|step| {
+            if step.to <= 0.6 || step.to <= 0.9 && step.length() <= 0.01 {
+                parts.push(step.to);
+                return StepEnd::Made {
+                    growth: sizes.growth,
+                };
             }
-        }
-        assert_eq!(parts[0], 0.5);
-        assert!(path.is_shortest() && path.lambda > 0.9 - 1.01 / 512.0);
+            failures += 1;
+            StepEnd::TooLong(step.from)
+        });
+        let reached = end.unwrap_err();
+        assert_eq!((parts[0], parts.last()), (0.5, Some(&reached)));
+        assert!(reached > 0.9 - 1.01 / 512.0);
         assert!(parts.is_sorted() && (40..80).contains(&parts.len()));
         assert!(failures < 60, "{failures}");
     }

@@ -106,7 +106,7 @@ pub(crate) fn check_branch_memory(rods: usize, segments: usize) -> Result<(), To
     })
 }
 
-/// The factorised sparse matrix of a leaf, of so many numbers.
+/// The factorized sparse matrix of a leaf, of so many numbers.
 pub(crate) fn check_factor_memory(numbers: usize) -> Result<(), TooMuch> {
     check(&[numbers, 8], SMALLER_GRID_ADVICE, || {
         format!("a factorised matrix of {numbers} numbers")

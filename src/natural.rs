@@ -3,12 +3,11 @@
 //! x' = L R v0,   q' = L/2 (R u0) q,
 //!
 //! integrated by the explicit Runge-Kutta method of order 8 of Dormand and Prince in equal steps.
-//!
-//! Coefficients of the explicit Runge-Kutta method of Dormand and Prince of
-//! order 8 with embedded error estimates of orders 5 and 3: those of the code
-//! DOP853 in Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
-//! 2nd ed., 1993, section II.10, to double precision.
+//! The coefficients, with embedded error estimates of orders 5 and 3, are those of the code DOP853
+//! (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, section
+//! II.10) to double precision; integrations with step control elsewhere use them, too.
 
+pub use crate::rotation::Pose;
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
 
@@ -24,17 +23,22 @@ pub struct Natural<'a> {
     scenario: &'a Scenario,
     /// Whether the rest lengths have grown.
     grown: bool,
-    /// Of every vein the fractions of its length where a step ends, with the states there.
-    veins: Vec<Vec<(f64, VeinPose)>>,
+    /// The ends of the steps along every vein, base to tip.
+    veins: Vec<Vec<StepEnd>>,
 }
 
-/// A vein at one sigma.
-type VeinPose = (DVec3, DQuat);
+/// Where a step along a vein ends.
+#[derive(Clone, Copy, Debug)]
+struct StepEnd {
+    /// Fraction of the vein's length.
+    sigma: f64,
+    pose: Pose,
+}
 
 impl<'a> Natural<'a> {
-    /// Of this scenario, whose veins have `grown`, or not yet.
+    /// The natural leaf of a scenario, whose veins have `grown`, or not yet.
     pub fn new(scenario: &'a Scenario, grown: bool) -> Self {
-        let veins = (0..scenario.rods.len()).map(|j| vein(scenario, j, grown));
+        let veins = (0..scenario.rods.len()).map(|j| integrate_vein(scenario, j, grown));
         Natural {
             veins: veins.collect(),
             scenario,
@@ -43,25 +47,22 @@ impl<'a> Natural<'a> {
     }
 
     /// Position and rotation of vein `j` at `sigma`.
-    pub fn vein_pose(&self, j: usize, sigma: f64) -> (DVec3, DQuat) {
+    pub fn vein_pose(&self, j: usize, sigma: f64) -> Pose {
         let vein = &self.veins[j];
-        let before = vein.partition_point(|(end, _)| *end <= sigma).max(1) - 1;
-        let (from, state) = vein[before];
-        match sigma == from {
-            true => state,
-            false => step(
-                &self.scenario.rods[j],
-                self.grown,
-                from,
-                sigma - from,
-                state,
-            ),
+        let before = vein.partition_point(|end| end.sigma <= sigma).max(1) - 1;
+        let from = vein[before];
+        match sigma == from.sigma {
+            true => from.pose,
+            false => {
+                let rod = &self.scenario.rods[j];
+                from.pose_after(rod, self.grown, sigma - from.sigma)
+            }
         }
     }
 }
 
 /// The steps along vein `j`, which end at every kink and seam of its rest shape.
-fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, VeinPose)> {
+fn integrate_vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<StepEnd> {
     let rod = &scenario.rods[j];
     let shape = rod.rest_curvature.iter().chain([&rod.rest_stretch]);
     let mut kinks: Vec<f64> = (shape.clone())
@@ -72,48 +73,64 @@ fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, VeinPose)> {
     kinks.dedup();
     let turn: f64 = rod.rest_curvature.iter().map(|p| p.max_abs()).sum();
     let longest = (MAX_STEP_ROTATION / (turn * rod.length)).min(MAX_STEP);
-    let mut steps = vec![(0.0, scenario.base(j))];
+    let (position, rotation) = scenario.base(j);
+    let base = Pose { position, rotation };
+    let mut steps = vec![StepEnd {
+        sigma: 0.0,
+        pose: base,
+    }];
     for end in kinks.into_iter().chain([1.0]) {
-        let (mut from, mut state) = steps[steps.len() - 1];
-        let count = ((end - from) / longest).ceil();
-        let width = (end - from) / count;
+        let mut last = steps[steps.len() - 1];
+        let count = ((end - last.sigma) / longest).ceil();
+        let width = (end - last.sigma) / count;
         for k in 0..count as usize {
-            state = step(rod, grown, from, width, state);
-            from = if k + 1 == count as usize {
-                end
-            } else {
-                from + width
+            last = StepEnd {
+                pose: last.pose_after(rod, grown, width),
+                sigma: if k + 1 == count as usize {
+                    end
+                } else {
+                    last.sigma + width
+                },
             };
-            steps.push((from, state));
+            steps.push(last);
         }
     }
     steps
 }
 
-/// A step of a vein from `sigma` by `width`.
-fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): VeinPose) -> VeinPose {
-    let mut slopes = [(DVec3::ZERO, DQuat::from_array([0.0; 4])); STAGES];
-    let combine = |slopes: &[VeinPose], weights: &[f64]| {
-        let mut sum = (x, q);
-        for ((dx, dq), weight) in slopes.iter().zip(weights) {
-            sum.0 += *dx * (width * weight);
-            sum.1 += *dq * (width * weight);
+impl StepEnd {
+    /// The pose after a further step by `width` along a vein.
+    fn pose_after(&self, rod: &Rod, grown: bool, width: f64) -> Pose {
+        // Slopes of the position and of the quaternion.
+        let mut slopes = [Pose {
+            position: DVec3::ZERO,
+            rotation: DQuat::from_array([0.0; 4]),
+        }; STAGES];
+        let combine = |slopes: &[Pose], weights: &[f64]| {
+            let mut sum = self.pose;
+            for (slope, weight) in slopes.iter().zip(weights) {
+                sum.position += slope.position * (width * weight);
+                sum.rotation += slope.rotation * (width * weight);
+            }
+            sum
+        };
+        for i in 0..STAGES {
+            let q = combine(&slopes, STAGE_WEIGHTS[i]).rotation.normalize();
+            let at = self.sigma + STAGE_NODES[i] * width;
+            let u = DVec3::from_array(Profile::values_of_three(&rod.rest_curvature, at));
+            let spin = 0.5 * rod.length * u;
+            let stretch = if grown { rod.rest_stretch.at(at) } else { 1.0 };
+            slopes[i] = Pose {
+                position: q * DVec3::X * (rod.length * stretch),
+                rotation: q * DQuat::from_xyzw(spin.x, spin.y, spin.z, 0.0),
+            };
         }
-        sum
-    };
-    for i in 0..STAGES {
-        let (_, q) = combine(&slopes, STAGE_WEIGHTS[i]);
-        let at = sigma + STAGE_NODES[i] * width;
-        let u = DVec3::from_array(Profile::values_of_three(&rod.rest_curvature, at));
-        let q = q.normalize();
-        let spin = 0.5 * rod.length * u;
-        slopes[i] = (
-            q * DVec3::X * (rod.length * if grown { rod.rest_stretch.at(at) } else { 1.0 }),
-            q * DQuat::from_xyzw(spin.x, spin.y, spin.z, 0.0),
-        );
+        let Pose { position, rotation } = combine(&slopes, &RESULT_WEIGHTS);
+        Pose {
+            position,
+            rotation: rotation.normalize(),
+        }
     }
-    let (x, q) = combine(&slopes, &RESULT_WEIGHTS);
-    (x, q.normalize())
 }
 
 /// Number of stages.
@@ -205,7 +222,8 @@ mod tests {
         "#;
         let scenario = Scenario::from_toml(text).unwrap();
         let natural = Natural::new(&scenario, true);
-        let (x, q) = natural.vein_pose(0, 0.77);
+        let tip = natural.vein_pose(0, 0.77);
+        let (x, q) = (tip.position, tip.rotation);
         let (u, s) = (DVec3::new(1.2, 0.7, -0.4), 0.77 * 2.0);
         let (_, base) = scenario.base(0);
         let turned = base * crate::rotation::exp(s * u);
@@ -219,19 +237,14 @@ mod tests {
         assert!((x - base * (1.1 * integral)).length() < 1e-13);
 
         for (from, to) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.61)] {
-            let (mut state, width) = (natural.vein_pose(1, from), (to - from) / 100.0);
+            let (mut pose, width) = (natural.vein_pose(1, from), (to - from) / 100.0);
             for k in 0..100 {
-                state = step(
-                    &scenario.rods[1],
-                    true,
-                    from + k as f64 * width,
-                    width,
-                    state,
-                );
+                let sigma = from + k as f64 * width;
+                pose = StepEnd { sigma, pose }.pose_after(&scenario.rods[1], true, width);
             }
-            let (x, q) = natural.vein_pose(1, to);
-            assert!((x - state.0).length() < 1e-13);
-            assert!((q.dot(state.1).abs() - 1.0).abs() < 1e-14);
+            let end = natural.vein_pose(1, to);
+            assert!((end.position - pose.position).length() < 1e-13);
+            assert!((end.rotation.dot(pose.rotation).abs() - 1.0).abs() < 1e-14);
         }
     }
 }

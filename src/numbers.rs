@@ -1,10 +1,9 @@
-//! Formats numbers for people.
-//!
-//! The largest of several sizes, by which solvers decide.
+//! Numbers as such: their text for people, the largest of several sizes, sorted lists, and the rule
+//! of quadrature.
 //!
 //! `f64::max` ignores what is not a number: an error, a correction or a residual that cannot be
-//! computed would count as zero. Here it counts as infinite, so that it is neither within a
-//! tolerance nor finite.
+//! computed would count as zero. In [`larger`] and [`largest`] it counts as infinite, so that it is
+//! neither within a tolerance nor finite.
 
 /// Formats an upper bound with two digits, rounded up so that it stays a bound, as in
 /// `3.1×10⁻⁹`.
@@ -62,6 +61,34 @@ pub fn larger(a: f64, b: f64) -> f64 {
 pub fn largest(sizes: impl IntoIterator<Item = f64>) -> f64 {
     sizes.into_iter().fold(0.0, larger)
 }
+
+/// Numbers in ascending order, each once.
+pub(crate) fn sorted_distinct(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut numbers: Vec<f64> = numbers.into_iter().collect();
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    numbers
+}
+
+/// A point of a rule of quadrature on (0, 1).
+pub(crate) struct QuadraturePoint {
+    pub at: f64,
+    pub weight: f64,
+}
+
+/// The Gauss-Legendre rule of five points, exact for polynomials up to degree 9.
+pub(crate) const GAUSS_LEGENDRE_RULE: [QuadraturePoint; 5] = {
+    const fn point(at: f64, weight: f64) -> QuadraturePoint {
+        QuadraturePoint { at, weight }
+    }
+    [
+        point(0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
+        point(0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
+        point(0.5, 0.284_444_444_444_444_44),
+        point(0.769_234_655_052_841_6, 0.239_314_335_249_683_23),
+        point(0.953_089_922_969_332, 0.118_463_442_528_094_54),
+    ]
+};
 
 #[cfg(test)]
 mod tests {

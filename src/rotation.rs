@@ -7,6 +7,15 @@ use crate::simd::{Lanes, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
+/// A point of a centerline, and the rotation of the directors there.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    /// Position.
+    pub position: DVec3,
+    /// Rotation of the directors: R e_i = d_i.
+    pub rotation: DQuat,
+}
+
 /// The angle about a unit `axis` by which a vector turns until its part normal to the axis has the
 /// direction of `to`, which is normal to it; zero if it has no such part.
 pub fn angle_about(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
@@ -87,7 +96,7 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
     (theta.scale(sinc * Lanes::splat(simd, 0.5)), cos)
 }
 
-/// Products a b of unit quaternions, renormalised to first order in the rounding error.
+/// Products a b of unit quaternions, renormalized to first order in the rounding error.
 #[inline(always)]
 pub fn multiply_each<S: Simd>((a, aw): Quaternions<S>, (b, bw): Quaternions<S>) -> Quaternions<S> {
     let simd = aw.simd;

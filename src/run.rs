@@ -8,7 +8,7 @@
 //! Refused options, and what methods do not model, as data: what reads them writes them as its
 //! users do.
 //!
-//! Words for the variants of an enum, such as a method or an outcome.
+//! Words for the variants of an enum, such as a method or an outcome, and what may be said of a result.
 
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
 pub use crate::run::host::{Instant, set};
@@ -49,8 +49,7 @@ impl Limit {
     }
 }
 
-/// An option that cannot have the value it was given: `--step 0` of a program, `step=0` of a
-/// function.
+/// An option that cannot have the value it was given.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{option} = {value}: {reason}")]
 pub struct RefusedOption {
@@ -87,7 +86,7 @@ pub enum UnmodelledFeature {
     },
     /// Wind.
     #[error(
-        "[wind]: {what} does not take wind into account: simulate does, and relax --path release in a steady one; leave it out"
+        "[wind]: {what} does not take wind into account, as motions do, and the release of a leaf in a steady one; leave it out"
     )]
     Wind {
         /// The method or the question.
@@ -155,6 +154,60 @@ macro_rules! words {
 
         $crate::read_and_write!($type);
     )*};
+}
+
+/// Declares what may be said of a result: an enum whose variants have a sentence, which `thiserror`
+/// makes of their data, and a code, a word for programs that stays when the sentence changes. A
+/// variant that passes on what another type says has the code of that. As JSON it is the sentence.
+macro_rules! remarks {
+    ($(
+        $(#[$about:meta])*
+        pub enum $type:ident {
+            $(
+                $(#[$of:meta])*
+                $variant:ident $(($($data:tt)*))? $({ $($fields:tt)* })?
+                    = $($code:literal)? $(inner.$inner_code:ident())?,
+            )*
+        }
+    )*) => {$(
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+        pub enum $type {
+            $($(#[$of])* $variant $(($($data)*))? $({ $($fields)* })?,)*
+        }
+
+        impl $type {
+            /// All of its own codes.
+            #[cfg(test)]
+            pub const CODES: &'static [&'static str] = &[$($($code,)?)*];
+
+            /// The word for it, in kebab case, which stays when its sentence changes.
+            pub fn code(&self) -> &'static str {
+                match self {
+                    $(
+                        $(Self::$variant { .. } => $code,)?
+                        $(Self::$variant(inner) => inner.$inner_code(),)?
+                    )*
+                }
+            }
+        }
+
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(
+                &self,
+                serializer: S,
+            ) -> std::result::Result<S::Ok, S::Error> {
+                serializer.collect_str(self)
+            }
+        }
+    )*};
+}
+pub(crate) use remarks;
+
+/// Several remarks as one text, as JSON and the console have them; none without any.
+pub(crate) fn join_remarks<R: ToString>(remarks: &[R]) -> Option<String> {
+    let sentences: Vec<String> = remarks.iter().map(R::to_string).collect();
+    (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
 /// Implements writing and parsing by word for types with `ALL` and `word()`.

@@ -12,7 +12,7 @@
 //! to be fitted, a vein that only droops is one half-wave, and the numbers depend neither on
 //! the position of the leaf nor on the order of its veins. Half-waves lower than
 //! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: they are joined
-//! with their neighbours.
+//! with their neighbors.
 //!
 //! **Chirality.** The twist is the integral of u1 from base to tip, in radians, including
 //! the rest twist. It is positive where d2 turns about d1 like a right-handed screw seen
@@ -29,7 +29,7 @@
 //! makes sqrt(-T/A2) L/pi half-waves along the vein.
 
 use crate::numbers::larger;
-use crate::rotation;
+use crate::rotation::{self, Pose};
 use crate::scenario::Scenario;
 use glam::{DQuat, DVec2, DVec3};
 use serde::ser::SerializeStruct;
@@ -117,7 +117,7 @@ pub fn equally_spaced(parts: usize) -> Vec<f64> {
     (0..=parts).map(|i| i as f64 / parts as f64).collect()
 }
 
-/// Interpolation at `at` by the polynomial through `count` neighbouring `nodes`: the index
+/// Interpolation at `at` by the polynomial through `count` neighboring `nodes`: the index
 /// of the first of them, and their weights.
 pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
     let count = count.min(nodes.len());
@@ -279,7 +279,7 @@ impl Serialize for Undulation {
 }
 
 /// A centerline with the directors along it, base to tip.
-pub type Centerline = Vec<(DVec3, DQuat)>;
+pub type Centerline = Vec<Pose>;
 
 impl Undulation {
     /// The undulation of a leaf at rest: waves and twist from its `lines`, one per rod with
@@ -323,8 +323,11 @@ impl Undulation {
         error: Option<f64>,
     ) -> Self {
         let line = |rod: &RodShape| -> Centerline {
-            let nodes = rod.nodes.iter();
-            nodes.map(|node| (node.position, node.rotation)).collect()
+            let pose = |node: &NodeState| Pose {
+                position: node.position,
+                rotation: node.rotation,
+            };
+            rod.nodes.iter().map(pose).collect()
         };
         let lines: Vec<Centerline> = rods.iter().map(line).collect();
         Undulation::from_centerlines(scenario, &lines, stations, rods, error)
@@ -370,8 +373,10 @@ fn mean(stations: &[f64], values: impl Iterator<Item = f64>) -> f64 {
 
 /// The integral of u1: the twists of all segments.
 fn twist(line: &Centerline) -> f64 {
-    let turn = |pair: &[(DVec3, DQuat)]| rotation::log(pair[0].1.conjugate() * pair[1].1).x;
-    line.windows(2).map(turn).sum()
+    let turn = |ends: &[Pose]| ends[0].rotation.conjugate() * ends[1].rotation;
+    line.windows(2)
+        .map(|ends| rotation::log(turn(ends)).x)
+        .sum()
 }
 
 /// A half-wave between two inflections.
@@ -399,16 +404,19 @@ impl DevelopedCurve {
     /// The curve of vein `j`, which has at least three nodes.
     fn from_vein(lines: &[Centerline], j: usize) -> Self {
         let line = &lines[j];
-        let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        let steps: Vec<DVec3> = (line.windows(2))
+            .map(|ends| ends[1].position - ends[0].position)
+            .collect();
         let (mut turns, mut last) = (Vec::new(), None);
         for (i, pair) in steps.windows(2).enumerate() {
             let [from, to] = [pair[0], pair[1]].map(DVec3::normalize_or_zero);
             let tangent = (from + to).normalize_or_zero();
-            let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
+            let [first, last_vein] = [0, lines.len() - 1].map(|j| lines[j][i + 1].position);
+            let across = last_vein - first;
             let mut normal = tangent.cross(across.normalize_or_zero());
             // Where the margins meet, the section defines the surface.
             if normal.length() < COINCIDENT_MARGINS_SINE {
-                normal = tangent.cross(line[i + 1].1 * DVec3::Y);
+                normal = tangent.cross(line[i + 1].rotation * DVec3::Y);
             }
             normal = normal.normalize_or_zero();
             // Where the margins cross they change sides, but the normal must not.
@@ -485,7 +493,7 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
     let mut waves: Vec<HalfWave> = (ends.windows(2))
         .map(|pair| curve.half_wave([pair[0], pair[1]]))
         .collect();
-    // The lowest is removed first; its neighbours bend to the same side and are joined.
+    // The lowest is removed first; its neighbors bend to the same side and are joined.
     while let Some(low) = (0..waves.len())
         .filter(|&i| waves[i].height < least)
         .min_by(|&a, &b| waves[a].height.total_cmp(&waves[b].height))

@@ -75,16 +75,33 @@ pub fn run(arch: Arch, kernel: &mut impl GroupKernel) {
     }
 }
 
-/// The part of an array given by its first index and its length.
+/// A part of an array.
+#[derive(Clone, Copy, Debug)]
+pub struct ArraySpan {
+    /// First index.
+    pub first: usize,
+    /// Length.
+    pub count: usize,
+}
+
+impl ArraySpan {
+    /// The part from `first` on of length `count`.
+    #[inline(always)]
+    pub fn new(first: usize, count: usize) -> Self {
+        ArraySpan { first, count }
+    }
+}
+
+/// A part of an array.
 #[inline(always)]
-pub fn slice(array: &[f64], (first, count): (usize, usize)) -> &[f64] {
-    &array[first..first + count]
+pub fn slice(array: &[f64], span: ArraySpan) -> &[f64] {
+    &array[span.first..span.first + span.count]
 }
 
 /// The part of an array, mutably.
 #[inline(always)]
-pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64] {
-    &mut array[first..first + count]
+pub fn slice_mut(array: &mut [f64], span: ArraySpan) -> &mut [f64] {
+    &mut array[span.first..span.first + span.count]
 }
 
 /// The same part of several arrays. (Written out, as compilers do not inline `map` here:
@@ -92,11 +109,11 @@ pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64
 #[inline(always)]
 pub fn array_chunks<const K: usize>(
     arrays: &[impl AsRef<[f64]>; K],
-    place: (usize, usize),
+    span: ArraySpan,
 ) -> [&[f64]; K] {
     let mut parts: [&[f64]; K] = [&[]; K];
     for k in 0..K {
-        parts[k] = slice(arrays[k].as_ref(), place);
+        parts[k] = slice(arrays[k].as_ref(), span);
     }
     parts
 }
@@ -113,19 +130,16 @@ pub fn group_components([a, b, c, d]: [DVec3; GROUP]) -> [NumberGroup; 3] {
 
 /// The same part of three arrays, mutably.
 #[inline(always)]
-pub fn array_chunks_mut(
-    arrays: &mut [impl AsMut<[f64]>; 3],
-    place: (usize, usize),
-) -> [&mut [f64]; 3] {
+pub fn array_chunks_mut(arrays: &mut [impl AsMut<[f64]>; 3], span: ArraySpan) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;
     [
-        slice_mut(x.as_mut(), place),
-        slice_mut(y.as_mut(), place),
-        slice_mut(z.as_mut(), place),
+        slice_mut(x.as_mut(), span),
+        slice_mut(y.as_mut(), span),
+        slice_mut(z.as_mut(), span),
     ]
 }
 
-/// One number for each of several neighbouring nodes, or rods.
+/// One number for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
     pub(crate) simd: S,
@@ -326,7 +340,7 @@ impl From<Lanes<Scalar>> for f64 {
     }
 }
 
-/// A vector for each of several neighbouring nodes, or rods.
+/// A vector for each of several neighboring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
 pub struct Vectors<S: Simd> {
     /// Along the first axis.
@@ -432,9 +446,9 @@ impl<S: Simd> Vectors<S> {
         Vectors::new(d1.dot(self), d2.dot(self), d3.dot(self))
     }
 
-    /// The vectors of a group, one in every lane, from the lane `part` on.
+    /// Packs the vectors of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
-    pub fn from_group_vectors(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
+    pub fn from_group(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
         Vectors::load_group(simd, &group_components(vectors), part)
     }
 

@@ -2,7 +2,6 @@
 //! the files it writes, figures and pages. The Python package uses it, too.
 
 #![warn(missing_docs)]
-#![cfg_attr(target_family = "wasm", allow(dead_code, unused_imports))]
 // In a browser there are no verbs, which use most of the rest.
 #![cfg_attr(target_family = "wasm", allow(dead_code, unused_imports))]
 mod figure;

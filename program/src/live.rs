@@ -5,10 +5,10 @@ use serde::Serialize;
 
 /// The page that `web/build.sh` makes.
 #[cfg(feature = "live")]
-const PAGE: Option<&str> = Some(include_str!("../../web/dist/live.html"));
+const LIVE_PAGE: Option<&str> = Some(include_str!("../../web/dist/live.html"));
 
 #[cfg(not(feature = "live"))]
-const PAGE: Option<&str> = None;
+const LIVE_PAGE: Option<&str> = None;
 
 /// Where a scenario stands in it.
 const SCENARIO_PLACEHOLDER: &str = "<script id=\"given\" type=\"application/json\">null</script>";
@@ -50,7 +50,7 @@ pub fn live_page(
         name: &'g str,
         sliders: &'g [LiveSlider],
     }
-    let page = PAGE.ok_or(LivePageNotBuilt)?;
+    let page = LIVE_PAGE.ok_or(LivePageNotBuilt)?;
     let given = Given {
         text,
         name,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use leafdyn::scenario;
 use leafdyn::study::{
-    self, Data, DataReadingOptions, Experiment, FitError, FitRequest, FitStep, FreeParameter,
+    self, Data, DataFileOptions, Experiment, FitError, FitRequest, FitStep, FreeParameter,
     MeasuredColumn, RowFilter,
 };
 use pyo3::prelude::*;
@@ -67,7 +67,7 @@ pub fn fit(
     let columns = columns.map_err(|error| fit_error(py, error))?;
     let rows: Result<Vec<RowFilter>, FitError> = rows.iter().map(|choice| choice.parse()).collect();
     let mut measured = Data {
-        reading: DataReadingOptions {
+        reading: DataFileOptions {
             columns: columns.clone(),
             every,
             rows: rows.map_err(|error| fit_error(py, error))?,

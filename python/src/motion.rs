@@ -221,7 +221,9 @@ impl Motion {
     /// What makes it doubtful from its beginning.
     #[getter]
     fn doubts(&self) -> Vec<String> {
-        self.state().simulation.doubts().to_vec()
+        let state = self.state();
+        let doubts = state.simulation.doubts().iter();
+        doubts.map(ToString::to_string).collect()
     }
 
     #[getter]

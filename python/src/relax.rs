@@ -134,7 +134,7 @@ fn solve_here(
 ) -> PyResult<Option<Result<Equilibrium, RelaxError>>> {
     let rods = scenario.rods.len();
     let few = |segments: usize| rods.saturating_mul(segments) <= FEW_NODES;
-    let short_steps = matches!(options.method, Method::SemiImplicit(_)) && options.modes == 0;
+    let short_steps = options.method.semi_implicit().is_some() && options.modes == 0;
     if !short_steps || rods > FEW_RODS || !few(asked.segments.unwrap_or(0)) {
         return Ok(None);
     }

@@ -201,8 +201,11 @@ impl Leaf {
         all.set_item(intern!(py, "path_events"), events)?;
         all.set_item(intern!(py, "outcome"), ended.outcome.word())?;
         all.set_item(intern!(py, "success"), ended.outcome.is_success())?;
-        all.set_item(intern!(py, "remark"), ended.remark.as_deref())?;
-        all.set_item(intern!(py, "doubts"), &found.doubts)?;
+        let remark = ended.remark.as_ref();
+        all.set_item(intern!(py, "remark"), remark.map(ToString::to_string))?;
+        all.set_item(intern!(py, "remark_code"), remark.map(|it| it.code()))?;
+        let doubts: Vec<String> = found.doubts.iter().map(ToString::to_string).collect();
+        all.set_item(intern!(py, "doubts"), doubts)?;
         all.set_item(intern!(py, "rods"), found.rod_count)?;
         all.set_item(intern!(py, "joined"), found.shape.joined)?;
         all.set_item(intern!(py, "segments"), &found.accuracy.segments)?;

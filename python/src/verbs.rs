@@ -166,7 +166,8 @@ pub fn trace<'py>(
             points.map(|point| curves(py, &point.curves)).collect()
         })
         .collect();
-    let (complete, remark) = (trace.complete, trace.remark.clone());
+    let remark = trace.remark.as_ref().map(ToString::to_string);
+    let complete = trace.complete;
     let files = Files::of(trace, scenario.checked.clone());
     Ok((files, complete, remark, lines?))
 }
@@ -202,7 +203,8 @@ pub fn boundary<'py>(
             points.map(|point| curves(py, &point.curves)).collect()
         })
         .collect();
-    let (complete, remark) = (boundary.complete, boundary.remark.clone());
+    let remark = boundary.remark.as_ref().map(ToString::to_string);
+    let complete = boundary.complete;
     let files = Files::of(boundary, scenario.checked.clone());
     Ok((files, complete, remark, lines?))
 }
@@ -309,7 +311,8 @@ pub fn chart(
         Ok::<_, ChartError>(chart)
     })?;
     let chart = found.map_err(value_error)?;
-    let (confirmed, remarks) = (chart.is_reference_confirmed(), chart.remarks.clone());
+    let confirmed = chart.is_reference_confirmed();
+    let remarks = chart.remarks.iter().map(ToString::to_string).collect();
     let scaling = chart.scaling.clone();
     let scaling = scaling.map(|scaling| Files::of(scaling, input.clone()));
     Ok((Files::of(chart, input), scaling, confirmed, remarks))

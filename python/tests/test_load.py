@@ -31,7 +31,7 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
         one, two = getattr(again, name), getattr(leaf, name)
         assert (one is None) == (two is None) and (one is None or np.array_equal(one, two)), name
     for name in (
-        "name method outcome success remark doubts rods joined segments tolerance residual energy stable "
+        "name method outcome success remark remark_code doubts rods joined segments tolerance residual energy stable "
         "negative_eigenvalues neutral_directions path path_events error_estimate tip_reaction_error "
         "tip_reaction_moments_error grip_reaction_errors"
     ).split():

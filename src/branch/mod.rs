@@ -38,23 +38,25 @@
 
 pub(crate) mod boundary;
 mod continuation;
+mod convergence;
 mod correct;
 mod critical;
 mod equations;
 mod family;
 mod refine;
 mod saddle_search;
+mod verified_branch;
 
-pub use crate::branch::continuation::{
-    BranchEnd, ContinuationOptions, NestedBranchEquations, VerifiedBranch, begin_branch,
-    follow_branch, switch_branches,
-};
+pub use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
+pub use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 pub use crate::branch::critical::{CriticalKind, CriticalPoint};
 pub use crate::branch::equations::BranchEquations;
 use crate::branch::family::OutOfRange;
 pub use crate::branch::family::{LeafFamily, ParameterRange, value_at_fraction};
-pub use crate::branch::refine::{ExtrapolatedPoint, VerificationFailure};
 pub(crate) use crate::branch::refine::{NEARLY_RIGID, on_finer, verify_at_parameter};
+pub use crate::branch::verified_branch::{
+    NestedBranchEquations, VerifiedBranch, begin_branch, switch_branches,
+};
 use crate::leaf::{DirectError, Increment, NodalField, State};
 use crate::relax::Stencil;
 

@@ -279,7 +279,7 @@ impl<'a> GroupRods<'a> {
         let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
         let vectors = [vector(a), vector(b), vector(c), vector(d)];
         (
-            Vectors::from_group_vectors(simd, vectors, part),
+            Vectors::from_group(simd, vectors, part),
             Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
         )
     }
@@ -322,7 +322,7 @@ struct LaneSegments<S: Simd> {
 #[inline(always)]
 fn lane_vectors<S: Simd>(simd: S, rods: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
     let [a, b, c, d] = rods;
-    Vectors::from_group_vectors(simd, [a[i], b[i], c[i], d[i]], part)
+    Vectors::from_group(simd, [a[i], b[i], c[i], d[i]], part)
 }
 
 /// Assembles the right-hand side and the energy of a group, and the matrix if requested.

@@ -153,8 +153,8 @@ impl DiscreteLeaf {
             discrete.grips = discrete.find_gripped_nodes(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
-                    true => discrete.strips(&natural),
-                    false => discrete.strips(&discrete.unstrained_state(false)),
+                    true => discrete.tissue_strips(&natural),
+                    false => discrete.tissue_strips(&discrete.unstrained_state(false)),
                 };
             }
         }
@@ -619,10 +619,10 @@ impl Leaf {
             let mut before = natural.vein_pose(j, 0.0);
             for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
                 let next = natural.vein_pose(j, *sigma);
-                let ((x0, q0), (x1, q1)) = (before, next);
-                let chord = (x1 - x0) / (self.scale.length * section.ds);
-                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
-                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
+                let chord = (next.position - before.position) / (self.scale.length * section.ds);
+                let [from, to] = [before, next].map(|pose| pose.rotation);
+                section.rest_strain = rotation::midpoint(from, to).inverse() * chord;
+                section.rest_curvature = rotation::log(from.conjugate() * to) / section.ds;
                 before = next;
             }
         }

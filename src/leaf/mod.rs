@@ -46,12 +46,11 @@ pub use crate::leaf::system::{
     AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
 };
 pub use crate::leaf::tissue::HalfTurn;
+use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation;
 pub use crate::scenario::Scale;
-use crate::scenario::{
-    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation, sorted_distinct,
-};
+use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -354,7 +353,7 @@ impl Leaf {
         self.scenario
             .rods
             .iter()
-            .flat_map(Rod::profiles)
+            .flat_map(Rod::constitutive_profiles)
             .all(constant)
     }
 
@@ -413,7 +412,7 @@ impl Leaf {
             return TissueStiffness::default();
         };
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
-        let [along, across, normal, fold] = tissue[g].profiles().map(|of| of.at(sigma));
+        let [along, across, normal, fold] = tissue[g].stiffness_profiles().map(|of| of.at(sigma));
         let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
         TissueStiffness {
             displacement: k * gap_length / self.scale.force(),

@@ -13,7 +13,7 @@ use crate::leaf::block_tridiagonal::{RodLane, lane_rods, rod_lane};
 use crate::leaf::discrete::{
     DiscreteLeaf, GroupLoads, LaneNodeForces, LaneRodLoads, NodeWeights, group_loads,
 };
-use crate::natural::{Natural, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
+use crate::natural::{Natural, Pose, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::rod::{NodePair, Section, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, directors};
 use crate::simd::{
@@ -210,16 +210,22 @@ impl<'a> RodIntegrator<'a> {
         };
         let (leaf, fields, slopes) = (&self.leaf.leaf, &self.stage.fields, &mut self.slopes[stage]);
         let at_rest = |j: usize| {
-            let (x, q) = natural.vein_pose(j, sigma);
-            (x / leaf.scale.length, q)
+            let pose = natural.vein_pose(j, sigma);
+            Pose {
+                position: pose.position / leaf.scale.length,
+                ..pose
+            }
         };
         let here = |j: usize| {
             let RodFields { x, q, .. } = rod_fields(fields, j);
-            (x, q)
+            Pose {
+                position: x,
+                rotation: q,
+            }
         };
-        let ends = |a: (DVec3, DQuat), b: (DVec3, DQuat)| NodePair {
-            x: [a.0, b.0],
-            q: [a.1, b.1],
+        let ends = |a: Pose, b: Pose| NodePair {
+            x: [a.position, b.position],
+            q: [a.rotation, b.rotation],
         };
         let mut left = (at_rest(0), here(0));
         for g in 0..leaf.rods() - 1 {

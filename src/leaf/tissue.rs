@@ -117,7 +117,7 @@ impl DiscreteLeaf {
     /// The strips of this leaf on its grid, gap after gap, base to tip, without force in the stress-free
     /// state `natural`. Their weights are those of the coupling, but for a joint tip, where strips
     /// resist rotations.
-    pub(super) fn strips(&self, natural: &State) -> Vec<TissueStrip> {
+    pub(super) fn tissue_strips(&self, natural: &State) -> Vec<TissueStrip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
             let stiffness = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);

@@ -1,5 +1,5 @@
 //! The Lanczos method for (K - sigma M)^-1 M, in the inner product of M, with full
-//! reorthogonalisation (C. Lanczos, J. Res. Nat. Bur. Standards 45, 1950;
+//! reorthogonalization (C. Lanczos, J. Res. Nat. Bur. Standards 45, 1950;
 //! T. Ericsson and A. Ruhe, Math. Comp. 35, 1980, for the inverse).
 //!
 //! Loads with which searches for modes begin.
@@ -20,7 +20,7 @@ const KRYLOV_DIMENSION_PER_PAIR: usize = 4;
 /// closer shift is cheaper.
 const MAX_FURTHER_CHECKS: f64 = 3.0;
 
-/// A direction reduced by orthogonalisation below this part of its length is rounding: the
+/// A direction reduced by orthogonalization below this part of its length is rounding: the
 /// Krylov space of the start is exhausted.
 const KRYLOV_EXHAUSTION_RATIO: f64 = 1e-13;
 
@@ -142,7 +142,7 @@ impl Lanczos<'_> {
         (Vec::new(), None)
     }
 
-    /// Orthogonalises a vector against the basis and the known modes, twice, since
+    /// Orthogonalizes a vector against the basis and the known modes, twice, since
     /// once is not accurate to the last digits. Returns its length.
     fn orthogonal(&self, vector: &mut [f64], basis: &[Vec<f64>]) -> f64 {
         for _ in 0..2 {

@@ -6,10 +6,10 @@
 //! A positive lambda is the square of a frequency, a negative one that of the
 //! rate at which the leaf leaves an unstable equilibrium.
 //!
-//! K - sigma M is factorised for a sigma below all eigenvalues, as the signs
+//! K - sigma M is factorized for a sigma below all eigenvalues, as the signs
 //! of its pivots prove, and the Lanczos method finds the eigenvalues nearest to
 //! sigma. Their number below the last one found follows from
-//! the signs of the pivots of a second factorisation there (Sylvester's law): missing ones,
+//! the signs of the pivots of a second factorization there (Sylvester's law): missing ones,
 //! such as the second one of a double eigenvalue, are
 //! searched for until the numbers agree. A list whose completeness cannot
 //! be proved is not returned.
@@ -201,7 +201,7 @@ impl Vibration<'_> {
         self.masses.add_to_system(system, -shift);
     }
 
-    /// K - shift M, factorised.
+    /// K - shift M, factorized.
     fn factorize(&self, system: &mut System, shift: f64) -> Option<MatrixFactors> {
         self.assemble(system, shift);
         self.direct_solver.factorize(system, 0.0).ok()
@@ -634,7 +634,7 @@ impl Eigenpair {
     }
 }
 
-/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighbouring
+/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighboring
 /// leaf and state: their errors have only a second-order effect. In the
 /// scenario's unit of time.
 pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &Eigenpair) -> f64 {

@@ -1,7 +1,6 @@
 //! Positions near given ones in which segments that hardly yield are not strained, such as those
-//! of arcs with different chords that are joined at their tips.
-//!
-//! Rigid rods with a common tip: curves of two parameters in the plane of the fan, neither
+//! of arcs with different chords that are joined at their tips. Where springs do not lead there, rigid
+//! rods with a common tip are found as curves of two parameters in the plane of the fan, neither
 //! stretched nor sheared, from the base to the tip.
 
 use crate::leaf::{DiscreteLeaf, State, System};
@@ -9,24 +8,31 @@ use crate::newton::{DefiniteSolver, NewtonEquations, NewtonIteration, SolverCoun
 use crate::rotation;
 use glam::{DMat2, DQuat, DVec2, DVec3};
 
-/// Squared frequencies of the springs that hold the nodes while their positions are made
-/// consistent: stiff ones first; a straight vein that must buckle may need softer ones.
-const HOLDING_SPRING_RATES: [f64; 3] = [1e3, 30.0, 1.0];
+/// How a leaf is made as stiff as it is while springs hold its nodes.
+struct StiffeningSteps {
+    /// Squared frequencies of the springs, tried in this order: with stiff ones nodes stay near; a
+    /// straight vein that must buckle may need softer ones.
+    spring_rates: [f64; 3],
+    /// Compliance (L^2/A) at first, ratio of successive ones, and the last.
+    first_compliance: f64,
+    compliance_ratio: f64,
+    last_compliance: f64,
+    /// Newton iterations at each compliance.
+    most_iterations: usize,
+    /// Accuracy (radians, lengths) of intermediate states and of the last one.
+    intermediate_accuracy: f64,
+    final_accuracy: f64,
+}
 
-/// Compliances (L^2/A) through which the leaf is made as stiff as it is: the first, the ratio of
-/// successive ones, and the last.
-const FIRST_COMPLIANCE: f64 = 0.1;
-
-const COMPLIANCE_RATIO: f64 = 0.3;
-
-const LAST_COMPLIANCE: f64 = 1e-9;
-
-/// Iterations at each of them, and their accuracy.
-const MAX_PROJECTION_ITERATIONS: usize = 20;
-
-const INTERMEDIATE_ACCURACY: f64 = 1e-4;
-
-const FINAL_ACCURACY: f64 = 1e-13;
+const STIFFENING: StiffeningSteps = StiffeningSteps {
+    spring_rates: [1e3, 30.0, 1.0],
+    first_compliance: 0.1,
+    compliance_ratio: 0.3,
+    last_compliance: 1e-9,
+    most_iterations: 20,
+    intermediate_accuracy: 1e-4,
+    final_accuracy: 1e-13,
+};
 
 /// A state near this one in which segments are strained no more than gently: the leaf becomes as
 /// stiff as it is in steps, without loads, while springs in proportion to the masses hold its
@@ -37,7 +43,7 @@ pub fn project_constraints(leaf: &DiscreteLeaf, near: &State) -> Option<State> {
     leaf.load_factor = 0.0;
     let mut system = System::new(&leaf);
     let mut held = |&rate: &f64| spring_held_equilibrium(&leaf, &mut system, near, rate);
-    let found = HOLDING_SPRING_RATES.iter().find_map(&mut held);
+    let found = STIFFENING.spring_rates.iter().find_map(&mut held);
     let is_held = leaf.leaf.has_placed_supports();
     found.or_else(|| joined_rigid_curves(&leaf).filter(|_| !is_held))
 }
@@ -50,13 +56,13 @@ fn spring_held_equilibrium(
     rate: f64,
 ) -> Option<State> {
     let mut state = near.clone();
-    let mut floor = FIRST_COMPLIANCE;
-    let last = leaf.least_compliance().max(LAST_COMPLIANCE);
+    let mut floor = STIFFENING.first_compliance;
+    let last = leaf.least_compliance().max(STIFFENING.last_compliance);
     leaf.with_compliance_floor(floor).strain_forces(&mut state);
     let mut hold = |leaf: &DiscreteLeaf, accuracy: f64| {
         let newton = NewtonIteration {
             accuracy,
-            iterations: MAX_PROJECTION_ITERATIONS,
+            iterations: STIFFENING.most_iterations,
             work: &mut SolverCounts::default(),
             progress: &mut |_, _| {},
         };
@@ -69,37 +75,50 @@ fn spring_held_equilibrium(
         newton.solve(leaf, &mut state, system, held).ok()
     };
     while floor > last {
-        hold(&leaf.with_compliance_floor(floor), INTERMEDIATE_ACCURACY)?;
-        floor *= COMPLIANCE_RATIO;
+        hold(
+            &leaf.with_compliance_floor(floor),
+            STIFFENING.intermediate_accuracy,
+        )?;
+        floor *= STIFFENING.compliance_ratio;
     }
-    hold(leaf, FINAL_ACCURACY)?;
+    hold(leaf, STIFFENING.final_accuracy)?;
     Some(state)
 }
 
-/// The tip is at the mean of the ends of the arcs, but within these parts of the
-/// length of the shortest rod; nearer by this factor, repeatedly, if
-/// a rod does not reach it.
-const TIP_REACH_RANGE: [f64; 2] = [0.2, 0.97];
+/// The search for rigid curves with a common tip.
+struct RigidCurveSearch {
+    /// The tip is at the mean of the ends of the arcs, but not nearer and not farther than these parts
+    /// of the length of the shortest rod.
+    nearest_tip: f64,
+    farthest_tip: f64,
+    /// Factor by which the tip comes nearer, repeatedly, if a rod does not reach it.
+    approach: f64,
+    /// Initial values of the second parameter of a curve. The first is that of
+    /// the arc minus a third of this, which keeps the direction of the chord. The side to which a
+    /// straight rod buckles is arbitrary; these values choose one.
+    initial_bends: [f64; 9],
+    /// Iterations of the search for one curve, and their longest step (radians).
+    most_iterations: usize,
+    longest_step: f64,
+    /// Gap at the tip that counts as closed, as a part of the length.
+    closed_gap: f64,
+    /// Largest turn of a segment, radians.
+    largest_turn: f64,
+}
 
-const TIP_APPROACH_FACTOR: f64 = 0.96;
-
-/// Initial values of the second parameter in the search for a curve. The first is that of
-/// the arc minus a third of this, which keeps the direction of the chord. The side to which a
-/// straight rod buckles is arbitrary; these values choose one.
-const INITIAL_BENDS: [f64; 9] = [0.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0, 10.0, -10.0];
-
-/// Iterations of a search, their longest step, and the gap that counts as closed.
-const CURVE_ITERATIONS: usize = 30;
-
-const MAX_CURVE_STEP: f64 = 0.7;
-
-const TIP_GAP_TOLERANCE: f64 = 1e-14;
-
-/// Largest turn of a segment.
-const MAX_SEGMENT_TURN: f64 = 1.0;
+const CURVES: RigidCurveSearch = RigidCurveSearch {
+    nearest_tip: 0.2,
+    farthest_tip: 0.97,
+    approach: 0.96,
+    initial_bends: [0.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0, 10.0, -10.0],
+    most_iterations: 30,
+    longest_step: 0.7,
+    closed_gap: 1e-14,
+    largest_turn: 1.0,
+};
 
 /// The state of a joined leaf, if there is one; the rods carry no forces.
-pub(super) fn joined_rigid_curves(leaf: &DiscreteLeaf) -> Option<State> {
+fn joined_rigid_curves(leaf: &DiscreteLeaf) -> Option<State> {
     let rods: Vec<PlanarCurve> = (0..leaf.rods())
         .map(|j| PlanarCurve::new(leaf, j))
         .collect();
@@ -118,9 +137,9 @@ pub(super) fn joined_rigid_curves(leaf: &DiscreteLeaf) -> Option<State> {
         .iter()
         .map(|rod| rod.length)
         .fold(f64::INFINITY, f64::min);
-    let nearest = TIP_REACH_RANGE[0] * shortest;
-    let first = mean.clamp(nearest, TIP_REACH_RANGE[1] * shortest);
-    let distances = std::iter::successors(Some(first), |far| Some(TIP_APPROACH_FACTOR * far));
+    let nearest = CURVES.nearest_tip * shortest;
+    let first = mean.clamp(nearest, CURVES.farthest_tip * shortest);
+    let distances = std::iter::successors(Some(first), |far| Some(CURVES.approach * far));
     let (tip, found) = distances
         .take_while(|distance| *distance >= nearest)
         .find_map(|distance| {
@@ -145,6 +164,12 @@ struct PlanarCurve {
     node_fractions: Vec<f64>,
     /// Segments in their own directions.
     segments: Vec<DVec3>,
+}
+
+/// Turn of a segment between its ends, radians, and its part of the length.
+struct SegmentTurn {
+    angle: f64,
+    fraction: f64,
 }
 
 impl PlanarCurve {
@@ -202,47 +227,53 @@ impl PlanarCurve {
     /// The parameters with which the rod ends at `tip`, with the least bending among those found,
     /// by Newton's method.
     fn solve_for_tip(&self, tip: DVec2, arc: f64) -> Option<[f64; 2]> {
-        let searches = INITIAL_BENDS.iter().filter_map(|&bend| {
+        let searches = CURVES.initial_bends.iter().filter_map(|&bend| {
             let mut at = DVec2::new(arc - bend / 3.0, bend);
-            for _ in 0..CURVE_ITERATIONS {
+            for _ in 0..CURVES.most_iterations {
                 let [end, of_a, of_b] = self.end_with_derivatives(at.to_array());
                 let gap = tip - end;
-                if gap.length() < TIP_GAP_TOLERANCE * self.length {
+                if gap.length() < CURVES.closed_gap * self.length {
                     return Some(at.to_array());
                 }
                 let step = DMat2::from_cols(of_a, of_b).inverse() * gap;
                 if !step.is_finite() {
                     return None;
                 }
-                at += step.clamp_length_max(MAX_CURVE_STEP);
+                at += step.clamp_length_max(CURVES.longest_step);
             }
             let [end, ..] = self.end_with_derivatives(at.to_array());
             // To rounding.
-            ((tip - end).length() < 10.0 * TIP_GAP_TOLERANCE * self.length).then_some(at.to_array())
+            ((tip - end).length() < 10.0 * CURVES.closed_gap * self.length).then_some(at.to_array())
         });
         searches
             .map(|found| (self.bending(found), found))
-            .filter(|(_, found)| self.largest_turn(*found) < MAX_SEGMENT_TURN)
+            .filter(|(_, found)| self.largest_turn(*found) < CURVES.largest_turn)
             .min_by(|(a, _), (b, _)| a.total_cmp(b))
             .map(|(_, found)| found)
     }
 
-    fn segment_turns(&self, parameters: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+    /// The turns of all segments.
+    fn segment_turns(&self, parameters: [f64; 2]) -> impl Iterator<Item = SegmentTurn> {
         self.node_fractions.windows(2).map(move |ends| {
             let [from, to] = [ends[0], ends[1]].map(|part| self.tangent_angle(parameters, part));
-            (to - from, ends[1] - ends[0])
+            SegmentTurn {
+                angle: to - from,
+                fraction: ends[1] - ends[0],
+            }
         })
     }
 
     /// Square of the curvature integrated over the length.
     fn bending(&self, parameters: [f64; 2]) -> f64 {
         let turns = self.segment_turns(parameters);
-        turns.map(|(turn, part)| turn * turn / part).sum()
+        turns
+            .map(|turn| turn.angle * turn.angle / turn.fraction)
+            .sum()
     }
 
     fn largest_turn(&self, parameters: [f64; 2]) -> f64 {
         let turns = self.segment_turns(parameters);
-        turns.fold(0.0, |largest, (turn, _)| largest.max(turn.abs()))
+        turns.fold(0.0, |largest, turn| largest.max(turn.angle.abs()))
     }
 
     fn append_nodes(&self, parameters: [f64; 2], x: &mut Vec<DVec3>, q: &mut Vec<DQuat>) {

@@ -1,10 +1,6 @@
-//! Motion in time.
-//!
-//! The interface of all methods of time integration.
-//!
-//! The energy of a moving leaf, and whether the motion is reliable.
-//!
-//! The rate at which strains change, for internal friction.
+//! Motion in time: what the explicit and the semi-implicit method share. This file has their interface
+//! and clock, the energies of a moving leaf, whose balance tells whether the motion is reliable, and the
+//! weights with which strains give their rate, for internal friction.
 
 mod constraint_projection;
 mod explicit;
@@ -14,7 +10,7 @@ mod semi_implicit;
 use crate::leaf::{DiscreteLeaf, HalfTurn, State};
 pub use crate::motion::constraint_projection::project_constraints;
 pub use crate::motion::explicit::{Explicit, RigidRodError, StableStep};
-pub use crate::motion::physics::{Inertia, Physics, SegmentDrag, WindDrag};
+pub use crate::motion::physics::{Inertia, MotionTimes, Physics, SegmentDrag, WindDrag};
 pub use crate::motion::semi_implicit::{SemiImplicit, StepControl};
 use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;
@@ -119,7 +115,7 @@ pub enum Stopped {
         /// Segments per rod.
         segments: usize,
     },
-    /// Sections of neighbouring veins passed half a turn against each other.
+    /// Sections of neighboring veins passed half a turn against each other.
     #[error("at t = {time:.6e} {}; the motion cannot be followed beyond: end it before", half_turn.sentence())]
     HalfTurn {
         /// Time.
@@ -168,26 +164,61 @@ impl Stopped {
     }
 }
 
+/// Differences of time below this part of a step are rounding.
+const TIME_ROUNDING_FRACTION: f64 = 1e-9;
+
+/// How far a motion is, and when it ends early.
+#[derive(Clone, Debug, Default)]
+pub struct MotionClock {
+    /// Present time.
+    time: f64,
+    /// Number of time steps.
+    steps: usize,
+    limit: Limit,
+}
+
+impl MotionClock {
+    /// Fails if the limit of the run is reached.
+    fn check_limit(&self) -> Result<(), Stopped> {
+        match self.limit.reached() {
+            true => Err(Stopped::Interrupted { time: self.time }),
+            false => Ok(()),
+        }
+    }
+}
+
 /// A method that integrates the motion of a leaf. Dimensionless throughout.
 pub trait TimeIntegrator {
+    /// The clock of the motion.
+    fn clock(&self) -> &MotionClock;
+
+    /// The clock of the motion, to be set.
+    fn clock_mut(&mut self) -> &mut MotionClock;
+
     /// Present time.
-    fn time(&self) -> f64;
+    fn time(&self) -> f64 {
+        self.clock().time
+    }
 
     /// Number of time steps.
-    fn steps(&self) -> usize;
+    fn steps(&self) -> usize {
+        self.clock().steps
+    }
 
     /// Bounds the steps from now on, of a method whose error determines them: the steps of a
     /// finer run that is compared with a coarser one are shorter everywhere, also where the times
     /// asked for limit both.
     fn limit_steps(&mut self, _longest: f64) {}
 
-    /// The longest step since this was asked last, of such a method.
+    /// The longest step since this was asked last, of a method whose error determines its steps.
     fn take_longest_step(&mut self) -> f64 {
         f64::INFINITY
     }
 
     /// Ends the motion at the first step behind a limit.
-    fn set_limit(&mut self, limit: Limit);
+    fn set_limit(&mut self, limit: Limit) {
+        self.clock_mut().limit = limit;
+    }
 
     /// Advances to exactly `until`; returns the state there, in which the motion is reliable.
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped>;
@@ -196,12 +227,19 @@ pub trait TimeIntegrator {
     fn snapshot(&mut self) -> Snapshot;
 }
 
-/// Largest energy that may appear without cause, as a part of the largest energy that moved.
-/// Unbounded growth soon exceeds any such limit.
-const LARGEST_IMBALANCE: f64 = 0.5;
+/// When the energy of a motion counts as growing without cause.
+struct EnergyGrowthLimits {
+    /// Largest energy that may appear, as a part of the largest energy that moved. Unbounded growth
+    /// soon exceeds any such limit: doubled, it is found a few steps later.
+    imbalance: f64,
+    /// Energy, in units of A/L, that may be due to rounding.
+    rounding: f64,
+}
 
-/// Energy, in units of A/L, that may be due to rounding.
-const ENERGY_ROUNDING: f64 = 1e-12;
+const ENERGY_GROWTH: EnergyGrowthLimits = EnergyGrowthLimits {
+    imbalance: 0.5,
+    rounding: 1e-12,
+};
 
 /// Energies at an instant, without what was dissipated and put in before. Sets the loads and
 /// the rest shape of `leaf` to those of that time.
@@ -271,10 +309,12 @@ pub fn check_resolution(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(),
     }
 }
 
-/// Energy dissipated and put in.
+/// Energy that a motion exchanged with what is around it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Exchange {
+    /// Energy dissipated.
     pub dissipated: f64,
+    /// Energy put in.
     pub work: f64,
 }
 
@@ -289,6 +329,7 @@ impl std::ops::AddAssign for Exchange {
 #[derive(Clone, Debug, Default)]
 pub struct EnergyBalance {
     exchanged: Exchange,
+    /// Balance and potential at the start.
     balance: f64,
     potential: f64,
     /// The largest energy that moved so far.
@@ -296,12 +337,14 @@ pub struct EnergyBalance {
 }
 
 impl EnergyBalance {
+    /// Begins with the energies of `start`.
     pub fn begin(&mut self, start: &Snapshot) {
         self.balance = start.energy.balance();
         self.potential = start.energy.potential;
         self.largest_exchanged_energy = start.energy.exchanged_energy(self.potential);
     }
 
+    /// Adds what a step exchanged.
     pub fn add(&mut self, exchange: Exchange) {
         self.exchanged += exchange;
     }
@@ -332,8 +375,9 @@ impl EnergyBalance {
         // The method's own damping may reduce energy, but nothing may increase it.
         let gain = now.energy.balance() - self.balance;
         let unresolved = unresolved_energy(leaf, physics, time, h);
-        let imbalance = gain / (self.largest_exchanged_energy + unresolved + ENERGY_ROUNDING);
-        if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
+        let imbalance =
+            gain / (self.largest_exchanged_energy + unresolved + ENERGY_GROWTH.rounding);
+        if !imbalance.is_finite() || imbalance > ENERGY_GROWTH.imbalance {
             return Err(Stopped::Diverged {
                 time,
                 percent: 100.0 * imbalance,

@@ -1,9 +1,7 @@
-//! What a leaf needs to move: masses, damping, time-dependent loads, and the air.
-//! Dimensionless: time in units of sqrt(rho L^4/A).
+//! What a leaf needs to move: masses, damping, time-dependent loads, and the air with its drag on the
+//! segments. Dimensionless: time in units of sqrt(rho L^4/A).
 //!
-//! Wind: the drag of the air on the segments of a leaf.
-//!
-//! The force per length of a rod is c |u_n| u_n with c = rho_a C_D w L/(2 rho), u_n being the part of
+//! The force of wind per length of a rod is c |u_n| u_n with c = rho_a C_D w L/(2 rho), u_n being the part of
 //! the air's velocity relative to the rod that is normal to its tangent. It is taken in the middle of
 //! every segment, where the tangent is that of its chord and the velocity the mean of its ends', to
 //! each of which half of it is applied: of second order in the length of the segments, and its power
@@ -22,7 +20,7 @@ pub struct Inertia {
     pub mass: f64,
     /// Moment of inertia about d2 and d3.
     pub transverse: f64,
-    /// Relative excess of that about d1.
+    /// Relative excess of the moment of inertia about d1.
     pub polar_excess: f64,
 }
 
@@ -38,6 +36,22 @@ impl Inertia {
         let excess = self.polar_excess * self.transverse;
         DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess
     }
+}
+
+/// A mass on a point of a vein.
+#[derive(Clone, Copy, Debug)]
+struct PointMass {
+    vein: usize,
+    /// Fraction of the vein's length.
+    sigma: f64,
+    mass: f64,
+}
+
+/// Duration of a motion and the interval between its outputs.
+#[derive(Clone, Copy, Debug)]
+pub struct MotionTimes {
+    pub duration: f64,
+    pub interval: f64,
 }
 
 /// Inertia, damping and loads of a leaf.
@@ -56,8 +70,7 @@ pub struct Physics {
     /// Part of the loads of single veins, and of the dead moments on points.
     rod_load_factor: f64,
     dead_moment_factor: f64,
-    /// Vein, fraction of its length and mass of what is on points.
-    point_masses: Vec<(usize, f64, f64)>,
+    point_masses: Vec<PointMass>,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
     /// The loads, if they are constant.
@@ -75,7 +88,11 @@ impl Physics {
         let mut physics = Physics::from_dynamics(leaf, leaf.scenario().dynamics.clone());
         let unit = physics.density_unit * physics.scale.length;
         let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
-        let masses = points.map(|it| (it.vein, it.at, it.mass / unit));
+        let masses = points.map(|it| PointMass {
+            vein: it.vein,
+            sigma: it.at,
+            mass: it.mass / unit,
+        });
         physics.point_masses = masses.collect();
         physics
     }
@@ -136,13 +153,8 @@ impl Physics {
             true => of.at(sigma),
             false => of.at((0.5 * leaf.grid.node_weight(i) - sigma).abs()),
         };
-        let here =
-            |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest_node(*at) == i;
-        let on_points = self
-            .point_masses
-            .iter()
-            .filter(here)
-            .map(|(_, _, mass)| mass);
+        let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
+        let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         Inertia {
             mass: length * around(&self.dynamics.density[j]) / self.density_unit + on_points,
@@ -152,9 +164,11 @@ impl Physics {
     }
 
     /// Duration of the motion and output interval.
-    pub fn duration_and_interval(&self) -> (f64, f64) {
-        let (duration, interval) = (self.dynamics.duration, self.dynamics.output_interval);
-        (duration / self.time_unit, interval / self.time_unit)
+    pub fn times(&self) -> MotionTimes {
+        MotionTimes {
+            duration: self.dynamics.duration / self.time_unit,
+            interval: self.dynamics.output_interval / self.time_unit,
+        }
     }
 
     /// The loads at a time.
@@ -195,7 +209,7 @@ impl Physics {
         self.evaluate_air_velocity(|velocity| velocity.at(time * self.time_unit))
     }
 
-    /// The mean of that velocity over an interval.
+    /// The mean of the air's velocity over an interval.
     pub fn mean_air(&self, interval: [f64; 2]) -> DVec3 {
         let [from, to] = interval.map(|time| time * self.time_unit);
         self.evaluate_air_velocity(|velocity| velocity.mean(from, to))
@@ -225,7 +239,7 @@ impl Physics {
     }
 
     /// The first time after `time` at which a load, the air's velocity or the factor of the rest curvatures may
-    /// change its slope; infinite if there is none. Not closer than [`SHORTEST`]: a jump
+    /// change its slope; infinite if there is none. Not closer than [`MIN_KNOT_STEP`]: a jump
     /// within less takes that long.
     pub fn next_knot(&self, time: f64) -> f64 {
         let next = self.knots.partition_point(|&knot| knot <= time);
@@ -233,7 +247,7 @@ impl Physics {
         knot.max(time + MIN_KNOT_STEP)
     }
 
-    /// A time at which one of them has a pulse too short for steps that end at its
+    /// A time at which a load, the air's velocity or the factor of the rest curvatures has a pulse too short for steps that end at its
     /// knots, in the scenario's unit.
     pub fn unresolved_pulse_time(&self) -> Option<f64> {
         let (d, shortest) = (&self.dynamics, MIN_KNOT_STEP * self.time_unit);
@@ -248,7 +262,7 @@ impl Physics {
         self.constant_rest_factor.unwrap_or_else(changing)
     }
 
-    /// The mean of that factor over an interval.
+    /// The mean of the factor of all rest curvatures over an interval.
     pub fn mean_rest_curvature_factor(&self, interval: [f64; 2]) -> f64 {
         let [from, to] = interval.map(|time| time * self.time_unit);
         let changing = || self.dynamics.rest.mean(from, to);
@@ -298,7 +312,7 @@ const RELATIVE_WIND_RATIO: f64 = 2.0;
 /// Wind on a leaf of a grid. Dimensionless.
 #[derive(Clone, Debug)]
 pub struct WindDrag {
-    /// c times the length, of all segments, rod after rod.
+    /// c times the length of every segment, rod after rod.
     factors: Vec<f64>,
     segments: usize,
 }
@@ -307,8 +321,9 @@ pub struct WindDrag {
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentDrag {
     factor: f64,
-    /// Length and unit tangent t of the chord.
+    /// Length of the chord.
     chord: f64,
+    /// Unit tangent t of the chord.
     tangent: DVec3,
     /// t . u, u_n and |u_n|.
     tangential_velocity: f64,
@@ -331,7 +346,7 @@ impl SegmentDrag {
         }
     }
 
-    /// The force.
+    /// The force of the air on the segment.
     pub fn force(&self) -> DVec3 {
         self.factor * self.normal_speed * self.normal_velocity
     }

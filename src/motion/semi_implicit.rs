@@ -1,4 +1,4 @@
-//! The semi-implicit method: the generalised-alpha method of Chung and Hulbert
+//! The semi-implicit method: the generalized-alpha method of Chung and Hulbert
 //! (J. Appl. Mech. 60, 1993) on rotations (Bruls, Cardona, Arnold, Mech. Mach.
 //! Theory 48, 2012).
 //!
@@ -16,31 +16,106 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 //!
-//! A time step.
-//!
-//! Work and dissipation of a step.
-//!
-//! The drag of wind in a step, and its work.
-//!
-//! Consistent initial conditions of a leaf at rest: its forces and accelerations and, where rigid
-//! segments are strained, as those of arcs with different chords, positions without such strains.
+//! A motion begins from consistent conditions of a leaf at rest: its forces and accelerations and, where
+//! rigid segments are strained, as those of arcs with different chords, positions without such strains.
 
 use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
 use crate::motion::constraint_projection::project_constraints;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, measure, rate_weights,
+    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
+    TimeIntegrator, Velocity, measure, rate_weights,
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
 use crate::rod::{Section, Wrench};
 use crate::rotation;
-use crate::run::Limit;
 use glam::{DMat3, DVec3};
 
-/// Spectral radius rho_inf at infinite frequency: the part of unresolved motion that
-/// remains after a step. Smaller values also damp more of what is resolved.
-const SPECTRAL_RADIUS: f64 = 0.8;
+/// Settings of the semi-implicit method.
+struct SemiImplicitSettings {
+    /// Spectral radius rho_inf at infinite frequency: the part of unresolved motion that
+    /// remains after a step. Smaller values also damp more of what is resolved.
+    spectral_radius: f64,
+    /// Shortest step, in units of time.
+    shortest_step: f64,
+    /// Bounds on the ratio of successive steps.
+    least_step_ratio: f64,
+    largest_step_ratio: f64,
+    /// Newton iterations in a step; a step that needs more is shortened.
+    most_iterations: usize,
+    /// Size of the last Newton iteration (radians, lengths), as a part of the permitted local error, of
+    /// which its error stays a small part.
+    iteration_error: f64,
+    /// Upper limit on the size of the last iteration.
+    largest_iteration_error: f64,
+    /// Size of the last iteration of steps of given length.
+    fixed_step_iteration_error: f64,
+    /// Size of the last iteration if steps are only counted, as a part of the permitted local error.
+    count_only_iteration_error: f64,
+    /// An iteration below this that does not decrease is due to rounding.
+    iteration_rounding: f64,
+    /// Relative accuracy of the conjugate gradients.
+    cg_accuracy: f64,
+    /// Relative accuracy of the conjugate gradients if steps are only counted, as a part of the
+    /// permitted local error: increments are less than one, so that this is noise far below it.
+    count_only_cg_accuracy: f64,
+    /// Largest rotation of a node in a step, radians.
+    largest_rotation: f64,
+    /// The stiffness with which the forces of rigid segments are condensed out is
+    /// at least this multiple of the resistance of inertia: iterations then converge
+    /// equally fast for all steps.
+    condensing_ratio: f64,
+}
+
+const SETTINGS: SemiImplicitSettings = SemiImplicitSettings {
+    spectral_radius: 0.8,
+    shortest_step: 1e-10,
+    least_step_ratio: 0.2,
+    largest_step_ratio: 2.0,
+    most_iterations: 12,
+    iteration_error: 1e-3,
+    largest_iteration_error: 1e-9,
+    fixed_step_iteration_error: 1e-12,
+    count_only_iteration_error: 1e-2,
+    iteration_rounding: 1e-11,
+    cg_accuracy: 1e-10,
+    count_only_cg_accuracy: 1e-2,
+    largest_rotation: 0.5,
+    condensing_ratio: 1e3,
+};
+
+/// A first step from rest, of implicit Euler, so short that the leaf hardly moves. It determines the
+/// forces in rigid segments, which do not follow from strains.
+struct FirstStepSettings {
+    /// Inverse square of the length of the step.
+    inverse_square: f64,
+    /// Newton iterations, and the size of the last (radians, lengths).
+    most_iterations: usize,
+    iteration_error: f64,
+    /// Strain of a rigid segment, as a length, that may be due to rounding.
+    strain_rounding: f64,
+    /// Strain of a rigid segment, as a length, above which positions are not consistent.
+    inconsistent_strain: f64,
+}
+
+const FIRST_STEP: FirstStepSettings = FirstStepSettings {
+    inverse_square: 1e6,
+    most_iterations: 30,
+    iteration_error: 1e-15,
+    strain_rounding: 1e-12,
+    inconsistent_strain: 1e-8,
+};
+
+/// Advice if energy grows, besides a shorter step.
+const ENERGY_GROWTH_ADVICE: &str = "dynamics.start = \"at-rest\"";
+
+/// Advice if steps become too short.
+const SHORT_STEP_ADVICE: &str = "use more segments a rod, or slower changes of the loads";
+
+/// Advice if no first step is short enough.
+const SHORT_FIRST_STEP_ADVICE: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
+    use dynamics.start = \"at-rest\", or a lower stiffness";
 
 /// Weights of the method.
 #[derive(Clone, Copy, Debug)]
@@ -66,31 +141,15 @@ impl GeneralizedAlphaWeights {
     }
 }
 
-/// Shortest step, and the part of a step below which differences of time are rounding.
-const SHORTEST_STEP: f64 = 1e-10;
-
-const TIME_ROUNDING_FRACTION: f64 = 1e-9;
-
-/// Bounds on the ratio of successive steps.
-const STEP_RATIO_BOUNDS: (f64, f64) = (0.2, 2.0);
-
-/// Advice if energy grows, besides a shorter step, and if steps are too short.
-const ENERGY_GROWTH_ADVICE: &str = "dynamics.start = \"at-rest\"";
-
-const SHORT_STEP_ADVICE: &str = "use more segments a rod, or slower changes of the loads";
-
-const SHORT_FIRST_STEP_ADVICE: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
-    use dynamics.start = \"at-rest\", or a lower stiffness";
-
 /// Control of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepControl {
-    /// All of this length, except those that end at the times asked for.
+    /// All steps of this length, except those that end at the times asked for.
     Fixed(f64),
-    /// Such that the local error of positions (lengths) and rotations (radians)
+    /// Steps with which the local error of positions (lengths) and rotations (radians)
     /// stays below this.
     LocalError(f64),
-    /// Bounded like [`StepControl::LocalError`], if only their number matters: equations are solved with
+    /// As with [`StepControl::LocalError`], if only the number of steps matters: equations are solved with
     /// just the accuracy that the local error is estimated with, and no energy balance is kept.
     CountOnly(f64),
 }
@@ -146,26 +205,24 @@ pub struct SemiImplicit {
     node_motions: Vec<NodeMotion>,
     next_node_motions: Vec<NodeMotion>,
     weights: GeneralizedAlphaWeights,
-    steps: StepControl,
+    control: StepControl,
     step: f64,
-    /// A bound on the steps, and the longest since this was asked last.
+    /// A bound on the steps, and the longest step since [`TimeIntegrator::take_longest_step`].
     step_bound: f64,
     longest_taken: f64,
-    time: f64,
-    count: usize,
-    /// Number of factorisations.
+    clock: MotionClock,
+    /// Number of factorizations.
     pub factorizations: usize,
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
     corrected_loads: Loads,
-    /// Those of the tissue's strips at the start.
+    /// How sections at the tissue's strips are aligned at the start.
     alignments: Vec<bool>,
-    limit: Limit,
 }
 
 impl SemiImplicit {
     /// A leaf at rest in `state`.
-    pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, steps: StepControl) -> Self {
+    pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, control: StepControl) -> Self {
         let nodes = leaf.rod_index_pairs(0..=leaf.segments());
         let mut motion = SemiImplicit {
             inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
@@ -181,7 +238,7 @@ impl SemiImplicit {
             next: state.clone(),
             node_motions: vec![NodeMotion::default(); state.x.len()],
             next_node_motions: vec![NodeMotion::default(); state.x.len()],
-            step: match steps {
+            step: match control {
                 StepControl::Fixed(h) => h,
                 StepControl::LocalError(error) | StepControl::CountOnly(error) => {
                     0.1 * error.cbrt()
@@ -189,19 +246,17 @@ impl SemiImplicit {
             },
             step_bound: f64::INFINITY,
             longest_taken: 0.0,
-            weights: GeneralizedAlphaWeights::from_spectral_radius(SPECTRAL_RADIUS),
-            steps,
-            time: 0.0,
-            count: 0,
+            weights: GeneralizedAlphaWeights::from_spectral_radius(SETTINGS.spectral_radius),
+            control,
+            clock: MotionClock::default(),
             factorizations: 0,
             balance: EnergyBalance::default(),
             corrected_loads: Loads::default(),
             alignments: leaf.strip_alignments(state),
-            limit: Limit::default(),
             leaf,
             physics,
         };
-        motion.initialise();
+        motion.initialize();
         motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
@@ -213,24 +268,24 @@ impl SemiImplicit {
     /// # Errors
     /// If it would be too short, or sections passed half a turn against each other.
     pub fn step_towards(&mut self, until: f64) -> Result<(), Stopped> {
-        let left = until - self.time;
+        let left = until - self.clock.time;
         if left < TIME_ROUNDING_FRACTION * self.step {
-            self.time = until;
+            self.clock.time = until;
             return Ok(());
         }
         let step = self.step.min(self.step_bound);
         let count = (left / step * (1.0 - 1e-12)).ceil().max(1.0);
         // The last two steps divide the remaining time equally.
         let last = count == 1.0;
-        let h = match self.steps {
+        let h = match self.control {
             StepControl::Fixed(_) => left / count,
             _ if count <= 2.0 => left / count,
             _ => step,
         };
         let error = self.attempt(h);
-        if let (Some(allowed), Some(error)) = (self.steps.error(), error) {
+        if let (Some(allowed), Some(error)) = (self.control.error(), error) {
             let factor = 0.9 * (allowed / error.max(1e-300)).cbrt();
-            let next = h * factor.clamp(STEP_RATIO_BOUNDS.0, STEP_RATIO_BOUNDS.1);
+            let next = h * factor.clamp(SETTINGS.least_step_ratio, SETTINGS.largest_step_ratio);
             if error > allowed {
                 self.step = next;
                 return Ok(());
@@ -242,19 +297,19 @@ impl SemiImplicit {
             Some(_) => self.accept(h),
             None => self.step = 0.25 * h,
         }
-        if let (StepControl::Fixed(longest), Some(_)) = (self.steps, error) {
-            self.step = longest.min(STEP_RATIO_BOUNDS.1 * self.step);
+        if let (StepControl::Fixed(longest), Some(_)) = (self.control, error) {
+            self.step = longest.min(SETTINGS.largest_step_ratio * self.step);
         }
-        let time = self.time;
+        let time = self.clock.time;
         // Beyond the jump of the law no step may converge.
-        let half_turn = match self.step < SHORTEST_STEP {
+        let half_turn = match self.step < SETTINGS.shortest_step {
             true => self.leaf.half_turn_near(&self.state),
             false => (self.leaf).half_turn_since(&self.alignments, &self.state),
         };
         if let Some(half_turn) = half_turn {
             return Err(Stopped::HalfTurn { time, half_turn });
         }
-        if self.step < SHORTEST_STEP {
+        if self.step < SETTINGS.shortest_step {
             let started = time > 0.0;
             let advice = if started {
                 SHORT_STEP_ADVICE
@@ -264,19 +319,19 @@ impl SemiImplicit {
             return Err(Stopped::StepTooShort { time, advice });
         }
         if error.is_some() && last {
-            self.time = until;
+            self.clock.time = until;
         }
         Ok(())
     }
 }
 
 impl TimeIntegrator for SemiImplicit {
-    fn time(&self) -> f64 {
-        self.time
+    fn clock(&self) -> &MotionClock {
+        &self.clock
     }
 
-    fn steps(&self) -> usize {
-        self.count
+    fn clock_mut(&mut self) -> &mut MotionClock {
+        &mut self.clock
     }
 
     fn limit_steps(&mut self, longest: f64) {
@@ -287,17 +342,11 @@ impl TimeIntegrator for SemiImplicit {
         std::mem::take(&mut self.longest_taken)
     }
 
-    fn set_limit(&mut self, limit: Limit) {
-        self.limit = limit;
-    }
-
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
-        while self.time < until {
-            if self.limit.reached() {
-                return Err(Stopped::Interrupted { time: self.time });
-            }
+        while self.clock.time < until {
+            self.clock.check_limit()?;
             // Within a step loads are linear in time: no pulse is stepped over.
-            let knot = self.physics.next_knot(self.time);
+            let knot = self.physics.next_knot(self.clock.time);
             self.step_towards(until.min(knot))?;
         }
         let now = self.snapshot();
@@ -316,7 +365,11 @@ impl TimeIntegrator for SemiImplicit {
             let [angular, linear] = m.v;
             Velocity { angular, linear }
         });
-        let (time, state, velocity) = (self.time, self.state.clone(), velocity.collect::<Vec<_>>());
+        let (time, state, velocity) = (
+            self.clock.time,
+            self.state.clone(),
+            velocity.collect::<Vec<_>>(),
+        );
         self.leaf.sections.clone_from(&self.sections);
         let energy = measure(&mut self.leaf, &self.physics, time, &state, &velocity);
         Snapshot {
@@ -328,41 +381,14 @@ impl TimeIntegrator for SemiImplicit {
     }
 }
 
-/// Newton iterations in a step, and the size of the last (radians, lengths),
-/// as a part of the permitted error and as an upper limit; for steps of given length.
-const MAX_NEWTON_ITERATIONS: usize = 12;
-
-const ITERATION_ERROR_FRACTION: f64 = 1e-3;
-
-const MAX_ITERATION_ERROR: f64 = 1e-9;
-
-const FIXED_STEP_ITERATION_ERROR: f64 = 1e-12;
-
-/// Iteration error if steps are only counted, as a part of the permitted error.
-const COUNT_ONLY_ITERATION_ERROR: f64 = 1e-2;
-
-/// Relative accuracy of the conjugate gradients, and, if steps are only counted, as a part of the
-/// permitted error: increments are less than one, so that this is noise far below it.
-const CG_TOLERANCE: f64 = 1e-10;
-
-const COUNT_ONLY_CG_TOLERANCE: f64 = 1e-2;
-
-/// Largest rotation of a node in a step, radians.
-const MAX_NODE_ROTATION: f64 = 0.5;
-
-/// The stiffness with which the forces of rigid segments are condensed out is
-/// at least this multiple of the resistance of inertia: iterations then converge
-/// equally fast for all steps.
-const CONDENSING_INERTIA_RATIO: f64 = 1e3;
-
 impl SemiImplicit {
-    /// Factorises and solves; false if the matrix is not positive definite.
-    pub(super) fn solve(&mut self) -> bool {
+    /// Factorizes and solves; false if the matrix is not positive definite.
+    fn solve(&mut self) -> bool {
         self.factorizations += 1;
         let mut uncounted = SolverCounts::default();
-        let accuracy = match self.steps {
-            StepControl::CountOnly(error) => COUNT_ONLY_CG_TOLERANCE * error,
-            _ => CG_TOLERANCE,
+        let accuracy = match self.control {
+            StepControl::CountOnly(error) => SETTINGS.count_only_cg_accuracy * error,
+            _ => SETTINGS.cg_accuracy,
         };
         self.solver
             .solve(&mut self.system, 0.0, None, accuracy, &mut uncounted)
@@ -370,7 +396,7 @@ impl SemiImplicit {
     }
 
     /// Adds the solved increments to the trial.
-    pub(super) fn advance_trial(&mut self) {
+    fn advance_trial(&mut self) {
         let (leaf, next) = (&self.leaf, &mut self.next);
         leaf.advance(&self.trial, &self.system, 1.0, next);
         std::mem::swap(&mut self.trial, next);
@@ -378,7 +404,7 @@ impl SemiImplicit {
 
     /// Rotation and displacement of a node from the state to the trial; exactly zero for a held
     /// base or tip.
-    pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
+    fn increment(&self, k: usize) -> [DVec3; 2] {
         let nodes = self.leaf.segments() + 1;
         let free = self.leaf.node_freedom(k / nodes, k % nodes);
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
@@ -414,26 +440,26 @@ impl SemiImplicit {
     }
 
     /// Attempts a step of h; returns its local error, or `None` if it was too long.
-    pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
+    fn attempt(&mut self, h: f64) -> Option<f64> {
         let damping = self.physics.damping;
         let w = self.weights;
         let of_acceleration = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * h * h);
         let per_mass = of_acceleration + damping * w.gamma / (w.beta * h);
-        self.apply_loads_and_damping(self.time + h, h, per_mass);
+        self.apply_loads_and_damping(self.clock.time + h, h, per_mass);
         self.correct_load_lag(h);
         self.predict(h);
-        let last = match self.steps {
-            StepControl::Fixed(_) => FIXED_STEP_ITERATION_ERROR,
-            StepControl::CountOnly(error) => COUNT_ONLY_ITERATION_ERROR * error,
+        let last = match self.control {
+            StepControl::Fixed(_) => SETTINGS.fixed_step_iteration_error,
+            StepControl::CountOnly(error) => SETTINGS.count_only_iteration_error * error,
             StepControl::LocalError(allowed) => {
-                (ITERATION_ERROR_FRACTION * allowed).min(MAX_ITERATION_ERROR)
+                (SETTINGS.iteration_error * allowed).min(SETTINGS.largest_iteration_error)
             }
         };
         let mut before = f64::INFINITY;
-        for _ in 0..MAX_NEWTON_ITERATIONS {
+        for _ in 0..SETTINGS.most_iterations {
             self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(self.time + h, w.gamma / (w.beta * h));
+            self.add_drag(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
@@ -449,16 +475,16 @@ impl SemiImplicit {
                 return None;
             }
             let size = self.system.largest_increment().larger();
-            if !size.is_finite() || size > before.max(MAX_NODE_ROTATION) {
+            if !size.is_finite() || size > before.max(SETTINGS.largest_rotation) {
                 return None;
             }
             self.advance_trial();
-            let remaining = match self.steps {
+            let remaining = match self.control {
                 // Two iterations show how fast they converge: the size of the next one.
                 StepControl::CountOnly(_) if before.is_finite() => size * size / before,
                 _ => size,
             };
-            if remaining <= last || (size < 1e-11 && size > 0.3 * before) {
+            if remaining <= last || (size < SETTINGS.iteration_rounding && size > 0.3 * before) {
                 self.update_motion(h);
                 return Some(self.local_error(h));
             }
@@ -485,7 +511,7 @@ impl SemiImplicit {
             let d = |c: usize| h * m.v[c] + 0.5 * h * h * m.a[c];
             // If the prediction is far away, the present state is better.
             let turn = d(0);
-            if turn.length() < MAX_NODE_ROTATION {
+            if turn.length() < SETTINGS.largest_rotation {
                 self.trial.q[k] = (rotation::exp(turn) * self.trial.q[k]).normalize();
                 self.trial.x[k] += d(1);
             }
@@ -501,7 +527,7 @@ impl SemiImplicit {
         if !self.physics.loads_vary() {
             return;
         }
-        let (now, w) = (self.time, self.weights);
+        let (now, w) = (self.clock.time, self.weights);
         let [before, now, after] =
             [now - self.past_step, now, now + h].map(|t| self.physics.loads(t));
         let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
@@ -553,7 +579,7 @@ impl SemiImplicit {
     /// rate c0 v + c1 v1 + c2 v2 from this and the last two strains, a rod is
     /// stiffer by 1 + eta c0 and has another rest shape. Inertia enters the matrix as
     /// `per_mass` times the masses.
-    pub(super) fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
+    fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
         self.leaf.loads = self.physics.loads(time);
         let (rest, eta) = (
             self.physics.rest_curvature_factor(time),
@@ -577,7 +603,7 @@ impl SemiImplicit {
             }
             let node = i / n * (n + 1) + i % n;
             let mass = 0.5 * (self.inertia[node].mass + self.inertia[node + 1].mass);
-            let inertial = DVec3::splat(CONDENSING_INERTIA_RATIO * per_mass * mass * section.ds);
+            let inertial = DVec3::splat(SETTINGS.condensing_ratio * per_mass * mass * section.ds);
             let condensing = (stiffer * own.condensing).max(inertial);
             section.condensing = condensing.min(section.compliance.recip());
         }
@@ -586,7 +612,7 @@ impl SemiImplicit {
 
 /// Adds mass times `per_mass` to the matrix, and a moment and a force to the
 /// right-hand side, at all nodes with equations.
-pub(super) fn add_inertia(
+fn add_inertia(
     system: &mut System,
     state: &State,
     inertia: &[Inertia],
@@ -609,7 +635,7 @@ pub(super) fn add_inertia(
 
 impl SemiImplicit {
     /// Strains (v, u) of all segments.
-    pub(super) fn strains(&self) -> Vec<[DVec3; 2]> {
+    fn strains(&self) -> Vec<[DVec3; 2]> {
         let (leaf, state, n) = (&self.leaf, &self.state, self.leaf.segments());
         let strains = |(j, i)| {
             let segment = leaf.segment(state, j, i, state.n[j * n + i]);
@@ -620,10 +646,10 @@ impl SemiImplicit {
 
     /// Accepts the attempted step of `h` and updates the energy balance, unless steps are only
     /// counted.
-    pub(super) fn accept(&mut self, h: f64) {
+    fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.node_motions, &mut self.next_node_motions);
-        if !matches!(self.steps, StepControl::CountOnly(_)) {
+        if !matches!(self.control, StepControl::CountOnly(_)) {
             let exchange = self.step_energy_exchange(h);
             self.balance.add(exchange);
         }
@@ -634,8 +660,8 @@ impl SemiImplicit {
         self.corrected_loads = Loads::default();
         self.past_step = h;
         self.longest_taken = self.longest_taken.max(h);
-        self.time += h;
-        self.count += 1;
+        self.clock.time += h;
+        self.clock.steps += 1;
     }
 
     /// What the accepted step of `h` exchanged.
@@ -655,7 +681,7 @@ impl SemiImplicit {
     /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of
     /// the states before (the trial) and after.
     fn varying_load_work(&mut self, h: f64) -> f64 {
-        let (from, to) = (self.time, self.time + h);
+        let (from, to) = (self.clock.time, self.clock.time + h);
         let mut work = 0.0;
         if self.physics.loads_vary() {
             let mut potential = |loads: Loads| {
@@ -737,7 +763,7 @@ impl SemiImplicit {
     /// time to the equations; the derivative of a velocity by the displacement is `rate`. The
     /// derivative by the direction of the rod is left out: it makes the matrix unsymmetric, and is
     /// small beside that of inertia in steps that resolve the motion.
-    pub(super) fn add_drag(&mut self, time: f64, rate: f64) {
+    fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
         let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
@@ -760,9 +786,9 @@ impl SemiImplicit {
 
     /// Work of the wind in the accepted step of `h`, from the trial: the mean of the forces before
     /// and after it, times the displacement.
-    pub(super) fn work_of_wind(&self, h: f64) -> f64 {
+    fn work_of_wind(&self, h: f64) -> f64 {
         let Some(wind) = &self.wind else { return 0.0 };
-        let [from, to] = [self.time, self.time + h].map(|time| self.physics.air(time));
+        let [from, to] = [self.clock.time, self.clock.time + h].map(|time| self.physics.air(time));
         let before = wind.drags(&self.trial, from, |k| self.next_node_motions[k].v[1]);
         let after = wind.drags(&self.state, to, |k| self.node_motions[k].v[1]);
         let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
@@ -775,37 +801,21 @@ impl SemiImplicit {
     }
 }
 
-/// Inverse square of the length of a first step from rest, of implicit Euler, so short that the
-/// leaf hardly moves. It determines the forces in rigid segments, which do not follow from
-/// strains.
-const FIRST_STEP_INVERSE_SQUARE: f64 = 1e6;
-
-/// Iterations of that step, and the size of the last.
-const INITIAL_ITERATIONS: usize = 30;
-
-const INITIAL_ITERATION_ERROR: f64 = 1e-15;
-
-/// Strain of a rigid segment, as a length, that may be due to rounding.
-const RIGID_STRAIN_ROUNDING: f64 = 1e-12;
-
-/// Strain of a rigid segment, as a length, above which positions are not consistent.
-const INCONSISTENT_RIGID_STRAIN: f64 = 1e-8;
-
 impl SemiImplicit {
-    /// Initialises the forces of the segments and the accelerations of the nodes.
-    pub(super) fn initialise(&mut self) {
-        self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP_INVERSE_SQUARE);
+    /// Initializes the forces of the segments and the accelerations of the nodes.
+    fn initialize(&mut self) {
+        self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP.inverse_square);
         let violation = self.leaf.strain_forces(&mut self.state);
         if self.leaf.least_compliance() > 0.0 {
             return self.set_accelerations();
         }
-        if violation > RIGID_STRAIN_ROUNDING {
+        if violation > FIRST_STEP.strain_rounding {
             let strained = self.state.clone();
             if self.first_step() {
                 std::mem::swap(&mut self.state, &mut self.trial);
             }
             let forces = self.state.n.clone();
-            if self.leaf.strain_forces(&mut self.state) < INCONSISTENT_RIGID_STRAIN {
+            if self.leaf.strain_forces(&mut self.state) < FIRST_STEP.inconsistent_strain {
                 self.state.n = forces;
             } else {
                 self.state = strained;
@@ -817,7 +827,7 @@ impl SemiImplicit {
             true => {
                 std::mem::swap(&mut self.state.n, &mut self.trial.n);
                 for k in 0..self.state.x.len() {
-                    let w = self.increment(k).map(|d| FIRST_STEP_INVERSE_SQUARE * d);
+                    let w = self.increment(k).map(|d| FIRST_STEP.inverse_square * d);
                     self.node_motions[k] = NodeMotion::at_rest(w);
                 }
             }
@@ -837,11 +847,11 @@ impl SemiImplicit {
     /// A first step, into the trial; false if it failed.
     fn first_step(&mut self) -> bool {
         self.trial.clone_from(&self.state);
-        for _ in 0..INITIAL_ITERATIONS {
+        for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(0.0, 0.0);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
-            let (inertia, per_mass) = (&self.inertia, FIRST_STEP_INVERSE_SQUARE);
+            let (inertia, per_mass) = (&self.inertia, FIRST_STEP.inverse_square);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
@@ -853,7 +863,7 @@ impl SemiImplicit {
                 return false;
             }
             self.advance_trial();
-            if self.system.largest_increment().larger() < INITIAL_ITERATION_ERROR {
+            if self.system.largest_increment().larger() < FIRST_STEP.iteration_error {
                 break;
             }
         }

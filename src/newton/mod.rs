@@ -8,7 +8,7 @@
 //!
 //! With the symmetric matrix K without them and the derivative W of them, (1 - K^-1 W) d = K^-1 r
 //! is solved by GMRES ([`solve_minimal_residual`]). K is
-//! factorised once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
+//! factorized once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
 mod force_progress;
@@ -45,7 +45,7 @@ const REPEATED_SOLVE_ACCURACY: f64 = 1e-10;
 pub struct SolverCounts {
     /// Accepted steps (time steps or Newton iterations).
     pub steps: usize,
-    /// Factorisations of a leaf matrix, rod by rod or sparse.
+    /// Factorizations of a leaf matrix, rod by rod or sparse.
     pub factorizations: usize,
     /// Evaluations of all internal forces of the leaf.
     pub force_evaluations: usize,
@@ -117,7 +117,7 @@ pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
 }
 
 /// Solver for matrices that must be positive definite: by conjugate gradients preconditioned
-/// by the factorised rods, or directly once these have proved too slow.
+/// by the factorized rods, or directly once these have proved too slow.
 #[derive(Default)]
 pub struct DefiniteSolver {
     /// The observed convergence of Newton's method so far.
@@ -136,7 +136,7 @@ impl DefiniteSolver {
         }
     }
 
-    /// Factorises K + `shift` M and solves for the assembled right-hand side plus
+    /// Factorizes K + `shift` M and solves for the assembled right-hand side plus
     /// `inertia`.
     pub fn solve(
         &mut self,
@@ -190,7 +190,7 @@ impl DefiniteSolver {
 
 /// The linear equations of an iteration, and its limits on increments.
 pub enum NewtonEquations<'s> {
-    /// With pivots of any sign, by a sparse factorisation whose pattern is reused; increments
+    /// With pivots of any sign, by a sparse factorization whose pattern is reused; increments
     /// are shortened to the given size. Converges to an equilibrium nearby, stable or not,
     /// like a solver of boundary-value problems.
     Indefinite { largest: f64 },
@@ -263,7 +263,7 @@ struct NewtonLinearSolver<'s> {
 
 impl NewtonIteration<'_> {
     /// Newton's method from a state; returns the remaining iteration error. The last
-    /// factorisation stays in the system.
+    /// factorization stays in the system.
     pub fn solve(
         self,
         leaf: &DiscreteLeaf,

@@ -1,9 +1,5 @@
-//! The modes of the settled leaf, extrapolated over nested grids, in the units of the
-//! scenario.
-//!
-//! Normalised shapes of modes.
-//!
-//! Eigenvalues on nested grids, and what their extrapolation tells.
+//! The lowest eigenvalues and modes of a leaf at rest: on nested grids, extrapolated, with their bars,
+//! in the units of the scenario.
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
@@ -11,51 +7,52 @@ use crate::modes::{Eigenpair, ModeRequest};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::richardson::{BestColumn, Richardson};
+use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
 use crate::relax::request::Options;
 use crate::relax::result::Mode;
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// Largest number of unknowns of the finest grid for which modes are computed without their
-/// shapes: about a second.
-const FEW_UNKNOWNS: usize = 20_000;
+/// How accurate eigenvalues are asked to be, and on how many grids they are computed.
+struct EigenvalueAccuracy {
+    /// The tolerance if only the signs of the eigenvalues are needed.
+    sign_tolerance: f64,
+    /// Accuracy of eigenvectors over the root of the tolerance: that of eigenvalues is its square.
+    vectors: f64,
+    /// Bounds of the accuracy of eigenvectors: with less of it close eigenvalues are not told apart.
+    best_vectors: f64,
+    worst_vectors: f64,
+    /// Largest relative error of frequencies that are listed without their shapes, over the tolerance,
+    /// but never asked to be less than that.
+    listed_over_tolerance: f64,
+    /// The largest such error in itself: by default eigenvalues have four digits.
+    largest_listed: f64,
+    /// Grids on which requested eigenvalues are compared: two do not tell how they converge, and one may
+    /// be equal on both by chance.
+    compared_grids: usize,
+    /// Largest number of grids finer than those of the relaxation.
+    added_grids: usize,
+    /// Largest number of grids that are extrapolated.
+    extrapolated_grids: usize,
+    /// Growth of the rounding error of an eigenvalue from grid to grid.
+    rounding_growth: f64,
+}
 
-/// Without their shapes the grids of a stable leaf with fewer unknowns than this suffice, if
-/// there are any: about as long as a relaxation.
-const QUICK_UNKNOWNS: usize = 4_000;
-
-/// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
-const MAX_ADDED_GRID_UNKNOWNS: usize = 200_000;
-
-/// Largest number of grids finer than those of the relaxation.
-const MORE_GRIDS: usize = 6;
-
-/// Growth of the rounding error of an eigenvalue from grid to grid.
-const EIGENVALUE_ROUNDING_GROWTH: f64 = 4.0;
-
-/// The tolerance if only the signs of the eigenvalues are needed.
-const SIGN_TOLERANCE: f64 = 1e-2;
-
-/// Accuracy of eigenvectors over the root of the tolerance (that of eigenvalues is its
-/// square), and its limits: with less of it close eigenvalues are not told apart.
-const ACCURACY: f64 = 5e-3;
-
-const EIGENVECTOR_ACCURACY_BOUNDS: (f64, f64) = (1e-7, 1.6e-4);
-
-/// Two grids do not tell how eigenvalues converge, and one may be equal on both by chance: of
-/// requested ones so many are compared.
-const MIN_COMPARED_GRIDS: usize = 3;
-
-/// Largest relative error of frequencies that are listed without their shapes, over the tolerance
-/// and in itself, but never asked to be less than the tolerance: by default eigenvalues have four
-/// digits.
-const LISTED_OVER_TOLERANCE: f64 = 40.0;
-
-const LARGEST_LISTED: f64 = 4e-5;
+const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
+    sign_tolerance: 1e-2,
+    vectors: 5e-3,
+    best_vectors: 1e-7,
+    worst_vectors: 1.6e-4,
+    listed_over_tolerance: 40.0,
+    largest_listed: 4e-5,
+    compared_grids: 3,
+    added_grids: 6,
+    extrapolated_grids: 4,
+    rounding_growth: 4.0,
+};
 
 /// The lowest modes of a settled leaf.
 pub struct LowestModes {
@@ -94,13 +91,20 @@ impl LowestModes {
 #[derive(Clone, Copy)]
 pub struct EigenvalueRequest {
     pub count: usize,
-    /// So many lower ones are left out, and the shift by which they are found to be lower: see
-    /// [`ModeRequest::above`].
-    pub omitted_lower: Option<(usize, f64)>,
+    /// Lower ones that are left out of the list.
+    pub omitted_lower: Option<OmittedEigenvalues>,
     /// Whether the stability of the leaf depends on them: then its size does not matter.
     pub decides_stability: bool,
     /// Whether more than their signs is needed: they are as accurate as requested ones.
     pub needs_values: bool,
+}
+
+/// Eigenvalues that are lower than those of a list.
+#[derive(Clone, Copy)]
+pub struct OmittedEigenvalues {
+    pub count: usize,
+    /// The shift by which they are found to be lower: see [`ModeRequest::modes_below`].
+    pub shift: f64,
 }
 
 impl EigenvalueRequest {
@@ -125,40 +129,42 @@ pub fn lowest(
 ) -> Option<LowestModes> {
     let EigenvalueRequest {
         count,
-        omitted_lower: above,
+        omitted_lower: omitted,
         ..
     } = list;
     let options = problem.options;
     let finest = found.levels.last()?;
-    let large =
-        unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides_stability;
+    let large = unknowns(&finest.leaf) > UNKNOWNS.without_shapes
+        && !options.mode_shapes
+        && !list.decides_stability;
     if count == 0 || !finest.leaf.leaf.has_potential() || large {
         return None;
     }
     let physics = Physics::new(problem.leaf);
-    let requested = count <= options.modes && above.is_none();
+    let requested = count <= options.modes && omitted.is_none();
     let tolerance = if requested || list.needs_values {
         problem.tolerance
     } else {
-        SIGN_TOLERANCE
+        EIGENVALUES.sign_tolerance
     };
     let on = |level: &GridLevel, near: &[Vec<Increment>]| {
         let wanted = ModeRequest {
             count,
-            modes_below: above,
-            accuracy: (ACCURACY * tolerance.sqrt())
-                .clamp(EIGENVECTOR_ACCURACY_BOUNDS.0, EIGENVECTOR_ACCURACY_BOUNDS.1),
+            modes_below: omitted.map(|omitted| (omitted.count, omitted.shift)),
+            accuracy: (EIGENVALUES.vectors * tolerance.sqrt())
+                .clamp(EIGENVALUES.best_vectors, EIGENVALUES.worst_vectors),
             approximate_modes: near,
             time: &options.limit,
         };
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
-    let left_out = above.map_or(0, |(others, _)| others);
+    let left_out = omitted.map_or(0, |omitted| omitted.count);
     let (wanted, most_unknowns) = match options.mode_shapes || list.needs_values {
-        true => (tolerance, MAX_ADDED_GRID_UNKNOWNS),
+        true => (tolerance, UNKNOWNS.added),
         false => {
-            let listed = (LISTED_OVER_TOLERANCE * tolerance).min(LARGEST_LISTED);
-            (tolerance.max(listed), FEW_UNKNOWNS)
+            let listed =
+                (EIGENVALUES.listed_over_tolerance * tolerance).min(EIGENVALUES.largest_listed);
+            (tolerance.max(listed), UNKNOWNS.without_shapes)
         }
     };
     let mut nested = NestedEigenvalues {
@@ -176,12 +182,13 @@ pub fn lowest(
         segments: Vec::new(),
     };
     let sharp = requested || list.needs_values;
-    let compares = requested && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let compares = requested && 2 * unknowns(&finest.leaf) <= UNKNOWNS.without_shapes;
     let enough = |series: &EigenvalueSeries| {
-        (!sharp || series.accurate()) && (!compares || series.grids.len() >= MIN_COMPARED_GRIDS)
+        (!sharp || series.accurate())
+            && (!compares || series.grids.len() >= EIGENVALUES.compared_grids)
     };
     let sufficient_grids = sufficient_grids(options, found);
-    let skipped = sufficient_grids.saturating_sub(GRIDS);
+    let skipped = sufficient_grids.saturating_sub(EIGENVALUES.extrapolated_grids);
     for (k, level) in found.levels.iter().enumerate().skip(skipped) {
         let series = &nested.series;
         let decided = !series.grids.is_empty() && series.undecided_size().is_none();
@@ -198,7 +205,7 @@ pub fn lowest(
     }
     nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        refine_eigenvalues(problem, &mut nested, most_unknowns, (on, enough));
+        refine_eigenvalues(problem, &mut nested, most_unknowns, on, enough);
     }
     let on = found.segments_of_estimate();
     let softening = (nested
@@ -213,12 +220,12 @@ pub fn lowest(
     };
     let unit = physics.time_unit.powi(-2);
     let mode = |it: ExtrapolatedEigenvalue| {
-        let (displacement, rotation) = shapes.get(it.number).cloned().unwrap_or_default();
+        let shape = shapes.get(it.number).cloned().unwrap_or_default();
         Mode {
             eigenvalue: it.value * unit,
             error: it.error.map(|error| error * unit),
-            displacement,
-            rotation,
+            displacement: shape.displacement,
+            rotation: shape.rotation,
         }
     };
     Some(LowestModes {
@@ -279,14 +286,14 @@ fn sufficient_grids(options: &Options, found: &NestedEquilibrium) -> usize {
     if options.mode_shapes || found.index != Some(0) {
         return found.levels.len();
     }
-    let few = |level: &&GridLevel| unknowns(&level.leaf) < QUICK_UNKNOWNS;
+    let few = |level: &&GridLevel| unknowns(&level.leaf) < UNKNOWNS.quick;
     let few = found.levels.iter().take_while(few).count();
     few.max(2).min(found.levels.len())
 }
 
 /// Whether the cost of modes on this grid is acceptable.
 fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
-    6 * leaf.rods() * grid.segments() <= MAX_ADDED_GRID_UNKNOWNS
+    6 * leaf.rods() * grid.segments() <= UNKNOWNS.added
 }
 
 /// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
@@ -298,7 +305,7 @@ pub fn deciding_grid(
 ) -> Option<Grid> {
     let noise = found.levels.last()?.leaf.neutral_shift();
     let finer = (found.next_finer_grid()).filter(|grid| is_affordable(problem.leaf, grid))?;
-    (size > EIGENVALUE_ROUNDING_GROWTH * noise && !problem.out_of_time()).then_some(finer)
+    (size > EIGENVALUES.rounding_growth * noise && !problem.out_of_time()).then_some(finer)
 }
 
 /// The next grid, if it has few unknowns.
@@ -306,7 +313,7 @@ pub fn affordable_next_grid(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
 ) -> Option<Grid> {
-    let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
+    let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= UNKNOWNS.without_shapes;
     (found.next_finer_grid()).filter(|grid| few(grid) && !problem.out_of_time())
 }
 
@@ -320,12 +327,10 @@ fn refine_eigenvalues(
     problem: &RelaxationProblem,
     nested: &mut NestedEigenvalues,
     most_unknowns: usize,
-    (on, enough): (
-        impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
-        impl Fn(&EigenvalueSeries) -> bool,
-    ),
+    on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    enough: impl Fn(&EigenvalueSeries) -> bool,
 ) -> Option<()> {
-    for _ in 0..MORE_GRIDS {
+    for _ in 0..EIGENVALUES.added_grids {
         if enough(&nested.series) || problem.out_of_time() {
             break;
         }
@@ -384,11 +389,15 @@ impl GridModes<'_> {
 /// of rotation alone.
 const PURE_ROTATION_DISPLACEMENT: f64 = 1e-6;
 
-/// Displacements and rotations of all nodes, rod by rod.
-pub(super) type NodalModeShape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
+/// The shape of a mode at all nodes, rod by rod.
+#[derive(Clone, Default)]
+struct NodalModeShape {
+    displacement: Vec<Vec<DVec3>>,
+    rotation: Vec<Vec<DVec3>>,
+}
 
-/// A shape in the scenario's unit of length, normalised.
-pub(super) fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape {
+/// A shape in the scenario's unit of length, normalized.
+fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape {
     let nodes = || shape.iter().flatten();
     let largest =
         |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
@@ -410,43 +419,48 @@ pub(super) fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> Nod
         shape.iter().map(rod).collect()
     };
     let unit = sign / size;
-    (
-        rods(displacement_part, unit * length),
-        rods(rotation_part, unit),
-    )
+    NodalModeShape {
+        displacement: rods(displacement_part, unit * length),
+        rotation: rods(rotation_part, unit),
+    }
 }
 
-/// Largest number of grids that are extrapolated.
-pub const GRIDS: usize = 4;
+/// From what the error bar of an extrapolated eigenvalue is made.
+struct EigenvalueBar {
+    /// Where all grids show the orders of their columns: factor on the largest correction of an
+    /// eigenvalue.
+    correction_factor: f64,
+    /// The part of each correction that those after it must reach, as that of a single number may be
+    /// small by chance. Of 895 eigenvalues of 390 random leaves on three grids, and of 542 on finer or
+    /// four, the largest error was 0.7 of the bar that follows.
+    correction_part: f64,
+    /// That part where signs alone are needed: grids then go on until they are certain.
+    correction_part_of_signs: f64,
+    /// Elsewhere: safety factor on the error.
+    safety: f64,
+    /// Lower bound of the last change as a part of the change before.
+    least_change: f64,
+    /// Lower bound of the error from two grids in differences of these, as there is no other change.
+    two_grids: f64,
+    /// An error of up to this many times that of rounding does not decrease on finer grids.
+    rounding: f64,
+    /// Relative error by unfinished iterations, as a part of the tolerance.
+    iterations: f64,
+    /// Eigenvalues below this part of the largest have errors relative to that part.
+    small_fraction: f64,
+}
 
-/// Eigenvalues below this part of the largest have errors relative to that part.
-const SMALL_EIGENVALUE_FRACTION: f64 = 1e-3;
-
-/// Where all grids show the orders of their columns: the factor on the largest correction of an
-/// eigenvalue, and the part of each that those after it must reach, as that of a single number may be
-/// small by chance. Of 895 eigenvalues of 390 random leaves on three grids, and of 542 on finer or four,
-/// the largest error was 0.7 of the bar that follows.
-const CORRECTIONS: (f64, f64) = (3.5, 1.0 / 128.0);
-
-/// From this tolerance on signs alone are needed, and that part is this.
-const SIGNS: f64 = 1e-2;
-
-const OF_SIGNS: f64 = 0.06;
-
-/// Elsewhere: the safety factor on the error of an eigenvalue, and lower bound of its last change as a
-/// part of the change before. From two grids the error is at least so many of their differences, as
-/// there is no other change.
-const ERROR_SAFETY_FACTOR: f64 = 2.0;
-
-const LEAST_CHANGE: f64 = 0.1;
-
-const TWO_GRID_ERROR_FACTOR: f64 = 1.0;
-
-/// An error of up to this many times that of rounding does not decrease on finer grids.
-const ROUNDING_ERROR_MULTIPLE: f64 = 4.0;
-
-/// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
-const ITERATION_ERROR_FRACTION: f64 = 2e-3;
+const BAR: EigenvalueBar = EigenvalueBar {
+    correction_factor: 3.5,
+    correction_part: 1.0 / 128.0,
+    correction_part_of_signs: 0.06,
+    safety: 2.0,
+    least_change: 0.1,
+    two_grids: 1.0,
+    rounding: 4.0,
+    iterations: 2e-3,
+    small_fraction: 1e-3,
+};
 
 /// An extrapolated eigenvalue.
 pub struct ExtrapolatedEigenvalue {
@@ -485,39 +499,41 @@ impl EigenvalueSeries {
     fn unit(&self, k: usize) -> f64 {
         let finest = &self.grids[self.grids.len() - 1];
         let largest = finest.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
-        let unit = finest[k].abs().max(SMALL_EIGENVALUE_FRACTION * largest);
+        let unit = finest[k].abs().max(BAR.small_fraction * largest);
         if unit > 0.0 { unit } else { 1.0 }
     }
 
     /// The extrapolated value of the eigenvalue with this number, and a bound on its error by its own
     /// changes if there are at least two grids, in its unit.
-    fn extrapolate_eigenvalue(&self, k: usize) -> (f64, Option<f64>) {
+    fn extrapolate_eigenvalue(&self, k: usize) -> Extrapolated<f64> {
         // A coarse grid may have fewer modes.
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
         let all = values.clone().count();
-        let values = values.skip(all.saturating_sub(GRIDS)).enumerate();
+        let values = values
+            .skip(all.saturating_sub(EIGENVALUES.extrapolated_grids))
+            .enumerate();
         let table: Richardson = values
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
         let error = |best: BestColumn| {
-            if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
-                let (factor, part) = CORRECTIONS;
-                // Where signs alone are needed, grids go on until they are certain.
-                let part = if self.tolerance < SIGNS {
-                    part
-                } else {
-                    OF_SIGNS
+            if best.columns > 1 && best.columns + 1 == all.min(EIGENVALUES.extrapolated_grids) {
+                let part = match self.tolerance < EIGENVALUES.sign_tolerance {
+                    true => BAR.correction_part,
+                    false => BAR.correction_part_of_signs,
                 };
-                return factor * table.largest_correction(best.columns, part);
+                return BAR.correction_factor * table.largest_correction(best.columns, part);
             }
             let least = match (all, best.columns) {
-                (2, _) => TWO_GRID_ERROR_FACTOR * (table.column(0)[0] - self.coarser(k)).abs(),
-                (_, 0) => LEAST_CHANGE * table.change_before(),
+                (2, _) => BAR.two_grids * (table.column(0)[0] - self.coarser(k)).abs(),
+                (_, 0) => BAR.least_change * table.change_before(),
                 _ => 0.0,
             };
-            ERROR_SAFETY_FACTOR * best.error.max(least)
+            BAR.safety * best.error.max(least)
         };
-        (table.extrapolated()[0], table.best().map(error))
+        Extrapolated {
+            value: table.extrapolated()[0],
+            error: table.best().map(error),
+        }
     }
 
     /// The eigenvalue with this number on the grid before the finest, in its unit.
@@ -531,16 +547,15 @@ impl EigenvalueSeries {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.extrapolate_eigenvalue(k))
             .collect();
-        let largest = found.iter().filter_map(|(_, error)| *error);
+        let largest = found.iter().filter_map(|it| it.error);
         let largest = largest.fold(0.0, f64::max);
-        let bound =
-            |error: f64| (error * largest).sqrt() + ITERATION_ERROR_FRACTION * self.tolerance;
-        let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
+        let bound = |error: f64| (error * largest).sqrt() + BAR.iterations * self.tolerance;
+        let in_units = |(number, it): (usize, &Extrapolated<f64>)| {
             let unit = self.unit(number);
             ExtrapolatedEigenvalue {
-                value: value * unit,
+                value: it.value * unit,
                 // Zero on all grids is that of a turn without resistance, and exact.
-                error: error.map(|error| match *value == 0.0 {
+                error: it.error.map(|error| match it.value == 0.0 {
                     true => 0.0,
                     false => bound(error) * unit + self.rounding,
                 }),
@@ -573,8 +588,7 @@ impl EigenvalueSeries {
     /// whether it is there.
     pub fn signs(&self) -> Vec<Option<bool>> {
         let alone = |k: usize| {
-            ROUNDING_ERROR_MULTIPLE * self.rounding
-                + ITERATION_ERROR_FRACTION * self.tolerance * self.unit(k)
+            BAR.rounding * self.rounding + BAR.iterations * self.tolerance * self.unit(k)
         };
         let certain = |(k, it): (usize, &ExtrapolatedEigenvalue)| match it.error {
             Some(error) => it.value.abs() > error || error == 0.0,
@@ -611,11 +625,11 @@ impl EigenvalueSeries {
                 return (!self.trusts_single_grid).then_some(size.max(self.unit(k)));
             };
             let noise = if self.turns {
-                ROUNDING_ERROR_MULTIPLE * self.rounding
+                BAR.rounding * self.rounding
             } else {
                 0.0
             };
-            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL_EIGENVALUE_FRACTION) + noise;
+            let zero = 2.0 * self.tolerance * self.unit(k).max(BAR.small_fraction) + noise;
             let decided = match size > error {
                 true => (it.value < 0.0) == (k < self.index),
                 false => error <= zero,

@@ -1,24 +1,22 @@
-//! Continuation of an equilibrium under a small change of its scenario, on the same grids,
-//! without jumps to another equilibrium.
-//!
-//! A leaf at rest that follows its scenario, as numbers of it change by little or much: along its
-//! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
+//! A leaf at rest that follows its scenario as numbers of it change: along its branch of equilibria, on
+//! the same grids, as long as they are stable, and elsewhere only where it is told so.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{
     DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State, Weighted,
 };
 use crate::newton::EquilibriumFailure;
 use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::transfer::{GridLevel, transfer};
+use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::{GRIDS, RelaxationProblem};
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
-use crate::relax::rest::{equilibrium_with_stability, relax_on_grids};
+use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
+use crate::relax::same_equilibrium::{is_near_prediction, is_same_beside_fold};
 use crate::relax::sensitivity::Linearized;
 use crate::relax::stability::state_from_rod_shapes;
 use crate::run::Instant;
@@ -26,12 +24,6 @@ use crate::scenario::Scenario;
 use crate::shape::RodShape;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
-/// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
-const LARGEST_PREDICTION_ERROR: f64 = 0.5;
-
-const DRIFT_LENGTH: f64 = 0.02;
 
 /// The grids on which an equilibrium is continued.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,10 +86,13 @@ impl NestedEquilibrium {
             .map(|(k, level)| {
                 let mut state = displaced_state(level, &leaf, &response[k]);
                 leaf.place_held_tips(&mut state);
-                (level.leaf.grid.clone(), state)
+                StateOnGrid {
+                    grid: level.leaf.grid.clone(),
+                    state,
+                }
             })
             .collect();
-        let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
+        let expected: Vec<State> = guesses.iter().map(|guess| guess.state.clone()).collect();
         let problem = RelaxationProblem {
             // As for a reduced leaf: it fails if the leaf would have to move far.
             whole_leaf: Some(&leaf),
@@ -119,11 +114,8 @@ impl NestedEquilibrium {
             _ => ContinuationFailure::OtherEquilibrium,
         })?;
         for ((level, expected), before) in found.levels.iter().zip(&expected).zip(&self.levels) {
-            let predicted = rescale_state(before, before.state.clone(), &leaf)
-                .largest_displacement_to(expected);
-            if level.state.largest_displacement_to(expected)
-                > LARGEST_PREDICTION_ERROR * predicted + DRIFT_LENGTH
-            {
+            let before = rescale_state(before, before.state.clone(), &leaf);
+            if !is_near_prediction(&before, expected, &level.state) {
                 return Err(ContinuationFailure::OtherEquilibrium);
             }
         }
@@ -136,10 +128,13 @@ fn relax_with_progress(
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Result<NestedEquilibrium, ContinuationFailure>, RelaxError> {
-    let (leaf, found) = relax_on_grids(scenario, options, false, progress)?;
+    let RelaxedLeaf {
+        result: leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, progress)?;
     if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
-        let remark = leaf.remark.clone();
-        let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
+        let remark = leaf.remark.as_ref();
+        let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
         return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
     Ok(Ok(found))
@@ -162,22 +157,25 @@ fn displaced_state(level: &GridLevel, leaf: &Leaf, response: &LinearResponse) ->
     rescale_state(level, state, leaf)
 }
 
-/// The shortest step of the way, as a part of it.
-const SHORTEST: f64 = 1.0 / 4096.0;
+/// Steps from one scenario to another.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1.0 / 4096.0,
+    longest: 1.0,
+    growth: 2.0,
+    failure: 0.25,
+};
 
-/// How much shorter a step is made that fails.
-const FAILED_STEP_FACTOR: f64 = 0.25;
+/// Why a leaf does not follow its scenario to the end.
+enum FollowEnd<E> {
+    /// Its branch cannot be followed beyond this part of the way.
+    Lost(f64),
+    /// A scenario on the way cannot be met.
+    Refused(E),
+}
 
 /// Grids on which the next equilibrium is predicted.
 const MAX_PREDICTED_GRIDS: usize = 2;
-
-/// The finest of the grids that are tried where coarser ones have no equilibrium any more: folds lie
-/// elsewhere on each of them.
-const FINEST: usize = 128;
-
-/// Equilibria on two grids that are no farther apart, in lengths, are one: beside a fold, which lies
-/// elsewhere on each, that is far.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.1;
 
 /// A leaf at rest, which can follow.
 ///
@@ -235,7 +233,10 @@ impl EquilibriumTracker {
         scenario: &Scenario,
         options: &Options,
     ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
-        let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
+        let RelaxedLeaf {
+            result: leaf,
+            on_grids: at,
+        } = relax_on_grids(scenario, options, false, &mut |_| {})?;
         let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
         let follower = EquilibriumTracker::new(Arc::new(scenario.clone()), options, at);
         Ok((leaf, rests.then_some(follower)))
@@ -278,14 +279,14 @@ impl EquilibriumTracker {
         let mut state = state_from_rod_shapes(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
         leaf.place_bases(&mut state);
         leaf.place_held_tips(&mut state);
-        EquilibriumTracker::begin_from(scenario, options, (grid, state))
+        EquilibriumTracker::begin_from(scenario, options, StateOnGrid { grid, state })
     }
 
     /// The same from this state on a grid.
     fn begin_from(
         scenario: &Scenario,
         options: &Options,
-        (grid, state): (Grid, State),
+        guess: StateOnGrid,
     ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
         check_wind_options(scenario, options)?;
         let clock = Instant::now();
@@ -296,7 +297,7 @@ impl EquilibriumTracker {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        match arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort) {
+        match arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort) {
             Ok(found) if found.is_stable() => {
                 let (at, result) = decide(&problem, found, clock, &mut effort);
                 let follower = EquilibriumTracker::new(Arc::clone(&scenario), options, at);
@@ -325,25 +326,34 @@ impl EquilibriumTracker {
         along: &dyn Fn(f64) -> Result<Scenario, E>,
     ) -> Result<TrackOutcome, E> {
         let clock = Instant::now();
-        let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
-        loop {
-            let scenario = Arc::new(along(way.next_lambda())?);
-            check_wind_options(&scenario, &self.options)?;
-            let last = way.next_lambda() == 1.0;
-            match self.step(Arc::clone(&scenario), last) {
+        let end = STEPS.follow(|step| {
+            let scenario = match along(step.to) {
+                Ok(scenario) => Arc::new(scenario),
+                Err(refused) => return StepEnd::Ended(FollowEnd::Refused(refused)),
+            };
+            if let Err(refused) = check_wind_options(&scenario, &self.options) {
+                return StepEnd::Ended(FollowEnd::Refused(E::from(refused)));
+            }
+            match self.step(Arc::clone(&scenario), step.to == 1.0) {
                 Ok(found) => {
                     (self.at, self.scenario) = (found, scenario);
-                    if last {
-                        self.coarsen();
-                        self.choose_cheaper_grid();
-                        return Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))));
+                    StepEnd::Made {
+                        growth: STEPS.growth,
                     }
-                    way.advance(2.0 * way.next_step_length());
                 }
-                Err(_) if way.shorten(FAILED_STEP_FACTOR) => {}
-                Err(_) if self.refine() => {}
-                Err(_) => return Ok(TrackOutcome::BranchEnded { part: way.lambda }),
+                Err(_) if !step.is_shortest => StepEnd::TooLong(FollowEnd::Lost(step.from)),
+                Err(_) if self.refine() => StepEnd::Again,
+                Err(_) => StepEnd::Ended(FollowEnd::Lost(step.from)),
             }
+        });
+        match end {
+            Ok(()) => {
+                self.coarsen();
+                self.choose_cheaper_grid();
+                Ok(TrackOutcome::Arrived(Box::new(self.equilibrium(clock))))
+            }
+            Err(FollowEnd::Lost(part)) => Ok(TrackOutcome::BranchEnded { part }),
+            Err(FollowEnd::Refused(refused)) => Err(refused),
         }
     }
 
@@ -351,7 +361,7 @@ impl EquilibriumTracker {
     /// enough.
     fn refine(&mut self) -> bool {
         if let [_, finer, ..] = &self.at.levels[..] {
-            let fine = finer.leaf.segments() <= FINEST;
+            let fine = finer.leaf.segments() <= GRIDS.finest_of_tracking;
             if fine {
                 let levels = self.at.levels[1..].to_vec();
                 self.at = self.at.without_estimates().with_levels(levels);
@@ -359,7 +369,8 @@ impl EquilibriumTracker {
             return fine;
         }
         let only = &self.at.levels[0].leaf;
-        only.segments() < FINEST && self.continue_on_grid(only.leaf.clone(), only.grid.refined())
+        only.segments() < GRIDS.finest_of_tracking
+            && self.continue_on_grid(only.leaf.clone(), only.grid.refined())
     }
 
     /// Whether it is in the same equilibrium on another grid, on which it then goes on.
@@ -371,8 +382,7 @@ impl EquilibriumTracker {
             return false;
         };
         let there = transfer(&own.leaf, &own.state, &other.leaf.grid);
-        let same = there.largest_displacement_to(&other.state) < SAME_EQUILIBRIUM_DISTANCE
-            && found.is_stable();
+        let same = is_same_beside_fold(&there, &other.state) && found.is_stable();
         if same {
             self.at = found;
         }
@@ -412,14 +422,14 @@ impl EquilibriumTracker {
         let leaf = Leaf::with_scale(Arc::new(scenario.clone()), scenario.scale());
         let grid = self.grid(&leaf);
         let state = self.state_on(&leaf, &grid);
-        self.relax_from_state(scenario, (grid, state))
+        self.relax_from_state(scenario, StateOnGrid { grid, state })
     }
 
     /// The same from this state on a grid; where that leads nowhere, as a relaxation begins.
     pub(crate) fn relax_from_state(
         &mut self,
         scenario: &Scenario,
-        guess: (Grid, State),
+        guess: StateOnGrid,
     ) -> Result<Equilibrium, RelaxError> {
         let (result, follower) = EquilibriumTracker::begin_from(scenario, &self.options, guess)?;
         if let Some(follower) = follower {
@@ -504,11 +514,12 @@ impl EquilibriumTracker {
             whole_leaf: Some(leaf),
             ..RelaxationProblem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
         };
-        let guess = self.state_on(leaf, &grid);
+        let state = self.state_on(leaf, &grid);
+        let guess = StateOnGrid { grid, state };
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, guess)], &mut effort);
+        let found = arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort);
         Ok(found
             .map_err(|_| ContinuationFailure::OtherEquilibrium)?
             .with_work(effort.work))
@@ -561,6 +572,7 @@ fn decide(
     clock: Instant,
     effort: &mut WorkLog,
 ) -> (NestedEquilibrium, Equilibrium) {
-    let (result, at) = equilibrium_with_stability(problem, Ok(found), clock, effort);
-    (at, result)
+    let RelaxedLeaf { result, on_grids } =
+        equilibrium_with_stability(problem, Ok(found), clock, effort);
+    (on_grids, result)
 }

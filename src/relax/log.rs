@@ -2,7 +2,7 @@
 
 use crate::leaf::EquationWorkspace;
 use crate::newton::{EquilibriumFailure, SolverCounts};
-use crate::relax::path::Stage;
+use crate::relax::path::PathPosition;
 use crate::relax::request::Progress;
 use std::fmt;
 
@@ -105,7 +105,7 @@ pub(crate) struct WorkLog<'o> {
     /// Nodes times force evaluations of all walks.
     pub loading_node_evaluations: usize,
     /// How far the leaf came on its path before it failed.
-    pub farthest_stage: Option<(Stage, f64)>,
+    pub farthest_position: Option<PathPosition>,
     /// The attempts to bring the leaf to rest.
     pub attempts: Vec<Attempt>,
     /// The memory of Newton's equations.
@@ -120,7 +120,7 @@ impl<'o> WorkLog<'o> {
             work: SolverCounts::default(),
             node_evaluations: 0,
             loading_node_evaluations: 0,
-            farthest_stage: None,
+            farthest_position: None,
             attempts: Vec::new(),
             workspace: EquationWorkspace::default(),
         }

@@ -1,9 +1,11 @@
-//! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
-//! the nested grids with their extrapolation, saddles, modes, and the result.
+//! How a leaf comes to rest, how accurate that is, and whether it is stable; the builder of a relaxation
+//! for users of the library.
 //!
-//! The builder of a relaxation for users of the library.
-//!
-//! A relaxation by any of the methods, as accurate between the stations as requested.
+//! A reader's way: `request` is what is asked for; `plan` is which equilibrium is meant, and by which
+//! attempts it is looked for; `rest` makes them and puts the result together. `loading` follows the
+//! path of slow loading, `solve_on_grid` brings the leaf to rest on one grid by any method,
+//! `accuracy` extrapolates over grids and estimates the error, `stability` decides by
+//! `eigenvalues` where the grids disagree, and `result` is what was found.
 
 pub(crate) mod accuracy;
 pub(crate) mod eigenvalues;
@@ -11,12 +13,13 @@ mod follow;
 mod loading;
 mod log;
 mod path;
-mod plan;
-pub(crate) mod problem;
+pub(crate) mod plan;
+mod remark;
 mod request;
 pub(crate) mod rest;
 mod result;
 mod saddle;
+mod same_equilibrium;
 mod sensitivity;
 mod shooting;
 pub(crate) mod solve_on_grid;
@@ -25,17 +28,23 @@ pub(crate) mod stability;
 use crate::memory;
 pub use crate::newton::{EquilibriumFailure, SolverCounts};
 pub(crate) use crate::relax::accuracy::NestedEquilibrium;
-pub(crate) use crate::relax::accuracy::transfer::{GridLevel, Stencil, rod_shapes};
+pub(crate) use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, Stencil, rod_shapes};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
 pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
-pub use crate::relax::path::{Event, Path, Route, StabilityLoss, Stage};
+pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
+pub(crate) use crate::relax::remark::serialize_remark;
+pub use crate::relax::remark::{
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
+    SpanHolder,
+};
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
-    SMALLEST_TOLERANCE, SemiImplicit, Settings, UnsupportedSetting, check_tolerance, without_wind,
+    SMALLEST_TOLERANCE, SemiImplicit, Settings, ShootingVariant, UnsupportedSetting,
+    check_tolerance, without_wind,
 };
 pub use crate::relax::rest::relax_from;
-pub(crate) use crate::relax::rest::relax_on_grids;
+pub(crate) use crate::relax::rest::{RelaxedLeaf, relax_on_grids};
 pub use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 pub(crate) use crate::relax::result::serialize_index;
 pub use crate::relax::result::{
@@ -58,7 +67,7 @@ use crate::run::Instant;
 pub use crate::run::{Limit, RefusedOption, UnknownWord as UnknownMethod, UnmodelledFeature};
 use crate::scenario::Scenario;
 pub use crate::shape::{NodeState, RodShape};
-pub use crate::shooting::CorrectionProgress;
+pub use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -236,7 +245,7 @@ fn relax_once(
         return shooting::relax(scenario, options, tolerance, progress);
     }
     let shape_alone = options.modes == 0;
-    relax_on_grids(scenario, options, shape_alone, progress).map(|(found, _)| found)
+    relax_on_grids(scenario, options, shape_alone, progress).map(|leaf| leaf.result)
 }
 
 crate::renamed! {

@@ -6,9 +6,9 @@
 //! coupling of the veins is put on. Tissue is without force between veins in their rest shapes: it
 //! belongs to the natural leaf, and ties the veins from the beginning. As long as this
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
-//! method. Where stability is lost the leaf moves on, down its energy (`loading::snap`).
+//! method. Where stability is lost the leaf moves on, down its energy (`relax::loading::snap`).
 //!
-//! A leaf that is held is moved to its holders instead, under its loads (`settle::grip`): that is its
+//! A leaf that is held is moved to its holders instead, under its loads (`relax::solve_on_grid::grips`): that is its
 //! path.
 //!
 //! The loads come first because straight veins of unequal chords that are compressed before
@@ -41,6 +41,15 @@ words! {
         /// What is held is moved to its place.
         Moving = "moving",
     }
+}
+
+/// A place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathPosition {
+    /// The stage.
+    pub stage: Stage,
+    /// The part of the stage, from 0 to 1.
+    pub lambda: f64,
 }
 
 /// Where the stability of the path was lost.
@@ -102,17 +111,6 @@ impl Path {
         }
     }
 
-    /// What is not certain about it, where this route was meant.
-    pub(super) fn doubt(&self, meant: Route) -> Option<String> {
-        match self {
-            Path::Loaded {
-                confirmed: false, ..
-            } => Some(UNCONFIRMED_PATH_REMARK.into()),
-            Path::Released if meant == Route::LoadedLeaf => Some(RELEASED_INSTEAD_REMARK.into()),
-            _ => None,
-        }
-    }
-
     /// The word for it in files.
     pub fn word(&self) -> &'static str {
         let snapped = |event: &Event| event.happening == StabilityLoss::Snapped;
@@ -124,14 +122,6 @@ impl Path {
         }
     }
 }
-
-/// Remark on a path whose events lead elsewhere on another grid.
-const UNCONFIRMED_PATH_REMARK: &str = "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
-     different grids: this is one in which it can rest; relax with --all looks for the others";
-
-/// Remark on a leaf whose path could not be followed.
-const RELEASED_INSTEAD_REMARK: &str = "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
-     loads instead, and may rest elsewhere than slow loading leads";
 
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

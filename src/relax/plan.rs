@@ -7,10 +7,257 @@
 //! loads stably, slow loading leads there too. Half of a symmetric leaf stands for the whole as long as
 //! that is stable.
 
+use crate::leaf::{Leaf, Loads};
 use crate::relax::log::{Extent, Strategy};
-use crate::relax::problem::{COARSEST, RelaxationProblem};
-use crate::relax::request::Method;
-use crate::relax::solve_on_grid::softens;
+use crate::relax::path::{Path, Route};
+use crate::relax::request::{Method, Options, SemiImplicit};
+
+/// The coarsest and the finest grids on which a leaf is brought to rest, in segments a vein.
+pub(super) struct GridLimits {
+    /// The coarsest grid of a relaxation and of slow loading, in two panels or more if profiles have
+    /// kinks. Twice as many double the work for a tolerance that the first grids keep.
+    pub coarsest: usize,
+    /// The coarsest grid where the tolerance is loose or only the shape is requested, as forces and
+    /// eigenvalues have larger errors, of a leaf that settles in the valley it starts in.
+    pub coarsest_of_shape: usize,
+    /// The coarsest grid of a blade, which is narrow at its tip: with half as many two error bars of 86
+    /// were too low by a factor of two.
+    pub coarsest_of_blade: usize,
+    /// The finest grid on which slow loading is repeated until two grids lead to one equilibrium. Twice
+    /// as many double the time after which a loading that no two grids confirm is given up.
+    pub finest_of_loading: usize,
+    /// The finest of the coarser grids that are tried where a followed leaf finds no equilibrium: folds
+    /// lie elsewhere on each of them.
+    pub finest_of_tracking: usize,
+    /// The finest grid from whose start a leaf that moves far is released until two grids lead to one
+    /// equilibrium.
+    pub finest_of_release: usize,
+    /// The finest grid on which an equilibrium that was not found by relaxation is looked for first.
+    pub finest_of_given_equilibrium: usize,
+    /// The finest grid that is tried where coarser ones do not resolve the bending.
+    pub finest_resolving: usize,
+    /// The finest grid of a relaxation. Twice as many allow tolerances a quarter as large, as far as
+    /// rounding does.
+    pub finest: usize,
+}
+
+pub(super) const GRIDS: GridLimits = GridLimits {
+    coarsest: 8,
+    coarsest_of_shape: 4,
+    coarsest_of_blade: 16,
+    finest_of_loading: 64,
+    finest_of_tracking: 128,
+    finest_of_release: 256,
+    finest_of_given_equilibrium: 1024,
+    finest_resolving: 2048,
+    finest: 16_384,
+};
+
+/// Limits on the work for one leaf. Twice as much doubles the time after which a leaf that does not
+/// come to rest is given up.
+pub(super) struct WorkLimits {
+    /// Nodes times force evaluations of a relaxation: some seconds.
+    pub node_evaluations: usize,
+    /// Force evaluations that any leaf may use on a coarse grid, of at most `coarse_segments`
+    /// segments, whatever was spent before; on finer ones inversely proportional to the segments, but
+    /// no fewer than `guaranteed_on_any_grid`.
+    pub guaranteed: usize,
+    pub guaranteed_on_any_grid: usize,
+    pub coarse_segments: usize,
+    /// Force evaluations of slow loading on a grid: it typically takes a dozen, and a few hundred for
+    /// each loss of stability.
+    pub loading_evaluations: usize,
+    /// Nodes times force evaluations of slow loading on all grids.
+    pub loading_node_evaluations: usize,
+    /// Nodes times steps of the explicit method: some ten seconds.
+    pub explicit_node_steps: usize,
+}
+
+pub(super) const WORK: WorkLimits = WorkLimits {
+    node_evaluations: 10_000_000,
+    guaranteed: 600,
+    guaranteed_on_any_grid: 100,
+    coarse_segments: 64,
+    loading_evaluations: 2500,
+    loading_node_evaluations: 10_000_000 / 8,
+    explicit_node_steps: 600_000_000,
+};
+
+/// Limits on the unknowns, six a node, of grids on which eigenvalues are computed. Time and memory grow
+/// in proportion.
+pub(super) struct UnknownLimits {
+    /// Grids on which eigenvalues take about as long as a relaxation: those of a stable leaf are computed
+    /// on no others if there are two, and only theirs, or those on the coarsest grid, are differentiated.
+    pub quick: usize,
+    /// The finest grid for eigenvalues without the shapes of their modes: about a second.
+    pub without_shapes: usize,
+    /// Grids that are added for the accuracy of eigenvalues.
+    pub added: usize,
+}
+
+pub(super) const UNKNOWNS: UnknownLimits = UnknownLimits {
+    quick: 4_000,
+    without_shapes: 20_000,
+    added: 200_000,
+};
+
+/// The smallest tolerance for which the first grid is tried alone: below it nodes would be too
+/// few for stations between them.
+const SMALLEST_SINGLE_GRID_TOLERANCE: f64 = 5e-7;
+
+/// Largest number of corrections of a leaf by its estimated error.
+const CORRECTIONS: usize = 4;
+
+/// The leaf that is to come to rest, and how.
+#[derive(Clone, Copy)]
+pub struct RelaxationProblem<'a> {
+    pub leaf: &'a Leaf,
+    /// The full leaf, if `leaf` is half of it.
+    pub whole_leaf: Option<&'a Leaf>,
+    pub options: &'a Options,
+    pub tolerance: f64,
+    /// Whether only the shape and its stability are requested, without forces on the grids,
+    /// eigenvalues or derivatives.
+    pub shape_alone: bool,
+    /// Whether to tell that the rods stay in their plane, as nothing acts out of it.
+    pub planar: bool,
+    /// Whether it fails where the leaf would have to leave the valley of its initial guess.
+    pub stays_in_valley: bool,
+}
+
+impl<'a> RelaxationProblem<'a> {
+    /// The leaf with forces and eigenvalues, wherever it comes to rest.
+    pub fn new(leaf: &'a Leaf, options: &'a Options, tolerance: f64) -> Self {
+        RelaxationProblem {
+            leaf,
+            whole_leaf: None,
+            options,
+            tolerance,
+            shape_alone: false,
+            planar: false,
+            stays_in_valley: false,
+        }
+    }
+
+    /// The same for the half of the leaf, if there is one.
+    pub fn reduced_to_half(self, half: Option<&'a Leaf>) -> Self {
+        match half {
+            None => self,
+            Some(half) => RelaxationProblem {
+                leaf: half,
+                whole_leaf: Some(self.leaf),
+                ..self
+            },
+        }
+    }
+
+    /// Segments of the fixed grid, if there is one.
+    pub fn segments(&self) -> Option<usize> {
+        self.options.method.segments()
+    }
+
+    /// Whether unstable equilibria are accepted.
+    pub fn keeps_unstable(&self) -> bool {
+        matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
+    }
+
+    /// Whether the time limit is reached or the run is cancelled.
+    pub fn out_of_time(&self) -> bool {
+        self.options.limit.reached()
+    }
+
+    /// Whether a grid is so coarse that it only serves leaves that settle in the valley they
+    /// start in.
+    pub fn too_coarse(&self, segments: usize) -> bool {
+        self.segments().is_none() && segments < GRIDS.coarsest
+    }
+
+    /// Whether the leaf is loaded slowly, rather than released.
+    pub fn loads_slowly(&self) -> bool {
+        let disturbed = |how: SemiImplicit| how.keep_unstable || how.disturbance.is_some();
+        let released = match self.options.method {
+            Method::SemiImplicit(how) => disturbed(how),
+            _ => false,
+        };
+        // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
+        self.options.route == Route::LoadedLeaf
+            && !released
+            && !self.leaf.has_placed_supports()
+            && !self.leaf.hinged()
+            && self.leaf.loads != Loads::default()
+            && !self.leaf.loads.has_moments()
+    }
+
+    /// Whether a leaf that was released may be loaded slowly.
+    pub fn may_be_loaded_instead(&self) -> bool {
+        let settles = matches!(
+            self.options.method,
+            Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none()
+        );
+        settles
+            && self.options.route == Route::LoadedLeaf
+            && !self.leaf.has_placed_supports()
+            && !self.leaf.hinged()
+            && !self.leaf.loads.has_moments()
+            && !self.out_of_time()
+    }
+
+    /// The path of the leaf as far as nothing happens on it, if it has one.
+    pub fn undisturbed_path(&self) -> Option<Path> {
+        if self.loads_slowly() {
+            return Some(Path::STABLE);
+        }
+        let released = self.options.route == Route::Release && !self.keeps_unstable();
+        let moved = self.leaf.has_placed_supports() || self.leaf.loads.has_moments();
+        (released && !moved).then_some(Path::Released)
+    }
+
+    /// The largest number of corrections.
+    pub fn corrections(&self) -> usize {
+        let grids = matches!(self.options.method, Method::SemiImplicit(_));
+        let free = !self.leaf.has_placed_supports() && self.segments().is_none();
+        match grids && free && self.shape_alone {
+            true => CORRECTIONS,
+            false => 0,
+        }
+    }
+
+    /// Whether the first grid may be enough.
+    pub fn may_use_single_grid(&self) -> bool {
+        self.corrections() > 0 && self.tolerance >= SMALLEST_SINGLE_GRID_TOLERANCE
+    }
+}
+
+/// From this tolerance on a leaf may begin on the coarsest grid for its shape alone.
+const LOOSE_TOLERANCE: f64 = 1e-3;
+
+/// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
+/// saddles, and not disturbed.
+pub(super) fn may_keep_start_valley(method: Method) -> bool {
+    matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
+}
+
+/// Whether half of a leaf may be solved in place of the whole.
+pub fn may_solve_half(method: Method) -> bool {
+    may_keep_start_valley(method) && matches!(method, Method::SemiImplicit(how) if !how.full_model)
+}
+
+/// Segments of the coarsest grid, unless a leaf needs more.
+pub fn least_segments(method: Method, tolerance: f64, shape_alone: bool) -> usize {
+    let loose = shape_alone || tolerance >= LOOSE_TOLERANCE;
+    match may_keep_start_valley(method) && loose {
+        true => GRIDS.coarsest_of_shape,
+        false => GRIDS.coarsest,
+    }
+}
+
+/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
+/// one is first settled with this compliance, which also gives its segment forces, and then
+/// with its own.
+const MOVING_COMPLIANCE: f64 = 2e-3;
+
+/// Approximate largest stretch of a softened leaf by its load.
+const MOVING_STRETCH: f64 = 0.05;
 
 /// By which rule the equilibrium of an attempt is accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +269,24 @@ pub enum Acceptance {
     /// It is at rest.
     AtRest,
 }
+
+/// How far an equilibrium is from the start of the iteration that led there.
+#[derive(Clone, Copy, Debug)]
+pub struct WayFromStart {
+    /// Largest displacement (lengths) or rotation (radians) of a node.
+    pub distance: f64,
+    /// Steps of the iteration.
+    pub steps: usize,
+}
+
+/// A leaf that rests so near to the arcs from which it starts, after so few steps of Newton's method
+/// without softened rods, rests where slow loading leads, stably if its veins take their loads stably:
+/// so did all of 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps
+/// and more; of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
+pub(super) const LONGEST_WAY_IN_FIRST_VALLEY: WayFromStart = WayFromStart {
+    distance: 2.0,
+    steps: 8,
+};
 
 /// An attempt that is planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +329,7 @@ pub fn plan(problem: &RelaxationProblem, has_half: bool, segments: usize) -> Vec
         let convex =
             matches!(problem.options.method, Method::SemiImplicit(_)) && !softens(problem.leaf);
         let from_arcs = PlannedAttempt {
-            segments: problem.segments().unwrap_or(COARSEST),
+            segments: problem.segments().unwrap_or(GRIDS.coarsest),
             needs_time: true,
             ..release
         };
@@ -93,4 +358,16 @@ pub fn plan(problem: &RelaxationProblem, has_half: bool, segments: usize) -> Vec
         });
     }
     attempts
+}
+
+/// The least compliance of a leaf that moves after so many pushes off saddles.
+pub(super) fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
+    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
+    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
+}
+
+/// Whether a leaf is so stiff that it is softened while it moves.
+pub fn softens(leaf: &Leaf) -> bool {
+    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
+    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
 }

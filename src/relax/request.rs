@@ -1,8 +1,5 @@
-//! What is asked of a relaxation: the method, the options, and the leaf on nested grids.
-//!
-//! The methods by which a leaf is brought to rest, each with its own options.
-//!
-//! Options of a relaxation, and the errors of requests that cannot be met.
+//! What is asked of a relaxation: the methods with their options, and the errors of requests that cannot
+//! be met.
 
 use crate::memory::TooMuch;
 use crate::relax::path::Route;
@@ -163,7 +160,53 @@ impl Method {
 
     /// Whether it solves the boundary-value problem.
     pub fn is_shooting(self) -> bool {
-        !matches!(self, Method::SemiImplicit(_) | Method::Explicit { .. })
+        self.shooting().is_some()
+    }
+
+    /// How it solves the boundary-value problem, if it does.
+    pub fn shooting(self) -> Option<ShootingVariant> {
+        let (intervals, from_relaxed_leaf) = match self {
+            Method::SemiImplicit(_) | Method::Explicit { .. } => return None,
+            Method::SingleShooting => (Some(1), false),
+            Method::Shooting { intervals } => (intervals, false),
+            Method::ShootingFromRest { intervals } => (intervals, true),
+        };
+        Some(ShootingVariant {
+            intervals,
+            from_relaxed_leaf,
+        })
+    }
+
+    /// Whether it is the explicit method.
+    pub fn is_explicit(self) -> bool {
+        matches!(self, Method::Explicit { .. })
+    }
+
+    /// The options of the semi-implicit method, if it is that.
+    pub fn semi_implicit(self) -> Option<SemiImplicit> {
+        match self {
+            Method::SemiImplicit(how) => Some(how),
+            _ => None,
+        }
+    }
+}
+
+/// How a leaf is brought to rest by shooting; single shooting has one interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShootingVariant {
+    /// Number of intervals; `None`: as many as the growth of perturbations needs.
+    pub intervals: Option<usize>,
+    /// Whether it starts from the leaf relaxed to a coarse tolerance, in place of arcs.
+    pub from_relaxed_leaf: bool,
+}
+
+impl SemiImplicit {
+    /// On one grid of `segments` segments a rod or, with `None`, on as many grids as it needs.
+    pub fn on_grid(segments: Option<usize>) -> SemiImplicit {
+        SemiImplicit {
+            segments,
+            ..SemiImplicit::default()
+        }
     }
 }
 

@@ -1,24 +1,24 @@
-//! From a scenario to rest on nested grids: the problem, the start, rest on one grid, finer ones,
-//! the decision on stability, and the result.
-//!
-//! What is asked of nested grids: which leaf is to come to rest, and how accurately.
-//!
-//! What the way to rest has cost so far, and what it leaves for reuse.
+//! From a scenario to its equilibrium: the attempts of the plan, the decision on stability, and the
+//! result; and a relaxation that begins with a given shape.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::newton::EquilibriumFailure;
+use crate::relax::accuracy::transfer::StateOnGrid;
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
 use crate::relax::eigenvalues;
 use crate::relax::eigenvalues::EigenvalueRequest;
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{
-    LoadingEnd, follow_load_path, grid_of, guess, load_slowly, solve_from_guesses,
-    solve_from_start, takes_loads_stably,
+    LoadingEnd, follow_load_path, grid_of, load_slowly, solve_from_guesses, solve_from_start,
+    state_on_requested_grid, takes_loads_stably,
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
-use crate::relax::plan::{Acceptance, PlannedAttempt, plan};
-use crate::relax::problem::{COARSEST, RelaxationProblem, least_segments, may_solve_half};
+use crate::relax::plan::{
+    Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
+    WayFromStart, least_segments, may_solve_half, plan,
+};
+use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
     check_wind_options,
@@ -31,20 +31,21 @@ use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
-/// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
-/// steps of Newton's method without softened rods, rests where slow loading leads, stably if its veins
-/// take their loads stably: so did all of 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
-/// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
-const FIRST_VALLEY_BOUNDS: (f64, usize) = (2.0, 8);
+/// A relaxed leaf.
+pub(crate) struct RelaxedLeaf {
+    /// The leaf in the units of the scenario.
+    pub result: Equilibrium,
+    /// The leaf on the grids from which the result was extrapolated.
+    pub on_grids: NestedEquilibrium,
+}
 
-/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
-/// also returns the leaf on these grids.
+/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
     shape_alone: bool,
     progress: &mut dyn FnMut(&Progress),
-) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
+) -> Result<RelaxedLeaf, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     check_wind_options(scenario, options)?;
@@ -59,7 +60,7 @@ pub(crate) fn relax_on_grids(
     let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
     // What a held leaf comes to depends on the way of its holders, which few segments would change.
     let least = match leaf.has_placed_supports() {
-        true => COARSEST,
+        true => GRIDS.coarsest,
         false => least_segments(method, tolerance, few),
     };
     let first = check_segments(&leaf, method.segments(), least)?;
@@ -165,8 +166,9 @@ fn acceptance_of(
 /// Whether Newton's method alone came to rest from the start, so near that this is where
 /// slow loading leads.
 fn is_in_first_valley(history: &History) -> bool {
-    let near = |(distance, steps): (f64, usize)| {
-        distance < FIRST_VALLEY_BOUNDS.0 && steps <= FIRST_VALLEY_BOUNDS.1
+    let near = |way: WayFromStart| {
+        way.distance < LONGEST_WAY_IN_FIRST_VALLEY.distance
+            && way.steps <= LONGEST_WAY_IN_FIRST_VALLEY.steps
     };
     history.from_start.is_some_and(near) && history.saddle.is_none()
 }
@@ -185,7 +187,7 @@ fn find_rest_on_grid(
     }
     let arrived = follow_load_path(problem, grid, effort).ok()?;
     let mut begun = NestedEquilibrium::without_grids(problem).with_path(Some(arrived.path));
-    let guess = guess(problem, &mut begun.history, arrived.level, effort);
+    let guess = state_on_requested_grid(problem, &mut begun.history, arrived.level, effort);
     solve_from_guesses(problem, begun, vec![guess], effort).ok()
 }
 
@@ -196,7 +198,7 @@ pub(super) fn equilibrium_with_stability(
     found: RelaxationResult,
     clock: Instant,
     effort: &mut WorkLog,
-) -> (Equilibrium, NestedEquilibrium) {
+) -> RelaxedLeaf {
     let requested = problem.options.modes;
     let before = clock.elapsed().as_secs_f64();
     let (decision, stopped) = match found {
@@ -211,18 +213,19 @@ pub(super) fn equilibrium_with_stability(
         false => before,
     };
     let found = decision.found.with_work(effort.work);
-    let outcome = report::outcome(problem, &found, stopped, effort.farthest_stage);
+    let outcome = report::outcome(problem, &found, stopped, effort.farthest_position);
     let mut leaf = report::equilibrium(problem, &found, outcome, wall);
     if matches!(leaf.path, Some(Path::Held { .. })) && !leaf.outcome.is_at_rest() {
         // What the way was like, it did not end where the leaf is held.
         leaf.path = None;
     }
     leaf.doubts = report::implausible_properties(problem.leaf.scenario(), &leaf);
-    let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
+    let doubt = (leaf.path.as_ref())
+        .and_then(|path| EquilibriumDoubt::about_path(path, problem.options.route));
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
     leaf.doubts.extend(doubt);
     leaf.doubts
-        .extend(unconfirmed.then(|| UNCONFIRMED_EQUILIBRIUM_REMARK.to_owned()));
+        .extend(unconfirmed.then_some(EquilibriumDoubt::UnconfirmedEquilibrium));
     leaf.apply_stability_verdict(decision.verdict);
     let modes = decision.modes.or_else(|| {
         let list = EigenvalueRequest::requested(problem);
@@ -230,7 +233,10 @@ pub(super) fn equilibrium_with_stability(
     });
     leaf.stability.modes = modes.map(|it| it.modes);
     leaf.attempts = std::mem::take(&mut effort.attempts);
-    (leaf, found)
+    RelaxedLeaf {
+        result: leaf,
+        on_grids: found,
+    }
 }
 
 impl Equilibrium {
@@ -242,15 +248,15 @@ impl Equilibrium {
             Verdict::Undecided(certain)
                 if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
             {
-                self.doubts.push(MINIMUM_INDEX_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedIndex);
                 certain
             }
             Verdict::Undecided(_) => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 return;
             }
             Verdict::Unknown => {
-                self.doubts.push(UNDECIDED_SIGN_REMARK.to_owned());
+                self.doubts.push(EquilibriumDoubt::UndecidedStability);
                 self.stability.negative_eigenvalues = None;
                 return;
             }
@@ -262,33 +268,13 @@ impl Equilibrium {
         }
         if index > 0 {
             self.outcome = Outcome::Saddle;
-            self.remark = Some(BESIDE_BIFURCATION_REMARK.to_owned());
+            self.remark = Some(EquilibriumRemark::BeyondBifurcation);
         } else if unknown {
             // It said so.
             self.remark = None;
         }
     }
 }
-
-/// Remark on a leaf that two grids never bring to the same equilibrium.
-const UNCONFIRMED_EQUILIBRIUM_REMARK: &str = "from its start the leaf moves to different equilibria on different grids: \
-     this is one in which it can rest; relax with --all looks for the others";
-
-/// Remark on a leaf with an eigenvalue that may have either sign.
-const UNDECIDED_SIGN_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     whether the leaf is stable is not certain";
-
-/// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
-const MINIMUM_INDEX_REMARK: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     the index is the number of those that are certainly negative, or larger";
-
-/// Remark on a leaf at rest on all grids that is at a saddle.
-const BESIDE_BIFURCATION_REMARK: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
-     still stable; a load that is a little larger, or a small disturbance, shows where it goes";
-
-/// Remark on a leaf that did not come to rest from the given shape.
-pub(super) const RELAXED_ANEW_REMARK: &str =
-    "from the given start the leaf does not come to rest: it was relaxed as without one";
 
 /// Brings a scenario's leaf to rest from a shape with as many rods, given at `stations` from 0 to 1:
 /// in the valley in which that lies, where a relaxation may find another. Where that leads nowhere it
@@ -331,7 +317,8 @@ pub fn relax_from(
     leaf.place_held_tips(&mut state);
     let mut effort = WorkLog::new(progress);
     let begun = NestedEquilibrium::without_grids(&problem);
-    let found = arrival::solve_from_guesses(&problem, begun, vec![(grid, state)], &mut effort);
+    let guesses = vec![StateOnGrid { grid, state }];
+    let found = arrival::solve_from_guesses(&problem, begun, guesses, &mut effort);
     let (settled, end) = match &found {
         Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
         Ok(_) => (false, AttemptEnd::Unstable),
@@ -339,12 +326,12 @@ pub fn relax_from(
     };
     effort.log(Strategy::GivenShape, Extent::Whole, segments, end);
     if settled {
-        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).0);
+        return Ok(equilibrium_with_stability(&problem, found, clock, &mut effort).result);
     }
     let given = effort.attempts;
-    let (mut leaf, _) = relax_on_grids(scenario, options, false, progress)?;
+    let mut leaf = relax_on_grids(scenario, options, false, progress)?.result;
     leaf.attempts.splice(0..0, given);
-    leaf.doubts.push(RELAXED_ANEW_REMARK.to_owned());
+    leaf.doubts.push(EquilibriumDoubt::RelaxedAnew);
     Ok(leaf)
 }
 

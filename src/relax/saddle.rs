@@ -1,30 +1,35 @@
-//! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
-//!
-//! Where the path loses its stability: the leaf moves on, down its energy, to another equilibrium
-//! under the same part of the loading.
-//!
-//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
-//! each solved to convergence, so that segments carry the forces of their strains however stiff
-//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
-//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
-//! is Newton's method.
+//! Saddles of the energy: their Morse index, their refinement by Newton's method, and the side on which
+//! a leaf leaves them: the same on all grids, in all units, and in whichever order its veins are
+//! numbered.
 
 use crate::leaf::{
     DefiniteFactors, DirectSolver, DiscreteLeaf, LinearSolveOutcome, NodalField, State, System,
 };
 use crate::newton::{NewtonEquations, NewtonIteration, SolverCounts};
+use crate::relax::same_equilibrium::{are_different_sides, are_equally_low, is_noticed_saddle};
 use glam::DVec3;
 use serde::Serialize;
 
-/// Size of the push off a saddle: largest rotation (radians) or displacement
-/// (lengths) along the unstable mode.
-const SADDLE_ESCAPE_DISTANCE: f64 = 0.03;
+/// How a leaf is pushed off a saddle.
+struct SaddleEscape {
+    /// Largest rotation (radians) or displacement (lengths) of the push along the unstable mode. A much
+    /// shorter one costs steps until the leaf moves, a much longer one may lead over another saddle.
+    distance: f64,
+    /// Steps of inverse iteration for the mode: it must be unstable, not accurate.
+    mode_iterations: usize,
+    /// Relative accuracy of the linear solutions of these.
+    mode_accuracy: f64,
+    /// The first shift of the inverse iteration, with respect to the masses; doubled until the matrix is
+    /// positive definite.
+    first_shift: f64,
+}
 
-/// Steps of inverse iteration; the mode must be unstable, not accurate.
-const MODE_ITERATIONS: usize = 6;
-
-/// Largest rotation or displacement in a Newton step towards an equilibrium of any kind.
-const MAX_STEP: f64 = 0.5;
+const ESCAPE: SaddleEscape = SaddleEscape {
+    distance: 0.03,
+    mode_iterations: 6,
+    mode_accuracy: 1e-3,
+    first_shift: 1e-4,
+};
 
 /// Lower bound on the lowest eigenvalue (with respect to the masses; 12 for a clamped rod) on
 /// one grid of a leaf that counts as clearly stable: near a fold it changes with the shape.
@@ -59,31 +64,45 @@ pub fn index(
     shift: f64,
     work: &mut SolverCounts,
 ) -> Option<usize> {
-    count(leaf, state, system, (0.0, shift), work)
+    count(
+        leaf,
+        state,
+        system,
+        HessianShift { excess: 0.0, shift },
+        work,
+    )
 }
 
-/// Negative eigenvalues of the Hessian minus `excess` times the excess stiffness of the elements
-/// plus `shift` times the mass matrix. With an excess any number of them without coupling is
+/// What is added to the Hessian of the energy before its negative eigenvalues are counted.
+#[derive(Clone, Copy)]
+struct HessianShift {
+    /// So many times the excess stiffness of the elements is subtracted.
+    excess: f64,
+    /// So many times the mass matrix is added.
+    shift: f64,
+}
+
+/// Negative eigenvalues of the shifted Hessian. With an excess any number of them without coupling is
 /// `None`, too.
 fn count(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (excess, shift): (f64, f64),
+    shifted: HessianShift,
     work: &mut SolverCounts,
 ) -> Option<usize> {
     if system.has_tissue() {
-        return count_coupled(leaf, state, system, (excess, shift), work);
+        return count_coupled(leaf, state, system, shifted, work);
     }
-    assemble_minus_excess(leaf, state, system, excess, work);
-    // For most stable leaves one linear-time factorisation is enough.
-    if system.is_definite_without_coupling(shift) {
+    assemble_minus_excess(leaf, state, system, shifted.excess, work);
+    // For most stable leaves one linear-time factorization is enough.
+    if system.is_definite_without_coupling(shifted.shift) {
         return Some(0);
     }
-    if excess > 0.0 && !system.coupled() {
+    if shifted.excess > 0.0 && !system.coupled() {
         return None;
     }
-    count_coupled(leaf, state, system, (excess, shift), work)
+    count_coupled(leaf, state, system, shifted, work)
 }
 
 /// The matrix, minus `excess` times the excess stiffness of the elements.
@@ -103,12 +122,12 @@ fn assemble_minus_excess(
     work.factorizations += 1;
 }
 
-/// [`count`] by the factorisation of the whole matrix.
+/// Negative eigenvalues of the shifted Hessian, by the factorization of the whole matrix.
 fn count_coupled(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (excess, shift): (f64, f64),
+    HessianShift { excess, shift }: HessianShift,
     work: &mut SolverCounts,
 ) -> Option<usize> {
     assemble_minus_excess(leaf, state, system, excess, work);
@@ -135,10 +154,13 @@ pub fn bounds(
     work: &mut SolverCounts,
 ) -> Option<IndexBounds> {
     let close = CLEARLY_POSITIVE.max(leaf.neutral_shift());
-    let mut of = |excess, shift| count_coupled(leaf, state, system, (excess, shift), work);
-    let least = of(0.0, close)?;
-    let here = of(0.0, -close)?;
-    let finer = of(EXCESS_SAFETY, -close)?;
+    let mut count = |excess, shift| {
+        let shifted = HessianShift { excess, shift };
+        count_coupled(leaf, state, system, shifted, work)
+    };
+    let least = count(0.0, close)?;
+    let here = count(0.0, -close)?;
+    let finer = count(EXCESS_SAFETY, -close)?;
     Some(IndexBounds {
         least,
         here,
@@ -171,21 +193,23 @@ pub fn clearly_stable(
     work: &mut SolverCounts,
 ) -> bool {
     let least = CLEARLY_POSITIVE.max(leaf.neutral_shift());
-    count(leaf, state, system, (EXCESS_SAFETY, -least), work) == Some(0)
+    let shifted = HessianShift {
+        excess: EXCESS_SAFETY,
+        shift: -least,
+    };
+    count(leaf, state, system, shifted, work) == Some(0)
 }
 
-/// Newton's equations with pivots of any sign, and steps of bounded size.
+/// Newton's equations with pivots of any sign, for steps to an equilibrium of any Morse index with
+/// rotations (radians) and displacements (lengths) of bounded size.
 pub const INDEFINITE_NEWTON_EQUATIONS: NewtonEquations =
-    NewtonEquations::Indefinite { largest: MAX_STEP };
+    NewtonEquations::Indefinite { largest: 0.5 };
 
-/// Newton iterations to converge at a saddle.
-const POLISH_ITERATIONS: usize = 20;
+/// Newton iterations that converge a saddle to rounding from where it was noticed.
+const CONVERGENCE_ITERATIONS: usize = 20;
 
-/// Accuracy of a converged saddle: rounding.
-const POLISH_ACCURACY: f64 = 1e-13;
-
-/// Largest distance of a saddle from the state at which it was noticed, in lengths.
-const POLISH_DISTANCE: f64 = 0.1;
+/// Accuracy of a converged saddle, in lengths and radians: rounding.
+const CONVERGED_ACCURACY: f64 = 1e-13;
 
 /// Converges a state near a saddle to rounding by Newton's method and counts its Morse index,
 /// a neutral mode not counting as negative. `None` if Newton's method leads elsewhere, with
@@ -198,21 +222,20 @@ pub fn converge_saddle(
 ) -> Option<usize> {
     let mut exact = state.clone();
     let iteration = NewtonIteration {
-        accuracy: POLISH_ACCURACY,
-        iterations: POLISH_ITERATIONS,
+        accuracy: CONVERGED_ACCURACY,
+        iterations: CONVERGENCE_ITERATIONS,
         work,
         progress: &mut |_, _| {},
     };
     let found = iteration.solve(leaf, &mut exact, system, INDEFINITE_NEWTON_EQUATIONS);
-    if found.is_err() || state.largest_displacement_to(&exact) >= POLISH_DISTANCE {
+    if found.is_err() || !is_noticed_saddle(state, &exact) {
         return None;
     }
     *state = exact;
     index(leaf, state, system, leaf.neutral_shift(), work)
 }
 
-/// Finds the most unstable mode at a saddle, by inverse iteration with the first shift, doubled
-/// from 1e-4, that makes the matrix positive definite, from the [`symmetry_breaking_field`]. It is the solution
+/// Finds the most unstable mode at a saddle, by inverse iteration with the first shift that makes the matrix positive definite, from the [`symmetry_breaking_field`]. It is the solution
 /// of the system; false if there is none.
 pub fn find_unstable_mode(
     leaf: &DiscreteLeaf,
@@ -226,12 +249,12 @@ pub fn find_unstable_mode(
     work.force_evaluations += 1;
     let momentum = system.mass_product(&symmetry_breaking_field(leaf, state, leaning));
     system.set_rhs(&momentum);
-    let mut shift = 1e-4;
+    let mut shift = ESCAPE.first_shift;
     let mut factors = loop {
         work.factorizations += 1;
         if let Some(mut factors) = DefiniteFactors::new(system, shift)
             && matches!(
-                factors.solve(system, 1e-3),
+                factors.solve(system, ESCAPE.mode_accuracy),
                 LinearSolveOutcome::Converged(_)
             )
         {
@@ -242,10 +265,10 @@ pub fn find_unstable_mode(
             return false;
         }
     };
-    for _ in 0..MODE_ITERATIONS {
+    for _ in 0..ESCAPE.mode_iterations {
         system.iterate_inverse();
         if !matches!(
-            factors.solve(system, 1e-3),
+            factors.solve(system, ESCAPE.mode_accuracy),
             LinearSolveOutcome::Converged(_)
         ) {
             break;
@@ -257,7 +280,7 @@ pub fn find_unstable_mode(
 /// Displaces a state along the mode that was found, to the side of this sign.
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
     let mut pushed = state.clone();
-    let step = sign * SADDLE_ESCAPE_DISTANCE / system.largest_increment().larger();
+    let step = sign * ESCAPE.distance / system.largest_increment().larger();
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }
@@ -275,26 +298,40 @@ pub fn escape_saddle(
     }
 }
 
-/// Energies of mirror images agree to this part, of the larger one or of one (A/L); images are
-/// farther apart than this (lengths, radians).
-const SAME_ENERGY: f64 = 1e-3;
+/// An equilibrium to which a leaf turned from a saddle.
+pub struct SideOfSaddle {
+    pub state: State,
+    /// The energy of the leaf there.
+    pub energy: f64,
+    /// Whether the other side has the same energy.
+    pub equally_open: bool,
+}
 
-const IMAGES_APART: f64 = 0.05;
+impl SideOfSaddle {
+    pub fn new(leaf: &DiscreteLeaf, state: State) -> Self {
+        SideOfSaddle {
+            energy: leaf.energy(&state),
+            state,
+            equally_open: false,
+        }
+    }
+}
 
-/// Of the sides of a saddle to which a leaf turned, with their energies: that of less energy, or the
-/// first of two that are equal, and whether there is another one as good.
-pub fn lower_energy_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
+/// Of the sides of a saddle to which a leaf turned that of less energy, or the first of two that are
+/// equal.
+pub fn lower_energy_side(sides: [Option<SideOfSaddle>; 2]) -> Option<SideOfSaddle> {
     match sides {
-        [Some((e1, one)), Some((e2, other))] => {
-            let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
-            let apart = one.distance(&other) > IMAGES_APART;
-            match e1 <= e2 || same {
-                true => Some((one, same && apart)),
-                false => Some((other, false)),
+        [Some(one), Some(other)] => {
+            let same = are_equally_low(one.energy, other.energy);
+            match one.energy <= other.energy || same {
+                true => Some(SideOfSaddle {
+                    equally_open: same && are_different_sides(&one.state, &other.state),
+                    ..one
+                }),
+                false => Some(other),
             }
         }
-        [Some((_, one)), None] | [None, Some((_, one))] => Some((one, false)),
-        [None, None] => None,
+        [one, other] => one.or(other),
     }
 }
 
@@ -307,9 +344,6 @@ pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddl
         tip: state.tip(0) * scale.length,
     }
 }
-
-/// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
-/// first, the rate below which there are no springs (beside a bifurcation a leaf moves slowly),
 
 /// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
 /// sign that has most in common with them; of several modes of one eigenvalue, as of veins that
@@ -332,4 +366,4 @@ pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec
 }
 
 /// Weight of a given direction over that of the others.
-pub(super) const GIVEN_BIAS_WEIGHT: f64 = 10.0;
+const GIVEN_BIAS_WEIGHT: f64 = 10.0;

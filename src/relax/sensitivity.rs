@@ -1,15 +1,7 @@
 //! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
 //! scenario, from the linearised equations on each grid, extrapolated like the results
-//! themselves.
-//!
-//! Derivatives of eigenvalues, and of the moments on clamps, by finite differences between
+//! themselves. Derivatives of eigenvalues, and of the moments on clamps, are finite differences between
 //! neighbouring equilibria, which are known to first order from the response.
-//!
-//! A parameter of a scenario, and finite differences of the scenario with respect to it.
-//!
-//! The linear response of a settled leaf to forces, and to changes of its parameters.
-//!
-//! Derivatives on successively refined grids.
 
 use crate::leaf::{
     DenseParameterForces, DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative,
@@ -18,8 +10,9 @@ use crate::leaf::{
 };
 use crate::modes::Eigenpair;
 use crate::motion::Physics;
-use crate::relax::accuracy::richardson::{BestColumn, Richardson};
+use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::plan::UNKNOWNS;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
 use crate::rod::Segment;
@@ -32,23 +25,61 @@ use std::sync::Arc;
 /// more of them adjoint solutions give those of tips and energy alone.
 const MAX_DIRECT_PARAMETERS: usize = 100;
 
-/// Grids with fewer unknowns than this have their eigenvalues differentiated, and the coarsest
-/// in any case.
-const FEW_UNKNOWNS: usize = 4_000;
+/// A number by which the results are differentiated, with the scenarios that differ in it.
+struct DifferentiatedParameter<'n, 'a> {
+    key: &'n String,
+    parameter: &'n Parameter<'a>,
+    /// The derivative of the scenario, as a weighted sum of scenarios.
+    rate: Vec<Weighted<Scenario>>,
+    /// Scenarios for finite differences; none where no result needs these.
+    neighbours: Vec<NeighbouringScenario>,
+}
 
-/// A number with its name, the derivative of the scenario, and neighbouring scenarios if they
-/// are needed.
-type ParameterRates<'n, 'a> = (
-    &'n String,
-    &'n Parameter<'a>,
-    Vec<Weighted<Scenario>>,
-    Vec<(f64, f64, Arc<Scenario>)>,
-);
+/// Derivatives of the results of a leaf, in its units.
+#[derive(Default)]
+struct ResultDerivatives<T> {
+    tips: T,
+    /// Of the energy: a number as x.
+    energy: T,
+    /// Of the eigenvalues: numbers as x.
+    eigenvalues: T,
+    /// Of the reaction at a held tip: of the force, then of the moments.
+    reaction: T,
+    positions: T,
+    /// Of the force and the moment on each grip.
+    grips: T,
+}
 
-/// Derivatives on one grid, in the leaf's units: of the tips, the energy, the eigenvalues (numbers
-/// as x), the reaction (force, then moments), the positions, and the grips' reactions (of each the
-/// force and the moment).
-type ResultDerivatives = [Vec<DVec3>; 6];
+impl ResultDerivatives<VectorSeries> {
+    /// Adds the derivatives on a grid of so many segments.
+    fn push(&mut self, segments: usize, on_grid: ResultDerivatives<Vec<DVec3>>) {
+        self.tips.push(segments, on_grid.tips);
+        self.energy.push(segments, on_grid.energy);
+        self.eigenvalues.push(segments, on_grid.eigenvalues);
+        self.reaction.push(segments, on_grid.reaction);
+        self.positions.push(segments, on_grid.positions);
+        self.grips.push(segments, on_grid.grips);
+    }
+
+    fn extrapolated(&self, tolerance: f64) -> ResultDerivatives<Extrapolated<Vec<DVec3>>> {
+        ResultDerivatives {
+            tips: self.tips.extrapolated(tolerance),
+            energy: self.energy.extrapolated(tolerance),
+            eigenvalues: self.eigenvalues.extrapolated(tolerance),
+            reaction: self.reaction.extrapolated(tolerance),
+            positions: self.positions.extrapolated(tolerance),
+            grips: self.grips.extrapolated(tolerance),
+        }
+    }
+}
+
+/// The squared frequencies of a leaf on one grid, and the derivatives of its results with respect to
+/// each number.
+struct DerivativesOnGrid {
+    /// In the scenario's unit of time.
+    eigenvalues: Vec<f64>,
+    derivatives: Vec<ResultDerivatives<Vec<DVec3>>>,
+}
 
 /// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
 /// are its grids from coarse to fine. Left out are numbers for which the scenario has no
@@ -64,48 +95,52 @@ pub(crate) fn sensitivities(
     };
     let leaf = &finest.leaf.leaf;
     let differences = modes > 0 || has_clamped_tip(leaf) || has_clamped_grips(leaf);
-    let known: Vec<ParameterRates> = (numbers.iter())
-        .filter_map(|(key, number)| {
-            let near = if differences {
-                number.neighbouring_scenarios()
+    let known: Vec<DifferentiatedParameter> = (numbers.iter())
+        .filter_map(|(key, parameter)| {
+            let neighbours = if differences {
+                parameter.neighbouring_scenarios()
             } else {
                 None
             };
-            Some((key, number, number.rate()?, near.unwrap_or_default()))
+            Some(DifferentiatedParameter {
+                key,
+                parameter,
+                rate: parameter.rate()?,
+                neighbours: neighbours.unwrap_or_default(),
+            })
         })
         .collect();
     let rates: Vec<LeafParameterDerivative> = (known.iter())
-        .map(|(_, _, terms, _)| LeafParameterDerivative::new(leaf, terms))
+        .map(|number| LeafParameterDerivative::new(leaf, &number.rate))
         .collect();
-    let mut found: Vec<[VectorSeries; 6]> = rates.iter().map(|_| Default::default()).collect();
+    let mut found: Vec<ResultDerivatives<VectorSeries>> =
+        rates.iter().map(|_| ResultDerivatives::default()).collect();
     let mut eigenvalues = VectorSeries::default();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-        let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
+        let with_modes = k == 0 || unknowns < UNKNOWNS.quick;
         let grid = SensitivityGrid {
             level,
             tolerance,
             modes: if with_modes { modes } else { 0 },
             stride: level.leaf.segments() / coarsest.leaf.segments(),
         };
-        let Some((squared, changes)) = grid.result_derivatives(&known, &rates) else {
+        let Some(on_grid) = grid.result_derivatives(&known, &rates) else {
             return Vec::new();
         };
         let segments = level.leaf.segments();
-        let squared = squared.into_iter().map(|value| DVec3::X * value);
-        eigenvalues.push(segments, squared.collect());
-        for (series, changes) in found.iter_mut().zip(changes) {
-            for (series, values) in series.iter_mut().zip(changes) {
-                series.push(segments, values);
-            }
+        let squared = on_grid.eigenvalues.into_iter();
+        eigenvalues.push(segments, squared.map(|value| DVec3::X * value).collect());
+        for (series, derivatives) in found.iter_mut().zip(on_grid.derivatives) {
+            series.push(segments, derivatives);
         }
     }
     let stations = coarsest.leaf.grid.sigma();
-    let (eigenvalues, _) = eigenvalues.extrapolated(tolerance);
+    let squared = eigenvalues.extrapolated(tolerance).value;
     (known.iter().zip(found))
-        .map(|((key, number, ..), series)| {
-            let all = series.map(|series| series.extrapolated(tolerance));
-            sensitivity((key, number.value), (leaf, stations), all, &eigenvalues)
+        .map(|(number, series)| {
+            let derivatives = series.extrapolated(tolerance);
+            sensitivity(number, leaf, stations, derivatives, &squared)
         })
         .collect()
 }
@@ -113,56 +148,70 @@ pub(crate) fn sensitivities(
 /// Extrapolated derivatives with respect to a number, at these stations, in the scenario's units;
 /// the eigenvalues themselves are `squared` frequencies.
 fn sensitivity(
-    (key, value): (&str, f64),
-    (leaf, stations): (&Leaf, &[f64]),
-    [tips, energy, eigenvalues, reaction, positions, grips]: [(Vec<DVec3>, Option<f64>); 6],
+    number: &DifferentiatedParameter,
+    leaf: &Leaf,
+    stations: &[f64],
+    derivatives: ResultDerivatives<Extrapolated<Vec<DVec3>>>,
     squared: &[DVec3],
 ) -> Sensitivity {
+    let ResultDerivatives {
+        tips,
+        energy,
+        eigenvalues,
+        reaction,
+        positions,
+        grips,
+    } = derivatives;
     let scale = leaf.scale;
     let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
         values.iter().map(|value| *value * unit).collect()
     };
-    let lowest = eigenvalues.0.first().map(|value| value.x);
+    let lowest = eigenvalues.value.first().map(|value| value.x);
     let lowest = lowest.filter(|it| it.is_finite());
     // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
     let frequency = |(change, squared): (&DVec3, &DVec3)| {
         let known = squared.x > 0.0 && change.x.is_finite();
         known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.x.sqrt()))
     };
-    let places = positions.0.chunks(stations.len());
-    let held = reaction.0.split_first().map(|(force, moments)| Reaction {
-        force: *force * scale.force(),
-        moments: has_clamped_tip(leaf).then(|| of(moments, scale.moment())),
-        error: None,
-        moments_error: None,
-    });
+    let places = positions.value.chunks(stations.len());
+    let held = reaction
+        .value
+        .split_first()
+        .map(|(force, moments)| Reaction {
+            force: *force * scale.force(),
+            moments: has_clamped_tip(leaf).then(|| of(moments, scale.moment())),
+            error: None,
+            moments_error: None,
+        });
     let grip = |(change, grip): (&[DVec3], &Grip)| GripReaction {
         force: change[0] * scale.force(),
         moment: (grip.held == SupportKind::Clamped).then(|| change[1] * scale.moment()),
         error: None,
         moment_error: None,
     };
-    let on_grips = grips.0.chunks(2).zip(&leaf.scenario().grips).map(grip);
+    let on_grips = grips.value.chunks(2).zip(&leaf.scenario().grips).map(grip);
     Sensitivity {
-        key: key.to_owned(),
-        value,
-        tips: of(&tips.0, scale.length),
-        tip_error: tips.1.map(|error| error * scale.length),
-        energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
-        energy_error: energy.1.map(|error| error * scale.moment()),
+        key: number.key.clone(),
+        value: number.parameter.value,
+        tips: of(&tips.value, scale.length),
+        tip_error: tips.error.map(|error| error * scale.length),
+        energy: energy.value.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
+        energy_error: energy.error.map(|error| error * scale.moment()),
         lowest_eigenvalue: lowest,
-        lowest_eigenvalue_error: lowest.and(eigenvalues.1),
-        frequencies: eigenvalues.0.iter().zip(squared).map(frequency).collect(),
-        tip_reaction_error: (reaction.1)
+        lowest_eigenvalue_error: lowest.and(eigenvalues.error),
+        frequencies: (eigenvalues.value.iter().zip(squared))
+            .map(frequency)
+            .collect(),
+        tip_reaction_error: (reaction.error)
             .filter(|_| held.is_some())
             .map(|error| error * scale.force()),
         reaction: held,
         grip_reactions: on_grips.collect(),
-        grip_reactions_error: (grips.1)
-            .filter(|_| !grips.0.is_empty())
+        grip_reactions_error: (grips.error)
+            .filter(|_| !grips.value.is_empty())
             .map(|error| error * scale.force()),
         positions: places.map(|rod| of(rod, scale.length)).collect(),
-        positions_error: positions.1.map(|error| error * scale.length),
+        positions_error: positions.error.map(|error| error * scale.length),
         stations: stations.to_vec(),
     }
 }
@@ -186,12 +235,12 @@ struct SensitivityGrid<'l> {
 }
 
 impl SensitivityGrid<'_> {
-    /// The squared frequencies, and the derivatives with respect to each number.
+    /// The derivatives with respect to each number; `None` if the leaf is at a singular point.
     fn result_derivatives(
         &self,
-        known: &[ParameterRates],
+        known: &[DifferentiatedParameter],
         rates: &[LeafParameterDerivative],
-    ) -> Option<(Vec<f64>, Vec<ResultDerivatives>)> {
+    ) -> Option<DerivativesOnGrid> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
         let mut linear = Linearized::new(self.level, self.tolerance);
         let forces = linear.forces(self.level, rates);
@@ -211,14 +260,18 @@ impl SensitivityGrid<'_> {
         );
         if forces.len() > MAX_DIRECT_PARAMETERS && modes.is_empty() && !leaf.has_moments() && !held
         {
-            return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
+            return Some(DerivativesOnGrid {
+                eigenvalues,
+                derivatives: self.tips_by_adjoint(&mut linear, &forces)?,
+            });
         }
         let responses = linear.responses(self.level, &forces)?;
         let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
-        let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
-            let change = (rate, response);
+        let derivatives = each.map(|((number, rate), (forces, response))| {
+            let near = &number.neighbours;
             let differences = !near.is_empty() && (held || !modes.is_empty());
-            let near = differences.then(|| NeighbouringEquilibria::new(self.level, near, change));
+            let near =
+                differences.then(|| NeighbouringEquilibria::new(self.level, near, rate, response));
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moments())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
@@ -230,19 +283,22 @@ impl SensitivityGrid<'_> {
                 it.moment.dot(turn)
             });
             let work: f64 = works.sum();
-            [
-                self.tips().map(tip).collect(),
-                vec![DVec3::X * (forces.energy + work)],
-                of_modes.map(|value| DVec3::X * value).collect(),
-                match tip_held {
-                    true => self.reaction(near.as_ref(), change),
+            ResultDerivatives {
+                tips: self.tips().map(tip).collect(),
+                energy: vec![DVec3::X * (forces.energy + work)],
+                eigenvalues: of_modes.map(|value| DVec3::X * value).collect(),
+                reaction: match tip_held {
+                    true => self.reaction(near.as_ref(), rate, response),
                     false => Vec::new(),
                 },
-                self.positions(rate, response),
-                self.grip_derivatives(near.as_ref(), change),
-            ]
+                positions: self.positions(rate, response),
+                grips: self.grip_derivatives(near.as_ref(), rate, response),
+            }
         });
-        Some((eigenvalues, changes.collect()))
+        Some(DerivativesOnGrid {
+            eigenvalues,
+            derivatives: derivatives.collect(),
+        })
     }
 
     fn tips(&self) -> std::ops::Range<usize> {
@@ -253,10 +309,11 @@ impl SensitivityGrid<'_> {
     fn reaction(
         &self,
         near: Option<&NeighbouringEquilibria>,
-        change: (&LeafParameterDerivative, &LinearResponse),
+        rate: &LeafParameterDerivative,
+        response: &LinearResponse,
     ) -> Vec<DVec3> {
         let leaf = &self.level.leaf;
-        let mut all = vec![leaf.reaction_rate(change.0, change.1)];
+        let mut all = vec![leaf.reaction_rate(rate, response)];
         if has_clamped_tip(&leaf.leaf) {
             all.extend(
                 near.iter()
@@ -270,7 +327,8 @@ impl SensitivityGrid<'_> {
     fn grip_derivatives(
         &self,
         near: Option<&NeighbouringEquilibria>,
-        (rate, response): (&LeafParameterDerivative, &LinearResponse),
+        rate: &LeafParameterDerivative,
+        response: &LinearResponse,
     ) -> Vec<DVec3> {
         let GridLevel { leaf, state } = self.level;
         if !leaf.has_grips() {
@@ -312,7 +370,7 @@ impl SensitivityGrid<'_> {
         &self,
         linear: &mut Linearized,
         forces: &[ParameterForces],
-    ) -> Option<Vec<ResultDerivatives>> {
+    ) -> Option<Vec<ResultDerivatives<Vec<DVec3>>>> {
         let units = unit_forces(&self.level.leaf, self.tips().len());
         let adjoint = linear.responses(self.level, &units)?;
         let linear = &*linear;
@@ -321,10 +379,10 @@ impl SensitivityGrid<'_> {
         let tip = |forces: &ParameterForces, tip: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
         };
-        let changes = |forces: &ParameterForces| -> ResultDerivatives {
-            let tips = self.tips().map(|k| tip(forces, k)).collect();
-            let energy = vec![DVec3::X * forces.energy];
-            [tips, energy, Vec::new(), Vec::new(), Vec::new(), Vec::new()]
+        let changes = |forces: &ParameterForces| ResultDerivatives {
+            tips: self.tips().map(|k| tip(forces, k)).collect(),
+            energy: vec![DVec3::X * forces.energy],
+            ..ResultDerivatives::default()
         };
         Some(forces.iter().map(changes).collect())
     }
@@ -365,18 +423,18 @@ impl NeighbouringEquilibria {
     /// From scenarios nearby, with their offsets and weights.
     pub fn new(
         level: &GridLevel,
-        scenarios: &[(f64, f64, Arc<Scenario>)],
-        (rate, response): (&LeafParameterDerivative, &LinearResponse),
+        scenarios: &[NeighbouringScenario],
+        rate: &LeafParameterDerivative,
+        response: &LinearResponse,
     ) -> NeighbouringEquilibria {
         let leaf = &level.leaf;
-        let near = |(offset, weight, scenario): &(f64, f64, Arc<Scenario>)| {
-            let near = Leaf::with_scale(Arc::clone(scenario), leaf.leaf.scale);
-            let near = DiscreteLeaf::new(&near, leaf.grid.clone());
+        let near = |near: &NeighbouringScenario| {
+            let own = Leaf::with_scale(Arc::clone(&near.scenario), leaf.leaf.scale);
             NeighbouringEquilibrium {
-                offset: *offset,
-                weight: *weight,
-                leaf: near,
-                state: displace_along_response(level, rate, response, *offset),
+                offset: near.offset,
+                weight: near.weight,
+                leaf: DiscreteLeaf::new(&own, leaf.grid.clone()),
+                state: displace_along_response(level, rate, response, near.offset),
             }
         };
         NeighbouringEquilibria(scenarios.iter().map(near).collect())
@@ -460,21 +518,46 @@ const NONLINEAR_PARAMETER_STEP: f64 = 1e-3;
 /// clamp moments.
 const EIGENVALUE_DIFFERENCE_STEP: f64 = 3e-4;
 
-/// Offsets (in steps) and weights of the central and the one-sided fourth-order differences.
-const CENTRAL_DIFFERENCE_RULE: [(f64, f64); 4] = [
-    (-2.0, 1.0 / 12.0),
-    (-1.0, -2.0 / 3.0),
-    (1.0, 2.0 / 3.0),
-    (2.0, -1.0 / 12.0),
+/// A term of a finite-difference rule.
+struct DifferenceTerm {
+    /// The offset of the value, in steps.
+    steps: f64,
+    /// Its weight in the derivative, for a step of one.
+    weight: f64,
+}
+
+const fn term(steps: f64, weight: f64) -> DifferenceTerm {
+    DifferenceTerm { steps, weight }
+}
+
+/// The difference of a function that is linear.
+const LINEAR_DIFFERENCE_RULE: [DifferenceTerm; 2] = [term(0.0, -1.0), term(1.0, 1.0)];
+
+/// The central difference of fourth order.
+const CENTRAL_DIFFERENCE_RULE: [DifferenceTerm; 4] = [
+    term(-2.0, 1.0 / 12.0),
+    term(-1.0, -2.0 / 3.0),
+    term(1.0, 2.0 / 3.0),
+    term(2.0, -1.0 / 12.0),
 ];
 
-const ONE_SIDED_DIFFERENCE_RULE: [(f64, f64); 5] = [
-    (0.0, -25.0 / 12.0),
-    (1.0, 4.0),
-    (2.0, -3.0),
-    (3.0, 4.0 / 3.0),
-    (4.0, -0.25),
+/// The one-sided difference of fourth order.
+const ONE_SIDED_DIFFERENCE_RULE: [DifferenceTerm; 5] = [
+    term(0.0, -25.0 / 12.0),
+    term(1.0, 4.0),
+    term(2.0, -3.0),
+    term(3.0, 4.0 / 3.0),
+    term(4.0, -0.25),
 ];
+
+/// A scenario with another value of a parameter, in a finite difference.
+pub(crate) struct NeighbouringScenario<S = Arc<Scenario>> {
+    /// By which the parameter differs.
+    offset: f64,
+    /// Weight in the derivative.
+    weight: f64,
+    scenario: S,
+}
 
 /// A numerical parameter of a scenario.
 pub(crate) struct Parameter<'a> {
@@ -498,15 +581,22 @@ impl Parameter<'_> {
 
     /// Scenarios with their offsets and weights by the first of these rules, in either
     /// direction, all of whose scenarios are admissible.
-    fn differences(&self, step: f64, rules: &[&[(f64, f64)]]) -> Option<Vec<(f64, f64, Scenario)>> {
+    fn differences(
+        &self,
+        step: f64,
+        rules: &[&[DifferenceTerm]],
+    ) -> Option<Vec<NeighbouringScenario<Scenario>>> {
         let signs = [1.0, -1.0];
         let mut tried = (rules.iter()).flat_map(|rule| signs.map(|sign| (*rule, sign)));
         tried.find_map(|(rule, sign)| {
             let step = sign * step;
-            let at = |(steps, weight): &(f64, f64)| {
-                let offset = steps * step;
-                let scenario = (self.make)(self.value + offset)?;
-                Some((offset, weight / step, scenario))
+            let at = |term: &DifferenceTerm| {
+                let offset = term.steps * step;
+                Some(NeighbouringScenario {
+                    offset,
+                    weight: term.weight / step,
+                    scenario: (self.make)(self.value + offset)?,
+                })
             };
             rule.iter().map(at).collect()
         })
@@ -517,7 +607,7 @@ impl Parameter<'_> {
         let found = match self.linear {
             true => self.differences(
                 LINEAR_PARAMETER_STEP * self.step_unit(),
-                &[&[(0.0, -1.0), (1.0, 1.0)]],
+                &[&LINEAR_DIFFERENCE_RULE],
             ),
             false => self.differences(
                 NONLINEAR_PARAMETER_STEP * self.step_unit(),
@@ -525,18 +615,24 @@ impl Parameter<'_> {
             ),
         };
         let terms = found?.into_iter();
-        let weighted = terms.map(|(_, weight, term)| Weighted { weight, term });
+        let weighted = terms.map(|near| Weighted {
+            weight: near.weight,
+            term: near.scenario,
+        });
         Some(weighted.collect())
     }
 
-    /// Neighbouring scenarios with their offsets and the finite-difference weights for a
-    /// function of the scenario.
-    pub fn neighbouring_scenarios(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
+    /// Neighbouring scenarios for the finite difference of a function of the scenario.
+    pub fn neighbouring_scenarios(&self) -> Option<Vec<NeighbouringScenario>> {
         let found = self.differences(
             EIGENVALUE_DIFFERENCE_STEP * self.step_unit(),
             &[&CENTRAL_DIFFERENCE_RULE, &ONE_SIDED_DIFFERENCE_RULE],
         )?;
-        let shared = |(offset, weight, scenario)| (offset, weight, Arc::new(scenario));
+        let shared = |near: NeighbouringScenario<Scenario>| NeighbouringScenario {
+            offset: near.offset,
+            weight: near.weight,
+            scenario: Arc::new(near.scenario),
+        };
         Some(found.into_iter().map(shared).collect())
     }
 }
@@ -722,41 +818,49 @@ const ITERATION_ERROR_FRACTION: f64 = 0.1;
 
 /// Values on successively refined grids, extrapolated together.
 #[derive(Default)]
-pub(super) struct VectorSeries(Vec<(usize, Vec<DVec3>)>);
+struct VectorSeries(Vec<GridVectors>);
+
+/// Values on a grid.
+struct GridVectors {
+    segments: usize,
+    values: Vec<DVec3>,
+}
 
 impl VectorSeries {
     /// Adds the values on a grid of so many segments, if there are as many as before: not all
     /// are known on every grid.
-    pub fn push(&mut self, segments: usize, values: Vec<DVec3>) {
+    fn push(&mut self, segments: usize, values: Vec<DVec3>) {
         let last = self.0.last();
-        let alike = last.is_none_or(|(_, last)| last.len() == values.len());
+        let alike = last.is_none_or(|last| last.values.len() == values.len());
         if !values.is_empty() && alike {
-            self.0.push((segments, values));
+            self.0.push(GridVectors { segments, values });
         }
     }
 
-    /// The extrapolated values, and a common error bound.
-    pub fn extrapolated(&self, tolerance: f64) -> (Vec<DVec3>, Option<f64>) {
-        let all = self.0.iter().flat_map(|(_, values)| values);
+    /// The extrapolated values, with a common error bound.
+    fn extrapolated(&self, tolerance: f64) -> Extrapolated<Vec<DVec3>> {
+        let all = self.0.iter().flat_map(|grid| &grid.values);
         let unit = all.fold(0.0_f64, |m, v| m.max(v.abs().max_element()));
-        let count = self.0.last().map_or(0, |(_, values)| values.len());
+        let count = self.0.last().map_or(0, |grid| grid.values.len());
         if unit == 0.0 || count == 0 {
-            let error = (self.0.len() > 1).then_some(0.0);
-            return (vec![DVec3::ZERO; count], error);
+            return Extrapolated {
+                value: vec![DVec3::ZERO; count],
+                error: (self.0.len() > 1).then_some(0.0),
+            };
         }
-        let on = |(segments, values): &(usize, Vec<DVec3>)| {
-            let numbers = values.iter().flat_map(|v| (*v / unit).to_array());
-            (*segments, numbers.collect())
+        let on = |grid: &GridVectors| {
+            let numbers = grid.values.iter().flat_map(|v| (*v / unit).to_array());
+            (grid.segments, numbers.collect())
         };
         let table: Richardson = self.0.iter().map(on).collect();
         let values = table.extrapolated().chunks(3);
         let error = |best: BestColumn| {
             (SAFETY * best.error + ROUNDING + ITERATION_ERROR_FRACTION * tolerance) * unit
         };
-        (
-            values.map(|v| DVec3::from_slice(v) * unit).collect(),
-            table.best().map(error),
-        )
+        Extrapolated {
+            value: values.map(|v| DVec3::from_slice(v) * unit).collect(),
+            error: table.best().map(error),
+        }
     }
 }
 
@@ -772,7 +876,8 @@ mod tests {
         let text = include_str!("../../scenarios/paper/fig04.toml");
         let scenario = Scenario::from_toml(text).unwrap();
         let options = Options::default();
-        let (_, found) = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
+        let relaxed = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
+        let found = relaxed.on_grids;
         for level in &found.levels {
             let mut linear = Linearized::new(level, 1e-6);
             let units = super::unit_forces(&level.leaf, 1);

@@ -2,10 +2,14 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::newton::SolverCounts;
-use crate::relax::request::{MAX_INTERVALS, Method, Options, Progress, RelaxError};
+use crate::relax::accuracy::StrainEffects;
+use crate::relax::remark::EquilibriumRemark;
+use crate::relax::request::{
+    MAX_INTERVALS, Options, Progress, RelaxError, SemiImplicit, ShootingVariant,
+};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::forces::{Reaction, Stresses};
-use crate::relax::result::report::neutral_directions;
+use crate::relax::result::report::{RunEnd, neutral_directions};
 use crate::relax::result::{
     Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability, report,
 };
@@ -82,11 +86,13 @@ pub fn relax(
     tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
-    let (intervals, from_rest) = match options.method {
-        Method::Shooting { intervals } => (intervals, false),
-        Method::ShootingFromRest { intervals } => (intervals, true),
-        _ => (Some(1), false),
-    };
+    let ShootingVariant {
+        intervals,
+        from_relaxed_leaf: from_rest,
+    } = options.method.shooting().unwrap_or(ShootingVariant {
+        intervals: Some(1),
+        from_relaxed_leaf: false,
+    });
     check_intervals(scenario.rods.len(), intervals)?;
     if !from_rest && scenario.held_tip.is_some() {
         // Shooting from arcs has no continuation to a held tip.
@@ -100,10 +106,12 @@ pub fn relax(
         }
         other => RelaxError::from(other),
     })?;
-    let how = (intervals, tolerance);
     let mut found = match from_rest {
-        true => relax_from_rest(scenario, options, how, progress)?,
-        false => shoot(scenario, options, how, ShootingStart::Arcs, progress),
+        true => relax_from_rest(scenario, options, intervals, tolerance, progress)?,
+        false => {
+            let start = ShootingStart::Arcs;
+            shoot(scenario, options, intervals, tolerance, start, progress)
+        }
     };
     found.doubts = report::implausible_properties(scenario, &found);
     Ok(found)
@@ -114,17 +122,18 @@ pub fn relax(
 fn relax_from_rest(
     scenario: &Scenario,
     options: &Options,
-    how: (Option<usize>, f64),
+    intervals: Option<usize>,
+    tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let relaxation = Options {
-        method: Method::default(),
+        method: SemiImplicit::default().into(),
         tolerance: Some(START_TOLERANCE),
         modes: 0,
         stations: None,
         ..options.clone()
     };
-    let (rest, _) = relax_on_grids(scenario, &relaxation, true, progress)?;
+    let rest = relax_on_grids(scenario, &relaxation, true, progress)?.result;
     if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
         return Ok(Equilibrium {
             method: options.method,
@@ -135,7 +144,7 @@ fn relax_from_rest(
         stations: &rest.shape.stations,
         rods: &rest.shape.rods,
     };
-    let mut found = shoot(scenario, options, how, start, progress);
+    let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
     found.stability.saddle = rest.stability.saddle;
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
@@ -159,7 +168,8 @@ impl From<shooting::ShootingCounts> for SolverCounts {
 fn shoot(
     scenario: &Scenario,
     options: &Options,
-    (intervals, tolerance): (Option<usize>, f64),
+    intervals: Option<usize>,
+    tolerance: f64,
     start: ShootingStart,
     progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {
@@ -188,7 +198,7 @@ fn shoot(
         energy_error: None,
     };
     let (mut energy, mut index, mut errors) = (None, None, None);
-    let ((outcome, remark), work, rods) = match found {
+    let (end, work, rods) = match found {
         Ok(solution) => {
             accuracy.intervals = Some(solution.intervals.len() - 1);
             accuracy.residual = Some(solution.defect);
@@ -197,8 +207,8 @@ fn shoot(
             errors = Some(solution.error);
             let rods = rods_at_stations(&own, &stations, &solution.rods);
             index = index_near(scenario, grid, &rods, solution.error.position);
-            let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
-            (outcome, solution.work, solution.rods)
+            let end = outcome_of_solution(scenario, &solution, index, tolerance);
+            (end, solution.work, solution.rods)
         }
         Err(failure) => (outcome_of_failure(&failure), failure.work, failure.rods),
     };
@@ -209,8 +219,8 @@ fn shoot(
     Equilibrium {
         scenario: scenario.name.clone(),
         method: options.method,
-        outcome,
-        remark,
+        outcome: end.outcome,
+        remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
         energy,
@@ -242,7 +252,7 @@ fn shoot(
         }),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
-        model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
+        model: Model::new(rods.len(), rods.len(), false, &[], StrainEffects::default()),
         attempts: Vec::new(),
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
@@ -262,38 +272,32 @@ fn outcome_of_solution(
     solution: &ShootingSolution,
     index: Option<usize>,
     tolerance: f64,
-) -> (Outcome, Option<String>) {
-    let (outcome, remark) = match index {
-        _ if solution.error.position > tolerance * longest(&scenario.rods) => (
+) -> RunEnd {
+    let end = match index {
+        _ if solution.error.position > tolerance * longest(&scenario.rods) => RunEnd::new(
             Outcome::ToleranceNotReached,
-            Some(match &solution.unsharpened {
-                Some(reason) => format!("this is the best solution found; with smaller local errors {reason}"),
-                None => "double precision does not carry more through this leaf: ask for a larger tolerance".into(),
-            }),
+            match &solution.unsharpened {
+                Some(reason) => EquilibriumRemark::NotSharpened(reason.clone()),
+                None => EquilibriumRemark::DoublePrecision,
+            },
         ),
-        Some(1..) => (
-            Outcome::Saddle,
-            Some("shooting finds equilibria, stable or not: the method semi-implicit finds a stable one".into()),
-        ),
-        Some(0) => (Outcome::Converged, None),
-        None => (
-            Outcome::Converged,
-            Some("the number of negative eigenvalues is not known: a dead moment has no energy, the leaf is too fine to count them, or one may have either sign".into()),
-        ),
+        Some(1..) => RunEnd::new(Outcome::Saddle, EquilibriumRemark::ShotSaddle),
+        Some(0) => RunEnd::new(Outcome::Converged, None),
+        None => RunEnd::new(Outcome::Converged, EquilibriumRemark::ShotIndexUnknown),
     };
-    let neutral = solution.neutral.as_ref().map(|neutral| neutral.to_string());
-    (outcome, remark.or(neutral))
+    let neutral = || (solution.neutral.clone()).map(EquilibriumRemark::NeutralDirection);
+    RunEnd::new(end.outcome, end.remark.or_else(neutral))
 }
 
 /// The outcome of a failure: how far the continuation came, and why it ended.
-fn outcome_of_failure(failure: &shooting::ShootingFailure) -> (Outcome, Option<String>) {
-    let way = match failure.lambda {
-        part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
-        _ => String::new(),
-    };
+fn outcome_of_failure(failure: &shooting::ShootingFailure) -> RunEnd {
     let outcome = match failure.reason {
         ShootingFailureReason::Singular(_) => Outcome::Singular,
         _ => Outcome::NotAtRest,
     };
-    (outcome, Some(format!("{}{way}", failure.reason)))
+    let remark = EquilibriumRemark::ShootingFailed {
+        reason: failure.reason.clone(),
+        part: failure.lambda,
+    };
+    RunEnd::new(outcome, remark)
 }

@@ -1,9 +1,6 @@
-//! Whether a leaf at rest is stable: counts of negative eigenvalues, and the eigenvalues that decide.
-//!
-//! The decision on the stability of a leaf at rest: its Morse index is that on a grid only where
-//! no eigenvalue is so close to zero that other grids may tell another sign.
-//!
-//! The Morse index of an equilibrium that was not found by relaxation.
+//! Whether a leaf at rest is stable: its Morse index is that on a grid only where no eigenvalue is so
+//! close to zero that other grids may tell another sign; elsewhere extrapolated eigenvalues decide. Also
+//! the Morse index of an equilibrium that was not found by relaxation.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::SolverCounts;
@@ -11,13 +8,14 @@ use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::accuracy::transfer::{GridLevel, positions, prolong};
 use crate::relax::eigenvalues::{
-    EigenvalueRequest, LowestModes, affordable_next_grid, deciding_grid,
+    EigenvalueRequest, LowestModes, OmittedEigenvalues, affordable_next_grid, deciding_grid,
 };
 use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::log::WorkLog;
-use crate::relax::problem::RelaxationProblem;
-use crate::relax::request::{MOST_MODES, Method, Options, Progress, SemiImplicit};
+use crate::relax::plan::{GRIDS, RelaxationProblem};
+use crate::relax::request::{MOST_MODES, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;
+use crate::relax::same_equilibrium::{is_given_within_errors, is_near_guess};
 use crate::relax::{eigenvalues, saddle};
 use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
@@ -228,7 +226,10 @@ fn check_near_zero(
     }
     NextStabilityCheck::Compute(EigenvalueRequest {
         count,
-        omitted_lower: Some((bounds.least, -bounds.close)),
+        omitted_lower: Some(OmittedEigenvalues {
+            count: bounds.least,
+            shift: -bounds.close,
+        }),
         decides_stability: true,
         needs_values: false,
     })
@@ -247,21 +248,32 @@ fn verdict(
     if as_counted && lowest.certainly_negative() <= found.index.unwrap_or(0) {
         return Verdict::AsCounted;
     }
-    let (certain, negative) = match list.omitted_lower {
-        Some(_) => (lowest.certainly_negative(), lowest.negative),
+    let negative = match list.omitted_lower {
+        Some(_) => NegativeEigenvalues {
+            certain: lowest.certainly_negative(),
+            all: lowest.negative,
+        },
         None => count_with_more_eigenvalues(problem, found, list, lowest),
     };
-    negative.map_or(Verdict::Undecided(certain), Verdict::Index)
+    (negative.all).map_or(Verdict::Undecided(negative.certain), Verdict::Index)
 }
 
-/// How many eigenvalues are negative for certain, and how many are, if that is known: of the list
-/// or, where its signs are not certain or all of them are negative, of a longer and exact one.
+/// What extrapolated eigenvalues tell of the Morse index.
+struct NegativeEigenvalues {
+    /// So many are negative for certain.
+    certain: usize,
+    /// The number of negative ones, if it is known.
+    all: Option<usize>,
+}
+
+/// The negative eigenvalues of the list or, where its signs are not certain or all of them are
+/// negative, of a longer and exact one.
 fn count_with_more_eigenvalues(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     list: EigenvalueRequest,
     lowest: &LowestModes,
-) -> (usize, Option<usize>) {
+) -> NegativeEigenvalues {
     let (mut certain, mut negative) = (lowest.certainly_negative(), lowest.negative);
     let mut list = EigenvalueRequest {
         decides_stability: true,
@@ -276,24 +288,19 @@ fn count_with_more_eigenvalues(
         negative = (more.as_ref()).and_then(|more| more.negative_beyond(certain));
         certain = certain.max(more.map_or(0, |more| more.certainly_negative()));
     }
-    // There may be more than can be listed.
-    (certain, negative.filter(|negative| *negative < list.count))
+    NegativeEigenvalues {
+        certain,
+        // There may be more than can be listed.
+        all: negative.filter(|negative| *negative < list.count),
+    }
 }
 
-/// The finest grid on which an equilibrium is looked for first.
-const FINEST: usize = 1024;
+/// Largest tolerance of the grids on which the eigenvalues of a given equilibrium are compared.
+const LARGEST_TOLERANCE_FOR_INDEX: f64 = 1e-4;
 
-/// Largest and smallest tolerance of further grids, on which its eigenvalues are compared: on the
-/// grids that a smaller one needs, rounding hides the signs of soft ones.
-const TOLERANCE: f64 = 1e-4;
-
-const LEAST_TOLERANCE: f64 = 1e-5;
-
-/// Equilibria farther apart than this, in lengths, are different ones, and so are those that are
-/// farther apart than their errors times the second number.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 0.02;
-
-const SAME_EQUILIBRIUM_ERROR_MULTIPLE: f64 = 10.0;
+/// Smallest tolerance of these grids: on those that a smaller one needs, rounding hides the signs of
+/// soft eigenvalues.
+const SMALLEST_TOLERANCE_FOR_INDEX: f64 = 1e-5;
 
 /// Number of negative eigenvalues of the energy's Hessian at the equilibrium with the shape `rods`,
 /// given at the nodes of `grid` in the scenario's units within `error`, decided as that of a
@@ -306,65 +313,79 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
         return None;
     }
     let options = Options {
-        method: Method::SemiImplicit(SemiImplicit {
+        method: SemiImplicit {
             keep_unstable: true,
             ..SemiImplicit::default()
-        }),
+        }
+        .into(),
         modes: 0,
         ..Options::default()
     };
     let mut ignored = |_: &Progress| {};
     let error = error / leaf.scale.length;
-    let tolerance = error.clamp(LEAST_TOLERANCE, TOLERANCE);
+    let tolerance = error.clamp(SMALLEST_TOLERANCE_FOR_INDEX, LARGEST_TOLERANCE_FOR_INDEX);
     let problem = RelaxationProblem::new(&leaf, &options, tolerance);
     let mut effort = WorkLog::new(&mut ignored);
     let discrete = DiscreteLeaf::new(&leaf, grid);
     let state = state_from_rod_shapes(&leaf, &discrete, rods);
-    let given = GridLevel {
+    let level = GridLevel {
         leaf: discrete,
         state,
     };
-    let mut guess = given.clone();
-    while guess.leaf.segments() <= FINEST {
+    let given = GivenEquilibrium { level, error };
+    let mut guess = given.level.clone();
+    while guess.leaf.segments() <= GRIDS.finest_of_given_equilibrium {
         let finer = GridLevel {
             leaf: DiscreteLeaf::new(&leaf, guess.leaf.grid.refined()),
             state: prolong(&guess.leaf, &guess.state),
         };
-        if let Some(counted) = index_from(&problem, guess, (&given, error), &mut effort) {
-            return counted;
+        if let Some(counted) = index_from(&problem, guess, &given, &mut effort) {
+            return counted.index;
         }
         guess = finer;
     }
     None
 }
 
-/// The index at the `given` equilibrium, known within `error`, counted on grids from that of the
-/// `guess` on; `None` if these lead to another one.
+/// An equilibrium that was not found by relaxation.
+struct GivenEquilibrium {
+    level: GridLevel,
+    /// Bound on the error of its positions, in lengths of the leaf.
+    error: f64,
+}
+
+/// The Morse index of a given equilibrium; `None` if an eigenvalue may have either sign.
+struct CountedIndex {
+    index: Option<usize>,
+}
+
+/// The index at the `given` equilibrium, counted on grids from that of the `guess` on; `None` if these
+/// lead to another one.
 fn index_from(
     problem: &RelaxationProblem,
     mut guess: GridLevel,
-    (given, error): (&GridLevel, f64),
+    given: &GivenEquilibrium,
     effort: &mut WorkLog,
-) -> Option<Option<usize>> {
+) -> Option<CountedIndex> {
     let GridLevel { leaf, state } = &mut guess;
     let mut system = System::new(leaf);
     let begun = state.clone();
     let index = saddle::converge_saddle(leaf, state, &mut system, &mut effort.work)?;
     if saddle::clearly_stable(leaf, state, &mut system, &mut effort.work) {
-        return (state.largest_displacement_to(&begun) < SAME_EQUILIBRIUM_DISTANCE)
-            .then_some(Some(0));
+        return is_near_guess(&begun, state).then_some(CountedIndex { index: Some(0) });
     }
     let counted = NestedEquilibrium::without_grids(problem).with_index(false, Some(index));
     let refined = refine_to_tolerance(problem, counted.with_finer_level(guess), effort).ok()?;
     // No other equilibrium is of interest.
     let Decision { found, verdict, .. } = decide(problem, refined, effort, &|_, _| None);
-    let allowed = SAME_EQUILIBRIUM_DISTANCE
-        .min(SAME_EQUILIBRIUM_ERROR_MULTIPLE * (error + found.error().unwrap_or(f64::INFINITY)));
-    (distance_from_given(&found, given) <= allowed).then_some(match verdict {
+    let error = given.error + found.error().unwrap_or(f64::INFINITY);
+    let same = is_given_within_errors(distance_from_given(&found, &given.level), error);
+    let index = match verdict {
         Verdict::AsCounted => found.index,
         Verdict::Index(index) => Some(index),
         Verdict::Undecided(_) | Verdict::Unknown => None,
-    })
+    };
+    same.then_some(CountedIndex { index })
 }
 
 /// The largest distance of the extrapolated positions from those `given` on a grid whose repeated

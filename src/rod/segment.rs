@@ -352,7 +352,7 @@ impl<S: Simd> LaneSections<S> {
         let ds = NumberGroup([a.ds, b.ds, c.ds, d.ds]);
         let ds = Lanes::load_group(simd, &ds, part);
         let vectors = |of: fn(&Section) -> DVec3| {
-            Vectors::from_group_vectors(simd, [of(a), of(b), of(c), of(d)], part)
+            Vectors::from_group(simd, [of(a), of(b), of(c), of(d)], part)
         };
         LaneSections {
             ds,

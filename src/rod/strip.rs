@@ -1,4 +1,4 @@
-//! Tissue between two neighbouring veins: the midpoint element laid across, from a node of one to
+//! Tissue between two neighboring veins: the midpoint element laid across, from a node of one to
 //! the node of the other at an equal fraction of their lengths.
 //!
 //! With the geodesic midpoint R of the rotations q0 and q1 of both nodes, the positions x0 and x1
@@ -7,7 +7,7 @@
 //! e = R^T (x1 - x0) - \[natural\],   theta = log(q0^* q1) - \[natural\],
 //! E = 1/2 sum_k k_k e_k^2 + 1/2 c_1 theta_1^2.
 //!
-//! k_1 resists neighbours that slide along each other, k_2 a change of width, k_3 one vein that rises
+//! k_1 resists neighbors that slide along each other, k_2 a change of width, k_3 one vein that rises
 //! above the other, c_1 a fold along the veins. As a segment a strip carries a spatial
 //! force as a further unknown, which is condensed out ([`Element`]), so that Newton's method
 //! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
@@ -23,7 +23,7 @@ use pulp::Scalar;
 /// A block of a matrix of the unknowns (rotation, displacement) of a node, rows first.
 pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 
-/// The tissue that belongs to a node of two neighbouring veins; also its derivative with respect
+/// The tissue that belongs to a node of two neighboring veins; also its derivative with respect
 /// to a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissueStrip {

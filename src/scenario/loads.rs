@@ -1,36 +1,35 @@
-//! Weight, and loads on points and along veins.
-//!
-//! Wind: the table `[wind]`.
-//!
-//! The motion of a leaf: its mass, damping and duration, and loads that change in time.
+//! Loads on a leaf and its motion: weight, loads on points and along veins, wind (the table `[wind]`),
+//! and the mass, damping, duration and loads in time of a motion (the table `[dynamics]`).
 
+use crate::numbers::sorted_distinct;
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
+use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::{Profile, Rod, Scale, Scenario, Schedule, sorted_distinct};
+use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::section::Property;
+use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
-use glam::DVec3;
 
 /// A dead load on a point of a vein.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLoad {
     /// The vein, counted from 0.
     pub vein: usize,
-    /// Where, as a fraction of its length in (0, 1].
+    /// The place of the point, a fraction of the vein's length in (0, 1].
     pub at: f64,
     /// The force, besides the weight of the mass.
     pub force: [f64; 3],
     /// The moment about the lab axes; zero unless the leaf is a single rod.
     pub moment: [f64; 3],
-    /// The mass, which [`Scenario::g`] pulls; not negative.
+    /// The mass, which [`Scenario::g`](crate::scenario::Scenario::g) pulls; not negative.
     pub mass: f64,
 }
 
 /// The weight of a vein per reference length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight<'s> {
-    /// The part that is the same all along the vein.
+    /// The weight per length that is the same all along the vein.
     pub even: [f64; 3],
     /// The acceleration of gravity, and the mass per length that it pulls, if any.
     pub of_mass: Option<([f64; 3], &'s Profile)>,
@@ -47,117 +46,37 @@ impl Weight<'_> {
     }
 }
 
-impl Scenario {
-    /// The weight of a vein per reference length.
-    pub fn weight(&self, vein: usize) -> Weight<'_> {
-        let own = self.own_gravity.get(vein).copied().unwrap_or([0.0; 3]);
-        let pulls = self.g != [0.0; 3];
-        Weight {
-            even: [0, 1, 2].map(|axis| self.gravity[axis] + own[axis]),
-            of_mass: pulls.then(|| (self.g, &self.dynamics.density[vein])),
-        }
-    }
-
-    /// The same leaf without weight, loads and wind; what is held of it stays where it is.
-    pub fn unloaded(&self) -> Scenario {
-        let none = [0.0; 3];
-        Scenario {
-            gravity: none,
-            own_gravity: Vec::new(),
-            g: none,
-            distributed: None,
-            points: Vec::new(),
-            tip_force: none,
-            tip_moment: none,
-            wind: None,
-            photo: None,
-            dynamics: self.dynamics.clone().with_loads(none, none, none),
-            ..self.clone()
-        }
-    }
-
-    /// Whether veins have loads of their own besides the gravity that all share.
-    pub fn has_own_loads(&self) -> bool {
-        let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];
-        weights || self.distributed.is_some() || !self.points.is_empty()
-    }
-
-    /// Whether dead moments act at rest.
-    pub fn has_moments(&self) -> bool {
-        let on_points = || self.points.iter().any(|point| point.moment != [0.0; 3]);
-        self.tip_moment != [0.0; 3] || on_points()
-    }
-
-    /// Whether all rods begin in the origin, in the plane z = 0.
-    pub(crate) fn is_fan(&self) -> bool {
-        let in_plane = |rod: &crate::scenario::Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;
-        self.rods.iter().all(in_plane)
-    }
-
-    /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
-    pub fn is_loaded_in_plane(&self) -> bool {
-        let flat = |load: [f64; 3]| load[2] == 0.0;
-        let even = |vein: usize| flat(self.weight(vein).even);
-        self.rods
-            .iter()
-            .all(|rod| flat(rod.base) && rod.elevation == 0.0)
-            && (0..self.rods.len()).all(even)
-            && flat(self.g)
-            && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
-            && self.points.iter().all(|point| flat(point.force))
-            && self.grips.iter().all(|grip| flat(grip.displacement))
-            && flat(self.tip_force)
-            && !self.has_moments()
-            && self.wind.is_none()
-    }
-
-    /// The sum of all weights, and of the loads along veins and on points.
-    pub fn total_load(&self) -> DVec3 {
-        let length: f64 = self.rods.iter().map(|rod| rod.length).sum();
-        let mut total = length * DVec3::from_array(self.gravity);
-        for (vein, rod) in self.rods.iter().enumerate() {
-            let Weight { even, of_mass } = self.weight(vein);
-            let own = DVec3::from_array(even) - DVec3::from_array(self.gravity);
-            total += rod.length * own;
-            if let Some((g, mass)) = of_mass {
-                total += rod.length * mass.integral(1.0) * DVec3::from_array(g);
-            }
-            for load in self.distributed.iter().map(|all| &all[vein]) {
-                let sums = load.each_ref().map(|one| one.integral(1.0));
-                total += rod.length * DVec3::from_array(sums);
-            }
-        }
-        let points = self
-            .points
-            .iter()
-            .map(|point| DVec3::from_array(self.force_on(point)));
-        total + points.sum::<DVec3>()
-    }
-
-    /// The force on a point: what is given, and the weight of its mass.
-    pub fn force_on(&self, point: &PointLoad) -> [f64; 3] {
-        [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])
-    }
+/// Weights of rods, forces per reference length.
+pub(super) struct RodWeights {
+    /// The weight that all rods share.
+    pub shared: [f64; 3],
+    /// The weight that each rod has besides; empty if rods do not differ.
+    pub own: Vec<[f64; 3]>,
 }
 
-/// Reads `load.gravity`: the weight that all rods share, and their own besides; empty if these do
-/// not differ.
-pub(super) fn gravity(entries: &Entries, rods: usize) -> ScenarioResult<([f64; 3], Vec<[f64; 3]>)> {
+/// Reads `load.gravity`.
+pub(super) fn read_weights(entries: &Entries, rods: usize) -> ScenarioResult<RodWeights> {
     let item = entries.value_or_default(Key::Gravity)?;
-    let each = item.vectors(rods)?;
+    let each = item.vector_per_rod(rods)?;
     let first = each.first().copied().unwrap_or([0.0; 3]);
     if each.iter().all(|own| *own == first) {
-        return Ok((first, Vec::new()));
+        return Ok(RodWeights {
+            shared: first,
+            own: Vec::new(),
+        });
     }
     item.refuse_unless(
         !entries.is_given(Key::GravityInTime),
         "dynamics.gravity, one vector for all rods, would replace these: leave one of them out",
     )?;
-    Ok(([0.0; 3], each))
+    Ok(RodWeights {
+        shared: [0.0; 3],
+        own: each,
+    })
 }
 
 /// Reads `load.g`, which needs a mass.
-pub(super) fn g(entries: &Entries) -> ScenarioResult<[f64; 3]> {
+pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<[f64; 3]> {
     let item = entries.value_or_default(Key::G)?;
     let g = item.vector()?;
     let masses = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
@@ -170,26 +89,28 @@ pub(super) fn g(entries: &Entries) -> ScenarioResult<[f64; 3]> {
     Ok(g)
 }
 
-/// Reads `load.distributed`; `None` if it is left out or zero.
-pub(super) fn distributed(
+/// Reads `load.distributed`; `None` if the entry is left out or zero.
+pub(super) fn read_distributed_loads(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
     let Some(item) = entries.given_value(Key::Distributed) else {
         return Ok(None);
     };
-    let loads = item.vector_profiles(rods)?;
+    let loads = item.vector_profile_per_rod(rods)?;
     let some = loads.iter().flatten().any(|load| load.max_abs() > 0.0);
     Ok(some.then_some(loads))
 }
 
 /// Reads `[[load.point]]`.
-pub(super) fn points(entries: &Entries, rods: usize) -> ScenarioResult<Vec<PointLoad>> {
+pub(super) fn read_point_loads(entries: &Entries, rods: usize) -> ScenarioResult<Vec<PointLoad>> {
     let count = entries.table_count("load.point").unwrap_or(0);
-    (0..count).map(|row| point(entries, row, rods)).collect()
+    (0..count)
+        .map(|row| read_point_load(entries, row, rods))
+        .collect()
 }
 
-fn point(entries: &Entries, row: usize, rods: usize) -> ScenarioResult<PointLoad> {
+fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult<PointLoad> {
     let item = |key| entries.value_in_row(key, row);
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
@@ -235,9 +156,8 @@ pub struct Wind {
 }
 
 /// Reads `[wind]`; `None` if there is no such table.
-pub(super) fn wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
-    let mut table = Key::all().filter(|key| key.table_and_name().0 == "wind");
-    if !table.any(|key| entries.is_given(key)) {
+pub(super) fn read_wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
+    if !entries.has_key_of_table("wind") {
         return Ok(None);
     }
     Ok(Some(Wind {
@@ -246,22 +166,32 @@ pub(super) fn wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind
             .vectors_in_time()?,
         density: entries.value_or_default(Key::WindDensity)?.number()?,
         drag: entries.value_or_default(Key::WindDrag)?.number()?,
-        width: entries.value_or_default(Key::WindWidth)?.quantity(rods)?,
+        width: entries
+            .value_or_default(Key::WindWidth)?
+            .profile_per_rod(rods)?,
     }))
 }
 
-/// Radius of the section over the length of the longest rod: half of it, the radius of
-/// gyration, is that of the relaxation.
-const DEFAULT_RADIUS_RATIO: f64 = 0.2;
+/// The motion of a leaf where `[dynamics]` leaves it out.
+struct DefaultMotion {
+    /// Radius of the section over the length of the longest rod: half of it, the radius of
+    /// gyration, is that of the relaxation.
+    radius: f64,
+    /// Duration, in units of sqrt(rho L^4/A).
+    duration: f64,
+    /// Outputs during the motion, after the first.
+    outputs: f64,
+}
 
-/// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
-const LOWEST_FREQUENCY: f64 = 3.516;
+const DEFAULT_MOTION: DefaultMotion = DefaultMotion {
+    radius: 0.2,
+    duration: 10.0,
+    outputs: 100.0,
+};
 
-/// Duration, in units of sqrt(rho L^4/A).
-const DEFAULT_DURATION: f64 = 10.0;
-
-/// Outputs in that time.
-pub(super) const DEFAULT_OUTPUTS: f64 = 100.0;
+/// Angular frequency of the lowest bending mode of a clamped-free rod, in units of sqrt(A/(rho L^4)):
+/// beta_1^2 of the beam.
+pub(crate) const CLAMPED_ROD_FREQUENCY: f64 = 3.516;
 
 words! {
     /// Where a motion begins, at time 0 and without velocity.
@@ -314,7 +244,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// The default for these rods, of which there is at least one, without loads: see
+    /// The default motion of these rods, of which there is at least one, without loads: see
     /// [`Dynamics::with_loads`].
     ///
     /// ```
@@ -340,7 +270,7 @@ impl Dynamics {
     pub fn default_for(rods: &[Rod]) -> Self {
         let scale = Scale::of(rods);
         let density = scale.stiffness / scale.length.powi(4);
-        Dynamics::of_density(rods, vec![Profile::Constant(density); rods.len()])
+        Dynamics::with_density(rods, vec![Profile::Constant(density); rods.len()])
     }
 
     /// This motion under constant loads.
@@ -373,12 +303,12 @@ impl Dynamics {
         critical_damping(&self.density, self.natural_time(rods))
     }
 
-    /// The default for rods of these densities.
-    pub(super) fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
+    /// The default motion of rods with these densities.
+    fn with_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
         let scale = Scale::of(rods);
         let time = natural_time_unit(scale, &density);
-        let duration = DEFAULT_DURATION * time;
-        let radius = Profile::Constant(DEFAULT_RADIUS_RATIO * scale.length);
+        let duration = DEFAULT_MOTION.duration * time;
+        let radius = Profile::Constant(DEFAULT_MOTION.radius * scale.length);
         let inertia = |density| round_inertia(density, &radius);
         Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
@@ -387,7 +317,7 @@ impl Dynamics {
             density,
             internal_damping: 0.0,
             duration,
-            output_interval: duration / DEFAULT_OUTPUTS,
+            output_interval: duration / DEFAULT_MOTION.outputs,
             clamped: true,
             start: MotionStart::Released,
             gravity: Schedule::constant([0.0; 3]),
@@ -398,12 +328,12 @@ impl Dynamics {
     }
 }
 
-/// That is critical for the lowest mode of a clamped rod of the mean density.
+/// The external damping that is critical for the lowest mode of a clamped rod of the mean density.
 fn critical_damping(density: &[Profile], time: f64) -> f64 {
-    2.0 * LOWEST_FREQUENCY * mean_mid_rod_value(density) / time
+    2.0 * CLAMPED_ROD_FREQUENCY * mean_mid_rod_value(density) / time
 }
 
-/// Mean of the mid-rod values; exact if all are equal.
+/// Mean of the values of profiles mid-rod; exact if all are equal.
 fn mean_mid_rod_value(profiles: &[Profile]) -> f64 {
     let counted = profiles.iter().zip(1..);
     counted.fold(0.0, |mean, (profile, count)| {
@@ -419,7 +349,7 @@ pub(super) fn natural_time_unit(scale: Scale, density: &[Profile]) -> f64 {
 /// Moment of inertia of a round section: rho I = density radius^2/4 at all knots of
 /// both profiles, and linear between them. Where the radius varies the exact value is a
 /// cubic, which lies below: more knots of the radius reduce the difference.
-pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
+fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     let at_fraction = |sigma: f64| density.at(sigma) * radius.at(sigma).powi(2) / 4.0;
     if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {
         return Profile::Constant(at_fraction(0.0));
@@ -427,6 +357,139 @@ pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     let at = sorted_distinct([&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat());
     let value = at.iter().map(|&sigma| at_fraction(sigma)).collect();
     Profile::Linear { at, value }
+}
+
+/// Reads `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
+pub(super) fn read_dynamics(
+    entries: &Entries,
+    rods: &[Rod],
+    source: &StiffnessSource,
+    loads: [[f64; 3]; 3],
+) -> ScenarioResult<Dynamics> {
+    let [gravity, tip_force, tip_moment] = loads;
+    let mass = [Key::MassDensity, Key::BladeMassDensity];
+    let mass = mass.into_iter().find(|key| entries.is_given(*key));
+    let of_mass = |property| mass.and_then(|_| source.property_profiles(property));
+    let density = match entries.given_value(Key::Density) {
+        Some(item) => {
+            if let Some(key) = mass {
+                let path = key.path();
+                let why = format!("{path} is given, too: leave one of them out");
+                return Err(item.value_error(why));
+            }
+            Some(item.profile_per_rod(rods.len())?)
+        }
+        None => of_mass(Property::Density),
+    };
+    let preset = match density {
+        Some(density) => Dynamics::with_density(rods, density),
+        None => Dynamics::default_for(rods),
+    }
+    .with_loads(gravity, tip_force, tip_moment);
+    let number = |key, default| {
+        entries
+            .given_value(key)
+            .map_or(Ok(default), |item| item.number())
+    };
+    let load = |key, default| match entries.given_value(key) {
+        Some(item) => item.vectors_in_time(),
+        None => Ok(default),
+    };
+    let duration = number(Key::Duration, preset.duration)?;
+    let section = read_rotary_inertia(entries, &preset.density)?;
+    let section = section.or_else(|| of_mass(Property::RotaryInertia));
+    let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
+    let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;
+    let output_interval = match entries.given_value(Key::OutputInterval) {
+        Some(item) => read_output_interval(item, duration)?,
+        None => duration / DEFAULT_MOTION.outputs,
+    };
+    let clamped = read_clamped(entries.value_or_default(Key::Clamped)?, rods.len())?;
+    let start = read_start(entries.value_or_default(Key::Start)?, clamped)?;
+    let gravity = load(Key::GravityInTime, preset.gravity)?;
+    let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
+    let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
+    if let Some(item) = entries.given_value(Key::TipMomentInTime) {
+        check_single_rod_moments(item, rods.len(), &tip_moment.value)?;
+    }
+    Ok(Dynamics {
+        polar_excess: if section.is_some() { 1.0 } else { 0.0 },
+        rotary_inertia: section.unwrap_or(preset.rotary_inertia),
+        external_damping,
+        internal_damping,
+        duration,
+        output_interval,
+        clamped,
+        start,
+        gravity,
+        tip_force,
+        tip_moment,
+        rest: match entries.given_value(Key::RestInTime) {
+            Some(item) => item.factors_in_time()?,
+            None => preset.rest,
+        },
+        density: preset.density,
+    })
+}
+
+fn read_rotary_inertia(
+    entries: &Entries,
+    density: &[Profile],
+) -> ScenarioResult<Option<Vec<Profile>>> {
+    let quantity = |item: EntryValue| item.profile_per_rod(density.len());
+    let inertia = entries
+        .given_value(Key::RotaryInertia)
+        .map(quantity)
+        .transpose()?;
+    let Some(item) = entries.given_value(Key::SectionRadius) else {
+        return Ok(inertia);
+    };
+    item.refuse_unless(
+        inertia.is_none(),
+        "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
+         leave one of them out",
+    )?;
+    let radius = quantity(item)?;
+    let round = density.iter().zip(&radius);
+    Ok(Some(
+        round
+            .map(|(density, radius)| round_inertia(density, radius))
+            .collect(),
+    ))
+}
+
+fn read_output_interval(item: EntryValue, duration: f64) -> ScenarioResult<f64> {
+    let interval = item.number()?;
+    item.refuse_unless(
+        interval <= duration,
+        format_args!(
+            "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
+        ),
+    )?;
+    Ok(interval)
+}
+
+fn read_clamped(item: EntryValue, rods: usize) -> ScenarioResult<bool> {
+    let clamped = item.switch()?;
+    item.refuse_unless(
+        clamped || rods == 1,
+        format_args!(
+            "a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base"
+        ),
+    )?;
+    Ok(clamped)
+}
+
+fn read_start(item: EntryValue, clamped: bool) -> ScenarioResult<MotionStart> {
+    let start = item.word(
+        "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
+         (in equilibrium under the loads at time 0)",
+    )?;
+    item.refuse_unless(
+        clamped || start == MotionStart::Released,
+        "a rod with a free base has no equilibrium to start from: use \"released\"",
+    )?;
+    Ok(start)
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! A photograph of the leaf: the table `[photo]`.
 
 use crate::scenario::format::entries::Entries;
+use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::format::source::ScenarioResult;
 use crate::scenario::format::{Key, NumberRange};
 use glam::DVec3;
 
-/// How a photograph shows the leaf: as seen from far away along an axis, pixels counted to the right
+/// How a photograph shows a leaf: as seen from far away along an axis, pixels counted to the right
 /// and down.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
@@ -18,11 +18,11 @@ pub struct Photo {
     pub rotation: f64,
     /// The direction to the right in a picture that is not turned: along an axis, or against it.
     pub right: DVec3,
-    /// The direction upwards, likewise.
+    /// The direction upwards in a picture that is not turned: along another axis, or against it.
     pub up: DVec3,
 }
 
-/// What changes of a photograph with a parameter.
+/// The derivative of a photograph by a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PhotoParameterDerivative {
     scale: f64,
@@ -33,13 +33,13 @@ pub struct PhotoParameterDerivative {
 impl Photo {
     /// The pixel of a point x is (a . x + b, c . x + d): (a, b) and (c, d).
     pub fn projection(&self) -> [(DVec3, f64); 2] {
-        let [right, up] = self.turned();
+        let [right, up] = self.picture_axes();
         let [x, y] = self.origin;
         [(right / self.scale, x), (-up / self.scale, y)]
     }
 
     /// The directions to the right and upwards in the picture.
-    fn turned(&self) -> [DVec3; 2] {
+    fn picture_axes(&self) -> [DVec3; 2] {
         let (sin, cos) = self.rotation.sin_cos();
         let (right, up) = (self.right, self.up);
         [cos * right - sin * up, sin * right + cos * up]
@@ -47,7 +47,7 @@ impl Photo {
 
     /// The derivative of the pixel of a point that does not move.
     pub fn rate(&self, point: DVec3, by: &PhotoParameterDerivative) -> [f64; 2] {
-        let [right, up] = self.turned().map(|axis| axis.dot(point) / self.scale);
+        let [right, up] = self.picture_axes().map(|axis| axis.dot(point) / self.scale);
         let growth = by.scale / self.scale;
         let [x, y] = by.origin;
         [
@@ -59,7 +59,7 @@ impl Photo {
     /// The coordinates of a point that are seen at a pixel: the third is not.
     pub fn point_at_pixel(&self, pixel: [f64; 2]) -> [Option<f64>; 3] {
         let [x, y] = [0, 1].map(|k| (pixel[k] - self.origin[k]) * self.scale);
-        let [right, up] = self.turned();
+        let [right, up] = self.picture_axes();
         let place = right * x - up * y;
         let seen = self.right.abs() + self.up.abs();
         [0, 1, 2].map(|axis| (seen[axis] > 0.5).then_some(place[axis]))
@@ -82,20 +82,19 @@ impl PhotoParameterDerivative {
 }
 
 /// Reads `[photo]`; `None` if there is no such table.
-pub(super) fn photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
-    let mut table = Key::all().filter(|key| key.table_and_name().0 == "photo");
-    if !table.any(|key| entries.is_given(key)) {
+pub(super) fn read_photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
+    if !entries.has_key_of_table("photo") {
         return Ok(None);
     }
     let [right, up] = [Key::PhotoRight, Key::PhotoUp].map(|key| entries.value_or_default(key));
     let (right, up) = (right?, up?);
-    let (towards, upwards) = (direction(right)?, direction(up)?);
+    let (towards, upwards) = (read_axis(right)?, read_axis(up)?);
     up.refuse_unless(
         towards.dot(upwards) == 0.0,
         "is the axis of photo.right: choose another",
     )?;
     Ok(Some(Photo {
-        scale: scale(entries)?,
+        scale: read_pixel_length(entries)?,
         origin: [
             entries.value_or_default(Key::PhotoX)?.number()?,
             entries.value_or_default(Key::PhotoY)?.number()?,
@@ -107,7 +106,7 @@ pub(super) fn photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
 }
 
 /// The length of a pixel, as given or by a ruler in the picture.
-fn scale(entries: &Entries) -> ScenarioResult<f64> {
+fn read_pixel_length(entries: &Entries) -> ScenarioResult<f64> {
     let ruler = [Key::RulerFrom, Key::RulerTo, Key::RulerLength];
     let given = ruler.into_iter().find(|key| entries.is_given(*key));
     match (entries.given_value(Key::PhotoScale), given) {
@@ -120,7 +119,7 @@ fn scale(entries: &Entries) -> ScenarioResult<f64> {
             let [from, to] =
                 [Key::RulerFrom, Key::RulerTo].map(|key| entries.value_or_default(key));
             let to = to?;
-            let ([x, y], [end_x, end_y]) = (pixel(from?)?, pixel(to)?);
+            let ([x, y], [end_x, end_y]) = (read_pixel(from?)?, read_pixel(to)?);
             let pixels = (end_x - x).hypot(end_y - y);
             to.refuse_unless(
                 pixels > 0.0,
@@ -131,7 +130,7 @@ fn scale(entries: &Entries) -> ScenarioResult<f64> {
     }
 }
 
-fn pixel(item: EntryValue) -> ScenarioResult<[f64; 2]> {
+fn read_pixel(item: EntryValue) -> ScenarioResult<[f64; 2]> {
     let needed = "a list of two numbers: pixels to the right, and down";
     let mut pixel = [0.0; 2];
     let numbers = item.list_of_length(2, "pixels to the right, and down", needed)?;
@@ -141,7 +140,7 @@ fn pixel(item: EntryValue) -> ScenarioResult<[f64; 2]> {
     Ok(pixel)
 }
 
-fn direction(item: EntryValue) -> ScenarioResult<DVec3> {
+fn read_axis(item: EntryValue) -> ScenarioResult<DVec3> {
     let (sign, axis) = match item.text()?.strip_prefix('-') {
         Some(axis) => (-1.0, axis),
         None => (1.0, item.text()?),

@@ -1,49 +1,239 @@
-//! What in a scenario is probably not what was intended.
+//! Numbers of a scenario that are allowed, but probably not what was intended: degrees in place of
+//! radians, accelerations in place of weights, lengths in other units.
 
-use crate::scenario::{Clamp, Dynamics, Rod, Scenario};
+use crate::run::remarks;
+use crate::scenario::checked::Scenario;
+use crate::scenario::loads::Dynamics;
+use crate::scenario::supports::Clamp;
+use crate::scenario::veins::Rod;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Largest plausible stretch of a vein relative to its rest stretch.
 pub(crate) const LARGEST_PLAUSIBLE_STRETCH: f64 = 0.2;
 
-/// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under
-/// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
-const HANGING_LENGTH_FACTOR: f64 = 30.0;
+/// What numbers of a leaf plausibly are. Accelerations are in units of length per second squared.
+struct PlausibleRanges {
+    /// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under its
+    /// own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+    hanging_length: f64,
+    /// Relative tolerance with which the acceleration of gravity is recognized.
+    gravity_tolerance: f64,
+    /// Multiple of (A/q)^(1/3) from which on a weight of 9.81 is taken for an acceleration.
+    suspicious_length: f64,
+    /// Multiple of the acceleration of gravity, and fraction of it, by which a weight contradicts a
+    /// mass.
+    weight_contradiction: f64,
+    /// Fraction by which two statements of a weight differ in rounding, and their angle in radians.
+    weight_tolerance: f64,
+    /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
+    /// a turn that are multiples of this.
+    degree_multiple: f64,
+}
 
-/// Gravity if entered by mistake as an acceleration in metres and seconds, and the relative
-/// tolerance with which that number is recognised.
-const GRAVITY_ACCELERATION: f64 = 9.81;
+const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
+    hanging_length: 30.0,
+    gravity_tolerance: 2e-3,
+    suspicious_length: 5.0,
+    weight_contradiction: 10.0,
+    weight_tolerance: 0.01,
+    degree_multiple: 15.0,
+};
 
-const GRAVITY_TOLERANCE: f64 = 2e-3;
+/// A unit of length, and the acceleration of gravity in it per second squared.
+struct GravityInUnit {
+    length: &'static str,
+    acceleration: f64,
+}
 
-/// Multiple of that length from which on such a number is taken for this mistake.
-const SUSPICIOUS_LENGTH_FACTOR: f64 = 5.0;
+const GRAVITY_IN_UNITS: [GravityInUnit; 4] = {
+    const fn unit(length: &'static str, acceleration: f64) -> GravityInUnit {
+        GravityInUnit {
+            length,
+            acceleration,
+        }
+    }
+    [
+        unit("m", 9.81),
+        unit("cm", 981.0),
+        unit("mm", 9810.0),
+        unit("in", 386.1),
+    ]
+};
 
-/// Multiple of the acceleration of gravity, and part of it, by which a weight contradicts a mass.
-const WEIGHT_CONTRADICTION_FACTOR: f64 = 10.0;
+/// The least and the largest acceleration of gravity in these units: in metres and in millimetres.
+const GRAVITY_RANGE: [f64; 2] = [
+    GRAVITY_IN_UNITS[0].acceleration,
+    GRAVITY_IN_UNITS[2].acceleration,
+];
 
-/// Part by which two statements of a weight differ in rounding, and their angle in radians.
-const WEIGHT_TOLERANCE: f64 = 0.01;
+impl GravityInUnit {
+    fn of(length: &str) -> Option<&'static GravityInUnit> {
+        GRAVITY_IN_UNITS.iter().find(|unit| unit.length == length)
+    }
+}
 
-/// The acceleration of gravity in units of length of these names per second squared, and its range
-/// in any of them.
-const GRAVITY_BY_LENGTH_UNIT: [(&str, f64); 4] =
-    [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
+remarks! {
+    /// What in a scenario is probably not what was intended. Veins are counted from 0, and numbers
+    /// are in the units of the scenario.
+    pub enum PlausibilityWarning {
+        /// An angle that is in degrees, or of a vein that grows backwards.
+        #[error("{key} is in radians, and {angle} is {}", turn_in_words(*.angle))]
+        AngleInDegrees {
+            /// The key of the scenario.
+            key: &'static str,
+            /// Its value.
+            angle: f64,
+        } = "angle-in-degrees",
+        /// A section with a side longer than its vein.
+        #[error(
+            "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
+            .vein + 1, four_digits(*.side), four_digits(*.length)
+        )]
+        ThickerThanLong {
+            /// The vein.
+            vein: usize,
+            /// The longest side of its section.
+            side: f64,
+            /// Its length.
+            length: f64,
+        } = "thicker-than-long",
+        /// A tip that is held farther from the base than a vein plausibly stretches.
+        #[error(
+            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
+            four_digits(*.distance), .vein + 1, four_digits(*.length), 100.0 * .stretch
+        )]
+        OutOfReach {
+            /// Of the tip from the base.
+            distance: f64,
+            /// The vein that would stretch most.
+            vein: usize,
+            /// Its length at rest.
+            length: f64,
+            /// By which part of its length it would stretch.
+            stretch: f64,
+        } = "out-of-reach",
+        /// A weight per length besides an acceleration that gives the mass the same weight.
+        #[error(
+            "load.gravity and load.g state the same weight, {} per length of vein {}, which then counts twice; {}",
+            four_digits(*.weight), .vein + 1, BOTH_WEIGHTS
+        )]
+        WeightGivenTwice {
+            /// A vein that has both.
+            vein: usize,
+            /// The weight per length.
+            weight: f64,
+        } = "weight-given-twice",
+        /// A weight per length besides an acceleration that gives the mass another weight.
+        #[error(
+            "load.gravity and load.g contradict each other: {}; {}",
+            both_weights(*.vein, [*.given, *.of_mass], *.apart), BOTH_WEIGHTS
+        )]
+        WeightsContradict {
+            /// A vein that has both.
+            vein: usize,
+            /// Its weight per length, as given.
+            given: f64,
+            /// The weight per length of its mass.
+            of_mass: f64,
+            /// The angle between both, in radians, if their directions differ.
+            apart: Option<f64>,
+        } = "weights-contradict",
+        /// A leaf that is too long for its weight, which is the acceleration of gravity by its number.
+        #[error(
+            "{}: load.gravity is a force per length, mass per length times 9.81, not the acceleration",
+            too_long_in_words(*.times)
+        )]
+        AccelerationAsWeight {
+            /// The length of every vein, at least, in lengths over which it carries its weight.
+            times: f64,
+        } = "acceleration-as-weight",
+        /// A leaf that is too long for its weight and stiffness.
+        #[error(
+            "{}: {}", too_long_in_words(*.times),
+            match .of_mass {
+                true => "load.g is an acceleration: check it, the mass, the stiffnesses and the units",
+                false => "load.gravity is a force per length: check it, the stiffnesses and the units",
+            }
+        )]
+        TooLong {
+            /// The length of every vein, at least, in lengths over which it carries its weight.
+            times: f64,
+            /// Whether the weight is that of its mass, by an acceleration.
+            of_mass: bool,
+        } = "too-long",
+        /// A weight that is not that of the mass.
+        #[error(
+            "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
+            four_digits(*.weight), four_digits(*.mass), four_digits(.weight / .mass)
+        )]
+        WeightOfAnotherMass {
+            /// Per length.
+            weight: f64,
+            /// Per length.
+            mass: f64,
+        } = "weight-of-another-mass",
+        /// The acceleration of gravity as it is in another unit of length.
+        #[error(
+            "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {unit}: there it is {expected}",
+            four_digits(*.given)
+        )]
+        GravityOfAnotherUnit {
+            /// The acceleration.
+            given: f64,
+            /// The unit of length in which it is that of gravity.
+            other: &'static str,
+            /// The unit of length of the scenario.
+            unit: String,
+            /// That of gravity in it.
+            expected: f64,
+        } = "gravity-of-another-unit",
+    }
+}
 
-const GRAVITY_RANGE: [f64; 2] = [9.81, 9810.0];
+/// What to do about two weights.
+const BOTH_WEIGHTS: &str =
+    "they add up: give one of them, and other loads along veins as load.distributed";
 
-/// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
-/// a turn that are multiples of this.
-const DEGREE_MULTIPLE: f64 = 15.0;
+fn turn_in_words(angle: f64) -> &'static str {
+    match angle.abs() > TAU {
+        true => "more than a turn",
+        false => "more than a right angle",
+    }
+}
 
-/// What is probably not what was intended, one short sentence each.
-pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
-    let heavy = weight_stated_twice(scenario).or_else(|| too_long(scenario));
+fn both_weights(vein: usize, weights: [f64; 2], apart: Option<f64>) -> String {
+    let ([one, other], vein) = (weights.map(four_digits), vein + 1);
+    match apart {
+        Some(angle) => format!(
+            "as weights per length of vein {vein}, {one} and {other}, they are {:.0} degrees apart",
+            angle.to_degrees()
+        ),
+        None => format!("they state the weights {one} and {other} per length of vein {vein}"),
+    }
+}
+
+fn too_long_in_words(times: f64) -> String {
+    format!(
+        "every vein is {times:.0} times longer than (A/q)^(1/3), over which it carries its weight"
+    )
+}
+
+fn four_digits(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+/// What is probably not what was intended.
+pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
+    let heavy = weight_stated_twice(scenario).or_else(|| leaf_too_long_for_weight(scenario));
     let heavy = heavy
         .or_else(|| weight_of_another_mass(scenario))
         .or_else(|| gravity_of_another_unit(scenario));
-    let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
+    let lengths = [
+        section_wider_than_vein_long(scenario),
+        heavy,
+        held_tip_out_of_reach(scenario),
+    ];
     let angles = [
         fan_angles_in_degrees(scenario),
         clamp_angle_in_degrees(scenario),
@@ -52,61 +242,64 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<String> {
 }
 
 /// The one of them that most probably keeps a leaf from coming to rest.
-pub fn obstacle(scenario: &Scenario) -> Option<String> {
+pub fn probable_obstacle_to_rest(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let slips = [
-        out_of_reach,
+        held_tip_out_of_reach,
         clamp_angle_in_degrees,
         fan_angles_in_degrees,
-        thicker_than_long,
+        section_wider_than_vein_long,
         weight_stated_twice,
         weight_of_another_mass,
     ];
     slips.into_iter().find_map(|slip| slip(scenario))
 }
 
+/// How far a held tip is from the base of a vein.
+struct TipReach {
+    vein: usize,
+    /// By which part the vein would have to stretch.
+    stretch: f64,
+    away: f64,
+    /// Length of the vein at rest.
+    length: f64,
+}
+
 /// A tip that is held farther from the base than a vein plausibly stretches.
-pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
+pub fn held_tip_out_of_reach(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
-    let of = |rod: &Rod| {
+    let reach = |(vein, rod): (usize, &Rod)| {
         let length = rod.length * rod.rest_stretch.integral(1.0);
         let away = tip.distance(rod.base_position());
-        (away / length - 1.0, away, length)
+        TipReach {
+            vein,
+            stretch: away / length - 1.0,
+            away,
+            length,
+        }
     };
-    let all = scenario.rods.iter().map(of).enumerate();
-    let (j, (stretch, away, length)) = all.min_by(|(_, a), (_, b)| b.0.total_cmp(&a.0))?;
-    (stretch > LARGEST_PLAUSIBLE_STRETCH).then(|| {
-        format!(
-            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
-            four_digits(away),
-            j + 1,
-            four_digits(length),
-            100.0 * stretch
-        )
+    let all = scenario.rods.iter().enumerate().map(reach);
+    let least = all.min_by(|a, b| b.stretch.total_cmp(&a.stretch))?;
+    (least.stretch > LARGEST_PLAUSIBLE_STRETCH).then_some(PlausibilityWarning::OutOfReach {
+        distance: least.away,
+        vein: least.vein,
+        length: least.length,
+        stretch: least.stretch,
     })
 }
 
-fn four_digits(number: f64) -> f64 {
-    format!("{number:.3e}").parse().unwrap_or(number)
-}
-
 /// Base angles of more than a right angle: a vein that grows backwards.
-fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
+fn fan_angles_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
     type Angle = fn(&Rod) -> f64;
-    let kinds: [(&str, Angle); 2] = [
+    let kinds: [(&'static str, Angle); 2] = [
         ("leaf.fan", |rod| rod.angle),
         ("leaf.elevation", |rod| rod.elevation),
     ];
-    let doubt = |key: &str, angle: f64| {
-        let turned = angle.abs() > FRAC_PI_2 * (1.0 + GRAVITY_TOLERANCE);
-        turned.then(|| {
-            format!(
-                "{key} is in radians, and {angle} is {}",
-                clamp_turn_meaning(angle)
-            )
-        })
+    let doubt = |key: &'static str, angle: f64| {
+        let turned = angle.abs() > FRAC_PI_2 * (1.0 + PLAUSIBLE.gravity_tolerance);
+        turned.then_some(PlausibilityWarning::AngleInDegrees { key, angle })
     };
     if let Some(blade) = &scenario.blade {
-        // The directions of its veins follow from this angle and its outline.
+        // The directions of a blade's veins follow from this angle and the outline.
         return doubt("leaf.elevation", blade.elevation);
     }
     kinds.into_iter().find_map(|(key, of)| {
@@ -116,46 +309,37 @@ fn fan_angles_in_degrees(scenario: &Scenario) -> Option<String> {
 }
 
 /// An angle by which a clamped tip is turned that looks like one in degrees.
-fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<String> {
+fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let clamps = scenario.held_tip.as_ref()?.clamps.as_ref()?;
     let angle = |clamp: &Clamp| {
         let whole = clamp.angle.fract() == 0.0 && clamp.angle.abs() > FRAC_PI_2;
-        whole.then_some(("angles", clamp.angle))
+        whole.then_some(("tip.angles", clamp.angle))
     };
     let twist = |clamp: &Clamp| {
-        let whole = clamp.twist % DEGREE_MULTIPLE == 0.0 && clamp.twist.abs() > TAU;
-        whole.then_some(("twist", clamp.twist))
+        let whole = clamp.twist % PLAUSIBLE.degree_multiple == 0.0 && clamp.twist.abs() > TAU;
+        whole.then_some(("tip.twist", clamp.twist))
     };
     let (key, angle) = clamps
         .iter()
         .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
-    let turned = clamp_turn_meaning(angle);
-    Some(format!("tip.{key} is in radians, and {angle} is {turned}"))
-}
-
-fn clamp_turn_meaning(angle: f64) -> &'static str {
-    match angle.abs() > TAU {
-        true => "more than a turn",
-        false => "more than a right angle",
-    }
+    Some(PlausibilityWarning::AngleInDegrees { key, angle })
 }
 
 /// A section with a side longer than its vein.
-fn thicker_than_long(scenario: &Scenario) -> Option<String> {
+fn section_wider_than_vein_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
     let mut rods = scenario.rods.iter().enumerate();
-    let (j, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
-    Some(format!(
-        "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
-        j + 1,
-        four_digits(side(j)),
-        four_digits(rod.length)
-    ))
+    let (vein, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
+    Some(PlausibilityWarning::ThickerThanLong {
+        vein,
+        side: side(vein),
+        length: rod.length,
+    })
 }
 
 /// A weight per length besides an acceleration that pulls the mass: they add up, and state either the
 /// same weight twice or two weights.
-fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
+fn weight_stated_twice(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let weights = |vein: usize| {
         let weight = scenario.weight(vein);
         let given = DVec3::from_array(weight.even);
@@ -164,30 +348,26 @@ fn weight_stated_twice(scenario: &Scenario) -> Option<String> {
         (given != DVec3::ZERO).then_some((vein, given, pulled))
     };
     let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
-    let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
+    let of_mass = pulled.length();
     let angle = given.angle_between(pulled);
-    let states = match given.distance(pulled) <= WEIGHT_TOLERANCE * pulled.length() {
-        true => format!(
-            "state the same weight, {other} per length of vein {}, which then counts twice",
-            vein + 1
-        ),
-        false if angle > WEIGHT_TOLERANCE => format!(
-            "contradict each other: as weights per length of vein {}, {one} and {other}, they are {:.0} degrees apart",
-            vein + 1,
-            angle.to_degrees()
-        ),
-        false => format!(
-            "contradict each other: they state the weights {one} and {other} per length of vein {}",
-            vein + 1
-        ),
-    };
-    Some(format!(
-        "load.gravity and load.g {states}; they add up: give one of them, and other loads along veins as load.distributed"
-    ))
+    Some(
+        match given.distance(pulled) <= PLAUSIBLE.weight_tolerance * of_mass {
+            true => PlausibilityWarning::WeightGivenTwice {
+                vein,
+                weight: of_mass,
+            },
+            false => PlausibilityWarning::WeightsContradict {
+                vein,
+                given: given.length(),
+                of_mass,
+                apart: (angle > PLAUSIBLE.weight_tolerance).then_some(angle),
+            },
+        },
+    )
 }
 
 /// A weight that is not that of the mass, if both are given, in seconds.
-fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
+fn weight_of_another_mass(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let even = (0..scenario.rods.len()).map(|vein| scenario.weight(vein).even);
     let weight = even.map(|even| DVec3::from_array(even).length());
     let weight = weight.fold(0.0, f64::max);
@@ -196,50 +376,41 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     if scenario.units.time.is_some() && !scenario.units.is_in_seconds() {
         return None;
     }
-    let known = GRAVITY_BY_LENGTH_UNIT
-        .iter()
-        .find(|(name, _)| Some(*name) == unit);
-    let [least, most] = match known {
-        Some((_, acceleration)) if given => [*acceleration; 2],
+    let [least, most] = match unit.and_then(GravityInUnit::of) {
+        Some(known) if given => [known.acceleration; 2],
         // In units without names densities alone may be dimensionless, those of a material not.
         None if unit.is_none() && scenario.radii.have_mass() => GRAVITY_RANGE,
         _ => return None,
     };
     let mass = scenario.dynamics.mean_density();
     let found = weight / mass;
-    let allowed = least / WEIGHT_CONTRADICTION_FACTOR..=most * WEIGHT_CONTRADICTION_FACTOR;
-    (weight > 0.0 && !allowed.contains(&found)).then(|| {
-        format!(
-            "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
-            four_digits(weight),
-            four_digits(mass),
-            four_digits(found)
-        )
-    })
+    let allowed = least / PLAUSIBLE.weight_contradiction..=most * PLAUSIBLE.weight_contradiction;
+    (weight > 0.0 && !allowed.contains(&found))
+        .then_some(PlausibilityWarning::WeightOfAnotherMass { weight, mass })
 }
 
 /// The acceleration of gravity as it is in another unit of length.
-fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
+fn gravity_of_another_unit(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let units = &scenario.units;
     if units.time.is_some() && !units.is_in_seconds() {
         return None;
     }
     let own = units.length.as_deref()?;
-    let (_, known) = GRAVITY_BY_LENGTH_UNIT
-        .iter()
-        .find(|(name, _)| *name == own)?;
+    let known = GravityInUnit::of(own)?.acceleration;
     let given = DVec3::from_array(scenario.g).length();
-    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < GRAVITY_TOLERANCE;
-    let of_other = |(name, acceleration): &&(&str, f64)| *name != own && is(*acceleration);
-    let (other, _) = GRAVITY_BY_LENGTH_UNIT.iter().find(of_other)?;
-    Some(format!(
-        "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
-        four_digits(given)
-    ))
+    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
+    let of_other = |unit: &&GravityInUnit| unit.length != own && is(unit.acceleration);
+    let other = GRAVITY_IN_UNITS.iter().find(of_other)?.length;
+    Some(PlausibilityWarning::GravityOfAnotherUnit {
+        given,
+        other,
+        unit: own.to_owned(),
+        expected: known,
+    })
 }
 
 /// A leaf that is too long for its weight and stiffness, if only its base is held.
-fn too_long(scenario: &Scenario) -> Option<String> {
+fn leaf_too_long_for_weight(scenario: &Scenario) -> Option<PlausibilityWarning> {
     if scenario.held_tip.is_some() {
         return None;
     }
@@ -247,9 +418,9 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     let weights = weights.map(|weight| DVec3::from_array(weight).length());
     let weight = weights.fold(0.0, f64::max);
     // 9.81 times a power of ten, for other units of length.
-    let digits = weight / 10_f64.powf((weight / GRAVITY_ACCELERATION).log10().round());
+    let digits = weight / 10_f64.powf((weight / GRAVITY_RANGE[0]).log10().round());
     let of_mass = scenario.g != [0.0; 3];
-    let slip = !of_mass && (digits / GRAVITY_ACCELERATION - 1.0).abs() < GRAVITY_TOLERANCE;
+    let slip = !of_mass && (digits / GRAVITY_RANGE[0] - 1.0).abs() < PLAUSIBLE.gravity_tolerance;
     // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
     let stiffness = |rod: &Rod| {
         let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));
@@ -268,25 +439,18 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     if weight == 0.0
         || shortest
             < if slip {
-                SUSPICIOUS_LENGTH_FACTOR
+                PLAUSIBLE.suspicious_length
             } else {
-                HANGING_LENGTH_FACTOR
+                PLAUSIBLE.hanging_length
             }
     {
         return None;
     }
-    let advice = match slip {
-        true => {
-            "load.gravity is a force per length, mass per length times 9.81, not the acceleration"
-        }
-        false if of_mass => {
-            "load.g is an acceleration: check it, the mass, the stiffnesses and the units"
-        }
-        false => "load.gravity is a force per length: check it, the stiffnesses and the units",
-    };
-    Some(format!(
-        "every vein is {shortest:.0} times longer than (A/q)^(1/3), over which it carries its weight: {advice}"
-    ))
+    let times = shortest;
+    Some(match slip {
+        true => PlausibilityWarning::AccelerationAsWeight { times },
+        false => PlausibilityWarning::TooLong { times, of_mass },
+    })
 }
 
 #[cfg(test)]
@@ -306,11 +470,18 @@ mod tests {
             );
             plausibility_warnings(&Scenario::from_toml(&text).unwrap())
         };
-        assert!(doubts("cm", 9.81)[0].contains("there it is 981"));
-        assert!(doubts("cm", 9.8)[0].contains("in m/s²"));
-        assert!(doubts("m", 981.0)[0].contains("there it is 9.81"));
+        let said = "load.g is 9.81, the acceleration of gravity in m/s², and lengths are in cm: there it is 981";
+        assert_eq!(doubts("cm", 9.81)[0].to_string(), said);
+        for (length, g, meant) in [("cm", 9.8, ("m", 981.0)), ("m", 981.0, ("cm", 9.81))] {
+            let said = &doubts(length, g)[0];
+            assert!(
+                matches!(said, PlausibilityWarning::GravityOfAnotherUnit { other, expected, .. }
+                    if (*other, *expected) == meant),
+                "{said}"
+            );
+        }
         for (length, g) in [("cm", 981.0), ("m", 9.81), ("cm", 160.0), ("ell", 9.81)] {
-            assert_eq!(doubts(length, g), Vec::<String>::new());
+            assert_eq!(doubts(length, g), []);
         }
     }
 
@@ -328,12 +499,14 @@ mod tests {
         };
         for elevation in [45.0, 2.0] {
             let said = doubts(elevation);
-            assert!(
-                said.len() == 1 && said[0].starts_with("leaf.elevation "),
-                "{said:?}"
-            );
+            let key = "leaf.elevation";
+            let wanted = PlausibilityWarning::AngleInDegrees {
+                key,
+                angle: elevation,
+            };
+            assert_eq!(said, [wanted]);
         }
-        assert_eq!(doubts(1.2), Vec::<String>::new());
+        assert_eq!(doubts(1.2), []);
     }
 
     /// A weight of another mass may keep a leaf from coming to rest.
@@ -347,7 +520,7 @@ mod tests {
                 section = {{ shape = "circle", diameter = 0.002, young = 1e9, mass_density = {density:e} }}
                 load = {{ gravity = [0.0, 0.0, -0.03] }}"#
             );
-            obstacle(&Scenario::from_toml(&text).unwrap())
+            probable_obstacle_to_rest(&Scenario::from_toml(&text).unwrap())
         };
         assert_eq!(heavy(1000.0), None);
         assert!(heavy(1e-6).is_some());

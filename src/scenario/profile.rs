@@ -1,47 +1,89 @@
-//! A quantity along a rod.
-//!
-//! A quantity in time.
-//!
-//! A rule of quadrature.
+//! Quantities along a rod, and quantities in time.
 
-use crate::scenario::blade::{BladePart, BladeProperty};
-use crate::scenario::section::{Property, Section};
+use crate::numbers::{GAUSS_LEGENDRE_RULE, sorted_distinct};
+use std::any::Any;
+use std::fmt::Debug;
+use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 
-/// Parts of the length of a blade over which an integral is a sum.
-const INTEGRATION_PANELS: usize = 32;
-
-/// A quantity along a rod: constant, linear between knots given at fractions
-/// sigma = s/L of the rod's length, or determined by its section or the blade.
+/// A quantity along a rod, over the fraction sigma = s/L of the rod's length.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// The same value everywhere; may be infinite where the quantity allows it.
     Constant(f64),
-    /// At least two knots: `at` rises strictly from 0 to 1; same length as `value`.
+    /// Linear between knots, of which there are at least two: `at` rises strictly from 0 to 1;
+    /// same length as `value`.
     Linear {
         /// Fractions of the length.
         at: Vec<f64>,
         /// Values at the knots, all finite.
         value: Vec<f64>,
     },
-    /// A property of the rod's section, where the section changes along it.
-    Section {
-        /// The section.
-        section: Arc<Section>,
-        /// The property.
-        property: Property,
-        /// A factor of the property.
-        factor: f64,
-    },
-    /// What follows from the outline and the material of a blade.
-    Blade {
-        /// The vein, or the tissue between two.
-        part: Arc<BladePart>,
-        /// The property.
-        property: BladeProperty,
-        /// A factor of the property.
-        factor: f64,
-    },
+    /// What follows from a section that changes along the rod, or from the outline and the material of
+    /// a blade.
+    Derived(DerivedProfile),
+}
+
+/// Properties along a rod that follow from one description of it, each with an index.
+pub(super) trait RodProperties:
+    Any + Debug + Send + Sync + UnwindSafe + RefUnwindSafe
+{
+    /// A property at the fraction `sigma` of the length.
+    fn value_at(&self, property: usize, sigma: f64) -> f64;
+
+    /// Three properties at the fraction `sigma` of the length, if their common part can be computed
+    /// once: the same values as one by one.
+    fn three_values_at(&self, _properties: [usize; 3], _sigma: f64) -> Option<[f64; 3]> {
+        None
+    }
+
+    /// The least and the largest value of a property along the rod.
+    fn extremes(&self, property: usize) -> [f64; 2];
+
+    /// Fractions strictly inside (0, 1) where the slope of a property may jump.
+    fn kinks(&self) -> &[f64];
+
+    /// Fractions strictly inside (0, 1) where a higher derivative may jump.
+    fn seams(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Equal parts of the length over which an integral is summed up, each by the rule of quadrature.
+    fn integration_panels(&self) -> usize {
+        1
+    }
+
+    /// Whether another description has the same type and content.
+    fn is_equal(&self, other: &dyn Any) -> bool;
+}
+
+/// A property of a section or a blade along a rod, times a factor.
+#[derive(Clone, Debug)]
+pub struct DerivedProfile {
+    source: Arc<dyn RodProperties>,
+    property: usize,
+    factor: f64,
+}
+
+impl DerivedProfile {
+    pub(super) fn new(source: Arc<dyn RodProperties>, property: usize, factor: f64) -> Self {
+        DerivedProfile {
+            source,
+            property,
+            factor,
+        }
+    }
+
+    fn at(&self, sigma: f64) -> f64 {
+        self.factor * self.source.value_at(self.property, sigma)
+    }
+}
+
+impl PartialEq for DerivedProfile {
+    fn eq(&self, other: &Self) -> bool {
+        let same = (self.property, self.factor) == (other.property, other.factor);
+        same && self.source.is_equal(&*other.source)
+    }
 }
 
 impl Profile {
@@ -59,43 +101,27 @@ impl Profile {
                 }
                 value[right - 1] + t.max(0.0) * (value[right] - value[right - 1])
             }
-            Profile::Section {
-                section,
-                property,
-                factor,
-            } => factor * section.property_value(*property, sigma),
-            Profile::Blade {
-                part,
-                property,
-                factor,
-            } => factor * part.property_value(*property, sigma),
+            Profile::Derived(derived) => derived.at(sigma),
         }
     }
 
-    /// The values of three at once: what they have in common is computed once.
+    /// The values of three profiles at the fraction `sigma`: what they have in common is computed once.
     pub fn values_of_three(profiles: &[Profile; 3], sigma: f64) -> [f64; 3] {
         if let [
-            Profile::Blade {
-                part,
-                property: first,
-                factor,
-            },
-            others @ ..,
+            Profile::Derived(first),
+            Profile::Derived(second),
+            Profile::Derived(third),
         ] = profiles
         {
-            let alike = |other: &Profile| match other {
-                Profile::Blade {
-                    part: its,
-                    property,
-                    factor,
-                } if Arc::ptr_eq(part, its) => Some((*property, *factor)),
-                _ => None,
-            };
-            if let [Some(second), Some(third)] = others.each_ref().map(alike)
-                && let Some(values) = part.three([*first, second.0, third.0], sigma)
+            let all = [first, second, third];
+            if all
+                .iter()
+                .all(|one| Arc::ptr_eq(&one.source, &first.source))
             {
-                let factors = [*factor, second.1, third.1];
-                return [0, 1, 2].map(|k| factors[k] * values[k]);
+                let properties = all.map(|one| one.property);
+                if let Some(values) = first.source.three_values_at(properties, sigma) {
+                    return [0, 1, 2].map(|k| all[k].factor * values[k]);
+                }
             }
         }
         profiles.each_ref().map(|profile| profile.at(sigma))
@@ -111,14 +137,16 @@ impl Profile {
                 let part = |w: &[f64]| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1]));
                 knots.windows(2).map(part).sum()
             }
-            Profile::Section { .. } | Profile::Blade { .. } => {
-                let inside = self.kinks().iter().copied().chain(self.panels());
+            Profile::Derived(derived) => {
+                let count = derived.source.integration_panels();
+                let panels = (1..count).map(|k| k as f64 / count as f64);
+                let inside = self.kinks().iter().copied().chain(panels);
                 let inside = inside.filter(|&knot| knot < sigma).chain([0.0, sigma]);
                 let part = |w: &[f64]| -> f64 {
                     let width = w[1] - w[0];
                     let points = GAUSS_LEGENDRE_RULE.iter();
                     points
-                        .map(|(x, weight)| width * weight * self.at(w[0] + x * width))
+                        .map(|point| width * point.weight * self.at(w[0] + point.at * width))
                         .sum()
                 };
                 sorted_distinct(inside).windows(2).map(part).sum()
@@ -126,22 +154,12 @@ impl Profile {
         }
     }
 
-    /// Fractions at which an integral is divided, besides kinks.
-    fn panels(&self) -> impl Iterator<Item = f64> + use<> {
-        let count = match self {
-            Profile::Blade { .. } => INTEGRATION_PANELS,
-            _ => 1,
-        };
-        (1..count).map(move |k| k as f64 / count as f64)
-    }
-
     /// Fractions strictly inside (0, 1) where the slope may jump.
     pub fn kinks(&self) -> &[f64] {
         match self {
             Profile::Constant(_) => &[],
             Profile::Linear { at, .. } => &at[1..at.len() - 1],
-            Profile::Section { section, .. } => section.kinks(),
-            Profile::Blade { part, .. } => part.kinks(),
+            Profile::Derived(derived) => derived.source.kinks(),
         }
     }
 
@@ -149,7 +167,7 @@ impl Profile {
     /// order stops there.
     pub(crate) fn seams(&self) -> &[f64] {
         match self {
-            Profile::Blade { part, .. } => part.outline_points(),
+            Profile::Derived(derived) => derived.source.seams(),
             _ => &[],
         }
     }
@@ -164,7 +182,7 @@ impl Profile {
         self.fold_extremes(f64::INFINITY, f64::min)
     }
 
-    /// The same profile times a factor.
+    /// The profile times a factor.
     pub fn scaled(&self, factor: f64) -> Profile {
         match self {
             Profile::Constant(value) => Profile::Constant(factor * value),
@@ -172,58 +190,28 @@ impl Profile {
                 at: at.clone(),
                 value: value.iter().map(|v| factor * v).collect(),
             },
-            Profile::Section {
-                section,
-                property,
-                factor: own,
-            } => Profile::Section {
-                section: section.clone(),
-                property: *property,
-                factor: factor * own,
-            },
-            Profile::Blade {
-                part,
-                property,
-                factor: own,
-            } => Profile::Blade {
-                part: part.clone(),
-                property: *property,
-                factor: factor * own,
-            },
+            Profile::Derived(derived) => Profile::Derived(DerivedProfile {
+                factor: factor * derived.factor,
+                ..derived.clone()
+            }),
         }
     }
 
     /// Folds values that include the extremes.
     fn fold_extremes(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
-            Profile::Section {
-                section,
-                property,
-                factor,
-            } => {
-                let values = section.extremes(*property).map(|value| factor * value);
-                values.into_iter().fold(start, with)
-            }
-            Profile::Blade {
-                part,
-                property,
-                factor,
-            } => {
-                let values = part.extremes(*property).map(|value| factor * value);
-                values.into_iter().fold(start, with)
-            }
             Profile::Constant(value) => with(start, *value),
             Profile::Linear { value, .. } => value.iter().copied().fold(start, with),
+            Profile::Derived(DerivedProfile {
+                source,
+                property,
+                factor,
+            }) => {
+                let values = source.extremes(*property).map(|value| factor * value);
+                values.into_iter().fold(start, with)
+            }
         }
     }
-}
-
-/// Numbers in ascending order, each once.
-pub(crate) fn sorted_distinct(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut numbers: Vec<f64> = numbers.into_iter().collect();
-    numbers.sort_by(f64::total_cmp);
-    numbers.dedup();
-    numbers
 }
 
 /// A quantity in time: linear between given times, constant before the first
@@ -267,68 +255,91 @@ impl<T> Schedule<T> {
         pulse.map(|k| self.at[k])
     }
 
-    /// The linear pieces of an interval: the middle of each, and its part of the interval.
-    fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+    /// The linear pieces of the schedule between two times.
+    fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = SchedulePiece> {
         let first = self.at.partition_point(|&known| known <= from);
         let last = self.at.partition_point(|&known| known < to).max(first);
         let inner = || self.at[first..last].iter().copied();
         let ends = inner().chain([to]);
-        [from]
-            .into_iter()
-            .chain(inner())
-            .zip(ends)
-            .map(move |(a, b)| {
-                let part = if to > from {
-                    (b - a) / (to - from)
-                } else {
-                    1.0
-                };
-                (0.5 * (a + b), part)
-            })
+        let begins = [from].into_iter().chain(inner());
+        begins.zip(ends).map(move |(a, b)| SchedulePiece {
+            middle: 0.5 * (a + b),
+            share: if to > from {
+                (b - a) / (to - from)
+            } else {
+                1.0
+            },
+        })
     }
 
-    /// The values on both sides of `time`, and the fraction of the step between them.
-    fn bracketing_values(&self, time: f64) -> (&T, &T, f64) {
+    /// The values on both sides of `time`.
+    fn bracket(&self, time: f64) -> ScheduleBracket<'_, T> {
         let last = self.at.len() - 1;
+        let constant = |value| ScheduleBracket {
+            from: value,
+            to: value,
+            fraction: 0.0,
+        };
         match self.at.partition_point(|&known| known <= time) {
-            0 => (&self.value[0], &self.value[0], 0.0),
-            after if after > last => (&self.value[last], &self.value[last], 0.0),
+            0 => constant(&self.value[0]),
+            after if after > last => constant(&self.value[last]),
             after => {
                 let (from, to) = (self.at[after - 1], self.at[after]);
-                let fraction = (time - from) / (to - from);
-                (&self.value[after - 1], &self.value[after], fraction)
+                ScheduleBracket {
+                    from: &self.value[after - 1],
+                    to: &self.value[after],
+                    fraction: (time - from) / (to - from),
+                }
             }
         }
     }
 }
 
+/// A linear piece of a schedule within an interval of time.
+struct SchedulePiece {
+    /// The time in the middle of the piece.
+    middle: f64,
+    /// Its duration over that of the interval.
+    share: f64,
+}
+
+/// The values of a schedule on both sides of a time.
+struct ScheduleBracket<'s, T> {
+    from: &'s T,
+    to: &'s T,
+    /// The fraction of the step from one to the other that has passed.
+    fraction: f64,
+}
+
 impl Schedule<f64> {
     /// The value at `time`.
     pub fn at(&self, time: f64) -> f64 {
-        let (from, to, fraction) = self.bracketing_values(time);
+        let ScheduleBracket { from, to, fraction } = self.bracket(time);
         interpolate_linearly(*from, *to, fraction)
     }
 
     /// The mean over an interval, exact however short the pulses in it.
     pub fn mean(&self, from: f64, to: f64) -> f64 {
         let pieces = self.pieces(from, to);
-        pieces.map(|(middle, part)| part * self.at(middle)).sum()
+        pieces
+            .map(|piece| piece.share * self.at(piece.middle))
+            .sum()
     }
 }
 
 impl Schedule<[f64; 3]> {
     /// The value at `time`.
     pub fn at(&self, time: f64) -> [f64; 3] {
-        let (from, to, fraction) = self.bracketing_values(time);
+        let ScheduleBracket { from, to, fraction } = self.bracket(time);
         std::array::from_fn(|axis| interpolate_linearly(from[axis], to[axis], fraction))
     }
 
     /// The mean over an interval, exact however short the pulses in it.
     pub fn mean(&self, from: f64, to: f64) -> [f64; 3] {
         let pieces = self.pieces(from, to);
-        pieces.fold([0.0; 3], |sum, (middle, part)| {
-            let value = self.at(middle);
-            std::array::from_fn(|axis| sum[axis] + part * value[axis])
+        pieces.fold([0.0; 3], |sum, piece| {
+            let value = self.at(piece.middle);
+            std::array::from_fn(|axis| sum[axis] + piece.share * value[axis])
         })
     }
 }
@@ -336,15 +347,6 @@ impl Schedule<[f64; 3]> {
 fn interpolate_linearly(from: f64, to: f64, fraction: f64) -> f64 {
     from + fraction * (to - from)
 }
-
-/// Abscissae and weights of the Gauss-Legendre rule of five points on (0, 1).
-pub(super) const GAUSS_LEGENDRE_RULE: [(f64, f64); 5] = [
-    (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
-    (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
-    (0.5, 0.284_444_444_444_444_44),
-    (0.769_234_655_052_841_6, 0.239_314_335_249_683_23),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-];
 
 #[cfg(test)]
 mod tests {
@@ -381,11 +383,6 @@ mod tests {
         // A small value at a knot is not lost next to large ones.
         assert_eq!(linear([0.0, 0.5, 1.0], [1e9, 1e-9, 1e9]).at(0.5), 1e-9);
     }
-}
-
-#[cfg(test)]
-mod schedule_tests {
-    use super::*;
 
     fn schedule<T: Copy>(at: &[f64], value: &[T]) -> Schedule<T> {
         let (at, value) = (at.to_vec(), value.to_vec());

@@ -11,31 +11,31 @@
 //! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
 //! ```
 //!
-//! Conditions at the bases, which clamps or hinges hold.
+//! Conditions hold at the bases, which clamps or hinges hold, and at the tips. Besides common loads
+//! veins have their own: weights, loads along them, and loads on points, by which n and m jump.
 //!
-//! Loads that veins have of their own: weights, loads along them, and on points.
-//!
-//! The leaf whose rest shape is known: stretched circular arcs from the fan at
-//! the base to one common tip. Free rods have their own rest shapes.
-//!
-//! The numbers that describe a leaf at one sigma.
+//! The equations contain a path of leaves from one whose solution is known, stretched circular arcs
+//! from the fan at the base to a common tip without loads, to the scenario's.
 
 #[cfg(test)]
 mod tests;
 
+use crate::rod::Wrench;
+use crate::rotation::Pose;
 use crate::run::Limit;
 use crate::scenario::{Profile, Scenario, SupportKind, ZeroEnergyRotation, longest};
-use crate::shooting::sensitivities::{TissueEnergy, TissueTangent};
+use crate::shape::NodeState;
+use crate::shooting::tissue::{TissueEnergy, TissueTangent};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
-/// A flat state holds [`STATE`] numbers per rod and, last, the potential
+/// A flat state holds [`STATE_SIZE`] numbers per rod and, last, the potential
 /// energy of everything from the base up to sigma.
 #[derive(Clone, Debug)]
 pub struct BoundaryValueProblem<'a> {
-    pub(super) scenario: &'a Scenario,
+    scenario: &'a Scenario,
     /// Unit of length: the longest rod.
     pub length_unit: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
@@ -44,12 +44,12 @@ pub struct BoundaryValueProblem<'a> {
     coupling: Vec<DVec3>,
     tissue: Option<TissueEnergy<'a>>,
     /// Whether veins have loads of their own.
-    pub(super) own_loads: bool,
+    own_loads: bool,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
-    /// Positions and rotations at which the tips of the rods are held.
-    held: Vec<(DVec3, DQuat)>,
+    /// Where the tips of the rods are held; empty if they are not.
+    held_tips: Vec<Pose>,
     /// Whether hinges hold the bases.
     hinged: bool,
     /// The smallest couple stiffness along each rod.
@@ -67,11 +67,11 @@ pub struct BoundaryValueProblem<'a> {
     /// Homotopy parameter between 0, rods with their largest stiffness in every direction, and 1,
     /// the rods of the scenario.
     pub softening_lambda: f64,
-    /// Time limit of their solution.
+    /// Time limit of the solution.
     pub limit: Limit,
 }
 
-/// Fractions of the length closer to each other than this are the same.
+/// Fractions of the length that are closer to each other than this are the same station.
 pub(super) const FRACTION_TOLERANCE: f64 = 1e-11;
 
 /// Constraint on the tips.
@@ -132,7 +132,7 @@ impl<'a> BoundaryValueProblem<'a> {
             .map(|j| {
                 let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
                 let pull: DVec3 = gaps.filter(|gap| *gap < coupling.len()).map(pull).sum();
-                // Neighbours that move in the opposite direction double the pull; against
+                // Neighbors that move in the opposite direction double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
                 let stiffness = least(&rods[j].force_stiffness) / force;
@@ -153,12 +153,14 @@ impl<'a> BoundaryValueProblem<'a> {
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
-            held: (0..rods.len())
+            held_tips: (0..rods.len())
                 .filter_map(|j| {
                     let held = scenario.held_tip.as_ref()?;
                     let clamp = held.clamps.as_ref().map(|clamps| clamps[j].rotation());
-                    let position = DVec3::from_array(held.position) / length;
-                    Some((position, clamp.unwrap_or_default()))
+                    Some(Pose {
+                        position: DVec3::from_array(held.position) / length,
+                        rotation: clamp.unwrap_or_default(),
+                    })
                 })
                 .collect(),
             hinged: scenario.base_held == SupportKind::Pinned,
@@ -205,16 +207,16 @@ impl<'a> BoundaryValueProblem<'a> {
         self.coupling[g] != DVec3::ZERO || self.tissue.is_some()
     }
 
-    /// Whether tissue ties neighbouring rods.
+    /// Whether tissue ties neighboring rods.
     pub fn has_tissue(&self) -> bool {
         self.tissue.is_some()
     }
 
-    /// The linearised loads by the tissue of gap `g`, if there is any.
+    /// The linearized loads by the tissue of gap `g`, if there is any.
     pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<TissueTangent> {
         let tissue = self.tissue.as_ref()?;
-        let rods = [g, g + 1].map(|j| RodState::from_flat_state(y, j));
-        let TissueTangent(matrix) = tissue.tangent(g, sigma, rods.each_ref());
+        let rods = [g, g + 1].map(|j| RodState::from_flat_state(y, j).pose());
+        let TissueTangent(matrix) = tissue.tangent(g, sigma, rods);
         Some(TissueTangent(matrix * self.load_lambda))
     }
 
@@ -273,21 +275,28 @@ impl<'a> BoundaryValueProblem<'a> {
         }
     }
 
-    /// Strains (v, u) of rod `j` under forces and moments along its directors.
-    pub fn strains(&self, j: usize, sigma: f64, n: DVec3, m: DVec3) -> (DVec3, DVec3) {
+    /// Rod `j` at `sigma` in the units of the scenario, from a flat state.
+    pub fn node_state(&self, j: usize, sigma: f64, y: &[f64]) -> NodeState {
+        let rod = RodState::from_flat_state(y, j);
+        let directors = rod.q.conjugate();
+        let (n, m) = (directors * rod.n, directors * rod.m);
         let law = self.material(j, sigma);
-        (
-            law.rest_strain + law.compliance * n,
-            law.rest_curvature + law.flexibility * m,
-        )
+        NodeState {
+            position: rod.r * self.length_unit,
+            rotation: rod.q,
+            v: law.rest_strain + law.compliance * n,
+            u: (law.rest_curvature + law.flexibility * m) / self.length_unit,
+            n: n * self.force_unit,
+            m: m * (self.force_unit * self.length_unit),
+        }
     }
 
     /// Slopes of the flat state `y` at `sigma`.
     pub fn write_slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
         let mut energy = 0.0;
         let mut pull = DVec3::ZERO;
-        // Force and moment by the tissue of the gap before the rod.
-        let mut before = [DVec3::ZERO; 2];
+        // What the tissue of the gap before the rod exerts on it.
+        let mut before = Wrench::default();
         for j in 0..self.rods() {
             let rod = RodState::from_flat_state(y, j);
             let (law, length) = (self.material(j, sigma), self.lengths[j]);
@@ -306,13 +315,21 @@ impl<'a> BoundaryValueProblem<'a> {
                 energy += 0.5 * gap.dot(pull);
                 load += pull;
             }
-            let [mut force, mut moment] = std::mem::take(&mut before);
+            let Wrench {
+                mut force,
+                mut moment,
+            } = std::mem::take(&mut before);
             if let Some(tissue) = self.tissue.as_ref().filter(|_| j + 1 < self.rods()) {
                 let next = RodState::from_flat_state(y, j + 1);
-                let (own, loads) = tissue.energy_and_loads(j, sigma, [&rod, &next]);
-                let [here, there] = loads.map(|load| load.map(|it| self.load_lambda * it));
-                energy += self.load_lambda * own;
-                (force, moment, before) = (force + here[0], moment + here[1], there);
+                let loads = tissue.loads(j, sigma, [rod.pose(), next.pose()]);
+                let [here, there] = loads.on_rods.map(|load| Wrench {
+                    force: self.load_lambda * load.force,
+                    moment: self.load_lambda * load.moment,
+                });
+                energy += self.load_lambda * loads.energy;
+                force += here.force;
+                moment += here.moment;
+                before = there;
             }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
             RodState {
@@ -358,7 +375,7 @@ impl<'a> BoundaryValueProblem<'a> {
         let forces = rods
             .iter()
             .enumerate()
-            .map(|(j, rod)| rod.n - self.tip_point_load(j)[0]);
+            .map(|(j, rod)| rod.n - self.tip_point_load(j).force);
         let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
@@ -366,13 +383,17 @@ impl<'a> BoundaryValueProblem<'a> {
                     (TipConstraint::Joint, 0) => force - self.load_lambda * self.tip_force,
                     (TipConstraint::Joint, _) => rod.r - rods[0].r,
                     (TipConstraint::Free, _) => {
-                        rod.n - self.load_lambda * self.tip_force - self.tip_point_load(j)[0]
+                        rod.n - self.load_lambda * self.tip_force - self.tip_point_load(j).force
                     }
-                    (TipConstraint::Pinned | TipConstraint::Clamped, _) => rod.r - self.held[j].0,
+                    (TipConstraint::Pinned | TipConstraint::Clamped, _) => {
+                        rod.r - self.held_tips[j].position
+                    }
                 };
                 let second = match self.tip_constraint() {
-                    TipConstraint::Clamped => rotation_difference(rod.q, self.held[j].1),
-                    _ => rod.m - self.load_lambda * self.tip_moment - self.tip_point_load(j)[1],
+                    TipConstraint::Clamped => {
+                        rotation_difference(rod.q, self.held_tips[j].rotation)
+                    }
+                    _ => rod.m - self.load_lambda * self.tip_moment - self.tip_point_load(j).moment,
                 };
                 [first.to_array(), second.to_array()].concat()
             })
@@ -396,7 +417,7 @@ impl<'a> BoundaryValueProblem<'a> {
             .sum();
         let points = self
             .point_loads_at(1.0)
-            .map(|(j, [force, _])| force.dot(RodState::from_flat_state(y, j).r));
+            .map(|(j, load)| load.force.dot(RodState::from_flat_state(y, j).r));
         -self.load_lambda * work - points.sum::<f64>()
     }
 }
@@ -454,7 +475,7 @@ impl BoundaryValueProblem<'_> {
 impl BoundaryValueProblem<'_> {
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is
     /// distributed along it.
-    pub(super) fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+    fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
         if !self.own_loads {
             return DVec3::ZERO;
         }
@@ -466,42 +487,45 @@ impl BoundaryValueProblem<'_> {
         (weight + along) * (self.length_unit / self.force_unit)
     }
 
-    /// Passes the loads on points at `sigma`, by which forces and moments jump, on the way to the tip; false if
-    /// there are none.
+    /// Changes a state by the loads on points at `sigma`, which the way to the tip passes there; false
+    /// if there are none.
     pub fn apply_point_loads(&self, sigma: f64, y: &mut [f64]) -> bool {
         let mut any = false;
-        for (j, [force, moment]) in self.point_loads_at(sigma) {
+        for (j, load) in self.point_loads_at(sigma) {
             let mut rod = RodState::from_flat_state(y, j);
-            rod.n -= force;
-            rod.m -= moment;
-            y[STATE_SIZE * self.rods()] -= force.dot(rod.r);
+            rod.n -= load.force;
+            rod.m -= load.moment;
+            y[STATE_SIZE * self.rods()] -= load.force.dot(rod.r);
             rod.write_flat_state(y, j);
             any = true;
         }
         any
     }
 
-    /// Rods, forces and moments of the loads on points at `sigma`.
-    pub(super) fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = (usize, [DVec3; 2])> {
+    /// The loads on points at `sigma`, each with its rod.
+    fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = (usize, Wrench)> {
         let points = self
             .scenario
             .points
             .iter()
             .filter(move |point| (point.at - sigma).abs() < FRACTION_TOLERANCE);
         let unit = self.load_lambda / self.force_unit;
-        let units = [unit, unit / self.length_unit];
+        let moment_unit = unit / self.length_unit;
         points.map(move |point| {
-            let [force, moment] = [self.scenario.force_on(point), point.moment];
-            let loads = [0, 1].map(|k| units[k] * DVec3::from_array([force, moment][k]));
-            (point.vein, loads)
+            let load = Wrench {
+                force: unit * DVec3::from_array(self.scenario.force_on(point)),
+                moment: moment_unit * DVec3::from_array(point.moment),
+            };
+            (point.vein, load)
         })
     }
 
-    /// The force and the moment on the tip of rod `j` by loads on points.
-    pub(super) fn tip_point_load(&self, j: usize) -> [DVec3; 2] {
+    /// What loads on points exert on the tip of rod `j`.
+    fn tip_point_load(&self, j: usize) -> Wrench {
         let here = self.point_loads_at(1.0).filter(|(rod, _)| *rod == j);
-        here.fold([DVec3::ZERO; 2], |sum, (_, [force, moment])| {
-            [sum[0] + force, sum[1] + moment]
+        here.fold(Wrench::default(), |sum, (_, load)| Wrench {
+            force: sum.force + load.force,
+            moment: sum.moment + load.moment,
         })
     }
 }
@@ -510,16 +534,16 @@ impl BoundaryValueProblem<'_> {
 /// nearly a full circle.
 const SHORTEST_CHORD: f64 = 0.05;
 
-/// Rest shape of one rod of that leaf: stretch v1, and bend about d3.
+/// Rest shape of one rod of the leaf of arcs: stretch v1, and bend about d3.
 #[derive(Clone, Copy, Debug)]
-pub struct RestArc {
-    pub stretch: f64,
-    pub bend: f64,
+struct RestArc {
+    stretch: f64,
+    bend: f64,
 }
 
-/// One arc per rod, for these dimensionless lengths without growth; none
-/// for free rods.
-pub fn rest_arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<RestArc> {
+/// The leaf of arcs with a common tip: one arc per rod, for these dimensionless lengths without
+/// growth; none for free rods, which keep their own rest shapes.
+fn rest_arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<RestArc> {
     if !scenario.joined || lengths.len() == 1 {
         return Vec::new();
     }
@@ -553,7 +577,7 @@ pub fn rest_arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<RestArc> {
 /// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
 pub const STATE_SIZE: usize = 13;
 
-/// Numbers that describe its perturbation: displacement, spatial rotation,
+/// Numbers that describe the perturbation of one rod at one sigma: displacement, spatial rotation,
 /// and the changes of n and m.
 pub const PERTURBATION_SIZE: usize = 12;
 
@@ -583,6 +607,16 @@ impl RodState {
         }
     }
 
+    /// Position and directors.
+    #[inline]
+    pub fn pose(&self) -> Pose {
+        Pose {
+            position: self.r,
+            rotation: self.q,
+        }
+    }
+
+    /// Writes the numbers of rod `j` into a flat state.
     #[inline]
     pub fn write_flat_state(&self, y: &mut [f64], j: usize) {
         let y = &mut y[STATE_SIZE * j..STATE_SIZE * (j + 1)];
@@ -596,16 +630,16 @@ impl RodState {
 /// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SlopeDerivatives {
-    /// Of r' with respect to the rotation.
+    /// Derivative of r' with respect to the rotation.
     pub r_theta: DMat3,
-    /// Of r' with respect to n.
+    /// Derivative of r' with respect to n.
     pub r_n: DMat3,
-    /// Of the rotation rate with respect to the rotation.
+    /// Derivative of the rotation rate with respect to the rotation.
     pub theta_theta: DMat3,
-    /// Of the rotation rate with respect to m.
+    /// Derivative of the rotation rate with respect to m.
     pub theta_m: DMat3,
-    /// Of m' with respect to the rotation.
+    /// Derivative of m' with respect to the rotation.
     pub m_theta: DMat3,
-    /// Of m' with respect to n.
+    /// Derivative of m' with respect to n.
     pub m_n: DMat3,
 }

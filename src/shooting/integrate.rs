@@ -1,34 +1,48 @@
-//! Initial-value problems by the method DOP853 with step control.
-//!
-//! A leaf along sigma: the start or the result of a boundary-value
-//! solution.
+//! Initial-value problems of a leaf by the method DOP853 with step control, and its trajectory along
+//! sigma: flat states at stations, from which a boundary-value solution starts, or which it results in.
 
 use crate::natural::{
     ERROR_WEIGHTS_3, ERROR_WEIGHTS_5, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES,
 };
 use crate::numbers::{larger, largest};
-use crate::shape::{NodeState, RodShape};
+use crate::shape::RodShape;
 use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE, RodState, STATE_SIZE};
 use glam::DVec3;
 
-/// Largest number of steps of an initial-value problem.
-const MAX_STEPS: usize = 20_000;
+/// What bounds the integration of an initial-value problem.
+struct IntegrationLimits {
+    /// Largest number of steps. Doubled, a problem that does not end takes twice as long.
+    most_steps: usize,
+    /// Solutions with a larger dimensionless number count as unbounded.
+    largest_state: f64,
+    /// Longest step at [`IntegrationLimits::reference_tolerance`], in units of the length over which a
+    /// perturbation grows or turns. Where the leaf is straight its own error would allow any step, and
+    /// the sensitivities, integrated with the same steps, would be inaccurate: doubled, their error is
+    /// 256 times as large. It grows with the power 1/8 of the tolerance, since otherwise solutions at
+    /// two tolerances would share their errors.
+    longest_step: f64,
+    /// Tolerance at which that is the longest step.
+    reference_tolerance: f64,
+    /// Longest step at any tolerance, in the same units.
+    longest_loose_step: f64,
+    /// Shortest step as a fraction of the length: shorter ones are rounding.
+    shortest_step: f64,
+}
 
-/// Solutions larger than this count as unbounded.
-const MAX_STATE: f64 = 1e9;
-
-/// Longest step at the tolerance 1e-13, in units of the length over which a
-/// perturbation grows or turns. Where the leaf is straight its own error would
-/// allow any step, and the sensitivities, integrated with the same steps, would
-/// be inaccurate. Like all steps it grows with the tolerance, since otherwise solutions at
-/// two tolerances would share their errors, but not beyond the last number.
-const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
+const LIMITS: IntegrationLimits = IntegrationLimits {
+    most_steps: 20_000,
+    largest_state: 1e9,
+    longest_step: 0.4,
+    reference_tolerance: 1e-13,
+    longest_loose_step: 2.25,
+    shortest_step: 1e-13,
+};
 
 /// The solution of an initial-value problem could not be continued beyond
 /// `sigma`: it grows without bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnboundedSolution {
-    /// How far it went.
+    /// Fraction of the length that it reached.
     pub sigma: f64,
 }
 
@@ -38,7 +52,7 @@ pub struct InitialValueIntegrator<'e, 'a> {
     tolerance: f64,
     pub sigma: f64,
     pub y: Vec<f64>,
-    /// Where it passed the last loads on points.
+    /// Sigma of the last loads on points that were passed.
     last_point_load: f64,
     /// Proposed size of the next step.
     step: f64,
@@ -92,8 +106,9 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         let rate = (0..self.equations.rods())
             .map(|j| self.equations.perturbation_rate(j, force(j)))
             .fold(1.0, f64::max);
-        let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
-        longest.min(LONGEST_STEP[1]) / rate
+        let looser = self.tolerance / LIMITS.reference_tolerance;
+        let longest = LIMITS.longest_step * looser.powf(0.125);
+        longest.min(LIMITS.longest_loose_step) / rate
     }
 
     /// Integrates to `end`; `after_step` is called after each step.
@@ -129,13 +144,13 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
             let last = step > 0.99 * left;
             let h = if last { left } else { step };
             // Two stops may differ by a rounding error: that is not a failure of step control.
-            if self.steps > MAX_STEPS || (!last && h < 1e-13) {
+            if self.steps > LIMITS.most_steps || (!last && h < LIMITS.shortest_step) {
                 return Err(failed);
             }
             self.attempt(h);
             let error = self.error(h);
             let mut state = self.next[..self.next.len() - 1].iter();
-            if !state.all(|value| value.abs() < MAX_STATE) || !error.is_finite() {
+            if !state.all(|value| value.abs() < LIMITS.largest_state) || !error.is_finite() {
                 self.step = 0.1 * h;
                 continue;
             }
@@ -183,7 +198,7 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         fifth * fifth / (fifth * fifth + 0.01 * third * third).sqrt() / self.tolerance
     }
 
-    /// Accepts the step and normalises the quaternions.
+    /// Accepts the step and normalizes the quaternions.
     fn accept(&mut self) {
         std::mem::swap(&mut self.y, &mut self.next);
         for j in 0..self.equations.rods() {
@@ -229,7 +244,7 @@ fn norm(
             RodState::from_flat_state(next, j),
         );
         let soft = equations.softest_couple_stiffness[j];
-        let unit = |a: glam::DVec3, b: glam::DVec3| soft + a.length().max(b.length());
+        let unit = |a: DVec3, b: DVec3| soft + a.length().max(b.length());
         let (force, moment) = (unit(a.n, b.n), unit(a.m, b.m));
         let sum: f64 = (0..STATE_SIZE)
             .map(|i| {
@@ -256,6 +271,13 @@ pub struct ShootingNodes {
     pub states: Vec<Vec<f64>>,
 }
 
+/// Sizes of the force and of the moment in a rod, dimensionless.
+#[derive(Clone, Copy, Debug)]
+pub struct ResultantSizes {
+    pub force: f64,
+    pub moment: f64,
+}
+
 /// Flat states at some sigmas, with cubic Hermite interpolation between them.
 #[derive(Clone, Debug)]
 pub struct LeafTrajectory {
@@ -265,7 +287,7 @@ pub struct LeafTrajectory {
 }
 
 impl LeafTrajectory {
-    /// From states of the equations in their present form.
+    /// The trajectory through states of the equations in their present form.
     pub fn new(
         equations: &BoundaryValueProblem,
         sigma: Vec<f64>,
@@ -297,7 +319,7 @@ impl LeafTrajectory {
         }
     }
 
-    /// From the shape of a leaf in the units of the scenario.
+    /// The trajectory of a leaf whose shape is given in the units of the scenario.
     pub fn from_leaf_shape(
         equations: &BoundaryValueProblem,
         stations: &[f64],
@@ -387,11 +409,12 @@ impl LeafTrajectory {
         &self.states[self.states.len() - 1]
     }
 
-    /// The last of its stations that is not beyond `sigma`.
+    /// The last station that is not beyond `sigma`.
     pub fn last_station(&self, sigma: f64) -> Option<f64> {
         self.sigma.iter().copied().rfind(|s| *s <= sigma)
     }
 
+    /// The flat state at `sigma`, between stations by cubic interpolation.
     pub fn interpolate_state(&self, sigma: f64) -> Vec<f64> {
         let last = self.sigma.len() - 1;
         let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);
@@ -423,11 +446,18 @@ impl LeafTrajectory {
         LeafTrajectory::new(equations, self.sigma.clone(), states)
     }
 
-    /// Largest force and moment of rod `j`.
-    pub fn largest_force_and_moment(&self, j: usize) -> (f64, f64) {
-        self.states.iter().fold((0.0, 0.0), |(n, m), y| {
+    /// The largest force and moment that rod `j` carries.
+    pub fn largest_resultants(&self, j: usize) -> ResultantSizes {
+        let start = ResultantSizes {
+            force: 0.0,
+            moment: 0.0,
+        };
+        self.states.iter().fold(start, |largest, y| {
             let rod = RodState::from_flat_state(y, j);
-            (larger(n, rod.n.length()), larger(m, rod.m.length()))
+            ResultantSizes {
+                force: larger(largest.force, rod.n.length()),
+                moment: larger(largest.moment, rod.m.length()),
+            }
         })
     }
 
@@ -441,31 +471,16 @@ impl LeafTrajectory {
         largest((0..equations.rods()).map(turn))
     }
 
-    /// The shape in the units of the scenario, at its stations.
+    /// The shape in the units of the scenario, at the trajectory's stations.
     pub fn shape(&self, equations: &BoundaryValueProblem) -> Vec<RodShape> {
         (0..equations.rods())
             .map(|j| RodShape {
                 length: equations.lengths[j] * equations.length_unit,
                 nodes: (self.sigma.iter().zip(&self.states))
-                    .map(|(&sigma, y)| node_state(equations, j, sigma, y))
+                    .map(|(&sigma, y)| equations.node_state(j, sigma, y))
                     .collect(),
             })
             .collect()
-    }
-}
-
-fn node_state(equations: &BoundaryValueProblem, j: usize, sigma: f64, y: &[f64]) -> NodeState {
-    let rod = RodState::from_flat_state(y, j);
-    let directors = rod.q.conjugate();
-    let (n, m) = (directors * rod.n, directors * rod.m);
-    let (v, u) = equations.strains(j, sigma, n, m);
-    NodeState {
-        position: rod.r * equations.length_unit,
-        rotation: rod.q,
-        v,
-        u: u / equations.length_unit,
-        n: n * equations.force_unit,
-        m: m * (equations.force_unit * equations.length_unit),
     }
 }
 

@@ -1,10 +1,8 @@
-//! Shooting over intervals: the initial-value problems between the nodes of
-//! multiple shooting, their defects and their sensitivities.
-//!
-//! The linear equations of multiple shooting, condensed to the tip.
+//! The intervals of multiple shooting: the initial-value problems between its nodes, their defects and
+//! sensitivities, and the linear equations of all intervals, condensed to the tip.
 //!
 //! The base leaves 6 N perturbations free. They are propagated through the
-//! intervals and re-orthonormalised before they all grow into the few directions of
+//! intervals and re-orthonormalized before they all grow into the few directions of
 //! fastest growth (S. K. Godunov 1961; S. D. Conte, SIAM Rev. 8,
 //! 1966). The tip's 6 N conditions determine them; back substitution divides by the growth.
 //! The product of all sensitivities is never formed.
@@ -17,72 +15,81 @@ use crate::shooting::equations::{
     BoundaryValueProblem, PERTURBATION_SIZE, RodState, TipConstraint, rotation_difference,
 };
 use crate::shooting::integrate::{
-    InitialValueIntegrator, LeafTrajectory, ShootingNodes, UnboundedSolution,
+    InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
 };
 use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Largest growth of a perturbation over one interval.
-pub const MAX_INTERVAL_GROWTH: f64 = 1e3;
+/// How the length is divided into intervals.
+pub struct IntervalChoice {
+    /// Largest growth of a perturbation over one interval. Doubled, intervals are fewer by a tenth, and
+    /// Newton's method starts from larger defects.
+    pub largest_growth: f64,
+    /// Most intervals chosen automatically, summed over rods: of N rods their matrices take
+    /// 24 N MB (see [`crate::memory`]), in proportion to this.
+    most_rod_intervals: usize,
+    /// Local error of the integration that measures growth, of which the magnitude is enough.
+    growth_tolerance: f64,
+    /// Local error of the integration that continues a start beyond its stations.
+    start_tolerance: f64,
+}
 
-/// Most intervals chosen automatically, summed over rods: of N rods their matrices take
-/// 24 N MB (see [`crate::memory`]).
-const MAX_ROD_INTERVALS: usize = 4096;
-
-/// Accuracy of the integration that measures growth.
-const GROWTH_TOLERANCE: f64 = 1e-4;
-
-/// Accuracy to which a start is continued beyond its stations.
-const START_TOLERANCE: f64 = 1e-8;
+pub const INTERVAL_CHOICE: IntervalChoice = IntervalChoice {
+    largest_growth: 1e3,
+    most_rod_intervals: 4096,
+    growth_tolerance: 1e-4,
+    start_tolerance: 1e-8,
+};
 
 /// Units of perturbations, so that none dominates the
 /// others: lengths and angles are not scaled, forces and moments of a rod are in
 /// units of the larger of what it carries and what bends it.
 #[derive(Clone, Debug)]
 pub struct PerturbationUnits {
-    force: Vec<f64>,
-    moment: Vec<f64>,
+    rods: Vec<ResultantSizes>,
 }
 
 impl PerturbationUnits {
     /// Units for a leaf near a trajectory.
     pub fn new(equations: &BoundaryValueProblem, near: &LeafTrajectory) -> Self {
-        let (force, moment) = (0..equations.rods())
-            .map(|j| {
-                let ((n, m), soft) = (
-                    near.largest_force_and_moment(j),
-                    equations.softest_couple_stiffness[j],
-                );
-                (soft + n, soft + m)
-            })
-            .unzip();
-        PerturbationUnits { force, moment }
+        let rods = (0..equations.rods()).map(|j| {
+            let largest = near.largest_resultants(j);
+            let soft = equations.softest_couple_stiffness[j];
+            ResultantSizes {
+                force: soft + largest.force,
+                moment: soft + largest.moment,
+            }
+        });
+        PerturbationUnits {
+            rods: rods.collect(),
+        }
     }
 
     /// The unit of the `k`-th component of a leaf's perturbation.
     pub fn component_unit(&self, k: usize) -> f64 {
         match k % PERTURBATION_SIZE {
             0..6 => 1.0,
-            6..9 => self.force[k / PERTURBATION_SIZE],
-            _ => self.moment[k / PERTURBATION_SIZE],
+            6..9 => self.rods[k / PERTURBATION_SIZE].force,
+            _ => self.rods[k / PERTURBATION_SIZE].moment,
         }
     }
 
     /// The unit of the sum of all forces at the tip.
     pub fn total_force(&self) -> f64 {
-        crate::numbers::largest(self.force.iter().copied())
+        largest(self.rods.iter().map(|rod| rod.force))
     }
 
+    /// The largest unit of a moment.
     pub fn largest_moment(&self) -> f64 {
-        crate::numbers::largest(self.moment.iter().copied())
+        largest(self.rods.iter().map(|rod| rod.moment))
     }
 
     /// The difference a - b of two flat states.
     pub fn difference(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
-        (0..self.force.len())
-            .flat_map(|j| {
+        (self.rods.iter().enumerate())
+            .flat_map(|(j, unit)| {
                 let (a, b) = (
                     RodState::from_flat_state(a, j),
                     RodState::from_flat_state(b, j),
@@ -90,8 +97,8 @@ impl PerturbationUnits {
                 [
                     a.r - b.r,
                     rotation_difference(a.q, b.q),
-                    (a.n - b.n) / self.force[j],
-                    (a.m - b.m) / self.moment[j],
+                    (a.n - b.n) / unit.force,
+                    (a.m - b.m) / unit.moment,
                 ]
             })
             .flat_map(|v| v.to_array())
@@ -100,14 +107,14 @@ impl PerturbationUnits {
 
     /// Adds `step` times an increment to a flat state.
     pub fn advance(&self, y: &mut [f64], increment: &[f64], step: f64) {
-        for j in 0..self.force.len() {
+        for (j, unit) in self.rods.iter().enumerate() {
             let mut rod = RodState::from_flat_state(y, j);
             let part =
                 |k: usize| step * DVec3::from_slice(&increment[PERTURBATION_SIZE * j + 3 * k..]);
             rod.r += part(0);
             rod.q = (glam::DQuat::from_scaled_axis(part(1)) * rod.q).normalize();
-            rod.n += part(2) * self.force[j];
-            rod.m += part(3) * self.moment[j];
+            rod.n += part(2) * unit.force;
+            rod.m += part(3) * unit.moment;
             rod.write_flat_state(y, j);
         }
     }
@@ -116,7 +123,7 @@ impl PerturbationUnits {
 /// Result of the integration over an interval.
 pub struct IntegratedInterval {
     pub end_state: Vec<f64>,
-    /// The linearised equations along it, if requested.
+    /// The linearized equations along it, if requested.
     steps: Vec<LinearStep>,
     pub step_count: usize,
     pub evaluations: usize,
@@ -127,7 +134,7 @@ pub fn integrate(
     equations: &BoundaryValueProblem,
     nodes: &ShootingNodes,
     tolerance: f64,
-    linearise: bool,
+    linearize: bool,
 ) -> Result<Vec<IntegratedInterval>, UnboundedSolution> {
     (0..nodes.states.len())
         .into_par_iter()
@@ -138,7 +145,7 @@ pub fn integrate(
             let (mut steps, mut count) = (Vec::new(), 0);
             integrator.run(end, |integrator| {
                 count += 1;
-                if linearise {
+                if linearize {
                     steps.push(LinearStep::from_last_step(equations, integrator));
                 }
             })?;
@@ -152,9 +159,13 @@ pub fn integrate(
         .collect()
 }
 
-/// Response of a group of rods at the end of an interval to perturbations of one rod,
-/// dimensionless: its first rod, and rows of numbers from there on.
-type RodResponses = (usize, Vec<f64>);
+/// Response of a group of rods at the end of an interval to perturbations of one rod, dimensionless.
+pub struct GroupResponse {
+    /// The first rod of the group.
+    first_rod: usize,
+    /// Rows of numbers from this rod on, one for each component of a rod's perturbation.
+    rows: Vec<f64>,
+}
 
 /// Pairs of interval and rod that a thread processes between progress reports.
 const PAIRS_PER_CHUNK: usize = 4;
@@ -165,7 +176,7 @@ pub fn responses(
     equations: &BoundaryValueProblem,
     integrated: &[IntegratedInterval],
     proceed: &mut dyn FnMut(f64) -> bool,
-) -> Option<Vec<RodResponses>> {
+) -> Option<Vec<GroupResponse>> {
     let rods = equations.rods();
     let all = integrated.len() * rods;
     let together = PAIRS_PER_CHUNK * rayon::current_num_threads();
@@ -178,12 +189,11 @@ pub fn responses(
         let some = some.into_par_iter().map(|task| {
             let (steps, j) = (&integrated[task / rods].steps, task % rods);
             match task < rods {
-                true => perturbation_responses::<6>(
-                    equations,
-                    steps,
-                    (j, equations.first_free_component()),
-                ),
-                false => perturbation_responses::<PERTURBATION_SIZE>(equations, steps, (j, 0)),
+                true => {
+                    let first = equations.first_free_component();
+                    perturbation_responses::<6>(equations, steps, j, first)
+                }
+                false => perturbation_responses::<PERTURBATION_SIZE>(equations, steps, j, 0),
             }
         });
         found.par_extend(some);
@@ -193,11 +203,11 @@ pub fn responses(
 
 /// The sensitivities of the ends of all intervals to their beginnings, in the
 /// given units: square, except in the first interval, which begins at the base,
-/// where only [six components](Equations::free_at_base) are perturbed.
+/// where only [six components](BoundaryValueProblem::first_free_component) are perturbed.
 pub fn sensitivities(
     equations: &BoundaryValueProblem,
     units: &PerturbationUnits,
-    responses: &[RodResponses],
+    responses: &[GroupResponse],
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
@@ -209,9 +219,9 @@ pub fn sensitivities(
             };
             let mut matrix = Mat::zeros(PERTURBATION_SIZE * rods, kinds * rods);
             let mut largest: f64 = 1.0;
-            for (j, (first, rows)) in columns.iter().enumerate() {
-                for (i, row) in rows.chunks(kinds).enumerate() {
-                    let row_index = PERTURBATION_SIZE * first + i;
+            for (j, response) in columns.iter().enumerate() {
+                for (i, row) in response.rows.chunks(kinds).enumerate() {
+                    let row_index = PERTURBATION_SIZE * response.first_rod + i;
                     for (k, value) in row.iter().enumerate() {
                         let from = PERTURBATION_SIZE * j + first_kind + k;
                         matrix[(row_index, kinds * j + k)] =
@@ -232,20 +242,25 @@ pub fn sensitivities(
 fn perturbation_responses<const W: usize>(
     equations: &BoundaryValueProblem,
     steps: &[LinearStep],
-    (j, first): (usize, usize),
-) -> RodResponses {
+    j: usize,
+    first: usize,
+) -> GroupResponse {
     let mut perturbations =
         Perturbations::<W>::unit_perturbations(coupled_rods(equations, j), j, first);
     for step in steps {
         perturbations.propagate(equations, step);
     }
-    (perturbations.rods.start, perturbations.entries)
+    GroupResponse {
+        first_rod: perturbations.rods.start,
+        rows: perturbations.entries,
+    }
 }
 
-/// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
+/// Chooses intervals over which no perturbation grows by more than
+/// [`IntervalChoice::largest_growth`].
 ///
 /// Growth is measured separately for positions, rotations, forces and moments, which makes it
-/// independent of units, for every rod with its neighbours held.
+/// independent of units, for every rod with its neighbors held.
 /// Fails if too many intervals would be needed.
 pub fn choose_intervals(
     equations: &BoundaryValueProblem,
@@ -254,14 +269,16 @@ pub fn choose_intervals(
     let mut sigma = vec![0.0];
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];
-        if sigma.len() * equations.rods() > MAX_ROD_INTERVALS.max(equations.rods()) {
+        if sigma.len() * equations.rods()
+            > (INTERVAL_CHOICE.most_rod_intervals).max(equations.rods())
+        {
             return Err(UnboundedSolution { sigma: begin });
         }
         let mut integrator = InitialValueIntegrator::new(
             equations,
             begin,
             near.interpolate_state(begin),
-            GROWTH_TOLERANCE,
+            INTERVAL_CHOICE.growth_tolerance,
         );
         let mut rods: Vec<Perturbations<PERTURBATION_SIZE>> = (0..equations.rods())
             .map(|j| Perturbations::unit_perturbations(j..j + 1, j, 0))
@@ -273,7 +290,7 @@ pub fn choose_intervals(
                 let step = LinearStep::from_last_step(equations, &integrator);
                 rods.iter_mut().any(|rod| {
                     rod.propagate(equations, &step);
-                    largest_growth(rod.rows()) > MAX_INTERVAL_GROWTH
+                    largest_growth(rod.rows()) > INTERVAL_CHOICE.largest_growth
                 })
             };
             if grown {
@@ -309,7 +326,7 @@ fn begin(equations: &BoundaryValueProblem, near: &LeafTrajectory, sigma: &[f64])
             equations,
             before,
             near.interpolate_state(before),
-            START_TOLERANCE,
+            INTERVAL_CHOICE.start_tolerance,
         );
         match integrator.run(here, |_| ()) {
             Ok(()) => integrator.y,
@@ -329,15 +346,16 @@ fn largest_growth(rows: &[[f64; PERTURBATION_SIZE]]) -> f64 {
 /// of the largest count as undetermined.
 const UNDETERMINED_SINGULAR_RATIO: f64 = 1e-10;
 
-/// Cosine from which on that direction is the turn of a leaf without resistance.
+/// Cosine of the angle between the least determined directions and a turn of veins without resistance
+/// above which they are this turn.
 const ZERO_ENERGY_COSINE: f64 = 0.9;
 
-/// The condensed equations, factorised.
+/// The condensed equations, factorized.
 pub struct CondensedEquations {
     maps: Vec<Mat<f64>>,
     /// Orthonormal bases of the free perturbations at the inner nodes.
     bases: Vec<Mat<f64>>,
-    /// Their growth: upper triangular.
+    /// The growth of these bases over an interval: upper triangular.
     growths: Vec<Mat<f64>>,
     /// Singular value decomposition of the tip's conditions in the last basis.
     left: Mat<f64>,
@@ -468,7 +486,7 @@ impl CondensedEquations {
         self.weakly_determined_direction(0)
     }
 
-    /// Of the directions that are determined, one of those that are least.
+    /// The direction that the conditions determine least but for `from_least` others.
     fn weakly_determined_direction(&self, from_least: usize) -> Vec<Vec<f64>> {
         let none = |matrix: &Mat<f64>| Col::zeros(matrix.nrows());
         let offsets: Vec<Col<f64>> = self.bases.iter().map(none).collect();
@@ -508,7 +526,7 @@ impl CondensedEquations {
     }
 }
 
-/// Linearised tip conditions of a perturbation at the tip.
+/// Linearized tip conditions of a perturbation at the tip.
 fn linearized_tip_conditions(
     tip: TipConstraint,
     units: &PerturbationUnits,
@@ -531,7 +549,7 @@ fn linearized_tip_conditions(
         .collect()
 }
 
-/// x <- R^-1 x with R upper triangular.
+/// Solves in place: x <- R^-1 x with R upper triangular.
 fn back_substitute(r: &Mat<f64>, x: &mut Col<f64>) {
     for i in (0..x.nrows()).rev() {
         let mut sum = x[i];

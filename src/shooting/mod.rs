@@ -3,13 +3,13 @@
 //!
 //! It shares with the relaxation only the checked scenario and, with its error estimate, the
 //! coefficients of a Runge-Kutta method: no grid, no element, no linear algebra. A solution
-//! found by both is therefore not an artefact of either.
+//! found by both is therefore not an artifact of either.
 //!
 //! **Unknown functions.** The paper integrates 18 functions per rod: r, the nine
 //! components of three directors, n and m along the directors, by eqs (1) to (6)
 //! and the nine equations d_i' = u x d_i. These do not keep the directors orthonormal,
 //! which the paper names as its difficulty. Here orientation is a unit
-//! quaternion, normalised after every step, and n and m are components
+//! quaternion, normalized after every step, and n and m are components
 //! along the lab axes, in which their balance contains no frame: 13 functions.
 //!
 //! **Boundary conditions.** (a) and (c) fix r and the directors at the base;
@@ -19,14 +19,14 @@
 //!
 //! **Initial-value problems** are integrated by the explicit Runge-Kutta method
 //! of order 8 of Dormand and Prince with step control. Sensitivities satisfy the
-//! linearised equations, integrated with the same steps.
+//! linearized equations, integrated with the same steps.
 //!
 //! **Multiple shooting.** Perturbations can grow beyond machine precision from base to
 //! tip: like exp(L sqrt(T/A2)) in a vein under tension T. The length is
 //! therefore divided into intervals over which growth stays below a thousand, the
 //! state at the beginning of each is unknown too, and the linear equations
 //! are condensed without forming the product of all sensitivities.
-//! [`Options::intervals`] = 1 is plain single shooting, to show where it fails.
+//! [`ShootingOptions::intervals`] = 1 is plain single shooting, to show where it fails.
 //!
 //! **Newton's method** is damped by an affine-invariant test. It starts
 //! from a relaxed leaf, or from arcs by continuation: a leaf whose rest shape is
@@ -34,10 +34,10 @@
 //! into the scenario's.
 //!
 //! **Error.** Every problem is solved with two tolerances; the difference is the
-//! estimate ([`Solution::error`]). Near a bifurcation [`Solution::neutral`] is
+//! estimate ([`ShootingSolution::error`]). Near a bifurcation [`ShootingSolution::neutral`] is
 //! the direction in which the leaf can move without resistance.
 //!
-//! Requests to the boundary-value solver, and its results.
+//! This file has the requests to the boundary-value solver and its results.
 
 mod equations;
 mod integrate;
@@ -45,6 +45,7 @@ mod intervals;
 mod newton;
 mod sensitivities;
 mod solve;
+mod tissue;
 
 use crate::memory::TooMuch;
 use crate::run::{Limit, UnmodelledFeature};
@@ -61,7 +62,7 @@ use std::ops::AddAssign;
 pub struct ShootingCounts {
     /// Number of corrections.
     pub iterations: usize,
-    /// Linearisations: sensitivities of all intervals, and their factorisation.
+    /// Linearizations: sensitivities of all intervals, and their factorization.
     pub linearizations: usize,
     /// Steps of the integrator.
     pub steps: usize,
@@ -86,7 +87,7 @@ pub struct CorrectionProgress {
     pub lambda: f64,
     /// Number of corrections for the present solution.
     pub iteration: usize,
-    /// Part of the linearisation for the next correction that is done, from 0 to 1.
+    /// Part of the linearization for the next correction that is done, from 0 to 1.
     pub linearized: f64,
     /// The largest component of the last correction, in the units of the unknowns;
     /// infinite before the first.
@@ -97,11 +98,11 @@ pub struct CorrectionProgress {
 
 /// Counts the work of a shooting and reports its progress.
 struct ShootingLog<'p> {
-    pub work: ShootingCounts,
+    work: ShootingCounts,
     /// Part of the present change of the leaf of arcs that is done.
-    pub lambda: f64,
+    lambda: f64,
     /// Called for each correction.
-    pub progress: &'p mut dyn FnMut(&CorrectionProgress),
+    progress: &'p mut dyn FnMut(&CorrectionProgress),
 }
 
 /// Displacements below this part of the largest are not mentioned.

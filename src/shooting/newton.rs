@@ -2,12 +2,10 @@
 //! it fails.
 //!
 //! Steps are damped by the natural monotonicity test: the next simplified correction,
-//! with the same linearisation, must be smaller than this one (P. Deuflhard, Newton
+//! with the same linearization, must be smaller than this one (P. Deuflhard, Newton
 //! Methods for Nonlinear Problems, Springer 2004, section 3.3). It compares
 //! corrections with corrections, and is therefore independent of the scaling of the
-//! equations and of their conditioning.
-//!
-//! Directions in which the equations are nearly singular, and why there is no convergence.
+//! equations and of their conditioning. Where it fails the last linearization tells why.
 
 use crate::memory;
 use crate::numbers::largest;
@@ -16,72 +14,92 @@ use crate::shape::equally_spaced;
 use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, RodState};
 use crate::shooting::integrate::{LeafTrajectory, ShootingNodes};
 use crate::shooting::intervals::{
-    CondensedEquations, IntegratedInterval, MAX_INTERVAL_GROWTH, PerturbationUnits,
-    choose_intervals, integrate, responses, sensitivities,
+    CondensedEquations, INTERVAL_CHOICE, IntegratedInterval, PerturbationUnits, choose_intervals,
+    integrate, responses, sensitivities,
 };
 use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
 use glam::DVec3;
 
-/// A leaf that turned by less than this (radians) keeps its linearisation.
-const RELINEARIZATION_ANGLE: f64 = 1e-3;
+/// What controls Newton's method. Corrections are in the units of the unknowns.
+struct ShootingNewtonControl {
+    /// Most corrections: twice as many prolong only what does not converge.
+    most_iterations: usize,
+    /// Smallest part of a step that damping tries.
+    least_factor: f64,
+    /// Smallest part of a step of a fresh linearization that is tried where Newton's method may give
+    /// up: a leaf at rest is near.
+    least_fresh_factor: f64,
+    /// Contraction of corrections below which a start counts as near its solution. Doubled,
+    /// continuation takes longer steps and may change the solution.
+    near_start_contraction: f64,
+    /// Contraction by a full step near a solution.
+    converging_contraction: f64,
+    /// Contraction up to which a linearization is kept. Doubled, linearizations are fewer and
+    /// corrections more.
+    reuse_contraction: f64,
+    /// Largest defect of a solution. Corrections are no measure of it where the linearized equations
+    /// are singular.
+    largest_defect: f64,
+    /// Corrections below this multiple of the integration's tolerance need not decrease further: they
+    /// are noise of its step control.
+    noise_factor: f64,
+    /// Corrections of a leaf at rest below this that a full step does not reduce are what rounding
+    /// makes of perturbations that grow: no part of a step and no other linearization reduces them.
+    rounding: f64,
+    /// Cost of all linearizations, in rods times steps of the integration, beyond which Newton's
+    /// method that may give up has to converge as it does near a solution: some seconds.
+    largest_cost: usize,
+    /// Cost of a linearization of the tissue of a gap over that of a rod.
+    tissue_cost: usize,
+    /// A leaf that turned by less than this (radians) keeps its linearization.
+    relinearization_angle: f64,
+    /// Distance from an axis (lengths) within which a point is on it.
+    axis_distance: f64,
+    /// Changes of a base's force and moment, in their units, below which a turn of the leaf changes
+    /// nothing: it is straight.
+    turn_load: f64,
+}
 
-/// Distance from an axis (lengths) within which a point is on it.
-const AXIS_DISTANCE_TOLERANCE: f64 = 1e-6;
+const CONTROL: ShootingNewtonControl = ShootingNewtonControl {
+    most_iterations: 60,
+    least_factor: 1e-3,
+    least_fresh_factor: 0.125,
+    near_start_contraction: 0.3,
+    converging_contraction: 0.25,
+    reuse_contraction: 0.1,
+    largest_defect: 1e-6,
+    noise_factor: 1e3,
+    rounding: 1e-5,
+    largest_cost: 300_000,
+    tissue_cost: 20,
+    relinearization_angle: 1e-3,
+    axis_distance: 1e-6,
+    turn_load: 1e-6,
+};
 
-/// Changes of a base's force and moment, in their units, below which a leaf does not turn: it is
-/// straight.
-const TURN_LOAD_TOLERANCE: f64 = 1e-6;
+/// When equations count as nearly singular, and how their neutral direction is measured.
+struct NeutralCriterion {
+    /// Smallest singular value of the tip's conditions, as a part of the largest, below which a
+    /// bifurcation is reported nearby.
+    singular_ratio: f64,
+    /// Growth over an interval above which nothing is reported: it alone makes the equations nearly
+    /// singular.
+    largest_growth: f64,
+    /// Size of the perturbation along the neutral direction whose effect is computed; the integration
+    /// has its square as tolerance.
+    perturbation: f64,
+    /// Fractions of the length at which it is computed for a failure.
+    stations: [f64; 9],
+}
 
-const MAX_ITERATIONS: usize = 60;
+const NEUTRAL: NeutralCriterion = NeutralCriterion {
+    singular_ratio: 1e-7,
+    largest_growth: 100.0 * INTERVAL_CHOICE.largest_growth,
+    perturbation: 1e-5,
+    stations: [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0],
+};
 
-const LEAST_FACTOR: f64 = 1e-3;
-
-/// Contraction below which a start counts as near its solution.
-const NEAR_START_CONTRACTION: f64 = 0.3;
-
-/// Largest defect of a solution, in its units. Corrections are no measure of it where
-/// the linearised equations are singular.
-const LARGEST_DEFECT: f64 = 1e-6;
-
-/// A linearisation is kept while it reduces corrections at least by this factor.
-const REUSE_CONTRACTION: f64 = 0.1;
-
-/// Corrections below this multiple of the integration's tolerance need not decrease
-/// further: they are noise of its step control.
-const CORRECTION_NOISE_FACTOR: f64 = 1e3;
-
-/// Singular values of the tip's conditions below this part of the largest are
-/// reported as a bifurcation nearby.
-const NEARLY_SINGULAR: f64 = 1e-7;
-
-/// Corrections of a leaf at rest below this that a full step does not reduce are what rounding makes
-/// of perturbations that grow: no part of a step and no other linearisation reduces them.
-const CORRECTION_ROUNDING: f64 = 1e-5;
-
-/// Cost of linearisations, in rods times steps of the integration, beyond which Newton's method that
-/// may give up has to converge as it does near a solution: some seconds.
-const MAX_LINEARIZATION_COST: usize = 300_000;
-
-/// Parts of steps of a fresh linearisation below which it gives up: a leaf at rest is near.
-const MIN_FRESH_DAMPING: f64 = 0.125;
-
-/// The cost of the tissue of a gap in that of a rod.
-const TISSUE_LINEARIZATION_COST: usize = 20;
-
-/// Contraction by a full step near a solution.
-const CONVERGING_CONTRACTION: f64 = 0.25;
-
-/// Unless perturbations grow by more than this over an interval, which
-/// alone makes the equations nearly singular.
-const LARGEST_GROWTH: f64 = 100.0 * MAX_INTERVAL_GROWTH;
-
-/// Size of the perturbation along a neutral direction whose effect is computed.
-const NEUTRAL_PERTURBATION: f64 = 1e-5;
-
-/// Stations at which it is computed.
-const NEUTRAL_STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
-
-/// Corrections do not decrease; the last one, relative.
+/// The reason that corrections do not decrease, of which the last is `correction`.
 fn no_convergence_reason(correction: f64) -> ShootingFailureReason {
     ShootingFailureReason::NoConvergence {
         correction,
@@ -91,7 +109,7 @@ fn no_convergence_reason(correction: f64) -> ShootingFailureReason {
     }
 }
 
-/// The state of a run; its linearisation is kept between calls.
+/// A run of Newton's method; its linearization is kept between calls.
 pub struct ShootingNewton<'e, 'a, 'p> {
     pub equations: &'e BoundaryValueProblem<'a>,
     pub units: PerturbationUnits,
@@ -102,13 +120,13 @@ pub struct ShootingNewton<'e, 'a, 'p> {
     pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
-    /// Cost of all linearisations.
+    /// Cost of all linearizations.
     linearization_cost_sum: usize,
     /// Which of the turns without resistance move something.
     effective_rotations: Vec<bool>,
-    /// The last linearisation.
+    /// The last linearization.
     pub condensed: Option<CondensedEquations>,
-    /// Growth of perturbations over each interval, at that linearisation.
+    /// Growth of perturbations over each interval, at that linearization.
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
@@ -116,9 +134,11 @@ pub struct ShootingNewton<'e, 'a, 'p> {
     log: &'e mut ShootingLog<'p>,
 }
 
+/// What a solution makes zero.
 struct Residuals {
     /// End of each interval minus the beginning of the next.
     defects: Vec<Vec<f64>>,
+    /// Residuals of the conditions at the tip.
     conditions: Vec<f64>,
 }
 
@@ -193,7 +213,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             true => self.linearize(tolerance)?,
         };
         let mut size = f64::INFINITY;
-        'iterations: for iteration in 0..MAX_ITERATIONS {
+        'iterations: for iteration in 0..CONTROL.most_iterations {
             self.progress.iteration = iteration;
             let step = self.correction(&residuals);
             size = largest_component(&step);
@@ -215,13 +235,13 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                         break (trial, next, remaining / size);
                     }
                     // Below the noise of the integrator corrections do not decrease.
-                    if size <= CORRECTION_NOISE_FACTOR * tolerance
-                        && remaining <= CORRECTION_NOISE_FACTOR * tolerance
+                    if size <= CONTROL.noise_factor * tolerance
+                        && remaining <= CONTROL.noise_factor * tolerance
                     {
                         break (trial, next, 0.0);
                     }
                 }
-                let far = || size <= CORRECTION_ROUNDING || 0.5 * factor < MIN_FRESH_DAMPING;
+                let far = || size <= CONTROL.rounding || 0.5 * factor < CONTROL.least_fresh_factor;
                 if self.costs_too_much() || self.gives_up && fresh && far() {
                     break 'iterations;
                 }
@@ -231,7 +251,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                     continue 'iterations;
                 }
                 factor *= 0.5;
-                if factor < LEAST_FACTOR || self.requires_near_start {
+                if factor < CONTROL.least_factor || self.requires_near_start {
                     break 'iterations;
                 }
             };
@@ -239,27 +259,27 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             self.nodes = trial;
             self.defect = next.largest(self.condensed.as_ref());
             let remaining = ratio * size;
-            if factor == 1.0
-                && (remaining <= tolerance || size <= CORRECTION_NOISE_FACTOR * tolerance)
+            if factor == 1.0 && (remaining <= tolerance || size <= CONTROL.noise_factor * tolerance)
             {
                 let last = self.correction(&next);
-                if largest_component(&last) <= CORRECTION_NOISE_FACTOR * tolerance {
+                if largest_component(&last) <= CONTROL.noise_factor * tolerance {
                     self.nodes = self.advanced_nodes(&last, 1.0);
                 }
-                return match self.defect <= LARGEST_DEFECT.max(CORRECTION_NOISE_FACTOR * tolerance)
+                return match self.defect
+                    <= CONTROL.largest_defect.max(CONTROL.noise_factor * tolerance)
                 {
                     true => Ok(()),
                     false => Err(no_convergence_reason(size)),
                 };
             }
-            if self.requires_near_start && ratio > NEAR_START_CONTRACTION {
+            if self.requires_near_start && ratio > CONTROL.near_start_contraction {
                 break;
             }
-            let converges = factor == 1.0 && ratio <= CONVERGING_CONTRACTION;
+            let converges = factor == 1.0 && ratio <= CONTROL.converging_contraction;
             if self.costs_too_much() && !converges {
                 break;
             }
-            let keep = factor == 1.0 && ratio <= REUSE_CONTRACTION;
+            let keep = factor == 1.0 && ratio <= CONTROL.reuse_contraction;
             residuals = if keep {
                 next
             } else {
@@ -270,13 +290,13 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         Err(no_convergence_reason(size))
     }
 
-    /// Whether another linearisation would cost too much for what may give up.
+    /// Whether another linearization would cost too much for what may give up.
     fn costs_too_much(&self) -> bool {
         self.gives_up
-            && self.linearization_cost_sum + self.linearization_cost() > MAX_LINEARIZATION_COST
+            && self.linearization_cost_sum + self.linearization_cost() > CONTROL.largest_cost
     }
 
-    /// The cost of a linearisation along the last integration.
+    /// The cost of a linearization along the last integration.
     fn linearization_cost(&self) -> usize {
         let rods = self.equations.rods();
         let gaps = if self.equations.has_tissue() {
@@ -284,7 +304,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         } else {
             0
         };
-        self.steps * (rods + TISSUE_LINEARIZATION_COST * gaps)
+        self.steps * (rods + CONTROL.tissue_cost * gaps)
     }
 
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, ShootingFailureReason> {
@@ -335,7 +355,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             }
             turn
         };
-        let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > TURN_LOAD_TOLERANCE);
+        let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > CONTROL.turn_load);
         let turns = self.turnings().map(turn);
         turns.filter(carries).collect()
     }
@@ -380,13 +400,13 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                     turned.write_flat_state(state, j);
                 }
             }
-            if angle.abs() > RELINEARIZATION_ANGLE {
+            if angle.abs() > CONTROL.relinearization_angle {
                 self.condensed = None;
             }
         }
     }
 
-    /// Reports progress, with this part of the linearisation done.
+    /// Reports progress, with this part of the linearization done.
     fn report(&mut self, linearized: f64) {
         self.progress.linearized = linearized;
         (self.log.progress)(&self.progress);
@@ -430,7 +450,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
     }
 
     fn correction(&self, residuals: &Residuals) -> Vec<Vec<f64>> {
-        let condensed = self.condensed.as_ref().expect("linearised before");
+        let condensed = self.condensed.as_ref().expect("linearized before");
         condensed.solve(
             &residuals.defects,
             &condensed.scaled_tip_conditions(&residuals.conditions),
@@ -461,7 +481,8 @@ fn rotation_moves_leaf(
     near: &LeafTrajectory,
     turning: &ZeroEnergyRotation,
 ) -> bool {
-    let stations = NEUTRAL_STATIONS
+    let stations = NEUTRAL
+        .stations
         .iter()
         .map(|sigma| near.interpolate_state(*sigma));
     let states: Vec<Vec<f64>> = stations.collect();
@@ -472,7 +493,7 @@ fn rotation_moves_leaf(
     };
     let points: Vec<DVec3> = turning.rods.clone().flat_map(of_rod).collect();
     let point = turning.point / equations.length_unit;
-    turning.section_rate < 0.0 || turning.moves_something(&points, point, AXIS_DISTANCE_TOLERANCE)
+    turning.section_rate < 0.0 || turning.moves_something(&points, point, CONTROL.axis_distance)
 }
 
 /// The largest component of an increment.
@@ -488,8 +509,8 @@ impl ShootingNewton<'_, '_, '_> {
             .map_or(1.0, |condensed| condensed.singular_value_ratio())
     }
 
-    /// Why there is no convergence, as far as the last linearisation shows it.
-    pub(super) fn diagnose_failure(&self, reason: ShootingFailureReason) -> ShootingFailureReason {
+    /// Why there is no convergence, as far as the last linearization shows it.
+    fn diagnose_failure(&self, reason: ShootingFailureReason) -> ShootingFailureReason {
         let ShootingFailureReason::NoConvergence {
             correction,
             fixed,
@@ -499,7 +520,7 @@ impl ShootingNewton<'_, '_, '_> {
         else {
             return reason;
         };
-        match self.neutral(&NEUTRAL_STATIONS) {
+        match self.neutral(&NEUTRAL.stations) {
             Some(neutral) => ShootingFailureReason::Singular(neutral),
             None if self.gives_up => ShootingFailureReason::Rounding {
                 correction,
@@ -521,22 +542,25 @@ impl ShootingNewton<'_, '_, '_> {
     /// The neutral direction, if the equations are nearly singular: the effect on the rods of a
     /// small perturbation along it.
     pub fn neutral(&self, stations: &[f64]) -> Option<NeutralDirection> {
-        let trusted = self.growth.iter().all(|growth| *growth < LARGEST_GROWTH);
+        let trusted = self
+            .growth
+            .iter()
+            .all(|growth| *growth < NEUTRAL.largest_growth);
         let condensed = self.condensed.as_ref()?;
-        if !trusted || condensed.singular_value_ratio() > NEARLY_SINGULAR {
+        if !trusted || condensed.singular_value_ratio() > NEUTRAL.singular_ratio {
             return None;
         }
         let direction = condensed.least_determined_direction();
         let nudged = self.advanced_nodes(
             &direction,
-            NEUTRAL_PERTURBATION / largest_component(&direction),
+            NEUTRAL.perturbation / largest_component(&direction),
         );
         let sampled = |nodes: &ShootingNodes| {
             LeafTrajectory::sample_solution(
                 self.equations,
                 nodes,
                 stations,
-                NEUTRAL_PERTURBATION * NEUTRAL_PERTURBATION,
+                NEUTRAL.perturbation * NEUTRAL.perturbation,
             )
         };
         let (at, perturbed) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);

@@ -1,9 +1,7 @@
-//! From a start to a solution with an error estimate.
-//!
-//! A boundary-value solution without a given start: by continuation from the leaf
-//! that rests in arcs, whose solution is known, to the scenario's.
+//! From a start to a solution with an error estimate: from a leaf at rest, or by continuation from the
+//! leaf that rests in arcs, whose solution is known, to the scenario's.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::run::UnmodelledFeature;
 use crate::scenario::{Scenario, SupportKind, longest};
 use crate::shape::{Difference, equally_spaced};
@@ -15,21 +13,60 @@ use crate::shooting::{
     ShootingLog, ShootingOptions, ShootingSolution, ShootingStart,
 };
 
-/// The error is estimated by comparison with a solution whose local errors may
-/// be larger by this factor.
-const COMPARISON_TOLERANCE_FACTOR: f64 = 100.0;
+/// Local errors allowed per step of the integration, dimensionless.
+struct LocalErrors {
+    /// Local error as a part of the required accuracy. Doubled, integrations take 8 % fewer steps.
+    accuracy_fraction: f64,
+    /// Smallest local error: below it rounding dominates.
+    least: f64,
+    /// Largest local error: above it step control becomes unreliable.
+    largest: f64,
+    /// Local error of the next attempt over that of one that did not reach the accuracy.
+    sharpening: f64,
+    /// Local error of the solution with which the error is estimated, over that of the result.
+    comparison: f64,
+    /// Local error of solutions on the way from arcs.
+    intermediate: f64,
+}
 
-/// Local error allowed per step of the integration, as a part of the required
-/// accuracy, and its bounds: below them rounding dominates, above them step control
-/// becomes unreliable.
-const LOCAL_ERROR_FRACTION: f64 = 1e-4;
+const LOCAL_ERRORS: LocalErrors = LocalErrors {
+    accuracy_fraction: 1e-4,
+    least: 1e-13,
+    largest: 1e-9,
+    sharpening: 1e-2,
+    comparison: 100.0,
+    intermediate: 1e-6,
+};
 
-const MIN_LOCAL_ERROR: f64 = 1e-13;
+/// Continuation from arcs.
+struct ArcContinuation {
+    /// Steps of a stage, of which the first is the whole change.
+    steps: StepSizes,
+    /// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
+    most_slope_evaluations: usize,
+    /// Stations per interval at which a solution is stored as the start of the next one.
+    stations_per_interval: usize,
+    /// Rotation over one interval, radians. Over many short intervals Newton's method has a larger
+    /// region of convergence; halved, they are twice as many.
+    interval_turn: f64,
+    least_intervals: usize,
+    most_intervals: usize,
+}
 
-const MAX_LOCAL_ERROR: f64 = 1e-9;
-
-/// Factor between attempts to reach the accuracy.
-const SHARPENING_FACTOR: f64 = 1e-2;
+const CONTINUATION: ArcContinuation = ArcContinuation {
+    steps: StepSizes {
+        first: 1.0,
+        shortest: 1.0 / 16384.0,
+        longest: 1.0,
+        growth: 2.0,
+        failure: 0.5,
+    },
+    most_slope_evaluations: 4_000_000,
+    stations_per_interval: 4,
+    interval_turn: 0.3,
+    least_intervals: 8,
+    most_intervals: 256,
+};
 
 /// Refuses scenarios with what the boundary-value problem does not contain and, unless the start is
 /// a leaf at rest, those to which the continuation from arcs does not lead.
@@ -72,7 +109,8 @@ pub fn solve(
             return solve_once(scenario, options.start, tolerance, options, progress);
         }
     };
-    let tolerance = (LOCAL_ERROR_FRACTION * accuracy).clamp(MIN_LOCAL_ERROR, MAX_LOCAL_ERROR);
+    let tolerance =
+        (LOCAL_ERRORS.accuracy_fraction * accuracy).clamp(LOCAL_ERRORS.least, LOCAL_ERRORS.largest);
     let solution = solve_once(scenario, options.start, tolerance, options, progress)?;
     let enough = accuracy * longest(&scenario.rods);
     Ok(sharpened(
@@ -95,8 +133,8 @@ fn sharpened(
     enough: f64,
     mut attempt: impl FnMut(&ShootingSolution, f64) -> Result<ShootingSolution, ShootingFailure>,
 ) -> ShootingSolution {
-    while solution.error.position > enough && tolerance > MIN_LOCAL_ERROR {
-        tolerance = (SHARPENING_FACTOR * tolerance).max(MIN_LOCAL_ERROR);
+    while solution.error.position > enough && tolerance > LOCAL_ERRORS.least {
+        tolerance = (LOCAL_ERRORS.sharpening * tolerance).max(LOCAL_ERRORS.least);
         match attempt(&solution, tolerance) {
             Ok(mut sharper) => {
                 sharper.work += solution.work;
@@ -186,7 +224,7 @@ fn solve_near(
             LeafTrajectory::sample_solution(equations, &newton.nodes, stations, tolerance);
         Ok(sampled?)
     };
-    let (coarse, fine) = (at(COMPARISON_TOLERANCE_FACTOR * tolerance)?, at(tolerance)?);
+    let (coarse, fine) = (at(LOCAL_ERRORS.comparison * tolerance)?, at(tolerance)?);
     let (rods, tip) = (fine.shape(equations), fine.tip());
     let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
     // Steps that end at the same stations share errors, which the
@@ -214,32 +252,12 @@ fn solve_near(
     })
 }
 
-/// Accuracy of intermediate solutions.
-const INTERMEDIATE_TOLERANCE: f64 = 1e-6;
-
-/// Smallest step, as a part of the whole change.
-const LEAST_STEP: f64 = 1.0 / 16384.0;
-
-/// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
-const MAX_SLOPE_EVALUATIONS: usize = 4_000_000;
-
-/// Stations per interval at which a solution is stored as the start of the next one.
-const STATIONS_PER_INTERVAL: usize = 4;
-
-/// Over many short intervals, Newton's method has a larger region of convergence.
-/// Rotation over one of them, in radians, and their largest number.
-const MAX_INTERVAL_TURN: f64 = 0.3;
-
-const LEAST_INTERVALS: usize = 8;
-
-const MOST_INTERVALS: usize = 256;
-
 /// A continuation that ended before the scenario's leaf was reached.
-pub struct InterruptedHomotopy {
-    pub reason: ShootingFailureReason,
+struct InterruptedHomotopy {
+    reason: ShootingFailureReason,
     /// Part of the change that was made.
-    pub lambda: f64,
-    pub last_trajectory: LeafTrajectory,
+    lambda: f64,
+    last_trajectory: LeafTrajectory,
 }
 
 /// How the leaf of arcs is changed into the scenario's, in the order of attempts.
@@ -254,7 +272,7 @@ const STRATEGIES: [HomotopyStrategy; 3] = [
 enum HomotopyStrategy {
     /// Newton's steps are limited to solutions nearby.
     LimitedSteps,
-    /// Steps limited like those of [`Strategy::Near`], with rods that initially have their
+    /// Steps limited like those of [`HomotopyStrategy::LimitedSteps`], with rods that initially have their
     /// largest stiffness in all directions.
     InitiallyStiff,
     /// Newton's steps are not limited.
@@ -263,7 +281,7 @@ enum HomotopyStrategy {
 
 /// Follows the equilibrium from the leaf of arcs to the scenario's. Returns a
 /// trajectory near the solution.
-pub fn continue_from_arcs(
+fn continue_from_arcs(
     equations: &mut BoundaryValueProblem,
     intervals: Option<usize>,
     log: &mut ShootingLog,
@@ -287,6 +305,12 @@ pub fn continue_from_arcs(
     Err(first.expect("there is a strategy"))
 }
 
+/// A solution on the way from arcs.
+struct PathPoint {
+    lambda: f64,
+    trajectory: LeafTrajectory,
+}
+
 /// A continuation by one of the strategies.
 struct HomotopyAttempt<'c, 'a, 'p> {
     strategy: HomotopyStrategy,
@@ -300,7 +324,7 @@ impl HomotopyAttempt<'_, '_, '_> {
         self.equations.load_lambda = 0.0;
         let stiff = self.strategy == HomotopyStrategy::InitiallyStiff;
         self.equations.softening_lambda = if stiff { 0.0 } else { 1.0 };
-        let unstressed = LeafTrajectory::unstressed_leaf(self.equations, INTERMEDIATE_TOLERANCE);
+        let unstressed = LeafTrajectory::unstressed_leaf(self.equations, LOCAL_ERRORS.intermediate);
         let near = unstressed.map_err(|unbounded| InterruptedHomotopy {
             reason: unbounded.into(),
             lambda: 0.0,
@@ -319,42 +343,51 @@ impl HomotopyAttempt<'_, '_, '_> {
         stage: HomotopyParameter,
         mut near: LeafTrajectory,
     ) -> Result<LeafTrajectory, InterruptedHomotopy> {
-        let mut path = Homotopy::new(1.0, [LEAST_STEP, 1.0]);
-        let mut before: Option<(LeafTrajectory, f64)> = None;
+        let mut before: Option<PathPoint> = None;
         let (begun, rods) = (self.log.work.slopes, self.equations.rods());
-        while path.lambda < 1.0 {
-            let part = path.lambda;
-            self.log.lambda = part;
-            *stage(self.equations) = path.next_lambda();
+        let end = CONTINUATION.steps.follow(|step| {
+            self.log.lambda = step.from;
+            *stage(self.equations) = step.to;
             let predicted = match &before {
-                Some((earlier, at)) => near.extrapolate(
+                Some(earlier) => near.extrapolate(
                     self.equations,
-                    earlier,
-                    path.next_step_length() / (part - at),
+                    &earlier.trajectory,
+                    step.length() / (step.from - earlier.lambda),
                 ),
                 None => near.clone(),
             };
             match self.solve_near(&predicted) {
                 Ok(trajectory) => {
-                    before = Some((std::mem::replace(&mut near, trajectory), part));
-                    path.advance(2.0 * path.next_step_length());
+                    before = Some(PathPoint {
+                        lambda: step.from,
+                        trajectory: std::mem::replace(&mut near, trajectory),
+                    });
+                    StepEnd::Made {
+                        growth: CONTINUATION.steps.growth,
+                    }
                 }
                 Err(reason) => {
                     let spent = (self.log.work.slopes - begun) * rods;
                     let ends = reason == ShootingFailureReason::OutOfTime
-                        || spent >= MAX_SLOPE_EVALUATIONS;
-                    if ends || !path.shorten(0.5) {
-                        return Err(InterruptedHomotopy {
-                            reason,
-                            lambda: part,
-                            last_trajectory: near,
-                        });
+                        || spent >= CONTINUATION.most_slope_evaluations;
+                    match ends {
+                        true => StepEnd::Ended((reason, step.from)),
+                        false => StepEnd::TooLong((reason, step.from)),
                     }
                 }
             }
+        });
+        match end {
+            Ok(()) => {
+                self.log.lambda = 1.0;
+                Ok(near)
+            }
+            Err((reason, lambda)) => Err(InterruptedHomotopy {
+                reason,
+                lambda,
+                last_trajectory: near,
+            }),
         }
-        self.log.lambda = 1.0;
-        Ok(near)
     }
 
     fn solve_near(
@@ -363,18 +396,20 @@ impl HomotopyAttempt<'_, '_, '_> {
     ) -> Result<LeafTrajectory, ShootingFailureReason> {
         let equations = &*self.equations;
         let count = self.intervals.unwrap_or_else(|| {
-            let turns = (near.largest_turn(equations) / MAX_INTERVAL_TURN).ceil() as usize;
-            turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
+            let turns = (near.largest_turn(equations) / CONTINUATION.interval_turn).ceil() as usize;
+            turns.clamp(CONTINUATION.least_intervals, CONTINUATION.most_intervals)
         });
         let mut newton = ShootingNewton::from_trajectory(equations, near, Some(count), self.log)?;
         newton.requires_near_start = self.strategy != HomotopyStrategy::UnlimitedSteps;
-        newton.solve(INTERMEDIATE_TOLERANCE)?;
-        let stations = equally_spaced(STATIONS_PER_INTERVAL * count.max(LEAST_INTERVALS));
+        newton.solve(LOCAL_ERRORS.intermediate)?;
+        let stations = equally_spaced(
+            CONTINUATION.stations_per_interval * count.max(CONTINUATION.least_intervals),
+        );
         let sampled = LeafTrajectory::sample_solution(
             equations,
             &newton.nodes,
             &stations,
-            INTERMEDIATE_TOLERANCE,
+            LOCAL_ERRORS.intermediate,
         );
         Ok(sampled?)
     }

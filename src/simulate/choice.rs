@@ -1,10 +1,10 @@
 //! Which method moves a leaf, and why.
 //!
-//! What a motion costs by either method, known or estimated beforehand: numbers of steps times
-//! measured times.
+//! What a motion costs by either method is known or estimated beforehand: numbers of steps times measured
+//! times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
 use crate::numbers::format_two_digits;
 use crate::simulate::{Options, Scheme};
 use crate::words;
@@ -31,20 +31,20 @@ words! {
 
 /// The method of a motion, and why. Displayed, it is a short explanation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
+pub struct SchemeChoice {
     /// The method.
     pub scheme: Scheme,
     /// Why.
     pub reason: SchemeReason,
     /// The costs that were compared, if any were: of the explicit and of the semi-implicit
     /// method.
-    pub costs: Option<[Cost; 2]>,
+    pub costs: Option<[MotionCost; 2]>,
 }
 
-impl Choice {
+impl SchemeChoice {
     /// The choice that does not depend on costs, if there is one.
     pub(super) fn forced_choice(options: &Options, physics: &Physics, rigid: bool) -> Option<Self> {
-        let of = |scheme, reason| Choice {
+        let of = |scheme, reason| SchemeChoice {
             scheme,
             reason,
             costs: None,
@@ -68,8 +68,8 @@ impl Choice {
     }
 
     /// The cheaper method.
-    pub(super) fn cheaper_method(explicit: Cost, semi_implicit: Cost) -> Self {
-        Choice {
+    pub(super) fn cheaper_method(explicit: MotionCost, semi_implicit: MotionCost) -> Self {
+        SchemeChoice {
             scheme: match explicit.seconds <= semi_implicit.seconds {
                 true => Scheme::Explicit,
                 false => Scheme::SemiImplicit,
@@ -80,7 +80,7 @@ impl Choice {
     }
 }
 
-impl fmt::Display for Choice {
+impl fmt::Display for SchemeChoice {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self.reason {
             SchemeReason::Requested => "as requested",
@@ -104,7 +104,7 @@ impl fmt::Display for Choice {
     }
 }
 
-impl fmt::Display for Cost {
+impl fmt::Display for MotionCost {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let about = if self.at_least { "more than" } else { "some" };
         let [steps, seconds] = [self.steps, self.seconds].map(format_two_digits);
@@ -112,14 +112,14 @@ impl fmt::Display for Cost {
     }
 }
 
-impl Serialize for Choice {
+impl Serialize for SchemeChoice {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys {
             reason: SchemeReason,
             explanation: String,
-            explicit: Option<Cost>,
-            semi_implicit: Option<Cost>,
+            explicit: Option<MotionCost>,
+            semi_implicit: Option<MotionCost>,
         }
         let of = |method: usize| self.costs.map(|costs| costs[method]);
         let keys = Keys {
@@ -132,39 +132,59 @@ impl Serialize for Choice {
     }
 }
 
-/// Measured seconds of an explicit step: in all, and per segment.
-const EXPLICIT_STEP: f64 = 1e-7;
+/// Measured seconds of steps.
+struct MotionCosts {
+    /// Seconds of an explicit step, whatever the leaf.
+    explicit_step: f64,
+    /// Further seconds of an explicit step per segment.
+    explicit_segment: f64,
+    /// Seconds of a semi-implicit step, whatever the leaf, with the iterations and the rejected attempts that belong to
+    /// it.
+    semi_implicit_step: f64,
+    /// Further seconds of a semi-implicit step per segment.
+    semi_implicit_segment: f64,
+    /// Number of rods that a semi-implicit step processes at a time.
+    rods_at_once: usize,
+}
 
-const EXPLICIT_SEGMENT_SECONDS: f64 = 2e-8;
+const COSTS: MotionCosts = MotionCosts {
+    explicit_step: 1e-7,
+    explicit_segment: 2e-8,
+    semi_implicit_step: 3e-6,
+    semi_implicit_segment: 8e-7,
+    rods_at_once: 4,
+};
 
-/// Measured seconds of a semi-implicit step, with the iterations and the rejected attempts that
-/// belong to it: in all, and per segment of rods processed four at a time.
-const SEMI_IMPLICIT_STEP: f64 = 3e-6;
+/// The pilot that estimates the number of semi-implicit steps. Of 60 leaves as people measure them
+/// the estimates were 0.54 to 1.45 of the true numbers, of 200 with internal damping, which need
+/// few steps, 1.2 to 3.2.
+struct PilotRun {
+    /// The permitted local error of its steps, as a multiple of the tolerance.
+    error_ratio: f64,
+    /// The largest permitted local error of its steps.
+    largest_error: f64,
+    /// The exponent with which the number of steps grows with the accuracy. By the order of the
+    /// method it is 1/3; measured, it is a little more, as fast motions count that longer steps
+    /// pass over.
+    step_exponent: f64,
+    /// Measured part of a step's time that a step of the pilot takes, whose equations are solved
+    /// with lower accuracy.
+    step_cost: f64,
+    /// The longest time of the pilot in seconds.
+    longest_seconds: f64,
+}
 
-const SEMI_IMPLICIT_SEGMENT_SECONDS: f64 = 8e-7;
-
-const SIMD_LANES: usize = 4;
-
-/// The permitted local error of the pilot's steps, as a multiple of the tolerance and at most, and
-/// the exponent with which the number of steps grows with the accuracy. By the order of the method
-/// it is 1/3; measured, it is a little more, as fast motions count that longer steps pass over.
-/// Of 60 leaves as people measure them the estimates were 0.54 to 1.45 of the true numbers, of 200
-/// with internal damping, which need few steps, 1.2 to 3.2.
-const PILOT_ERROR_RATIO: f64 = 1000.0;
-
-const LARGEST_PILOT_ERROR: f64 = 0.1;
-
-const STEP_COUNT_EXPONENT: f64 = 0.357;
-
-/// Measured part of a step's time that a step of the pilot takes, whose equations are solved with
-/// lower accuracy, and the longest time of the pilot in seconds.
-const PILOT_STEP: f64 = 0.5;
-
-const LONGEST_PILOT: f64 = 0.3;
+const PILOT: PilotRun = PilotRun {
+    error_ratio: 1000.0,
+    largest_error: 0.1,
+    step_exponent: 0.357,
+    step_cost: 0.5,
+    longest_seconds: 0.3,
+};
 
 /// The cost of a motion by a method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Cost {
+pub struct MotionCost {
     /// Number of time steps; of the semi-implicit method an estimate.
     pub steps: f64,
     /// Seconds that they take on one core of a machine of 2020, approximately.
@@ -175,20 +195,24 @@ pub struct Cost {
 
 /// Approximate seconds of an explicit step.
 pub(super) fn explicit_step(rods: usize, segments: usize) -> f64 {
-    EXPLICIT_STEP + EXPLICIT_SEGMENT_SECONDS * (rods * segments) as f64
+    COSTS.explicit_step + COSTS.explicit_segment * (rods * segments) as f64
 }
 
 /// Approximate seconds of a semi-implicit step.
 pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
-    let segments = rods.next_multiple_of(SIMD_LANES) * segments;
-    SEMI_IMPLICIT_STEP + SEMI_IMPLICIT_SEGMENT_SECONDS * segments as f64
+    let segments = rods.next_multiple_of(COSTS.rods_at_once) * segments;
+    COSTS.semi_implicit_step + COSTS.semi_implicit_segment * segments as f64
 }
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
-pub(super) fn explicit_cost(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
-    let (duration, _) = physics.duration_and_interval();
+pub(super) fn explicit_cost(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    method: &Explicit,
+) -> MotionCost {
+    let duration = physics.times().duration;
     let steps = duration / method.longest_step();
-    Cost {
+    MotionCost {
         steps,
         seconds: steps * explicit_step(leaf.rods(), leaf.segments()),
         at_least: false,
@@ -206,14 +230,14 @@ pub(super) fn semi_implicit_cost(
     state: &State,
     tolerance: f64,
     most: f64,
-) -> Cost {
-    let (duration, interval) = physics.duration_and_interval();
-    let error = (PILOT_ERROR_RATIO * tolerance)
-        .min(LARGEST_PILOT_ERROR)
+) -> MotionCost {
+    let MotionTimes { duration, interval } = physics.times();
+    let error = (PILOT.error_ratio * tolerance)
+        .min(PILOT.largest_error)
         .max(tolerance);
-    let of_step = (error / tolerance).powf(STEP_COUNT_EXPONENT);
+    let of_step = (error / tolerance).powf(PILOT.step_exponent);
     let seconds = semi_implicit_step(leaf.rods(), leaf.segments());
-    let cost = |steps: f64, at_least: bool| Cost {
+    let cost = |steps: f64, at_least: bool| MotionCost {
         steps,
         seconds: steps * seconds,
         at_least,
@@ -224,7 +248,7 @@ pub(super) fn semi_implicit_cost(
     if outputs > most {
         return cost(outputs, true);
     }
-    let longest = (LONGEST_PILOT / (PILOT_STEP * seconds)) as usize;
+    let longest = (PILOT.longest_seconds / (PILOT.step_cost * seconds)) as usize;
     let steps = StepControl::CountOnly(error);
     let mut pilot = SemiImplicit::new(leaf.clone(), physics.clone(), state, steps);
     let (mut steps, mut attempts, mut failed) = (0.0, 0_usize, false);

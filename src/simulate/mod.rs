@@ -19,17 +19,11 @@
 //! # assert!((simulation.frame().time - 10.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! Where a motion begins.
-//!
-//! Requests that cannot be simulated.
-//!
-//! What makes a motion doubtful from its beginning: it starts where it would stay for ever but for
-//! rounding.
 
 mod choice;
 mod record;
 mod refinement;
+mod remark;
 
 pub use crate::leaf::HalfTurn;
 use crate::leaf::{
@@ -38,29 +32,29 @@ use crate::leaf::{
 use crate::modes::{Eigenpair, ModeRequest, lowest};
 pub use crate::motion::{Energy, Stopped};
 use crate::motion::{
-    Explicit, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
+    Explicit, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
     TimeIntegrator, project_constraints,
 };
 use crate::newton::{NewtonIteration, SolverCounts};
-use crate::numbers::format_two_digits;
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route,
+    Equilibrium, EquilibriumTracker, INDEFINITE_NEWTON_EQUATIONS, RelaxError, Route, StateOnGrid,
     converge_saddle,
 };
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{MotionStart, Scenario, Schedule, plausibility_warnings};
-pub use crate::simulate::choice::{Choice, Cost, SchemeReason};
+pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub use crate::simulate::record::{
-    Frame, Imbalance, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
+    Frame, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
 };
-use crate::simulate::refinement::{Comparison, Trajectory, compared_points};
+use crate::simulate::refinement::{MotionComparison, Trajectory, compared_points};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
+pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
 use crate::{relax, words};
 use std::f64::consts::PI;
 use std::time::Duration;
 
 /// Default number of segments per rod, unless its rest shape needs more.
-const SEGMENTS: usize = 16;
+pub(crate) const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
 /// longest rod.
@@ -79,7 +73,7 @@ words! {
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method; `None`: the one that costs less, as [`Choice`] says.
+    /// The method; `None`: the one that costs less, as [`SchemeChoice`] says.
     pub scheme: Option<Scheme>,
     /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
@@ -100,8 +94,8 @@ pub struct Simulation {
     leaf: Leaf,
     grid: Grid,
     physics: Physics,
-    choice: Choice,
-    doubts: Vec<String>,
+    choice: SchemeChoice,
+    doubts: Vec<MotionDoubt>,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn TimeIntegrator + Send>,
@@ -110,7 +104,7 @@ pub struct Simulation {
     made: usize,
     moving: Duration,
     /// The run that this one is compared with, and the bar that is aimed at.
-    comparison: Option<Comparison>,
+    comparison: Option<MotionComparison>,
     aim: Option<f64>,
     /// The last output whose error is known.
     known_until: Option<f64>,
@@ -124,11 +118,12 @@ impl Simulation {
     /// The leaf at time 0.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let from = |leaf: &Leaf, grid: &Grid| state(leaf, grid, tolerance, options.limit.clone());
+        let from =
+            |leaf: &Leaf, grid: &Grid| start_state(leaf, grid, tolerance, options.limit.clone());
         Simulation::with_initial_state(scenario, options, &from)
     }
 
-    /// The same from where a leaf is that followed another scenario, without velocity: what it is
+    /// The motion from where a leaf is that followed another scenario, without velocity: what it is
     /// released from, or where its stable equilibria end.
     pub fn from_tracker(
         follower: &EquilibriumTracker,
@@ -150,7 +145,11 @@ impl Simulation {
         scenario: &Scenario,
     ) -> Result<Equilibrium, RelaxError> {
         let now = self.method.snapshot();
-        follower.relax_from_state(scenario, (self.grid.clone(), now.state))
+        let guess = StateOnGrid {
+            grid: self.grid.clone(),
+            state: now.state,
+        };
+        follower.relax_from_state(scenario, guess)
     }
 
     fn with_initial_state(
@@ -167,7 +166,7 @@ impl Simulation {
         let leaf = Leaf::new(scenario);
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         relax::check_tolerance(tolerance)?;
-        let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
+        let segments = relax::check_segments(&leaf, options.segments, DEFAULT_MOTION_SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
         let state = state(&leaf, &grid)?;
@@ -175,10 +174,12 @@ impl Simulation {
         let doubt = unstable_start_doubt(&discrete, &physics, &state);
         let rigid = discrete.least_compliance() == 0.0;
         let mut begun = None;
-        let choice = match Choice::forced_choice(options, &physics, rigid) {
+        let choice = match SchemeChoice::forced_choice(options, &physics, rigid) {
             Some(choice) => choice,
             None => {
-                let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
+                let explicit = &begun
+                    .insert(explicit_motion(&discrete, &physics, &state, None)?)
+                    .method;
                 let cost = choice::explicit_cost(&discrete, &physics, explicit);
                 let other = choice::semi_implicit_cost(
                     &discrete,
@@ -187,7 +188,7 @@ impl Simulation {
                     tolerance,
                     cost.seconds,
                 );
-                Choice::cheaper_method(cost, other)
+                SchemeChoice::cheaper_method(cost, other)
             }
         };
         if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
@@ -202,13 +203,16 @@ impl Simulation {
         let mut stable = None;
         let mut method: Box<dyn TimeIntegrator + Send> = match choice.scheme {
             Scheme::Explicit => {
-                let (explicit, bound) = match begun {
+                let ExplicitMotion {
+                    method,
+                    stable: bound,
+                } = match begun {
                     Some(begun) => begun,
-                    None => explicit(&discrete, &physics, &state, step)?,
+                    None => explicit_motion(&discrete, &physics, &state, step)?,
                 };
-                step = Some(explicit.longest_step() * physics.time_unit);
+                step = Some(method.longest_step() * physics.time_unit);
                 stable = Some(bound);
-                Box::new(explicit)
+                Box::new(method)
             }
             Scheme::SemiImplicit => {
                 let step = step.map(|step| step / physics.time_unit);
@@ -218,13 +222,14 @@ impl Simulation {
             }
         };
         method.set_limit(options.limit.clone());
-        let (duration, interval) = physics.duration_and_interval();
+        let MotionTimes { duration, interval } = physics.times();
+        let warnings = plausibility_warnings(scenario).into_iter();
         let simulation = Simulation {
             leaf,
             choice,
             doubts: doubt
                 .into_iter()
-                .chain(plausibility_warnings(scenario))
+                .chain(warnings.map(MotionDoubt::Implausible))
                 .collect(),
             stable,
             step,
@@ -259,7 +264,7 @@ impl Simulation {
     /// Steps from here to the end, and the approximate number of seconds they take on one core
     /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
-        let (duration, _) = self.physics.duration_and_interval();
+        let duration = self.physics.times().duration;
         let left = (duration * self.physics.time_unit - self.time()).max(0.0);
         let steps = match (self.step, self.choice.costs) {
             (Some(step), _) => left / step,
@@ -287,21 +292,21 @@ impl Simulation {
 
     /// Compares this run, which has not begun, with another from now on; `keep`s what a finer
     /// run is compared with.
-    fn compare_with(&mut self, comparison: Option<Comparison>, keep: bool) {
+    fn compare_with(&mut self, comparison: Option<MotionComparison>, keep: bool) {
         self.comparison = comparison;
         self.trajectory = keep.then(Trajectory::default);
         let mut frame = self.frame();
-        self.compare(&mut frame);
+        self.compare_frame(&mut frame);
     }
 
     /// Compares the output just made, and keeps its points.
-    fn compare(&mut self, frame: &mut Frame) {
+    fn compare_frame(&mut self, frame: &mut Frame) {
         if self.comparison.is_none() && self.trajectory.is_none() {
             return;
         }
         let points = compared_points(frame, self.grid.sigma(), self.leaf.joined());
         if let Some(comparison) = &mut self.comparison {
-            comparison.compare(self.made, &points);
+            comparison.compare_output(self.made, &points);
             frame.error = comparison.error_bar;
             self.known_until = comparison
                 .error_bar
@@ -325,7 +330,7 @@ impl Simulation {
 
     /// Bounds the steps to half of the time between outputs.
     fn halve_outputs(&mut self) {
-        let (_, interval) = self.physics.duration_and_interval();
+        let interval = self.physics.times().interval;
         self.longest_steps = vec![0.5 * interval; self.outputs];
     }
 
@@ -361,12 +366,12 @@ impl Simulation {
     }
 
     /// Why it is this method.
-    pub fn choice(&self) -> Choice {
+    pub fn choice(&self) -> SchemeChoice {
         self.choice
     }
 
-    /// What makes the motion doubtful from its beginning: one sentence each.
-    pub fn doubts(&self) -> &[String] {
+    /// What makes the motion doubtful.
+    pub fn doubts(&self) -> &[MotionDoubt] {
         &self.doubts
     }
 
@@ -454,14 +459,14 @@ impl Simulation {
             });
         self.moving += clock.elapsed();
         frame.map(|mut frame| {
-            self.compare(&mut frame);
+            self.compare_frame(&mut frame);
             frame
         })
     }
 
     /// The time of an output, in the method's unit.
     fn output_time(&self, number: usize) -> f64 {
-        let (duration, interval) = self.physics.duration_and_interval();
+        let MotionTimes { duration, interval } = self.physics.times();
         match number >= self.outputs {
             true => duration,
             false => interval * number as f64,
@@ -469,18 +474,23 @@ impl Simulation {
     }
 }
 
-/// The explicit method, and its stable step in the scenario's unit of time, which `step`
-/// must not exceed.
-fn explicit(
+/// The explicit method, and its stable step in the scenario's unit of time.
+struct ExplicitMotion {
+    method: Explicit,
+    stable: StableStep,
+}
+
+/// The explicit method with a `step` that must not exceed the stable one.
+fn explicit_motion(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     step: Option<f64>,
-) -> Result<(Explicit, StableStep), SimulationError> {
+) -> Result<ExplicitMotion, SimulationError> {
     let own = step.map(|step| step / physics.time_unit);
-    let explicit = Explicit::new(leaf.clone(), physics.clone(), state, own)
+    let method = Explicit::new(leaf.clone(), physics.clone(), state, own)
         .map_err(|RigidRodError| SimulationError::Rigid)?;
-    let bound = explicit.stable_step();
+    let bound = method.stable_step();
     let stable = bound.step * physics.time_unit;
     match step {
         Some(found) if found > stable => {
@@ -493,7 +503,10 @@ fn explicit(
         }
         _ => {
             let step = stable;
-            Ok((explicit, StableStep { step, ..bound }))
+            Ok(ExplicitMotion {
+                method,
+                stable: StableStep { step, ..bound },
+            })
         }
     }
 }
@@ -504,7 +517,7 @@ fn explicit(
 const LARGEST_FORCE: f64 = 256.0 * PI * PI;
 
 /// The positions and rotations at time 0.
-pub(super) fn state(
+pub(super) fn start_state(
     leaf: &Leaf,
     grid: &Grid,
     tolerance: f64,
@@ -512,18 +525,18 @@ pub(super) fn state(
 ) -> Result<State, SimulationError> {
     match leaf.scenario().dynamics.start {
         MotionStart::Released if !leaf.has_placed_supports() => {
-            Ok(released(&DiscreteLeaf::new(leaf, grid.clone())))
+            Ok(released_state(&DiscreteLeaf::new(leaf, grid.clone())))
         }
         // Held tips and grips are moved to their positions by the relaxation.
         MotionStart::Released | MotionStart::ConfirmedEquilibrium => {
-            at_rest(leaf, grid, tolerance, limit)
+            state_at_rest(leaf, grid, tolerance, limit)
         }
     }
 }
 
 /// The initial state of a relaxation or, where its arcs would strain rods that hardly yield, a
 /// state near it without such strains: otherwise the energy of these would drive the motion.
-fn released(leaf: &DiscreteLeaf) -> State {
+fn released_state(leaf: &DiscreteLeaf) -> State {
     let mut arcs = relax::initial_state(leaf);
     leaf.strain_forces(&mut arcs);
     let strained = leaf.rod_index_pairs(0..leaf.segments()).any(|(j, i)| {
@@ -536,7 +549,7 @@ fn released(leaf: &DiscreteLeaf) -> State {
 }
 
 /// The equilibrium under the loads, in the wind and with the rest shape at time 0.
-fn at_rest(
+fn state_at_rest(
     leaf: &Leaf,
     grid: &Grid,
     tolerance: f64,
@@ -544,7 +557,7 @@ fn at_rest(
 ) -> Result<State, SimulationError> {
     let scenario = scenario_at_start(leaf.scenario());
     let options = relax::Options {
-        method: relax::Method::default().on_grid(Some(grid.segments())),
+        method: relax::SemiImplicit::on_grid(Some(grid.segments())).into(),
         tolerance: Some(tolerance),
         limit,
         route: match scenario.wind {
@@ -657,23 +670,30 @@ pub enum SimulationError {
     },
 }
 
-/// Largest distance of a start from the equilibrium that it is compared with, in lengths.
-const LARGEST_START_DISTANCE: f64 = 0.1;
+/// When a start counts as an unstable equilibrium.
+struct UnstableStartTest {
+    /// Largest distance of a start from the equilibrium that it is compared with, in lengths.
+    largest_distance: f64,
+    /// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
+    /// none: it would have to grow by e fourteen times.
+    negligible_deviation: f64,
+    /// Accuracy of these modes.
+    mode_accuracy: f64,
+}
 
-/// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
-/// none: it would have to grow by e fourteen times.
-const NEGLIGIBLE_MODE_DEVIATION: f64 = 1e-6;
+const UNSTABLE_START: UnstableStartTest = UnstableStartTest {
+    largest_distance: 0.1,
+    negligible_deviation: 1e-6,
+    mode_accuracy: 1e-9,
+};
 
-/// Accuracy of these modes.
-const MODE_ACCURACY: f64 = 1e-9;
-
-/// A sentence on a start at an unstable equilibrium, or beside one but without a deviation along
+/// The doubt about a start at an unstable equilibrium, or beside one but without a deviation along
 /// its unstable modes, such as that of a straight column under its weight.
 pub(super) fn unstable_start_doubt(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     start: &State,
-) -> Option<String> {
+) -> Option<MotionDoubt> {
     let mut leaf = leaf.clone();
     leaf.loads = physics.loads(0.0);
     if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
@@ -691,7 +711,7 @@ pub(super) fn unstable_start_doubt(
     let wanted = ModeRequest {
         count: index,
         modes_below: None,
-        accuracy: MODE_ACCURACY,
+        accuracy: UNSTABLE_START.mode_accuracy,
         approximate_modes: &[],
         time: &Limit::default(),
     };
@@ -699,17 +719,16 @@ pub(super) fn unstable_start_doubt(
     modes.retain(|mode| mode.eigenvalue < 0.0);
     let fastest = -modes.first()?.eigenvalue;
     let deviates = |mode: &Eigenpair| {
-        deviation(&leaf, physics, (&exact, start), &mode.shape) > NEGLIGIBLE_MODE_DEVIATION
+        mode_deviation(&leaf, physics, (&exact, start), &mode.shape)
+            > UNSTABLE_START.negligible_deviation
     };
     if modes.iter().any(deviates) {
         return None;
     }
-    let time = format_two_digits(physics.time_unit / fastest.sqrt());
-    Some(format!(
-        "the motion starts at an unstable equilibrium (negative eigenvalues: {index}), and nothing displaces the leaf \
-         the way it would leave: a deviation grows by e in {time}, and rounding decides when and to which side; \
-         give it a small push, such as a short dynamics.tip_force"
-    ))
+    Some(MotionDoubt::UnstableStart {
+        index,
+        growth_time: physics.time_unit / fastest.sqrt(),
+    })
 }
 
 /// Whether the first step of Newton's method is short enough for an equilibrium nearby.
@@ -723,12 +742,12 @@ fn may_be_near(leaf: &DiscreteLeaf, start: &State, system: &mut System) -> bool 
     };
     // It is not converged after one step.
     let _ = first.solve(leaf, &mut next, system, INDEFINITE_NEWTON_EQUATIONS);
-    start.largest_displacement_to(&next) < LARGEST_START_DISTANCE
+    start.largest_displacement_to(&next) < UNSTABLE_START.largest_distance
 }
 
 /// The largest rotation or displacement in the part along a mode of what leads from one state to
 /// another. Modes are orthonormal in the mass product.
-fn deviation(
+fn mode_deviation(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     (from, to): (&State, &State),
@@ -753,6 +772,8 @@ fn deviation(
 }
 
 crate::renamed! {
+    Choice => SchemeChoice,
+    Cost => MotionCost,
     Moment => OutputSample,
     Refused => SimulationError,
     Still => ShapeSnapshot,

@@ -1,12 +1,12 @@
-//! A leaf at an instant, and the record of a simulation that has ended.
-//!
-//! Selection of outputs for a few pictures.
+//! A leaf at an instant, the record of a simulation that has ended, and which outputs are chosen for a few
+//! pictures or a film.
 
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
 use crate::scenario;
 use crate::shape::{interpolation_weights, serialize_tips};
-use crate::simulate::{Choice, Scheme, Simulation, Stopped};
+use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
+use crate::simulate::{Scheme, SchemeChoice, Simulation, Stopped};
 use glam::{DQuat, DVec3};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -49,17 +49,8 @@ impl OutputSample {
     }
 }
 
-/// The largest deviation of the energy balance of a motion from that at its start, as a part of
-/// the largest energy that moved.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "the energy balance is off by {:.0} % of the largest energy that moved: compare with a motion in shorter steps",
-    100.0 * .0
-)]
-pub struct Imbalance(pub f64);
-
 impl Imbalance {
-    /// That of the outputs of a motion, if it is more than a few per cent.
+    /// The imbalance of the outputs of a motion, if it is more than a few per cent.
     fn from_samples(moments: &[OutputSample], rounding: f64) -> Option<Self> {
         let start = moments.first()?.energy;
         let (mut moved, mut off) = (rounding, 0.0_f64);
@@ -68,12 +59,6 @@ impl Imbalance {
             off = off.max((e.balance() - start.balance()).abs());
         }
         (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))
-    }
-}
-
-impl Serialize for Imbalance {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 
@@ -102,11 +87,11 @@ pub struct Record {
     /// per cent.
     #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
     pub imbalance: Option<Imbalance>,
-    /// What makes it doubtful from its beginning.
+    /// What makes it doubtful.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<MotionDoubt>,
     /// Why it has this method.
-    pub choice: Choice,
+    pub choice: SchemeChoice,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -211,10 +196,9 @@ impl Record {
     }
 
     /// Why the motion ended early, or what makes it doubtful.
-    pub fn remark(&self) -> Option<String> {
-        let imbalance = self.imbalance.map(|imbalance| imbalance.to_string());
-        self.stopped
-            .map_or(imbalance, |stopped| Some(stopped.to_string()))
+    pub fn remark(&self) -> Option<MotionRemark> {
+        let imbalance = self.imbalance.map(MotionRemark::Imbalance);
+        self.stopped.map(MotionRemark::Stopped).or(imbalance)
     }
 }
 
@@ -235,7 +219,7 @@ fn serialize_outcome<S: Serializer>(
     keys.end()
 }
 
-/// Their number, all energies at the last one, and the conserved quantity at the first and the
+/// The number of outputs, all energies at the last one, and the conserved quantity at the first and the
 /// last.
 fn serialize_moments<S: Serializer>(
     moments: &[OutputSample],
@@ -261,7 +245,7 @@ fn serialize_moments<S: Serializer>(
 }
 
 /// Number of nodes for cubic interpolation.
-const CUBIC: usize = 4;
+pub(super) const CUBIC: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
 /// by rod, base to tip.

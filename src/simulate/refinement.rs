@@ -1,23 +1,23 @@
 //! A motion followed on finer and finer grids in shorter and shorter steps, each run compared with
-//! the one before, until its tips are as accurate as requested.
-//!
-//! How accurate a motion is: its tips, and the middles of its veins, compared at every output with
-//! those of a run on another grid in other steps.
+//! the one before, until its tips are as accurate as requested. Compared are the tips and the middles
+//! of the veins, at every output.
 //!
 //! Both methods are of second order in space and time. With the length h of segments, and steps in
 //! proportion to it, the error of a run is C h^2, and the difference of two runs tells C
 //! (Richardson). Differences grow in time, mostly as phases do; but they vanish at the turning
 //! points of a vibration, so that the bar at an output is the largest so far. A component whose
 //! phase the coarser run has lost altogether is wrong in it by up to twice its amplitude, and no
-//! more in the finer run: [`SAFETY`] lets the bar be the difference itself.
+//! more in the finer run: `COMPARISON.safety` lets the bar be the difference itself.
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
-use crate::numbers::{format_two_digits, larger, largest};
+use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
 use crate::shape::interpolation_weights;
+use crate::simulate::record::CUBIC;
+use crate::simulate::remark::MotionDoubt;
 use crate::simulate::{
-    Choice, DEFAULT_TIP_ERROR, Frame, Options, Scheme, Simulation, SimulationError,
+    DEFAULT_TIP_ERROR, Frame, Options, Scheme, SchemeChoice, Simulation, SimulationError,
 };
 use crate::{relax, scenario, simulate};
 use glam::DVec3;
@@ -26,24 +26,32 @@ use glam::DVec3;
 /// first run, and that which it is compared with, take what they need.
 pub const REFINEMENT_SECONDS: f64 = 10.0;
 
-/// The coarsest grid that a motion is compared with; below, a finer one is.
-const COARSEST: usize = 4;
+/// How runs of a refinement follow each other.
+struct RefinementSteps {
+    /// The coarsest grid that a motion is compared with; below, a finer one is.
+    coarsest_segments: usize,
+    /// The ratio of the local errors of steps of which one is half as long: they are of third
+    /// order.
+    local_error_ratio: f64,
+    /// Bounds on the local error of a step.
+    local_error: (f64, f64),
+    /// The time of a run over that on a grid of half as many segments, in steps twice as long.
+    cost_ratio: f64,
+    /// Explicit steps that are longer by no more than this factor count as equally long.
+    equal_step: f64,
+    /// Where runs part later than runs on coarser grids by less than this factor, they part for
+    /// another reason than the phases of vibrations, and finer grids do not help.
+    later_parting: f64,
+}
 
-/// The ratio of the local errors of steps of which one is half as long: they are of third order.
-const LOCAL_ERROR_RATIO: f64 = 8.0;
-
-/// Bounds on the local error of a step.
-const LOCAL_ERROR: (f64, f64) = (1e-12, 0.1);
-
-/// The time of a run over that on a grid of half as many segments, in steps twice as long.
-const COST_RATIO: f64 = 4.0;
-
-/// Explicit steps that are longer by no more than this factor count as equally long.
-const EQUAL_STEP_FACTOR: f64 = 1.1;
-
-/// Where runs part later than runs on coarser grids by less than this factor, they part for
-/// another reason than the phases of vibrations, and finer grids do not help.
-const LATER_PARTING_FACTOR: f64 = 1.3;
+const REFINEMENT: RefinementSteps = RefinementSteps {
+    coarsest_segments: 4,
+    local_error_ratio: 8.0,
+    local_error: (1e-12, 0.1),
+    cost_ratio: 4.0,
+    equal_step: 1.1,
+    later_parting: 1.3,
+};
 
 /// The grid of a run, and its steps as in [`Options`].
 #[derive(Clone, Copy, Debug)]
@@ -89,16 +97,16 @@ pub struct Refinement {
     /// The error of tips that is aimed at, if one is.
     aim: Option<f64>,
     length: f64,
-    choice: Choice,
+    choice: SchemeChoice,
     /// The next run and the one before, as they were or will be.
     resolution: Resolution,
     before: Option<Resolution>,
     /// The next run, not begun, and the points of the run that it is compared with, if they are
     /// known.
     next: Option<Simulation>,
-    coarser: Option<(usize, Trajectory)>,
-    /// Those of the run before that.
-    coarsest: Option<(usize, Trajectory)>,
+    coarser: Option<RunTrajectory>,
+    /// The points of the run before that.
+    coarsest: Option<RunTrajectory>,
     /// Number of runs that have ended, and whether the next is the last in any case.
     runs: usize,
     last: bool,
@@ -192,10 +200,13 @@ impl Refinement {
             .aim
             .is_some_and(|aim| bar.is_some_and(|bar| bar <= aim));
         if !met && self.refines() && !self.last {
-            self.refine(simulation, stopped);
+            self.prepare_refined_run(simulation, stopped);
         }
         if self.next.is_some() {
-            let others = (simulation.segments(), trajectory.unwrap_or_default());
+            let others = RunTrajectory {
+                segments: simulation.segments(),
+                trajectory: trajectory.unwrap_or_default(),
+            };
             let before = self.coarser.replace(others);
             if self.last {
                 // The run before once more, compared with what it was compared with.
@@ -211,13 +222,21 @@ impl Refinement {
             && !met
             && stopped.is_none()
         {
-            let doubt = missed_accuracy_doubt(simulation, aim, self.refines());
+            let doubt = match (simulation.error_bar(), simulation.known_until()) {
+                (Some(error), _) => MotionDoubt::Inaccurate {
+                    error,
+                    aim,
+                    refined_within: self.refines().then_some(REFINEMENT_SECONDS),
+                },
+                (None, Some(from)) => MotionDoubt::RunsPart { from },
+                (None, None) => MotionDoubt::NotCompared,
+            };
             simulation.doubts.push(doubt);
         }
     }
 
     /// Builds the next run, if there is one.
-    fn refine(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
+    fn prepare_refined_run(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
         if matches!(stopped, Some(Stopped::Interrupted { .. })) {
             return;
         }
@@ -225,19 +244,20 @@ impl Refinement {
             // The finer grid fails: what the coarser one found is the result.
             if let Some(before) = self.before {
                 self.last = true;
-                self.next = self.build(before).ok();
+                self.next = self.build_run(before).ok();
             }
             return;
         }
         let until = ended.known_until().filter(|_| ended.error_bar().is_none());
         if let (Some(until), Some(before)) = (until, self.known_until)
             && before > 0.0
-            && until < LATER_PARTING_FACTOR * before
+            && until < REFINEMENT.later_parting * before
         {
             return;
         }
         let part = ended.time() / self.scenario.dynamics.duration;
-        let expected = COST_RATIO * ended.seconds_so_far() / part.clamp(f64::EPSILON, 1.0);
+        let expected =
+            REFINEMENT.cost_ratio * ended.seconds_so_far() / part.clamp(f64::EPSILON, 1.0);
         if self.seconds + expected > REFINEMENT_SECONDS {
             return;
         }
@@ -245,7 +265,7 @@ impl Refinement {
         let halved = Resolution {
             segments: 2 * now.segments,
             step: now.step.map(|step| 0.5 * step),
-            tolerance: self.local_error(now.tolerance / LOCAL_ERROR_RATIO),
+            tolerance: self.local_error(now.tolerance / REFINEMENT.local_error_ratio),
         };
         let Ok(next) = self.build_with_steps(halved) else {
             return;
@@ -267,11 +287,13 @@ impl Refinement {
     fn local_error(&self, tolerance: f64) -> f64 {
         match self.choice.scheme {
             Scheme::Explicit => self.resolution.tolerance,
-            Scheme::SemiImplicit => tolerance.clamp(LOCAL_ERROR.0, LOCAL_ERROR.1),
+            Scheme::SemiImplicit => {
+                tolerance.clamp(REFINEMENT.local_error.0, REFINEMENT.local_error.1)
+            }
         }
     }
 
-    fn build(&self, at: Resolution) -> Result<Simulation, SimulationError> {
+    fn build_run(&self, at: Resolution) -> Result<Simulation, SimulationError> {
         let start_tolerance = self.options.tolerance.unwrap_or(self.scenario.tolerance);
         let options = Options {
             scheme: Some(self.choice.scheme),
@@ -281,7 +303,7 @@ impl Refinement {
             limit: self.options.limit.clone(),
         };
         let from = |leaf: &Leaf, grid: &Grid| {
-            simulate::state(leaf, grid, start_tolerance, options.limit.clone())
+            simulate::start_state(leaf, grid, start_tolerance, options.limit.clone())
         };
         Simulation::with_initial_state(&self.scenario, &options, &from)
     }
@@ -289,9 +311,11 @@ impl Refinement {
     /// With steps of this length or, by the explicit method, the longest stable ones if they are
     /// hardly longer, or shorter.
     fn build_with_steps(&self, at: Resolution) -> Result<Simulation, SimulationError> {
-        let stable = self.build(Resolution { step: None, ..at })?;
+        let stable = self.build_run(Resolution { step: None, ..at })?;
         match (at.step, stable.longest_step()) {
-            (Some(step), Some(longest)) if longest > EQUAL_STEP_FACTOR * step => self.build(at),
+            (Some(step), Some(longest)) if longest > REFINEMENT.equal_step * step => {
+                self.build_run(at)
+            }
             _ => Ok(stable),
         }
     }
@@ -322,12 +346,17 @@ impl Refinement {
         &mut self,
         first: &mut Simulation,
         watch: &mut RunObserver,
-    ) -> Option<Option<Comparison>> {
+    ) -> Option<Option<MotionComparison>> {
         let own = self.resolution;
         let coarser = own.segments.div_ceil(2);
-        let (segments, factor) = match coarser >= COARSEST && self.has_grid(coarser) {
-            true => (coarser, 2.0),
-            false => (2 * own.segments, 0.5),
+        let (segments, factor) =
+            match coarser >= REFINEMENT.coarsest_segments && self.has_grid(coarser) {
+                true => (coarser, 2.0),
+                false => (2 * own.segments, 0.5),
+            };
+        let with_trajectory = |trajectory: Trajectory| RunTrajectory {
+            segments,
+            trajectory,
         };
         let with = |step: Option<f64>| Resolution {
             segments,
@@ -337,13 +366,14 @@ impl Refinement {
         if let Some(step) = self.options.step {
             // Given steps are taken on the other grid, too, and steps half as long there tell what
             // they cost.
-            let runs = [step, 0.5 * step].map(|step| self.build(with(Some(step))).ok());
+            let runs = [step, 0.5 * step].map(|step| self.build_run(with(Some(step))).ok());
             let [Some(same), Some(halved)] = runs else {
                 return Some(None);
             };
             let same = self.run_unrecorded(same, watch)?;
             let halved = self.run_unrecorded(halved, watch)?;
-            let comparison = Comparison::new(own.segments, (segments, same), self.length);
+            let comparison =
+                MotionComparison::new(own.segments, with_trajectory(same), self.length);
             return Some(Some(comparison.with_half_steps(&halved)));
         }
         let longer = own.step.map(|step| factor * step);
@@ -352,13 +382,13 @@ impl Refinement {
         };
         if let (Some(step), Some(longer)) = (run.longest_step(), longer)
             && factor > 1.0
-            && EQUAL_STEP_FACTOR * step < longer
+            && REFINEMENT.equal_step * step < longer
         {
             // The coarser grid does not allow explicit steps twice as long.
             self.resolution.step = Some(0.5 * step);
-            match self.build(self.resolution) {
+            match self.build_run(self.resolution) {
                 Ok(shorter) => *first = shorter,
-                // It was accepted with longer steps.
+                // Unreachable: the run was accepted with longer steps.
                 Err(_) => return Some(None),
             }
         }
@@ -368,11 +398,12 @@ impl Refinement {
         let trajectory = self.run_unrecorded(run, watch)?;
         if factor > 1.0 {
             first.halve_coarser_steps(&trajectory);
-            self.coarser = Some((segments, trajectory.clone()));
+            self.coarser = Some(with_trajectory(trajectory.clone()));
         }
-        Some(Some(Comparison::new(
+        let other = with_trajectory(trajectory);
+        Some(Some(MotionComparison::new(
             own.segments,
-            (segments, trajectory),
+            other,
             self.length,
         )))
     }
@@ -383,60 +414,40 @@ impl Refinement {
     }
 
     /// The comparison of a later run with the one before.
-    fn compare_next(&self, next: &mut Simulation) -> Option<Comparison> {
-        let (segments, trajectory) = self.coarser.clone()?;
-        next.halve_coarser_steps(&trajectory);
-        let run = (segments, trajectory);
-        Some(Comparison::new(next.segments(), run, self.length))
+    fn compare_next(&self, next: &mut Simulation) -> Option<MotionComparison> {
+        let coarser = self.coarser.clone()?;
+        next.halve_coarser_steps(&coarser.trajectory);
+        Some(MotionComparison::new(next.segments(), coarser, self.length))
     }
 }
 
-/// A sentence on a motion that is not as accurate as it was to be.
-fn missed_accuracy_doubt(simulation: &Simulation, aim: f64, refined: bool) -> String {
-    let aim = format_two_digits(aim);
-    let why = match refined {
-        true => format!(
-            "finer grids would take more than {REFINEMENT_SECONDS} seconds, or cannot be followed; give more segments"
-        ),
-        false => "give more segments and shorter steps, or leave both out".into(),
-    };
-    match (simulation.error_bar(), simulation.known_until()) {
-        (Some(bar), _) => format!(
-            "the error of the tips may be {}, and {aim} was aimed at: {why}",
-            format_two_digits(bar)
-        ),
-        (None, Some(until)) => format!(
-            "from t = {} on runs on two grids part, as where a leaf snaps: how accurate the tips are is known until then",
-            format_two_digits(until)
-        ),
-        (None, None) => {
-            "how accurate the tips are is not known: there is no second run to compare with".into()
-        }
-    }
+/// How the error of a run follows from its difference from another.
+struct RunComparison {
+    /// The bar over the error that the order of the methods says: the difference itself where a
+    /// phase is lost.
+    safety: f64,
+    /// Two runs have parted where they differ by more than this part of the largest displacement in
+    /// the motion: phases differ by so many radians, or one has snapped and the other has not.
+    parted: f64,
+    /// As long as displacements since the start differ by more than that part of the largest of
+    /// them so far, as those of a shared tip do while waves cross the first segments, the order of
+    /// the methods is not to be seen, and this factor is in its place. (A joined leaf let go needed
+    /// 8.)
+    unresolved_safety: f64,
+    /// Runs that differ by less than this part of the longest rod have not parted, however little
+    /// the leaf moves: they have come to rest, or vibrate with such an amplitude.
+    negligible: f64,
+    /// What rounding leaves of differences, relative to the longest rod.
+    rounding: f64,
 }
 
-/// The bar over the error that the order of the methods says.
-const SAFETY: f64 = 3.0;
-
-/// Two runs have parted where they differ by more than this part of the largest displacement in
-/// the motion: phases differ by so many radians, or one has snapped and the other has not.
-const PARTED_DISPLACEMENT_FRACTION: f64 = 0.2;
-
-/// As long as displacements since the start differ by more than that part of the largest of them
-/// so far, as those of a shared tip do while waves cross the first segments, the order of the
-/// methods is not to be seen, and this factor is in its place. (A joined
-/// leaf let go needed 8.)
-const UNRESOLVED_ERROR_FACTOR: f64 = 10.0;
-
-/// Runs that differ by less than this part of the longest rod have not parted, however little the
-/// leaf moves: they have come to rest, or vibrate with such an amplitude.
-const NEGLIGIBLE_RUN_DIFFERENCE: f64 = 1e-3;
-
-/// What rounding leaves of differences, relative to the longest rod.
-const ROUNDING: f64 = 1e-12;
-
-/// Number of nodes for cubic interpolation.
-const CUBIC: usize = 4;
+const COMPARISON: RunComparison = RunComparison {
+    safety: 3.0,
+    parted: 0.2,
+    unresolved_safety: 10.0,
+    negligible: 1e-3,
+    rounding: 1e-12,
+};
 
 /// Where the compared points are at all outputs of a run.
 #[derive(Clone, Debug, Default)]
@@ -499,9 +510,16 @@ pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> 
     points
 }
 
+/// Where the compared points are in a run on a grid of so many segments.
+#[derive(Clone, Debug)]
+pub(super) struct RunTrajectory {
+    pub segments: usize,
+    pub trajectory: Trajectory,
+}
+
 /// A run compared with others, output after output.
 #[derive(Clone, Debug)]
-pub(super) struct Comparison {
+pub(super) struct MotionComparison {
     other: Trajectory,
     /// Segments of the other run.
     pub segments: usize,
@@ -519,19 +537,22 @@ pub(super) struct Comparison {
     pub error_bar: Option<f64>,
 }
 
-impl Comparison {
-    /// Of a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
+impl MotionComparison {
+    /// Compares a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
     /// longest rod has this length.
-    pub fn new(segments: usize, other: (usize, Trajectory), length: f64) -> Self {
-        let (others, other) = other;
+    pub fn new(segments: usize, other: RunTrajectory, length: f64) -> Self {
+        let RunTrajectory {
+            segments: others,
+            trajectory: other,
+        } = other;
         let [own, its] = [segments, others].map(|count| (count as f64).powi(-2));
-        Comparison {
-            factor: SAFETY * own / (its - own).abs(),
+        MotionComparison {
+            factor: COMPARISON.safety * own / (its - own).abs(),
             segments: others,
             of_steps: None,
-            parting_distance: (PARTED_DISPLACEMENT_FRACTION * other.largest_displacement())
-                .max(NEGLIGIBLE_RUN_DIFFERENCE * length),
-            rounding: ROUNDING * length,
+            parting_distance: (COMPARISON.parted * other.largest_displacement())
+                .max(COMPARISON.negligible * length),
+            rounding: COMPARISON.rounding * length,
             start: Vec::new(),
             displacement: 0.0,
             error_bar: Some(0.0),
@@ -539,11 +560,11 @@ impl Comparison {
         }
     }
 
-    /// With the distances of the other run from one like it in steps half as long.
+    /// Adds the distances of the other run from one like it in steps half as long.
     pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
         let distances = self.other.distances(halved);
         let bar = |distance: f64| match distance <= self.parting_distance {
-            true => 4.0 / 3.0 * SAFETY * distance,
+            true => 4.0 / 3.0 * COMPARISON.safety * distance,
             false => f64::INFINITY,
         };
         self.of_steps = Some(distances.into_iter().map(bar).collect());
@@ -551,7 +572,7 @@ impl Comparison {
     }
 
     /// Compares the points of an output, behind all before it.
-    pub fn compare(&mut self, output: usize, points: &[DVec3]) {
+    pub fn compare_output(&mut self, output: usize, points: &[DVec3]) {
         let of_steps = match &self.of_steps {
             None => Some(0.0),
             Some(bars) => bars.get(output).copied().filter(|bar| bar.is_finite()),
@@ -573,9 +594,9 @@ impl Comparison {
             let moves = points.iter().zip(other).zip(start.iter().zip(others_start));
             let moves = moves.map(|((a, b), (a0, b0))| ((*a - *a0) - (*b - *b0)).length());
             let of_moves = largest(moves);
-            let factor = match of_moves <= PARTED_DISPLACEMENT_FRACTION * self.displacement {
+            let factor = match of_moves <= COMPARISON.parted * self.displacement {
                 true => self.factor,
-                false => UNRESOLVED_ERROR_FACTOR * self.factor,
+                false => COMPARISON.unresolved_safety * self.factor,
             };
             let bar = factor * distance + of_steps + self.rounding;
             (distance <= self.parting_distance).then(|| bar.max(before))

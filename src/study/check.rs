@@ -1,19 +1,20 @@
-//! Two independent methods for the same equilibrium, compared.
-//!
-//! Serialisation of both solutions for `check.json`.
+//! Two independent methods for the same equilibrium, compared: relaxation, and the boundary-value problem
+//! by shooting.
 
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, serialize_index,
+    Equilibrium, EquilibriumRemark, Options, Outcome, Progress, RelaxError, SemiImplicit,
+    serialize_index, serialize_remark,
 };
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use crate::shape::{Difference, serialize_tips};
 use crate::shooting::{ShootingFailure, ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::study::judge::{
-    common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near, rod_differences,
-    run_timed,
+    Timed, common_stations, eigenvalue_grid, grid_nodes_and_others, morse_index_near,
+    rod_differences, run_timed,
 };
+use crate::study::remark::CheckReason;
 use crate::{relax, shooting, words};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
@@ -51,10 +52,10 @@ pub enum CheckVerdict {
     /// They do not.
     Differ,
     /// There are not two solutions to compare, with the reason.
-    NotCompared(String),
+    NotCompared(CheckReason),
     /// Shooting finds no solution of its own, only that nothing it can resolve contradicts the relaxed
     /// leaf, with the reason.
-    NotIndependent(String),
+    NotIndependent(CheckReason),
 }
 
 words! {
@@ -161,14 +162,11 @@ impl Check {
     fn reach_verdict(&self) -> CheckVerdict {
         let solution = match self.shot.as_ref().map(|shot| &shot.found) {
             None => {
-                let why = (self.relaxed.remark.as_ref()).map(|remark| format!(": {remark}"));
-                let why = why.unwrap_or_default();
-                return CheckVerdict::NotCompared(format!(
-                    "the relaxation did not come to rest{why}"
-                ));
+                let remark = self.relaxed.remark.clone();
+                return CheckVerdict::NotCompared(CheckReason::NotAtRest { remark });
             }
             Some(Err(failure)) => {
-                let why = failure.reason.to_string();
+                let why = CheckReason::ShootingFailed(failure.reason.clone());
                 return match failure.reason {
                     ShootingFailureReason::Rounding { .. }
                     | ShootingFailureReason::Unbounded { fixed: false, .. } => {
@@ -180,10 +178,8 @@ impl Check {
             Some(Ok(solution)) => solution,
         };
         if solution.error.position > self.allowed() {
-            return CheckVerdict::NotCompared(format!(
-                "the boundary-value solution is only known within {:.1e}: ask for a larger tolerance",
-                solution.error.position
-            ));
+            let error = solution.error.position;
+            return CheckVerdict::NotCompared(CheckReason::Inaccurate { error });
         }
         let [force, moment] = self.allowed_resultants();
         let same = |found: Difference| {
@@ -289,7 +285,7 @@ pub fn check(
         ..Options::default()
     };
     // Forces are compared as well: not the shape alone.
-    let (relaxed, _) = relax::relax_on_grids(scenario, &asked, false, progress)?;
+    let relaxed = relax::relax_on_grids(scenario, &asked, false, progress)?.result;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| solve_by_shooting(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))
@@ -315,7 +311,10 @@ fn solve_by_shooting(
         gives_up: true,
         ..shooting::ShootingOptions::new(start, &stations, precision)
     };
-    let (found, wall_seconds) = run_timed(|| {
+    let Timed {
+        result: found,
+        seconds: wall_seconds,
+    } = run_timed(|| {
         shooting::solve(scenario, &options, &mut |step| {
             progress(&Progress::Shooting(*step))
         })
@@ -327,10 +326,13 @@ fn solve_by_shooting(
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
-            Ok(solution) => {
-                let shape = (&solution.stations[..], &solution.rods[..]);
-                morse_index_near(scenario, grid, shape, solution.error.position)
-            }
+            Ok(solution) => morse_index_near(
+                scenario,
+                grid,
+                &solution.stations,
+                &solution.rods,
+                solution.error.position,
+            ),
             Err(_) => None,
         },
         found,
@@ -359,8 +361,8 @@ pub fn serialize_relaxation<S: Serializer>(
     #[derive(Serialize)]
     struct Keys<'a> {
         outcome: &'static str,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        remark: Option<&'a str>,
+        #[serde(flatten, serialize_with = "serialize_remark")]
+        remark: &'a Option<EquilibriumRemark>,
         segments: &'a [usize],
         error_estimate: Option<f64>,
         residual: Option<f64>,
@@ -373,7 +375,7 @@ pub fn serialize_relaxation<S: Serializer>(
     }
     Keys {
         outcome: leaf.outcome.word(),
-        remark: leaf.remark.as_deref(),
+        remark: &leaf.remark,
         segments: &leaf.accuracy.segments,
         error_estimate: leaf.accuracy.error_estimate,
         residual: leaf.accuracy.residual,

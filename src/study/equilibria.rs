@@ -1,32 +1,40 @@
-//! Equilibria shapes of a leaf, as far as many starts find them.
+//! Equilibria of a leaf, as far as many starts find them.
 
-use crate::numbers::format_error_bound;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
 };
-use crate::run::{Instant, Limit};
+use crate::run::{Instant, Limit, join_remarks};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 use crate::study::judge::{common_stations, rod_differences};
+use crate::study::remark::EquilibriaRemark;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-/// Starts relaxed in parallel, before the next check for new equilibria.
-const PARALLEL_STARTS: usize = 16;
+/// The search for equilibria, which also ends after [`MOST_FRUITLESS_STARTS`].
+struct EquilibriaSearch {
+    /// Starts relaxed in parallel, before the next check for new equilibria.
+    parallel_starts: usize,
+    /// Largest number of starts.
+    most_starts: usize,
+    /// Equilibria closer to each other than this part of the longest rod, or than their error
+    /// estimates, are the same.
+    same_distance: f64,
+    /// Energies that differ by less than this, relatively, are the same.
+    same_energy: f64,
+}
+
+const SEARCH: EquilibriaSearch = EquilibriaSearch {
+    parallel_starts: 16,
+    most_starts: 160,
+    same_distance: 1e-3,
+    same_energy: 1e-6,
+};
 
 /// The search ends after so many starts in a row without a new equilibrium, or after
 /// all starts.
 pub const MOST_FRUITLESS_STARTS: usize = 32;
-
-const MOST_STARTS: usize = 160;
-
-/// Equilibria closer to each other than this part of the longest rod, or than
-/// their error estimates, are the same.
-const SAME_EQUILIBRIUM_DISTANCE: f64 = 1e-3;
-
-/// Energies that differ by less than this, relatively, are the same.
-const SAME_ENERGY_DIFFERENCE: f64 = 1e-6;
 
 /// The equilibria of a leaf that many starts have found. As JSON it is
 /// `equilibria.json`.
@@ -36,13 +44,15 @@ pub struct Equilibria {
     pub scenario: String,
     /// Number of starts.
     pub starts: usize,
-    /// Those that did not come to rest within the tolerance.
+    /// Number of starts that did not come to rest within the tolerance.
     pub failed: usize,
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
     pub found: Vec<FoundEquilibrium>,
-    /// A remark if a stable one has less energy than the one in which a relaxation ends.
-    pub remark: Option<String>,
+    /// Whether a stable one has less energy than that in which a relaxation ends, and whether the
+    /// search was stopped.
+    #[serde(rename = "remark", serialize_with = "serialize_remarks")]
+    pub remarks: Vec<EquilibriaRemark>,
     /// Total time, in seconds.
     pub wall_seconds: f64,
 }
@@ -58,7 +68,7 @@ pub struct FoundEquilibrium {
     pub plain: bool,
 }
 
-/// Of the equilibrium only what identifies it, and its shape.
+/// An equilibrium as JSON: what identifies it, and its shape.
 impl Serialize for FoundEquilibrium {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -108,7 +118,7 @@ pub fn equilibria(
         found: Vec::new(),
         starts: 0,
         failed: 0,
-        remark: None,
+        remarks: Vec::new(),
         wall_seconds: 0.0,
     };
     let find = |how: SemiImplicit| {
@@ -129,8 +139,8 @@ pub fn equilibria(
     all.add_equilibrium(any, false);
     let mut in_vain = 0;
     let mut next = 0;
-    while next < MOST_STARTS && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
-        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + PARALLEL_STARTS)
+    while next < SEARCH.most_starts && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
+        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + SEARCH.parallel_starts)
             .into_par_iter()
             .map(|number| {
                 find(SemiImplicit {
@@ -139,7 +149,7 @@ pub fn equilibria(
                 })
             })
             .collect();
-        next += PARALLEL_STARTS;
+        next += SEARCH.parallel_starts;
         for ended in batch {
             let before = all.found.len();
             let ended = ended?;
@@ -160,11 +170,10 @@ pub fn equilibria(
         let [a, b] = [a, b].map(|found| found.equilibrium.energy.unwrap_or(f64::NAN));
         a.total_cmp(&b)
     });
-    all.remark = all.lower_energy_remark();
+    all.remarks.extend(all.lower_energy_remark());
     if limit.reached() {
-        let stopped = format!("the search was stopped after {} starts", all.starts);
-        let both = all.remark.take().into_iter().chain([stopped]);
-        all.remark = Some(both.collect::<Vec<_>>().join("; "));
+        let starts = all.starts;
+        all.remarks.push(EquilibriaRemark::Stopped { starts });
     }
     all.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(all)
@@ -193,29 +202,38 @@ impl Equilibria {
 }
 
 impl Equilibria {
+    /// Its remarks in one sentence, if there are any.
+    pub fn remark(&self) -> Option<String> {
+        join_remarks(&self.remarks)
+    }
+
     /// The stable equilibrium with less energy than that of the unperturbed start, if any.
-    fn lower_energy_remark(&self) -> Option<String> {
+    fn lower_energy_remark(&self) -> Option<EquilibriaRemark> {
         let plain = self.found.iter().position(|found| found.plain)?;
         let stable = |found: &FoundEquilibrium| found.equilibrium.stable() == Some(true);
         let lowest = self.found.iter().position(stable)?;
         let [least, energy] = [lowest, plain].map(|k| self.found[k].equilibrium.energy);
         let (least, energy) = (least?, energy?);
         // Mirror images differ by rounding only.
-        let less = energy - least;
-        (less > SAME_ENERGY_DIFFERENCE * energy.abs()).then(|| {
-            format!(
-                "a relaxation ends in equilibrium {}, but number {} is stable, too, and has less energy, by {}",
-                plain + 1,
-                lowest + 1,
-                format_error_bound(less)
-            )
+        let difference = energy - least;
+        (difference > SEARCH.same_energy * energy.abs()).then_some(EquilibriaRemark::LowerEnergy {
+            plain,
+            lowest,
+            difference,
         })
     }
 }
 
+fn serialize_remarks<S: Serializer>(
+    remarks: &[EquilibriaRemark],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    join_remarks(remarks).serialize(serializer)
+}
+
 fn is_same_equilibrium(a: &Equilibrium, b: &Equilibrium) -> bool {
     let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
-    let within = (SAME_EQUILIBRIUM_DISTANCE * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
+    let within = (SEARCH.same_distance * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at common stations.
     let both = common_stations(&a.shape.stations, &b.shape.stations);
     let mut apart = rod_differences(&both, &a.shape.rods, &b.shape.rods).flatten();

@@ -1,20 +1,19 @@
-//! Common basis of all comparisons of methods: the answer of a method, within a
-//! time limit if there is one, the distance of two answers, and whether they
-//! confirm each other.
-//!
-//! The reference is determined by two independent methods: the relaxed leaf,
-//! and the solution of the boundary-value problem that starts from it.
+//! Common basis of all comparisons of methods: the answer of a method, its time, the distance of two
+//! answers, and whether they confirm each other.
 
 use crate::leaf::{Grid, Leaf};
 use crate::relax;
-use crate::relax::{Equilibrium, Method, Options, Outcome, RelaxError, SolverCounts, index_near};
+use crate::relax::{
+    Equilibrium, Options, Outcome, RelaxError, SemiImplicit, SolverCounts, index_near,
+};
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape, Undulation};
 use crate::shooting::{ShootingSolution, ShootingStart};
+use crate::study::remark::SolutionRemark;
 
 /// Stations closer than this are the same.
-const SAME_STATION_DISTANCE: f64 = 1e-9;
+pub const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Least number of segments of a grid on which negative eigenvalues are counted.
 pub const LEAST_EIGENVALUE_SEGMENTS: usize = 32;
@@ -28,7 +27,7 @@ pub struct MethodSolution {
     /// How the run ended.
     pub outcome: Outcome,
     /// Why it did not succeed, or another remark of the method.
-    pub remark: Option<String>,
+    pub remark: Option<SolutionRemark>,
     /// Fractions of the length at which the shape is known, ascending.
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
@@ -48,7 +47,7 @@ impl From<Equilibrium> for MethodSolution {
     fn from(leaf: Equilibrium) -> Self {
         MethodSolution {
             outcome: leaf.outcome,
-            remark: leaf.remark,
+            remark: leaf.remark.map(SolutionRemark::Equilibrium),
             stations: leaf.shape.stations,
             rods: leaf.shape.rods,
             energy: leaf.energy.unwrap_or(f64::NAN),
@@ -61,7 +60,6 @@ impl From<Equilibrium> for MethodSolution {
 }
 
 impl MethodSolution {
-    /// Relaxes a leaf.
     pub fn from_relaxation(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
         relax::relax(scenario, options, &mut |_| {}).map(MethodSolution::from)
     }
@@ -128,11 +126,29 @@ impl MethodSolution {
     }
 }
 
-/// Returns the result of `run` and the seconds it took.
-pub fn run_timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
+/// A result, and the seconds it took.
+#[derive(Clone, Debug)]
+pub struct Timed<T> {
+    pub result: T,
+    pub seconds: f64,
+}
+
+impl<T, E> Timed<Result<T, E>> {
+    pub fn transpose(self) -> Result<Timed<T>, E> {
+        Ok(Timed {
+            result: self.result?,
+            seconds: self.seconds,
+        })
+    }
+}
+
+pub fn run_timed<T>(run: impl FnOnce() -> T) -> Timed<T> {
     let clock = Instant::now();
-    let found = run();
-    (found, clock.elapsed().as_secs_f64())
+    let result = run();
+    Timed {
+        result,
+        seconds: clock.elapsed().as_secs_f64(),
+    }
 }
 
 /// A grid of at least so many segments on which eigenvalues can be counted.
@@ -150,7 +166,8 @@ pub fn eigenvalue_grid(scenario: &Scenario, segments: usize) -> Grid {
 pub fn morse_index_near(
     scenario: &Scenario,
     grid: Grid,
-    (stations, rods): (&[f64], &[RodShape]),
+    stations: &[f64],
+    rods: &[RodShape],
     error: f64,
 ) -> Option<usize> {
     let kept: Vec<usize> = (common_stations(stations, grid.sigma()).into_iter())
@@ -176,7 +193,7 @@ pub fn single_grid_error(
     const SAFETY: f64 = 2.0;
     let on = |segments: usize| {
         let options = Options {
-            method: Method::default().on_grid(Some(segments)),
+            method: SemiImplicit::on_grid(Some(segments)).into(),
             tolerance: Some(tolerance),
             limit: limit.clone(),
             ..Options::default()

@@ -8,6 +8,7 @@ mod fit;
 mod judge;
 mod map;
 mod margin;
+mod remark;
 mod sensitivity;
 mod trace;
 mod vary;
@@ -20,9 +21,9 @@ pub use crate::study::boundary::{
     StabilityBoundary, trace_stability_boundary,
 };
 pub use crate::study::chart::{
-    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRow,
-    FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution, ScalingRow, ScalingStudy,
-    SolverConfig, TimingSpread, chart, scaling,
+    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRemark,
+    ChartRow, ChartRowRemark, FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution,
+    ScalingRow, ScalingStudy, SolverConfig, TimingSpread, chart, scaling,
 };
 pub use crate::study::check::{
     Check, CheckOptions, CheckVerdict, ComparedQuantity, DifferenceLocation, ShootingResult, check,
@@ -31,17 +32,20 @@ pub use crate::study::equilibria::{
     Equilibria, FoundEquilibrium, MOST_FRUITLESS_STARTS, equilibria,
 };
 pub use crate::study::fit::{
-    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, Fit,
-    FitAlternative, FitBudget, FitCandidate, FitError, FitExperiment, FitLeaf, FitOutcome,
-    FitParameter, FitRequest, FitResidual, FitStep, FitWork, FreeParameter, FreeParameterTarget,
-    MeasuredColumn, MeasuredQuantity, MeasuredValue, OffsetColumn, RowCondition, RowFilter,
-    SystematicResiduals, TracedVeinPoint, fit,
+    ComparisonOperator, Data, DataFile, DataFileOptions, DataOrigin, Experiment,
+    ExperimentConditions, Fit, FitAlternative, FitCandidate, FitCandidateRemark, FitCostLimit,
+    FitError, FitLeaf, FitOutcome, FitParameter, FitRemark, FitRequest, FitResidual, FitStep,
+    FitWork, FreeParameter, FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue,
+    OffsetColumn, RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
 };
 pub use crate::study::map::{
-    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
-    MapShow, ReferenceConfidence, map,
+    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapMotionFailure, MapOutcome, MapRefused,
+    MapRemark, MapRequest, MapRow, MapShow, ReferenceConfidence, map,
 };
 pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
+pub use crate::study::remark::{
+    BoundaryRemark, BranchRemark, CheckReason, EquilibriaRemark, SolutionRemark, TraceRemark,
+};
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
 };
@@ -53,6 +57,9 @@ pub use crate::study::vary::{
     BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,
     VariableTarget, VariedScenario, VaryError,
 };
+
+/// Names of the lab axes in the words for quantities.
+const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 crate::renamed! {
     Base => BaseScenario,
@@ -79,7 +86,10 @@ crate::renamed! {
     PeerRow => PeerMeasurement,
     Place => DifferenceLocation,
     Quantity => ComparedQuantity,
-    Reading => DataReadingOptions,
+    Reading => DataFileOptions,
+    DataReadingOptions => DataFileOptions,
+    FitBudget => FitCostLimit,
+    FitExperiment => ExperimentConditions,
     Reference => ReferenceSolution,
     Row => ChartRow,
     RowChoice => RowFilter,

@@ -1,14 +1,14 @@
-//! A leaf at rest, and its derivatives with respect to numbers of its scenario.
-//!
-//! A blade at rest, and what its division into veins matters: the same blade with half as many, and
+//! A leaf at rest with the derivatives of its results with respect to numbers of its scenario; and a blade
+//! at rest with the effect of its division into veins, told by the same blade with half as many veins, and
 //! with narrower ends.
 
 use crate::numbers::largest;
 use crate::relax::{
-    Equilibrium, EquilibriumTracker, FewerVeins, Method, Options, Parameter, Progress, RelaxError,
-    Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
+    Equilibrium, EquilibriumDoubt, EquilibriumTracker, FewerVeins, Options, Parameter, Progress,
+    RelaxError, RelaxedLeaf, Sensitivity, relax, relax_on_grids, sensitivities, without_wind,
 };
 use crate::scenario::Scenario;
+use crate::study::judge::SAME_STATION_DISTANCE;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
 use glam::DVec3;
 
@@ -21,7 +21,7 @@ pub enum SensitivityError {
     /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
-    /// Shooting has no grids on which equations are linearised.
+    /// Shooting has no grids on which equations are linearized.
     #[error("sensitivities are those of a relaxed leaf: use the method semi-implicit")]
     Method,
 }
@@ -42,7 +42,10 @@ pub fn relax_with_sensitivities(
     without_wind(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
-    let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
+    let RelaxedLeaf {
+        result: mut leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
     let turnings = count_zero_energy_rotations(scenario);
@@ -50,7 +53,7 @@ pub fn relax_with_sensitivities(
         at_rest && turns && decides_zero_energy_rotation(number, turnings)
     });
     leaf.doubts
-        .extend(none.iter().map(|(key, _)| no_derivative_remark(key)));
+        .extend((none.into_iter()).map(|(key, _)| EquilibriumDoubt::NoDerivative { key }));
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(
             &found.levels,
@@ -63,7 +66,8 @@ pub fn relax_with_sensitivities(
     Ok(leaf)
 }
 
-/// The same derivatives of a leaf that follows, and is where `base` has it.
+/// Derivatives of the tip, the energy and the lowest eigenvalue of a leaf that is followed, where
+/// `base` has it now.
 pub fn sensitivities_of_tracker(
     follower: &EquilibriumTracker,
     base: &BaseScenario,
@@ -91,7 +95,7 @@ fn values_of_keys<'k>(
         .collect()
 }
 
-/// These numbers by their names.
+/// The numbers as parameters of the scenario, by their names.
 fn named_parameters<'v>(
     base: &'v BaseScenario,
     values: &'v [(&'v ParameterKeys, f64)],
@@ -118,18 +122,8 @@ fn count_zero_energy_rotations(scenario: &Scenario) -> usize {
         .count()
 }
 
-fn no_derivative_remark(key: &str) -> String {
-    format!(
-        "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
-         change of this number decides where it turns to"
-    )
-}
-
 /// Tolerance of the blades that a blade is compared with.
 const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
-
-/// Stations nearer to each other than this are the same.
-const SAME_STATION_DISTANCE: f64 = 1e-9;
 
 /// Relaxes the leaf of `base` and, if it is a blade that comes to rest in a stable equilibrium,
 /// compares it with others: [`Equilibrium::blade`] tells how far they are apart. Neither is
@@ -143,7 +137,7 @@ pub fn relax_blade(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let mut leaf = relax(base.scenario(), options, progress)?;
-    let refines = matches!(&options.method, Method::SemiImplicit(how) if how.segments.is_none());
+    let refines = (options.method.semi_implicit()).is_some_and(|how| how.segments.is_none());
     let (Some(blade), Some(true), true) = (leaf.blade.as_ref(), leaf.stable(), refines) else {
         return Ok(leaf);
     };

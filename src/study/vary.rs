@@ -1,10 +1,10 @@
 //! Numbers of a scenario that vary: `KEY=FROM..TO[:COUNT][log]`.
 //!
-//! A key is any number of the scenario by its path as in `--set`, one entry of
+//! A key is any number of the scenario by its path (`table.key`), one entry of
 //! a list by an index that counts from 0 (`load.gravity[2]`), a common factor of all numbers
 //! of a key (`scale:stiffness.bending_2`), or a setting of a method
 //! (`method.step`). Several keys joined by `+` take the same value. The
-//! values are substituted as by `--set`, so that every limit of the
+//! values are substituted in the text of the scenario, so that every limit of the
 //! format applies to them ([`BaseScenario::scenario_with_values`]); the text is parsed only once.
 //!
 //! ```
@@ -23,10 +23,6 @@
 //! assert_eq!(heavy.scenario.gravity, [0.0, 0.0, -100.0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! The scenario into which varying numbers are substituted.
-//!
-//! The numbers of a scenario that can vary, one by one.
 
 #[cfg(test)]
 mod tests;
@@ -34,7 +30,7 @@ mod tests;
 use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
-use crate::scenario::format::units::{DIMENSIONLESS, Dimension, TIME};
+use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
 use crate::scenario::{
     Entries, EntryPath, Key, Scenario, ScenarioError, ValueSchema, intended_number,
 };
@@ -171,7 +167,7 @@ impl FromStr for VariableTarget {
             return Err(refuse(format!("unknown key: methods have {all}")));
         }
         let part = EntryPath::parse(text).map_err(refuse)?;
-        part.is_number().map_err(refuse)?;
+        part.check_is_number().map_err(refuse)?;
         Ok(VariableTarget::Entry(part))
     }
 }
@@ -428,17 +424,17 @@ pub struct VariedScenario {
 
 impl BaseScenario {
     /// Reads the file at `path`, with the entries `overrides` replaced
-    /// (`KEY=VALUE`, as in `--set`, or `method.segments=16`).
+    /// (`KEY=VALUE`, by paths of the scenario, or `method.segments=16`).
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, VaryError> {
         BaseScenario::from_text(scenario::text(path)?, path.display().to_string(), overrides)
     }
 
-    /// The same from a text; messages call it `file`.
+    /// Reads a scenario from a text; messages call it `file`.
     pub fn from_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
         BaseScenario::new(&Entries::from_text(&text, &file)?, overrides, true)
     }
 
-    /// The same from entries; settings of methods are unknown keys unless they are allowed.
+    /// Checks entries with the `overrides` replaced; settings of methods are unknown keys unless they are allowed.
     pub fn new(
         entries: &Entries,
         overrides: &[String],
@@ -476,7 +472,7 @@ impl BaseScenario {
 
     /// The text of the scenario's file.
     pub fn text(&self) -> &str {
-        self.entries.text()
+        self.entries.source_text()
     }
 
     /// The entries replaced, without the settings of methods.
@@ -612,18 +608,18 @@ impl BaseScenario {
             }),
             value,
             unit,
-            // The natural leaf depends on shapes at rest otherwise.
+            // The stress-free leaf depends on shapes at rest otherwise.
             linear: keys.is_scenario_linear() && !self.scenario().needs_stress_free_leaf(),
         }
     }
 
-    /// The same keys, or one for each entry if they are a list or a profile.
+    /// These keys or, of a list or a profile, one key for each entry.
     pub(crate) fn keys_by_entry(&self, keys: &ParameterKeys) -> Vec<ParameterKeys> {
         let [VariableTarget::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
         };
         match self.entries.value_at(*part) {
-            Some(value) => (part.numbers(value).into_iter())
+            Some(value) => (part.number_paths(value).into_iter())
                 .map(|part| ParameterKeys(vec![VariableTarget::Entry(part)]))
                 .collect(),
             None => vec![keys.clone()],
@@ -691,13 +687,13 @@ impl BaseScenario {
     /// and profiles their common factor, and each entry of short ones.
     pub fn numbers(&self) -> Vec<ScenarioNumber> {
         let mut numbers = Vec::new();
-        for part in Key::all().flat_map(|key| self.entries.parts(key)) {
+        for part in Key::all().flat_map(|key| self.entries.paths_of_key(key)) {
             let Some(value) = self.entries.value_at(part) else {
                 continue;
             };
             let each = match self.entries.number_at(part) {
                 Some(_) => vec![part],
-                None => part.numbers(value),
+                None => part.number_paths(value),
             };
             let factor = EntryPath {
                 scale: true,
@@ -721,7 +717,7 @@ impl BaseScenario {
         let value = self.entries.number_at(part)?;
         // Some defaults are those of tables that would stand beside what is given in their place.
         let allowed = || self.scenario_with_values(&[(&keys, value)]).is_ok();
-        let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance && allowed();
+        let can_vary = part.check_is_number().is_ok() && part.key != Key::Tolerance && allowed();
         let is_length = part.key.dimension() == [1, 0, 0];
         can_vary.then(|| ScenarioNumber {
             value,

@@ -1,7 +1,7 @@
 //! Tables as instruments, spreadsheets and people write them give the numbers that they mean, and
 //! what could mean two things is refused.
 
-use leafdyn::study::{Data, DataReadingOptions, FitRequest, MeasuredColumn, fit};
+use leafdyn::study::{Data, DataFileOptions, FitRequest, MeasuredColumn, fit};
 use leafdyn_testing::fit::{LEAF, request};
 use leafdyn_testing::*;
 
@@ -32,10 +32,10 @@ fn read_with(
 ) -> Result<Data, String> {
     let columns = columns.iter().map(|column| column.parse());
     let columns: Result<Vec<MeasuredColumn>, _> = columns.collect();
-    let reading = DataReadingOptions {
+    let reading = DataFileOptions {
         columns: columns.map_err(|refused| refused.to_string())?,
         every: every.try_into().unwrap(),
-        ..DataReadingOptions::default()
+        ..DataFileOptions::default()
     };
     let mut data = Data {
         reading,

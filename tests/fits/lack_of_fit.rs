@@ -1,7 +1,7 @@
 //! A fit does not call determined what follows from a model that lacks something: residuals that are
 //! smooth along a column are found, and slack can be free.
 
-use leafdyn::study::{Data, DataReadingOptions, FitOutcome, fit};
+use leafdyn::study::{Data, DataFileOptions, FitOutcome, fit};
 use leafdyn_testing::fit::{fitted, request, within_bars};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -48,9 +48,9 @@ fn a_load_cell_has_a_zero_and_rows_are_chosen() {
     }
     table += "100.0,50.0,0.02\n";
     let mut data = Data {
-        reading: DataReadingOptions {
+        reading: DataFileOptions {
             rows: vec!["tip.position[0]>100.05 and reaction_x<10".parse().unwrap()],
-            ..DataReadingOptions::default()
+            ..DataFileOptions::default()
         },
         ..Data::default()
     };

@@ -103,9 +103,10 @@ fn a_slender_blade_is_not_confirmed() {
     let CheckVerdict::NotIndependent(why) = verdict else {
         panic!("{verdict:?}");
     };
+    let sentence = why.to_string();
     assert!(
-        why.contains("shooting cannot resolve this leaf: perturbations grow 10^1"),
-        "{why}"
+        sentence.contains("shooting cannot resolve this leaf: perturbations grow 10^1"),
+        "{sentence}"
     );
     assert!(linearizations <= 2, "{linearizations}");
 }

@@ -2,6 +2,7 @@
 //! its second number, has a critical point where the curve is, within what both state.
 //! `LEAFDYN_BOUNDARIES` is how many leaves are tried.
 
+use leafdyn::study::BoundaryRemark;
 use leafdyn_testing::branch::{follow, text};
 use leafdyn_testing::plane::followed;
 use leafdyn_testing::random::Draw;
@@ -88,9 +89,9 @@ fn judged(number: usize) -> (usize, Vec<String>) {
     };
     // Some leaves stay stable all along, and say so.
     if found.curves.is_empty() {
-        let remark = found.remark.unwrap_or_default();
-        let stays = remark.contains("the index changes nowhere");
-        let wrong = (!stays).then(|| format!("{what}: {remark}"));
+        let remark = found.remark;
+        let stays = matches!(remark, Some(BoundaryRemark::NoIndexChange { .. }));
+        let wrong = (!stays).then(|| format!("{what}: {remark:?}"));
         return (0, wrong.into_iter().collect());
     }
     let key = case.across.split('=').next().unwrap();

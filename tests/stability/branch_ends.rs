@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use leafdyn::relax::Limit;
-use leafdyn::study::{BranchEnd, Trace, TraceUntil, trace};
+use leafdyn::study::{BranchEnd, Trace, TraceRemark, TraceUntil, trace};
 use leafdyn_testing::base;
 use leafdyn_testing::branch::{follow, request, text};
 
@@ -35,7 +35,7 @@ fn thrust(until: Option<TraceUntil>, switch: bool) -> Trace {
 #[test]
 fn a_branch_ends_where_it_loses_its_stability() {
     let whole = thrust(None, false);
-    assert_eq!(whole.branches[0].destabilizations(), 3);
+    assert_eq!(whole.branches[0].index_increase_count(), 3);
     let ended = thrust(Some(TraceUntil::Unstable), true);
     let [straight, sides @ ..] = &ended.branches[..] else {
         panic!("no branch")
@@ -111,7 +111,7 @@ fn a_run_that_is_stopped_keeps_what_it_knows() {
     assert_eq!(known.end, BranchEnd::RunLimitReached);
     assert!(!stopped.complete);
     let count = known.points.len();
-    assert!(stopped.remark.as_ref().unwrap().contains("stopped"));
+    assert_eq!(stopped.remark, Some(TraceRemark::Stopped));
     assert!(1 < count && count < all.points.len(), "{count}");
     for (known, all) in known.points.iter().zip(&all.points) {
         assert_eq!((known.value, known.index), (all.value, all.index));
@@ -136,12 +136,9 @@ fn a_run_that_is_stopped_says_nothing_of_what_it_did_not_try() {
     let stopped = stopped.unwrap();
     assert_eq!(stopped.branches.len(), 1);
     let straight = &stopped.branches[0];
-    assert!(straight.critical_points().next().is_some() && straight.remark.is_none());
-    assert!(
-        stopped
-            .remark
-            .as_ref()
-            .unwrap()
-            .contains("branches that cross")
-    );
+    assert!(straight.critical_points().next().is_some() && straight.remarks.is_empty());
+    let remark = stopped.remark.expect("the run was stopped");
+    assert_eq!(remark.code(), "stopped-before-crossings");
+    let sentence = "the run was stopped: branches that cross are not all followed";
+    assert_eq!(remark.to_string(), sentence);
 }

@@ -174,7 +174,7 @@ const VEINS: &str = r#"
 #[test]
 fn a_hinge_that_moves_is_followed() {
     let found = follow(VEINS, "", "leaf.base[0][1]=-0.2..-0.1", false);
-    assert!(found.complete, "{:?}", found.branches[0].remark);
+    assert!(found.complete, "{:?}", found.branches[0].remarks);
     let key = "leaf.base[0][1]".parse().unwrap();
     let points = &found.branches[0].points;
     assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));

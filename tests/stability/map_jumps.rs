@@ -21,7 +21,7 @@ fn mapped(base: BaseScenario, axes: &[&str]) -> Map {
     let methods = vec![MapMethod::default()];
     let request = MapRequest::new(base, axes, Some(methods.clone()), None, 300.0).unwrap();
     let cells = 0..request.cells();
-    let rows = cells.flat_map(|cell| request.solve(cell, &methods));
+    let rows = cells.flat_map(|cell| request.solve_cell(cell, &methods));
     let mut map = Map::new(request.clone(), rows.collect());
     map.find_jumps(&|_, _| {});
     map

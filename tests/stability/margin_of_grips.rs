@@ -1,6 +1,8 @@
 //! The margin of a leaf with holders along its veins, which stay where they are.
 
-use leafdyn::relax::{CriticalTipForce, InstabilityKind, Margin, PostcriticalBehavior};
+use leafdyn::relax::{
+    CriticalTipForce, InstabilityKind, Margin, MarginRemark, PostcriticalBehavior,
+};
 use leafdyn::study::relax_with_margin;
 use leafdyn_testing::*;
 
@@ -99,7 +101,7 @@ fn a_gripped_tip_is_not_pushed() {
     let [gripped, held] = [grip, &held].map(|how| margin(&strip(1.0, &format!("{how}\n{pulled}"))));
     for margin in [&gripped, &held] {
         assert!(margin.pushes.is_empty() && margin.largest_push.is_none());
-        assert!(margin.remark.as_ref().unwrap().contains("held"));
+        assert_eq!(margin.remark, Some(MarginRemark::TipHeld));
     }
     let [one, other] = [&gripped, &held].map(|margin| margin.barrier.as_ref().unwrap());
     let bars = one.error.unwrap() + other.error.unwrap();

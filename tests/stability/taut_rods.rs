@@ -22,7 +22,7 @@ fn a_stretched_wire_carries_its_strain() {
         assert!(
             found.complete,
             "{slenderness}: {:?}",
-            found.branches[0].remark
+            found.branches[0].remarks
         );
         let stiffness = 0.25e9 * PI / slenderness.powi(2);
         for point in &found.branches[0].points {

@@ -17,7 +17,7 @@ const ACROSS: &str = r#"
 #[test]
 fn points_are_the_leaves_that_relax_there() {
     let found = follow(ACROSS, "", "grip[1].move[1]=0..0.2", false);
-    assert!(found.complete, "{:?}", found.branches[0].remark);
+    assert!(found.complete, "{:?}", found.branches[0].remarks);
     let key = "grip[1].move[1]".parse().unwrap();
     let points = &found.branches[0].points;
     assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));

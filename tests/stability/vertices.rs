@@ -19,7 +19,7 @@ fn a_strip_out_of_its_plane_reports_the_plane_one_that_crosses_it() {
         assert!(
             trace.complete,
             "{stiffness}: {:?}",
-            trace.branches[0].remark
+            trace.branches[0].remarks
         );
         let critical: Vec<_> = trace.branches[0].critical_points().collect();
         let [(_, point)] = critical[..] else {

@@ -163,8 +163,8 @@ fn failures(kind: &Kind, least: usize) -> (usize, usize) {
         failed += usize::from(!at_rest);
         if !at_rest || seconds > SLOW {
             let (outcome, work) = (found.outcome.word(), found.work);
-            let remark = found.remark.unwrap_or_default();
-            println!("{name}: {outcome} after {seconds:.1} s, {work:?}: {remark}");
+            let remark = found.remark;
+            println!("{name}: {outcome} after {seconds:.1} s, {work:?}: {remark:?}");
             if let Ok(folder) = std::env::var("FAILED") {
                 std::fs::write(format!("{folder}/{name}.toml"), text).unwrap();
             }

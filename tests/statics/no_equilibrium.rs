@@ -1,6 +1,6 @@
 //! Where a leaf cannot come to rest, the message names what keeps it from it.
 
-use leafdyn::relax::{Equilibrium, Options, RelaxError, relax};
+use leafdyn::relax::{Equilibrium, EquilibriumRemark, Options, RelaxError, RestObstacle, relax};
 use leafdyn_testing::*;
 
 const RIGID: &str = r#"
@@ -19,14 +19,14 @@ fn relaxed(text: &str, entries: &str) -> Result<Equilibrium, RelaxError> {
 
 /// What is said of a leaf that does not come to rest.
 #[track_caller]
-fn blamed(text: &str, entries: &str) -> String {
+fn blamed(text: &str, entries: &str) -> EquilibriumRemark {
     let found = relaxed(text, entries).unwrap();
     assert!(
         !found.outcome.is_at_rest(),
         "{entries}: {:?}",
         found.outcome
     );
-    found.remark.unwrap_or_default()
+    found.remark.expect("it says why")
 }
 
 /// Moments about the line about which a leaf turns freely balance nothing: those across the force on
@@ -75,7 +75,7 @@ fn moments_along_a_free_turn_have_no_equilibrium() {
 fn an_inextensible_vein_held_straight_is_named() {
     let gripped = format!("{RIGID}\n[[grip]]\nvein = 1\nat = 0.7\n");
     let weight = "load.gravity=[0.0, 0.0, -1.0]";
-    let told = blamed(&gripped, weight);
+    let told = blamed(&gripped, weight).to_string();
     let named = "vein 1 is inextensible and held straight between its base and the grip at 0.7 of its length";
     assert!(told.contains(named), "{told}");
     for (entries, rests) in [
@@ -110,6 +110,8 @@ fn half_a_turn_of_neighbours_is_named() {
         force = [-8.4567, 1.9064, 3.9613]
     "#;
     let told = blamed(veins, "");
-    let named = "the sections of veins 2 and 3 are turned against each other by half a turn at 1 of their length";
-    assert!(told.contains(named), "{told}");
+    let Some(RestObstacle::HalfTurn { place }) = told.obstacle() else {
+        panic!("{told}");
+    };
+    assert_eq!((place.gap, place.sigma), (1, 1.0));
 }

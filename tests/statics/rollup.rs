@@ -66,6 +66,7 @@ fn no_twist_where_there_is_none_and_too_many_turns_are_refused() {
         let turned = rod(&format!("load.tip_moment={moment}"));
         let lost = relaxed(&turned, &Options::default());
         assert_eq!(lost.outcome, Outcome::NotAtRest);
-        assert!(lost.remark.unwrap().contains("lower load.tip_moment"));
+        let remark = lost.remark.unwrap().to_string();
+        assert!(remark.contains("lower load.tip_moment"), "{remark}");
     }
 }

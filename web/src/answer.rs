@@ -190,12 +190,12 @@ pub fn branch(trace: &Trace) -> Branch {
     let ways = &trace.branches;
     let back = ways.get(1).map(points).unwrap_or_default();
     let on = ways.first().map(points).unwrap_or_default();
-    let remark = ways.iter().find_map(|branch| branch.remark.clone());
+    let remark = ways.iter().find_map(TraceBranch::remark);
     Branch {
         key: trace.keys.to_string(),
         log: trace.log,
         complete: trace.complete,
-        remark: trace.remark.clone().or(remark),
+        remark: trace.remark.as_ref().map(ToString::to_string).or(remark),
         // The first point is on both.
         points: back.into_iter().skip(1).rev().chain(on).collect(),
     }

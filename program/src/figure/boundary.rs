@@ -1,24 +1,21 @@
-//! The boundary of stability: curves in the plane of two numbers, with the index on both
-//! sides, and leaves from either side.
+//! The boundary of stability in the plane of two numbers: curves with the index on both sides, shaded
+//! ground on which the branch is stable, cells of a coarse map, and leaves from either side of a curve.
 //!
-//! Labels with the index on both sides of the curves of a boundary.
-//!
-//! The ground of a plane of two numbers on which the branch is stable, between the curves of a
-//! boundary.
+//! Labels stand on both sides of a curve where there is room; curves close to each other share them. Ground
+//! is stable where all curves around it say so, which is found along rows and columns of the panel.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
 use crate::figure::drawing::labels::{
-    HEADER, LabelPlacement, Legend, MOST_CURVES_NAMED, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, SmallPanels, TICK_FONT_SIZE, clearest_label,
-    draw_panel_title, label_size, new_page,
+    LabelPlacement, Legend, MOST_CURVES_NAMED, clearest_label, label_size, new_page,
 };
 use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::space::SmallPanels;
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve, vein_tips};
 use crate::figure::drawing::{
-    BLUE, Color, DashPattern, Drawing, GREEN, NOTE_COLOR, PURPLE, SKY, SLATE, Stroke, TEXT_COLOR,
-    TextAnchor, VERMILION, polygon_path,
+    BLUE, Color, DashPattern, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, PAGE, PURPLE, PageRectangle,
+    SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, draw_panel_title, polygon_path,
 };
-use crate::figure::leaf::{DrawnVeins, longest_curve, vein_tips};
-use crate::figure::map::{DARKEST_MORSE_INDEX, PALE, fill_cell_by_index};
+use crate::figure::map::{DARKEST_MORSE_INDEX, STABLE_GROUND_COLOR, fill_cell_by_index};
 use crate::figure::scenario::{FigureSetting, QuantityLabel};
 use crate::report::numbers::{
     count_in_words, format_error_bound, format_four_digits, vein_count_text,
@@ -31,36 +28,43 @@ use leafdyn::study::{
 };
 use std::collections::{BTreeSet, HashMap};
 
-const DIAGRAM_HEIGHT: f64 = 400.0;
+/// Sizes of the diagram, in pixels.
+struct BoundaryLayout {
+    diagram: f64,
+    /// Width right of the panel, for the key.
+    key: f64,
+    /// Most leaves drawn, each at a named point.
+    most_leaves: usize,
+}
 
-/// Right of the panel, for the key.
-const LEGEND_WIDTH: f64 = 210.0;
+const LAYOUT: BoundaryLayout = BoundaryLayout {
+    diagram: 400.0,
+    key: 210.0,
+    most_leaves: 4,
+};
 
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
 
-/// Most leaves drawn, each at a named point.
-const MOST_LEAVES_DRAWN: usize = 4;
-
-/// Colours of neighbouring curves; they also differ in their dashes.
+/// Colors of neighboring curves; they also differ in their dashes.
 const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
 pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
     let shown: Vec<CaptionedLeaf> = (boundary.curves.iter())
         .flat_map(|curve| (curve.beside.iter()).map(|leaf| CaptionedLeaf::new(curve.kind, leaf)))
-        .take(MOST_LEAVES_DRAWN)
+        .take(LAYOUT.most_leaves)
         .collect();
     let longest = longest_curve(shown.iter().flat_map(|it| &it.leaf.curves));
     let shapes: Vec<DrawnVeins> = (shown.iter())
         .map(|it| DrawnVeins::from_curves(&it.curves, &it.tips, longest).with_supports(scenario))
         .collect();
     let diagram =
-        PageRectangle::left_of_legend(HEADER + PANEL_TITLE_HEIGHT, DIAGRAM_HEIGHT, LEGEND_WIDTH);
-    let below = diagram.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        PageRectangle::left_of_legend(PAGE.header + PAGE.panel_title, LAYOUT.diagram, LAYOUT.key);
+    let below = diagram.opposite_corner().y + PAGE.panel_axis;
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(boundary), None);
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(boundary), None);
     drawing.height = panels.bottom();
     drawing.draw_group("curves", |page| {
         draw_curves(page, boundary, &scenario.units, &shown, diagram)
@@ -174,7 +178,7 @@ fn draw_curves(
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
     let mut labels = LabelPlacement::in_rectangle(cell);
     for (c, (curve, line)) in boundary.curves.iter().zip(&lines).enumerate() {
-        for ends in join_segments(line.segments()) {
+        for ends in join_segments(line.segment_ends()) {
             axes.draw_clipped_line(page, &ends, curve_stroke(c, line));
         }
         labels.avoid_curve(&axes, &curve.points.iter().map(at).collect::<Vec<_>>());
@@ -192,7 +196,7 @@ fn draw_curves(
     }
     labels.draw_requested(page);
     draw_index_labels(page, &lines, &mut labels);
-    draw_legend(page, boundary, (&lines, shaded), cell);
+    draw_legend(page, boundary, &lines, shaded, cell);
 }
 
 /// The part of the panel in which curves were looked for.
@@ -234,7 +238,7 @@ fn join_segments(segments: impl Iterator<Item = [DVec2; 2]>) -> Vec<Vec<Option<D
     lines
 }
 
-/// Draws the cells of the map, each in the colour of its index.
+/// Draws the cells of the map, each in the color of its index.
 fn draw_index_cells(
     page: &mut Drawing,
     axes: &PanelAxes,
@@ -259,7 +263,7 @@ fn draw_index_cells(
     }
     for [c, r] in &map.disagreeing {
         if let Some(at) = axes.page_position((map.first[c - 1], map.second[r - 1])) {
-            page.draw_label(at, "×", TICK_FONT_SIZE, TextAnchor::Middle, TEXT_COLOR);
+            page.draw_label(at, "×", FONT_SIZE.tick, TextAnchor::Middle, TEXT_COLOR);
         }
     }
 }
@@ -296,7 +300,8 @@ fn parameter_axis(boundary: &StabilityBoundary, units: &Units, which: usize) -> 
 fn draw_legend(
     page: &mut Drawing,
     boundary: &StabilityBoundary,
-    (lines, shaded): (&[BoundaryLine], bool),
+    lines: &[BoundaryLine],
+    has_stable_region: bool,
     cell: PageRectangle,
 ) {
     let mut key = Legend::right_of(cell);
@@ -315,7 +320,7 @@ fn draw_legend(
     if more > 0 {
         key.add_entry(page, "", &format!("and {more} more"), |_, _| ());
     }
-    if shaded {
+    if has_stable_region {
         key.add_entry(page, "", &stability_phrase(0), |page, cell| {
             fill_cell_by_index(page, cell, 0)
         });
@@ -345,27 +350,32 @@ fn draw_legend(
     }
 }
 
-/// Spacing of the places that are tried along a curve, and their largest number.
-const PLACE_SPACING: f64 = 5.0;
+/// Where the sides of a curve are labelled, in pixels.
+struct SideLabelRules {
+    /// Of the places that are tried along a curve, and their largest number.
+    spacing: f64,
+    most_places: usize,
+    /// Curves closer than this are labelled together, with the indices outside them.
+    neighbour: f64,
+    /// From a curve to its label.
+    gap: f64,
+    least_clearance: f64,
+    /// Least component of the normal of a curve along the first number, which distinguishes the sides.
+    least_normal: f64,
+}
 
-const MOST_PLACES_TRIED: usize = 400;
-
-/// Curves closer than this are labelled together, with the indices outside them.
-const NEIGHBOUR_DISTANCE: f64 = 16.0;
-
-/// From a curve to its label.
-const GAP: f64 = 4.0;
-
-/// Labels need at least this clearance.
-const LEAST_CLEARANCE: f64 = 2.0;
-
-/// The normal of a curve must have at least this component along the first number, which
-/// distinguishes the sides.
-const LEAST_NORMAL_COMPONENT: f64 = 0.15;
+const SIDE_LABEL: SideLabelRules = SideLabelRules {
+    spacing: 5.0,
+    most_places: 400,
+    neighbour: 16.0,
+    gap: 4.0,
+    least_clearance: 2.0,
+    least_normal: 0.15,
+};
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
-pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
+fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &mut LabelPlacement) {
     let mut named = vec![false; curves.len()];
     for c in 0..curves.len() {
         if named[c] {
@@ -375,47 +385,65 @@ pub fn draw_index_labels(page: &mut Drawing, curves: &[BoundaryLine], labels: &m
         let best = clearest_label(
             places.map(|place| SideLabels::for_curves(curves, c, place)),
             |sides| {
-                let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
+                let room = sides.labels.iter().map(|it| labels.clearance(&it.cell));
                 room.fold(f64::INFINITY, f64::min)
             },
         );
-        if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST_CLEARANCE) {
-            for (cell, text) in sides.texts {
+        if let Some(best) = best.filter(|best| best.clearance >= SIDE_LABEL.least_clearance) {
+            for PlacedLabel { cell, text } in best.label.labels {
                 labels.draw_label_at(page, cell, &text, NOTE_COLOR);
             }
-            sides.curves.iter().for_each(|&curve| named[curve] = true);
+            best.label
+                .curves
+                .iter()
+                .for_each(|&curve| named[curve] = true);
         }
     }
 }
 
-/// A place on a curve: the point, the normal to the right, and the indices on both sides.
-type LabelPlace = (DVec2, DVec2, [usize; 2]);
+/// A place on a curve next to which its sides may be labelled.
+#[derive(Clone, Copy)]
+struct LabelPlace {
+    at: DVec2,
+    /// The normal that points to the right.
+    normal: DVec2,
+    /// Indices to the left and to the right.
+    sides: [usize; 2],
+}
+
+/// A straight piece of a curve.
+struct BoundarySegment {
+    pub ends: [DVec2; 2],
+    /// Indices to the left and to the right.
+    pub sides: [usize; 2],
+}
+
+/// Where a curve crosses a line: how far along the line, and what is on both sides.
+struct LineCrossing<S> {
+    pub along: f64,
+    pub sides: S,
+}
 
 /// A curve on the page.
-pub struct BoundaryLine {
-    /// Segments: their ends, and the indices to the left and to the right.
-    pieces: Vec<([DVec2; 2], [usize; 2])>,
+struct BoundaryLine {
+    segments: Vec<BoundarySegment>,
     /// Whether two branches meet and vanish there, so that it has no sides.
     is_fold: bool,
-    /// Of a fold, to which side there is a stable leaf, if that is known.
+    /// On which sides of a fold there is a stable leaf, if that is known.
     stable_sides: Option<[bool; 2]>,
 }
 
 impl BoundaryLine {
     /// A line of these segments, along which branches cross, or where two meet.
-    pub fn new(pieces: Vec<([DVec2; 2], [usize; 2])>, fold: bool) -> Self {
+    pub fn new(segments: Vec<BoundarySegment>, fold: bool) -> Self {
         BoundaryLine {
-            pieces,
+            segments,
             is_fold: fold,
             stable_sides: None,
         }
     }
 
-    pub fn from_curve(
-        axes: &PanelAxes,
-        boundary: &StabilityBoundary,
-        curve: &BoundaryCurve,
-    ) -> Self {
+    fn from_curve(axes: &PanelAxes, boundary: &StabilityBoundary, curve: &BoundaryCurve) -> Self {
         // Along the axis the first number may move towards the end of its range, or away.
         let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
         let points = curve.points.iter();
@@ -436,8 +464,11 @@ impl BoundaryLine {
                     true => [before, after],
                     false => [after, before],
                 };
-                let ends = drawn.windows(2).map(|ends| ([ends[0], ends[1]], sides));
-                ends.collect::<Vec<_>>()
+                let segments = drawn.windows(2).map(|ends| BoundarySegment {
+                    ends: [ends[0], ends[1]],
+                    sides,
+                });
+                segments.collect::<Vec<_>>()
             });
         let first = curve.points.first();
         let fold = curve.multiplicity == 1
@@ -447,46 +478,51 @@ impl BoundaryLine {
         let stable = stable.find(|leaf| leaf.index == 0 && leaf.fallen_from.is_none());
         let stable = stable.and_then(|leaf| axes.page_position((leaf.values[0], leaf.values[1])));
         let to_left =
-            stable.and_then(|at| Some(line.index_crossings(at, DVec2::X).next()?.0 > 0.0));
+            stable.and_then(|at| Some(line.index_crossings(at, DVec2::X).next()?.along > 0.0));
         BoundaryLine {
             stable_sides: to_left.map(|left| [left, !left]),
             ..line
         }
     }
 
-    /// Its segments.
-    pub fn segments(&self) -> impl Iterator<Item = [DVec2; 2]> {
-        self.pieces.iter().map(|(ends, _)| *ends)
+    fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
+        self.segments.iter().map(|segment| segment.ends)
     }
 
     /// Whether ground on one of its sides is stable.
-    pub fn bounds_stable_region(&self) -> bool {
-        self.pieces.iter().any(|(_, sides)| sides.contains(&0))
+    fn bounds_stable_region(&self) -> bool {
+        (self.segments.iter()).any(|segment| segment.sides.contains(&0))
     }
 
-    /// Its crossings with a line: how far along the line, and whether the ground on both sides is
-    /// stable, unless that is not known.
-    pub fn stability_crossings(
+    /// Its crossings with a line, and whether the ground on both sides is stable, unless that is not
+    /// known.
+    fn stability_crossings(
         &self,
         at: DVec2,
         normal: DVec2,
-    ) -> impl Iterator<Item = (f64, Option<[bool; 2]>)> {
-        self.index_crossings(at, normal).map(|(along, sides)| {
+    ) -> impl Iterator<Item = LineCrossing<Option<[bool; 2]>>> {
+        self.index_crossings(at, normal).map(|crossing| {
+            let sides = crossing.sides;
             let stable = match self.is_fold {
                 true => self.stable_sides.filter(|_| sides.contains(&0)),
                 false => Some(sides.map(|index| index == 0)),
             };
-            (along, stable)
+            LineCrossing {
+                along: crossing.along,
+                sides: stable,
+            }
         })
     }
 
     /// Places on it, from the middle outwards.
     fn label_places(&self) -> Vec<LabelPlace> {
         let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
-        let whole: f64 = self.pieces.iter().map(|(ends, _)| length(ends)).sum();
-        let spacing = PLACE_SPACING.max(whole / MOST_PLACES_TRIED as f64);
+        let whole: f64 = self.segments.iter().map(|it| length(&it.ends)).sum();
+        let spacing = SIDE_LABEL
+            .spacing
+            .max(whole / SIDE_LABEL.most_places as f64);
         let (mut places, mut before) = (Vec::new(), 0.0);
-        for (ends, sides) in &self.pieces {
+        for BoundarySegment { ends, sides } in &self.segments {
             let (own, step) = (length(ends), ends[1] - ends[0]);
             let normal = step.perp().normalize_or_zero();
             let normal = if normal.x < 0.0 { -normal } else { normal };
@@ -494,8 +530,13 @@ impl BoundaryLine {
             for k in 0..count {
                 let part = (k as f64 + 0.5) / count as f64;
                 let off = (before + part * own - 0.5 * whole).abs();
-                if normal.x > LEAST_NORMAL_COMPONENT {
-                    places.push((off, (ends[0] + part * step, normal, *sides)));
+                if normal.x > SIDE_LABEL.least_normal {
+                    let place = LabelPlace {
+                        at: ends[0] + part * step,
+                        normal,
+                        sides: *sides,
+                    };
+                    places.push((off, place));
                 }
             }
             before += own;
@@ -504,38 +545,52 @@ impl BoundaryLine {
         places.into_iter().map(|(_, place)| place).collect()
     }
 
-    /// Its crossings with a line: how far along the line, and the indices on both sides.
-    fn index_crossings(&self, at: DVec2, normal: DVec2) -> impl Iterator<Item = (f64, [usize; 2])> {
-        self.pieces.iter().filter_map(move |([a, b], sides)| {
-            let step = *b - *a;
+    /// Where the curve crosses a line through a point along this normal, with the indices on both sides.
+    fn index_crossings(
+        &self,
+        at: DVec2,
+        normal: DVec2,
+    ) -> impl Iterator<Item = LineCrossing<[usize; 2]>> {
+        self.segments.iter().filter_map(move |segment| {
+            let ([a, b], sides) = (segment.ends, segment.sides);
+            let step = b - a;
             let across = normal.perp_dot(step);
-            let part = (at - *a).perp_dot(normal) / step.perp_dot(normal);
-            let along = (*a - at).perp_dot(step) / across;
-            (across != 0.0 && (0.0..=1.0).contains(&part)).then_some((along, *sides))
+            let part = (at - a).perp_dot(normal) / step.perp_dot(normal);
+            let along = (a - at).perp_dot(step) / across;
+            let crosses = across != 0.0 && (0.0..=1.0).contains(&part);
+            crosses.then_some(LineCrossing { along, sides })
         })
     }
 }
 
+/// A text and the rectangle that it fills.
+struct PlacedLabel {
+    cell: PageRectangle,
+    text: String,
+}
+
 /// Labels on the sides of a curve, or of several curves close to each other.
 struct SideLabels {
-    texts: Vec<(PageRectangle, String)>,
+    labels: Vec<PlacedLabel>,
     curves: Vec<usize>,
 }
 
 impl SideLabels {
-    fn for_curves(curves: &[BoundaryLine], c: usize, (at, normal, sides): LabelPlace) -> Self {
+    fn for_curves(curves: &[BoundaryLine], c: usize, place: LabelPlace) -> Self {
+        let LabelPlace { at, normal, sides } = place;
         let label = |along: f64, sign: f64, text: String| {
             let size = label_size(&text);
-            let reach = 0.5 * (size * normal.abs()).element_sum() + GAP;
+            let reach = 0.5 * (size * normal.abs()).element_sum() + SIDE_LABEL.gap;
             let middle = at + (along + sign * reach) * normal;
             let corner = middle - 0.5 * size;
-            (PageRectangle { corner, size }, text)
+            let cell = PageRectangle { corner, size };
+            PlacedLabel { cell, text }
         };
         if curves[c].is_fold {
             let (fewer, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
             let text = format!("{fewer} and {more} meet");
             return SideLabels {
-                texts: vec![label(0.0, 1.0, text)],
+                labels: vec![label(0.0, 1.0, text)],
                 curves: vec![c],
             };
         }
@@ -543,42 +598,46 @@ impl SideLabels {
             .iter()
             .enumerate()
             .filter(|(k, it)| *k != c && !it.is_fold);
-        let mut others: Vec<(f64, [usize; 2], usize)> = others
-            .flat_map(|(k, it)| {
-                it.index_crossings(at, normal)
-                    .map(move |(at, sides)| (at, sides, k))
-            })
+        let mut others: Vec<(usize, LineCrossing<[usize; 2]>)> = others
+            .flat_map(|(k, it)| it.index_crossings(at, normal).map(move |found| (k, found)))
             .collect();
         let mut named = vec![c];
         // From the curve outwards, while the next one is close and the indices between them agree.
         let mut outside = |sign: f64, out: usize| {
-            others.sort_by(|a, b| (sign * a.0).total_cmp(&(sign * b.0)));
+            others.sort_by(|(_, a), (_, b)| (sign * a.along).total_cmp(&(sign * b.along)));
             let (mut along, mut index) = (0.0, sides[out]);
-            for (at, it, k) in &others {
-                if (0.0..NEIGHBOUR_DISTANCE).contains(&(sign * (at - along)))
-                    && it[1 - out] == index
+            for (k, it) in &others {
+                if (0.0..SIDE_LABEL.neighbour).contains(&(sign * (it.along - along)))
+                    && it.sides[1 - out] == index
                 {
-                    (along, index) = (*at, it[out]);
+                    (along, index) = (it.along, it.sides[out]);
                     named.push(*k);
                 }
             }
             label(along, sign, format!("index {index}"))
         };
-        let texts = vec![outside(-1.0, 0), outside(1.0, 1)];
+        let labels = vec![outside(-1.0, 0), outside(1.0, 1)];
         SideLabels {
-            texts,
+            labels,
             curves: named,
         }
     }
 }
 
-/// Distance in pixels of the rows in which crossings with curves are looked for, and of the columns.
-const ROW: f64 = 2.0;
+/// Rows and columns along which crossings with curves are looked for, in pixels.
+struct ShadingGrid {
+    /// Distance of rows, and of columns.
+    row: f64,
+    column: f64,
+    /// Least distance of a column from the ends of a stretch in which it is.
+    beside: f64,
+}
 
-const COLUMN_SPACING: f64 = 4.0;
-
-/// Least distance of a column from the ends of a stretch in which it is.
-const BESIDE: f64 = 0.5;
+const SHADING: ShadingGrid = ShadingGrid {
+    row: 2.0,
+    column: 4.0,
+    beside: 0.5,
+};
 
 /// A part of a row between two crossings with curves, or a crossing and an end of the row.
 struct RowStretch {
@@ -592,16 +651,12 @@ struct RowStretch {
 
 /// Shades where the branch is stable in a part of the plane that curves leave only at its rim; whether
 /// there is such ground.
-pub fn shade_stable_region(
-    page: &mut Drawing,
-    cell: PageRectangle,
-    curves: &[BoundaryLine],
-) -> bool {
-    let rows = (cell.size.y / ROW).floor().max(1.0) as usize;
+fn shade_stable_region(page: &mut Drawing, cell: PageRectangle, curves: &[BoundaryLine]) -> bool {
+    let rows = (cell.size.y / SHADING.row).floor().max(1.0) as usize;
     let height = cell.size.y / rows as f64;
     let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;
     let stretches: Vec<RowStretch> = (0..rows)
-        .flat_map(|row| row_stretches(cell, curves, (row, y(row))))
+        .flat_map(|row| row_stretches(cell, curves, row, y(row)))
         .collect();
     let regions = connected_regions(&stretches, cell, curves, y);
     // Of the stretches of a region those with curves must all say that it is stable.
@@ -642,7 +697,7 @@ pub fn shade_stable_region(
         let left = ends.iter().map(|ends| ends[0]);
         let right = ends.iter().rev().map(|ends| ends[1]);
         let corners: Vec<DVec2> = left.chain(right).collect();
-        page.draw_shape(polygon_path(&corners), PALE, None);
+        page.draw_shape(polygon_path(&corners), STABLE_GROUND_COLOR, None);
     }
     any
 }
@@ -651,28 +706,33 @@ pub fn shade_stable_region(
 fn row_stretches(
     cell: PageRectangle,
     curves: &[BoundaryLine],
-    (row, y): (usize, f64),
+    row: usize,
+    y: f64,
 ) -> Vec<RowStretch> {
     let from = cell.corner.with_y(y);
-    let mut crossings: Vec<(f64, [bool; 2], usize)> = (curves.iter().enumerate())
+    let mut crossings: Vec<(usize, LineCrossing<Option<[bool; 2]>>)> = (curves.iter().enumerate())
         .flat_map(|(k, curve)| {
             let found = curve.stability_crossings(from, DVec2::X);
-            found.map(move |(x, sides)| (x, sides.unwrap_or_default(), k))
+            found.map(move |crossing| (k, crossing))
         })
-        .filter(|(x, ..)| (0.0..=cell.size.x).contains(x))
+        .filter(|(_, crossing)| (0.0..=cell.size.x).contains(&crossing.along))
         .collect();
-    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    crossings.sort_by(|(_, a), (_, b)| a.along.total_cmp(&b.along));
     let at = |k: Option<usize>| k.and_then(|k| crossings.get(k));
+    let sides = |crossing: &LineCrossing<Option<[bool; 2]>>| crossing.sides.unwrap_or_default();
     (0..=crossings.len())
         .map(|k| {
             let (left, right) = (at(k.checked_sub(1)), at(Some(k)));
-            let said = [left.map(|it| it.1[1]), right.map(|it| it.1[0])];
+            let said = [
+                left.map(|(_, it)| sides(it)[1]),
+                right.map(|(_, it)| sides(it)[0]),
+            ];
             RowStretch {
                 row,
-                end_curves: [left, right].map(|it| it.map(|it| it.2)),
+                end_curves: [left, right].map(|it| it.map(|(curve, _)| *curve)),
                 ends: [
-                    left.map_or(0.0, |it| it.0),
-                    right.map_or(cell.size.x, |it| it.0),
+                    left.map_or(0.0, |(_, it)| it.along),
+                    right.map_or(cell.size.x, |(_, it)| it.along),
                 ]
                 .map(|x| from.x + x),
                 stable: said.into_iter().flatten().reduce(|a, b| a && b),
@@ -681,7 +741,7 @@ fn row_stretches(
         .collect()
 }
 
-/// The region of each stretch: those of neighbouring rows are one where a column leads from one to the
+/// The region of each stretch: those of neighboring rows are one where a column leads from one to the
 /// other without a curve in between.
 fn connected_regions(
     stretches: &[RowStretch],
@@ -689,7 +749,7 @@ fn connected_regions(
     curves: &[BoundaryLine],
     y: impl Fn(usize) -> f64,
 ) -> Vec<usize> {
-    let columns = (cell.size.x / COLUMN_SPACING).ceil().max(1.0) as usize;
+    let columns = (cell.size.x / SHADING.column).ceil().max(1.0) as usize;
     let x = |k: usize| cell.corner.x + (k as f64 + 0.5) * cell.size.x / columns as f64;
     let crossed: Vec<Vec<f64>> = (0..columns)
         .map(|k| {
@@ -697,7 +757,7 @@ fn connected_regions(
             let found = curves
                 .iter()
                 .flat_map(|it| it.stability_crossings(top, DVec2::Y));
-            found.map(|(y, _)| y).collect()
+            found.map(|crossing| crossing.along).collect()
         })
         .collect();
     let mut parent: Vec<usize> = (0..stretches.len()).collect();
@@ -726,7 +786,7 @@ fn connected_regions(
             ];
             // A column along a curve leads nowhere.
             let open = (0..columns).any(|k| {
-                let inside = low + BESIDE < x(k) && x(k) < high - BESIDE;
+                let inside = low + SHADING.beside < x(k) && x(k) < high - SHADING.beside;
                 inside && !crossed[k].iter().any(|y| (here..=below).contains(y))
             });
             if open {
@@ -749,8 +809,11 @@ mod tests {
     /// A line through these points with the index on both sides.
     fn line(points: &[[f64; 2]], sides: [usize; 2]) -> BoundaryLine {
         let points: Vec<DVec2> = points.iter().map(|&it| DVec2::from_array(it)).collect();
-        let pieces = points.windows(2).map(|ends| ([ends[0], ends[1]], sides));
-        BoundaryLine::new(pieces.collect(), false)
+        let segments = points.windows(2).map(|ends| BoundarySegment {
+            ends: [ends[0], ends[1]],
+            sides,
+        });
+        BoundaryLine::new(segments.collect(), false)
     }
 
     /// The area that is shaded of a panel of 100 x 100.

@@ -1,25 +1,22 @@
-//! Speed against accuracy: error against time, and time against the number of
-//! veins, for every method of relaxation.
-//!
-//! The panel of a chart: one line per series, with failures in lanes above.
+//! Speed against accuracy: error against time, and time against the number of veins, for every method of
+//! relaxation and for other programs. A series is a line of points; its failures are crosses in lanes above
+//! the frame, one lane for each way to fail.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PageRectangle, TICK_FONT_SIZE, new_page,
-};
+use crate::figure::drawing::labels::{Legend, new_page};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    BLUE, Color, Drawing, GREEN, NOTE_COLOR, ORANGE, PURPLE, SHADOW_COLOR, SKY, SLATE, Stroke,
-    TEXT_COLOR, TextAnchor, VERMILION, circle_path, rectangle_path,
+    BLUE, Color, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, ORANGE, PAGE, PURPLE, PageRectangle,
+    SHADOW_COLOR, SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, circle_path,
+    rectangle_path,
 };
 use crate::report::contender_name;
 use crate::report::numbers::format_error_bound;
 use glam::DVec2;
-use leafdyn::relax::Method;
 use leafdyn::study::{Chart, ChartRow, PeerProgram, ScalingStudy, SolverConfig};
 
-/// Fixed colours of the peers that come with this crate, the same in every chart;
+/// Fixed colors of the peers that come with this crate, the same in every chart;
 /// other peers take the rest in turn.
 const KNOWN_PEER_COLORS: [(&str, Color); 3] = [
     ("solve_bvp", Color(120, 120, 128)),
@@ -33,24 +30,25 @@ const OTHER_PEER_COLORS: [Color; 3] = [
     Color(165, 120, 130),
 ];
 
-/// Smaller errors are drawn here.
+/// Errors below this one, down to zero, are drawn as if they were as large.
 const SMALLEST_ERROR_DRAWN: f64 = 1e-17;
 
 const FEWEST_DECADES: f64 = 1.0;
 
 pub fn draw_chart(chart: &Chart) -> Drawing {
-    let rows: Vec<(usize, &ChartRow)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
-    let mut series = contender_series(&rows, false);
+    let rods = chart.rods;
+    let rows = chart.rows.iter().map(|row| RowOfLeaf { rods, row });
+    let mut series = contender_series(&rows.collect::<Vec<_>>(), false);
     series.extend(peer_series(&chart.peers));
     let floor = chart.reference.as_ref().map(|found| found.known_within);
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
-    let (across, up) = point_coordinates(&series);
     let failed = series.iter().flat_map(|series| &series.failures);
-    let across = across.into_iter();
-    let up = up.into_iter().chain(floor);
+    let seconds = series_points(&series).map(|point| point.0);
+    let errors = series_points(&series).map(|point| point.1).chain(floor);
+    let name = "largest true error of positions / L";
     let panel = ChartPanel {
-        across: time_axis(across.chain(failed.filter_map(|failure| failure.x))),
-        up: Axis::logarithmic("largest true error of positions / L", up, FEWEST_DECADES),
+        across: time_axis(seconds.chain(failed.filter_map(|failure| failure.x))),
+        up: Axis::logarithmic(name, errors, FEWEST_DECADES),
         series,
         floor,
     };
@@ -74,7 +72,10 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
 }
 
 pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
-    let rows = scaling.rows.iter().map(|found| (found.rods, &found.row));
+    let rows = scaling.rows.iter().map(|found| RowOfLeaf {
+        rods: found.rods,
+        row: &found.row,
+    });
     let series = contender_series(&rows.collect::<Vec<_>>(), true);
     let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
     rods.sort_unstable();
@@ -86,7 +87,7 @@ pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
             ticks: TickPlacement::WholeNumbers(rods),
             ..axis
         },
-        up: time_axis(point_coordinates(&series).1.into_iter()),
+        up: time_axis(series_points(&series).map(|point| point.1)),
         series,
         floor: None,
     };
@@ -109,40 +110,62 @@ fn time_axis(values: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn chart_page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, title, notes, None);
-    drawing.height = (HEADER + panel.total_height()).ceil();
-    drawing.draw_group("chart", |page| panel.draw(page, HEADER));
+    let mut drawing = new_page(PAGE.left_margin, title, notes, None);
+    drawing.height = (PAGE.header + panel.total_height()).ceil();
+    drawing.draw_group("chart", |page| panel.draw(page, PAGE.header));
     drawing
 }
 
-/// Coordinates of the points of all series, across and up.
-fn point_coordinates(series: &[ChartSeries]) -> (Vec<f64>, Vec<f64>) {
-    let points = series.iter().flat_map(|series| &series.points);
-    points.map(|point| point.coordinates).unzip()
+fn series_points(series: &[ChartSeries]) -> impl Iterator<Item = (f64, f64)> {
+    series.iter().flat_map(ChartSeries::point_coordinates)
 }
 
-/// Colour and marker of a contender.
-fn contender_style(who: SolverConfig) -> (Color, Marker) {
-    match (who.method, who.one_grid) {
-        (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
-        (Method::SemiImplicit(_), true) => (SKY, Marker::Square),
-        (Method::Explicit { .. }, false) => (VERMILION, Marker::Circle),
-        (Method::Explicit { .. }, true) => (ORANGE, Marker::Square),
-        (Method::SingleShooting, _) => (GREEN, Marker::Triangle),
-        (Method::Shooting { .. }, _) => (PURPLE, Marker::Wedge),
-        (Method::ShootingFromRest { .. }, _) => (SLATE, Marker::Diamond),
+/// A row of a chart, and the number of veins of its leaf.
+struct RowOfLeaf<'c> {
+    rods: usize,
+    row: &'c ChartRow,
+}
+
+/// How the points of a series look, and the line through them.
+#[derive(Clone, Copy)]
+struct SeriesStyle {
+    color: Color,
+    marker: Marker,
+    dashed: bool,
+}
+
+/// Color and marker of each contender, in the order of [`SolverConfig::ALL`].
+const CONTENDER_STYLES: [SeriesStyle; SolverConfig::ALL.len()] = {
+    const fn solid(color: Color, marker: Marker) -> SeriesStyle {
+        SeriesStyle {
+            color,
+            marker,
+            dashed: false,
+        }
     }
+    [
+        solid(BLUE, Marker::Circle),
+        solid(SKY, Marker::Square),
+        solid(VERMILION, Marker::Circle),
+        solid(ORANGE, Marker::Square),
+        solid(GREEN, Marker::Triangle),
+        solid(PURPLE, Marker::Wedge),
+        solid(SLATE, Marker::Diamond),
+    ]
+};
+
+fn contender_style(who: SolverConfig) -> SeriesStyle {
+    CONTENDER_STYLES[who.number().unwrap_or(0)]
 }
 
 /// A series for each contender with results: seconds over veins, or errors over
-/// seconds. Each row comes with its number of veins.
-fn contender_series(rows: &[(usize, &ChartRow)], over_veins: bool) -> Vec<ChartSeries> {
+/// seconds.
+fn contender_series(rows: &[RowOfLeaf], over_veins: bool) -> Vec<ChartSeries> {
     let of = |who: SolverConfig| {
-        let (color, marker) = contender_style(who);
         let default = if who.is_default() { " (default)" } else { "" };
         let name = format!("{}{default}", contender_name(who));
-        let mut series = ChartSeries::new(name, color, marker, false);
-        for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
+        let mut series = ChartSeries::new(name, contender_style(who));
+        for RowOfLeaf { rods, row } in rows.iter().filter(|it| it.row.contender == who) {
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
                 true => (rods, seconds),
@@ -179,19 +202,18 @@ fn peer_color(name: &str, others: usize) -> Color {
     )
 }
 
-/// One dashed line for each peer, from large errors to small.
+/// A dashed series for each other program, from large errors to small.
 fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
     let mut all: Vec<ChartSeries> = Vec::new();
     for peer in peers {
         let place = all.iter().position(|series| series.name == peer.name);
         let place = place.unwrap_or_else(|| {
-            let color = peer_color(&peer.name, all.len());
-            all.push(ChartSeries::new(
-                peer.name.clone(),
-                color,
-                Marker::Ring,
-                true,
-            ));
+            let style = SeriesStyle {
+                color: peer_color(&peer.name, all.len()),
+                marker: Marker::Ring,
+                dashed: true,
+            };
+            all.push(ChartSeries::new(peer.name.clone(), style));
             all.len() - 1
         });
         match peer
@@ -217,26 +239,34 @@ fn peer_series(peers: &[PeerProgram]) -> Vec<ChartSeries> {
     all
 }
 
-const FRAME_HEIGHT: f64 = 430.0;
+/// Sizes of a chart, in pixels.
+struct ChartLayout {
+    frame: f64,
+    /// Width right of the frame, for the key and the names of lanes.
+    key: f64,
+    /// Height of a lane of failures, and the gap below all.
+    lane: f64,
+    lane_gap: f64,
+}
 
-/// Right of the frame, for the key and the names of lanes.
-const KEY: f64 = 252.0;
+const LAYOUT: ChartLayout = ChartLayout {
+    frame: 430.0,
+    key: 252.0,
+    lane: 16.0,
+    lane_gap: 7.0,
+};
 
-const LANE_HEIGHT: f64 = 16.0;
-
-const LANE_GAP: f64 = 7.0;
-
-/// Colour of the points on the Pareto front and of the band that joins them.
+/// Color of the points on the Pareto front and of the band that joins them.
 const PARETO_FRONT_COLOR: Color = Color(247, 205, 92);
 
-/// Colour of the area below the accuracy of the reference.
+/// Color of the area below the accuracy of the reference.
 const REFERENCE_ACCURACY_COLOR: Color = Color(240, 240, 243);
 
 const FAILURE_LANES_COLOR: Color = Color(250, 240, 238);
 
 /// A point, in the units of the axes.
 #[derive(Clone, Copy, Debug)]
-pub struct ChartPoint {
+struct ChartPoint {
     pub coordinates: (f64, f64),
     /// Ends of its spread in repeated measurements.
     pub spread: [(f64, f64); 2],
@@ -245,36 +275,31 @@ pub struct ChartPoint {
 
 /// A run without a point.
 #[derive(Clone, Debug)]
-pub struct FailedRun {
-    /// Where it is on the horizontal axis; `None`: not known.
+struct FailedRun {
+    /// Its value along the horizontal axis, if that is known.
     pub x: Option<f64>,
     pub word: String,
 }
 
-pub struct ChartSeries {
+struct ChartSeries {
     pub name: String,
-    pub color: Color,
-    pub dashed: bool,
-    pub marker: Marker,
+    pub style: SeriesStyle,
     pub points: Vec<ChartPoint>,
     pub failures: Vec<FailedRun>,
 }
 
 impl ChartSeries {
-    /// Without points so far.
-    pub fn new(name: String, color: Color, marker: Marker, dashed: bool) -> Self {
+    pub fn new(name: String, style: SeriesStyle) -> Self {
         ChartSeries {
             name,
-            color,
-            dashed,
-            marker,
+            style,
             points: Vec::new(),
             failures: Vec::new(),
         }
     }
 
     fn stroke(&self) -> Stroke {
-        Stroke::new(self.color, 1.5).with_dashes(self.dashed)
+        Stroke::new(self.style.color, 1.5).with_dashes(self.style.dashed)
     }
 
     fn point_coordinates(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -282,7 +307,7 @@ impl ChartSeries {
     }
 }
 
-pub struct ChartPanel {
+struct ChartPanel {
     pub series: Vec<ChartSeries>,
     pub across: Axis,
     pub up: Axis,
@@ -304,18 +329,22 @@ impl ChartPanel {
     fn lanes_height(&self) -> f64 {
         match self.failure_lanes().len() {
             0 => 0.0,
-            lanes => lanes as f64 * LANE_HEIGHT + LANE_GAP,
+            lanes => lanes as f64 * LAYOUT.lane + LAYOUT.lane_gap,
         }
     }
 
     /// Height of the panel with lanes and axis.
-    pub fn total_height(&self) -> f64 {
-        self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS_HEIGHT
+    fn total_height(&self) -> f64 {
+        self.lanes_height() + LAYOUT.frame + PAGE.panel_axis
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
         let axes = PanelAxes {
-            cell: PageRectangle::left_of_legend(start + self.lanes_height(), FRAME_HEIGHT, KEY),
+            cell: PageRectangle::left_of_legend(
+                start + self.lanes_height(),
+                LAYOUT.frame,
+                LAYOUT.key,
+            ),
             across: self.across.clone(),
             up: self.up.clone(),
         };
@@ -328,17 +357,17 @@ impl ChartPanel {
         }
         for series in &self.series {
             for point in &series.points {
-                axes.draw_curve(page, &point.spread, Stroke::new(series.color, 1.1));
+                axes.draw_curve(page, &point.spread, Stroke::new(series.style.color, 1.1));
             }
             axes.draw_markers(
                 page,
                 series.point_coordinates(),
-                series.marker,
-                series.color,
+                series.style.marker,
+                series.style.color,
             );
         }
         for (lane, word) in self.failure_lanes().into_iter().enumerate() {
-            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LANE_HEIGHT, word);
+            self.draw_failure_lane(page, axes.cell, start + lane as f64 * LAYOUT.lane, word);
         }
         self.draw_legend(page, axes.cell);
     }
@@ -375,24 +404,24 @@ impl ChartPanel {
     fn draw_failure_lane(&self, page: &mut Drawing, cell: PageRectangle, top: f64, word: &str) {
         const CROSS_SPACING: f64 = 11.0;
         let (left, right) = (cell.corner.x, cell.opposite_corner().x);
-        let middle = top + 0.5 * LANE_HEIGHT;
-        let area = DVec2::new(cell.size.x, LANE_HEIGHT - 2.0);
+        let middle = top + 0.5 * LAYOUT.lane;
+        let area = DVec2::new(cell.size.x, LAYOUT.lane - 2.0);
         let start = DVec2::new(left, top + 1.0);
         page.draw_shape(rectangle_path(start, area), FAILURE_LANES_COLOR, None);
-        let name = Font::embedded().shorten_text(word, TICK_FONT_SIZE, KEY - 14.0);
+        let name = Font::embedded().shorten_text(word, FONT_SIZE.tick, LAYOUT.key - 14.0);
         let at = DVec2::new(right + 10.0, middle);
-        page.draw_centered_label(at, &name, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
+        page.draw_centered_label(at, &name, FONT_SIZE.tick, TextAnchor::Start, NOTE_COLOR);
         let mut from_right = right;
         for series in &self.series {
             let failures = || series.failures.iter().filter(|it| it.word == word);
             let places = failures().filter_map(|it| Some(self.across.fraction(it.x?)));
             for fraction in places.filter(|fraction| fraction.is_finite()) {
                 let x = left + fraction.clamp(0.0, 1.0) * cell.size.x;
-                Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
+                Marker::Cross.draw(page, DVec2::new(x, middle), series.style.color);
             }
             if failures().any(|failure| failure.x.is_none()) {
                 from_right -= CROSS_SPACING;
-                Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
+                Marker::Cross.draw(page, DVec2::new(from_right, middle), series.style.color);
             }
         }
     }
@@ -402,7 +431,7 @@ impl ChartPanel {
         for series in &self.series {
             key.add_entry(page, &series.name, "", |page, cell| {
                 cell.draw_midline(page, series.stroke());
-                series.marker.draw(page, cell.middle(), series.color);
+                (series.style.marker).draw(page, cell.middle(), series.style.color);
             });
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
@@ -487,7 +516,10 @@ mod tests {
     #[test]
     fn times_are_spread_along_their_axis() {
         let chart = sample::sample_chart();
-        let rows = [(5, &chart.rows[0])];
+        let rows = [RowOfLeaf {
+            rods: 5,
+            row: &chart.rows[0],
+        }];
         let spread = |over_veins| contender_series(&rows, over_veins)[0].points[0].spread;
         assert_eq!(spread(false), [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
         assert_eq!(spread(true), [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
@@ -498,7 +530,7 @@ mod tests {
         let mut chart = sample::sample_chart();
         let of = |chart: &Chart| -> Vec<(String, Color)> {
             let all = peer_series(&chart.peers).into_iter();
-            all.map(|peer| (peer.name, peer.color)).collect()
+            all.map(|peer| (peer.name, peer.style.color)).collect()
         };
         let alone = of(&chart)[0].clone();
         chart.peers.insert(0, chart.peers[0].clone());

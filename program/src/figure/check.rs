@@ -3,16 +3,14 @@
 
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN,
-    PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, WIDTH, draw_header,
-    draw_panel_title,
-};
+use crate::figure::drawing::labels::{Legend, LegendRows, draw_header};
 use crate::figure::drawing::markers::{Marker, draw_second_solution_dot};
+use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, draw_panel_title, vein_color,
 };
-use crate::figure::leaf::{DrawnVeins, LeafPanels};
+use crate::figure::leaf::LeafPanels;
 use crate::figure::scenario::FigureSetting;
 use crate::report::numbers::format_error_bound;
 use crate::report::{check_verdict_phrase, equilibrium_kind, relaxation_verdict};
@@ -20,7 +18,26 @@ use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, CheckVerdict, ComparedQuantity};
 
-const LINE_HEIGHT: f64 = 19.0;
+/// Sizes of the panel of differences, in pixels.
+struct DifferenceLayout {
+    /// Height of a line of the reason for a verdict.
+    reason_line: f64,
+    frame: f64,
+    /// Width right of the frame, for the key.
+    key: f64,
+    /// Height of the strip below for differences of exactly zero: one lane per quantity.
+    zero_strip: f64,
+    /// Curves through more stations have no markers.
+    most_marked: usize,
+}
+
+const LAYOUT: DifferenceLayout = DifferenceLayout {
+    reason_line: 19.0,
+    frame: 216.0,
+    key: 212.0,
+    zero_strip: 30.0,
+    most_marked: 70,
+};
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -37,29 +54,29 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let reason = match &check.verdict {
         CheckVerdict::NotCompared(why) | CheckVerdict::NotIndependent(why) => Font::embedded()
             .wrap_text(
-                why,
-                TEXT_FONT_SIZE,
-                WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN,
+                &why.to_string(),
+                FONT_SIZE.text,
+                PAGE.width - PAGE.left_margin - PAGE.right_margin,
             ),
         _ => Vec::new(),
     };
-    let key_line = NOTES_BASE_LINE + LINE_HEIGHT * (reason.len() + 1) as f64;
-    let panels = LeafPanels::placed_below(HEADER - NOTES_BASE_LINE + key_line, &veins);
+    let key_line = PAGE.notes_base_line + LAYOUT.reason_line * (reason.len() + 1) as f64;
+    let panels = LeafPanels::placed_below(PAGE.header - PAGE.notes_base_line + key_line, &veins);
     let compared = !check.along.is_empty();
     let below = if compared { PANEL_HEIGHT } else { 0.0 };
-    let mut drawing = Drawing::new(WIDTH, &title);
+    let mut drawing = Drawing::new(PAGE.width, &title);
     drawing.height = (panels.bottom() + below).ceil();
     drawing.draw_group("header", |page| {
         let notes = header_notes(check, &veins, &setting);
-        draw_header(page, PAGE_LEFT_MARGIN, &title, &notes, Some(&veins));
+        draw_header(page, PAGE.left_margin, &title, &notes, Some(&veins));
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(
-                PAGE_LEFT_MARGIN,
-                NOTES_BASE_LINE + LINE_HEIGHT * (line + 1) as f64,
+                PAGE.left_margin,
+                PAGE.notes_base_line + LAYOUT.reason_line * (line + 1) as f64,
             );
-            page.draw_label(base, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+            page.draw_label(base, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         }
-        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, key_line, 26.0);
+        let mut key = LegendRows::starting_at(PAGE.left_margin, key_line, 26.0);
         let stroke = Stroke::new(vein_color(0.3), veins.line_width());
         key.add_entry(page, "relaxed", |page, cell| {
             cell.draw_midline(page, stroke)
@@ -98,28 +115,25 @@ fn header_notes(check: &Check, veins: &DrawnVeins, setting: &FigureSetting) -> V
     notes
 }
 
-const FRAME_HEIGHT: f64 = 216.0;
-
-/// Right of the frame, for the key.
-const KEY: f64 = 212.0;
-
-const PANEL_HEIGHT: f64 = PANEL_TITLE_HEIGHT + FRAME_HEIGHT + PANEL_AXIS_HEIGHT;
+const PANEL_HEIGHT: f64 = PAGE.panel_title + LAYOUT.frame + PAGE.panel_axis;
 
 const FEWEST_DECADES: f64 = 3.0;
 
-/// Height of the strip below for differences of exactly zero: one lane per quantity.
-const ZERO_STRIP_HEIGHT: f64 = 30.0;
+/// How much both solutions differ in a quantity.
+struct DifferenceCurve {
+    along: NamedCurve,
+    /// The largest difference at which the solutions agree.
+    allowed: Option<f64>,
+}
 
-const MOST_STATIONS_MARKED: usize = 70;
-
-/// Differences of a quantity along the veins, and the largest one at which the
-/// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
+/// Differences of a quantity along the veins: of positions in units of `unit`, of other quantities in
+/// those of the scenario.
 fn difference_curve(
     quantity: ComparedQuantity,
     check: &Check,
     unit: f64,
     color: Color,
-) -> (NamedCurve, Option<f64>) {
+) -> DifferenceCurve {
     let (name, unit, allowed) = match quantity {
         ComparedQuantity::Position => {
             ("position, in lengths L", unit, Some(check.allowed() / unit))
@@ -134,20 +148,22 @@ fn difference_curve(
         .map(|found| quantity.component(found) / unit);
     let stations = check.relaxed.shape.stations.iter().copied();
     let points = stations.zip(values).collect();
-    let curve = NamedCurve {
+    let along = NamedCurve {
         name,
         color,
         points,
     };
-    (curve, allowed)
+    DifferenceCurve { along, allowed }
 }
 
 fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let quantities = ComparedQuantity::ALL.into_iter().zip(CURVE_COLORS);
-    let (curves, allowed): (Vec<NamedCurve>, Vec<Option<f64>>) = quantities
+    let curves: Vec<DifferenceCurve> = quantities
         .map(|(quantity, color)| difference_curve(quantity, check, unit, color))
-        .unzip();
-    let mut cell = PageRectangle::left_of_legend(start + PANEL_TITLE_HEIGHT, FRAME_HEIGHT, KEY);
+        .collect();
+    let values = || curves.iter().flat_map(|curve| curve.along.ordinates());
+    let mut cell =
+        PageRectangle::left_of_legend(start + PAGE.panel_title, LAYOUT.frame, LAYOUT.key);
     let what = "largest difference of all veins at each station";
     draw_panel_title(page, cell.corner, "(e)", what);
     let stations = Axis {
@@ -155,29 +171,27 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
-    let mut values = curves.iter().flat_map(NamedCurve::ordinates);
-    if values.any(|value| value == 0.0) {
-        cell.size.y -= ZERO_STRIP_HEIGHT;
+    if values().any(|value| value == 0.0) {
+        cell.size.y -= LAYOUT.zero_strip;
         across.labelled = false;
         draw_zero_strip(page, &curves, cell, stations);
     }
-    let values = curves.iter().flat_map(NamedCurve::ordinates);
-    let values = values.chain(allowed.iter().flatten().copied());
+    let allowed = curves.iter().filter_map(|curve| curve.allowed);
     let axes = PanelAxes {
         cell,
         across,
-        up: Axis::logarithmic("", values, FEWEST_DECADES),
+        up: Axis::logarithmic("", values().chain(allowed), FEWEST_DECADES),
     };
     axes.draw(page);
-    for (curve, allowed) in curves.iter().zip(allowed) {
-        if let Some(allowed) = allowed {
-            let stroke = Stroke::new(curve.color, 1.0).with_dashes(true);
+    for curve in &curves {
+        if let Some(allowed) = curve.allowed {
+            let stroke = Stroke::new(curve.along.color, 1.0).with_dashes(true);
             axes.draw_curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
         }
     }
-    for curve in &curves {
+    for DifferenceCurve { along: curve, .. } in &curves {
         axes.draw_curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        if curve.points.len() <= MOST_STATIONS_MARKED {
+        if curve.points.len() <= LAYOUT.most_marked {
             axes.draw_markers(page, curve.points.iter().copied(), Marker::Dot, curve.color);
         }
     }
@@ -188,14 +202,14 @@ fn draw_differences(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
 /// below it.
 fn draw_zero_strip(
     page: &mut Drawing,
-    curves: &[NamedCurve],
+    curves: &[DifferenceCurve],
     above: PageRectangle,
     stations: Axis,
 ) {
     let strip = PanelAxes {
         cell: PageRectangle::new(
             DVec2::new(above.corner.x, above.opposite_corner().y),
-            DVec2::new(above.size.x, ZERO_STRIP_HEIGHT),
+            DVec2::new(above.size.x, LAYOUT.zero_strip),
         ),
         across: stations,
         up: Axis {
@@ -205,15 +219,15 @@ fn draw_zero_strip(
     };
     strip.draw(page);
     for (lane, curve) in curves.iter().enumerate() {
-        let zeros = curve.points.iter().filter(|point| point.1 == 0.0);
+        let zeros = (curve.along.points.iter()).filter(|point| point.1 == 0.0);
         let places = zeros.map(|point| (point.0, lane as f64 - 1.5));
-        strip.draw_markers(page, places, Marker::Dot, curve.color);
+        strip.draw_markers(page, places, Marker::Dot, curve.along.color);
     }
 }
 
-fn draw_legend(page: &mut Drawing, curves: &[NamedCurve], cell: PageRectangle) {
+fn draw_legend(page: &mut Drawing, curves: &[DifferenceCurve], cell: PageRectangle) {
     let mut key = Legend::right_of(cell);
-    for curve in curves {
+    for DifferenceCurve { along: curve, .. } in curves {
         let largest = match curve.ordinates().fold(0.0, f64::max) {
             0.0 => "no difference".into(),
             largest => format!("≤ {}", format_error_bound(largest)),
@@ -229,6 +243,8 @@ mod tests {
     use super::*;
     use crate::figure::drawing::formats::checked_svg_text;
     use crate::report::sample;
+    use leafdyn::relax::EquilibriumRemark;
+    use leafdyn::study::CheckReason;
 
     fn svg(check: &Check) -> String {
         checked_svg_text(&draw(check, &sample::sample_scenario("fan", 5)))
@@ -252,14 +268,16 @@ mod tests {
     #[test]
     fn without_a_second_solution_the_reason_is_given() {
         let mut check = sample::sample_check(5, 8, 0.0);
-        let reason = "the relaxation did not come to rest: ".repeat(6);
+        let remark = Some(EquilibriumRemark::OutOfMemory { segments: 512 });
         check.shot = None;
         check.along.clear();
         check.difference = None;
-        check.verdict = CheckVerdict::NotCompared(reason);
+        check.verdict = CheckVerdict::NotCompared(CheckReason::NotAtRest { remark });
         let svg = svg(&check);
         assert!(svg.contains("could not be compared"));
-        assert_eq!(svg.matches("rest:").count(), 6);
+        for part in ["did not come to rest:", "the limit on memory"] {
+            assert!(svg.contains(part), "{part}");
+        }
         assert!(!svg.contains("class=\"differences\""));
     }
 }

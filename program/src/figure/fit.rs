@@ -1,24 +1,19 @@
-//! A fit: its numbers with their intervals, results of experiments with the model and its confidence
-//! band along what varied, measured points over the veins, and below each the residuals.
-//!
-//! The free numbers of a fit with their intervals.
-//!
-//! The panels of the figure of a fit.
-//!
-//! The results of experiments as series along the column that varies.
+//! A fit: the free numbers with their intervals, results of experiments with the model and its confidence
+//! band, measured points over the veins, and below each panel the residuals. Results of experiments that
+//! differ along a line are a series along the column that varies most; other results keep the numbers of
+//! their experiments.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page, panel_letters,
-};
+use crate::figure::drawing::labels::{Legend, new_page};
 use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::space::{PlaneView, VIEW_FROM_ABOVE, VIEW_FROM_SIDE};
 use crate::figure::drawing::{
-    BLUE, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
-    circle_path, color_of_vein, polygon_path, rectangle_path,
+    BLUE, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, SECOND_SOLUTION_COLOR,
+    Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path, color_of_vein, panel_letters, polygon_path,
+    rectangle_path,
 };
-use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::figure::scenario::{COORDINATE_NAMES, QuantityLabel, name_with_unit};
 use crate::report::numbers::{
     count_in_words, format_five_digits, format_four_digits, round_to_error,
 };
@@ -27,12 +22,40 @@ use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::{Fit, FitLeaf, FitParameter, FitResidual, MeasuredQuantity, ParameterKeys};
 use std::collections::HashMap;
 
-const BOTTOM: f64 = 4.0;
+/// Sizes of the panels of results and of measured leaves, in pixels.
+struct ResultLayout {
+    height: f64,
+    /// Height of the residuals below a panel, and the gap between.
+    residuals: f64,
+    residuals_gap: f64,
+    /// Least distance between ticks of residuals.
+    residual_ticks: f64,
+    /// Heights of a leaf, and between its two views.
+    least_leaf: f64,
+    largest_leaf: f64,
+    views_gap: f64,
+    /// Width right of the panels, for the key.
+    key: f64,
+    /// Half the width of the band of a single experiment.
+    half_band: f64,
+    /// Most panels of results, and most leaves, that are drawn.
+    most_panels: usize,
+    most_leaves: usize,
+}
 
-/// Most panels of results, and most leaves, that are drawn.
-const MOST_RESULT_PANELS: usize = 8;
-
-const MOST_LEAVES: usize = 3;
+const RESULT_LAYOUT: ResultLayout = ResultLayout {
+    height: 190.0,
+    residuals: 70.0,
+    residuals_gap: 12.0,
+    residual_ticks: 16.0,
+    least_leaf: 110.0,
+    largest_leaf: 300.0,
+    views_gap: 70.0,
+    key: 200.0,
+    half_band: 5.0,
+    most_panels: 8,
+    most_leaves: 3,
+};
 
 pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
     let units = &scenario.units;
@@ -48,55 +71,65 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
             fit.degrees_of_freedom
         )),
     }
-    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
+    let mut page = new_page(PAGE.left_margin, &name, &notes, None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
-    let mut top = HEADER;
+    let mut top = PAGE.header;
     page.draw_group("numbers", |page| {
         top = draw_fit_parameters(page, top, &letter(), &fit.parameters, units);
     });
-    for results in result_series_by_kind(fit).iter().take(MOST_RESULT_PANELS) {
+    for results in result_series_by_kind(fit)
+        .iter()
+        .take(RESULT_LAYOUT.most_panels)
+    {
         page.draw_group("result", |page| {
             top = draw_results(page, top, &letter(), units, results);
         });
     }
     let traced = fit.leaves.iter().filter(|(_, it)| !it.traced.is_empty());
-    for (name, leaf) in traced.take(MOST_LEAVES) {
+    for (name, leaf) in traced.take(RESULT_LAYOUT.most_leaves) {
         page.draw_group("veins", |page| {
             let of = fit.residuals.iter();
             let of = of.filter(|it| it.rod.is_some() && it.number == leaf.number);
-            top = draw_measured_veins(page, top, &letter(), (name, units), leaf, of.collect());
+            top = draw_measured_veins(page, top, &letter(), name, units, leaf, of.collect());
         });
     }
-    page.height = (top + BOTTOM).ceil();
+    page.height = (top + PAGE.bottom_margin).ceil();
     page
 }
 
-/// Left of the intervals, for the numbers in words; right of them, for the values; and a row.
-const WORDS_WIDTH: f64 = 216.0;
+/// Sizes of the panel of intervals, in pixels.
+struct IntervalLayout {
+    /// Left of the intervals, for the numbers in words; right of them, for the values.
+    words: f64,
+    values: f64,
+    row: f64,
+    most_rows: usize,
+    /// Intervals are drawn up to this part of the value.
+    widest: f64,
+}
 
-const VALUES_WIDTH: f64 = 200.0;
-
-const ROW_HEIGHT: f64 = 24.0;
-
-const MOST_NUMBERS_DRAWN: usize = 30;
-
-/// Intervals are drawn up to this part of the value.
-const WIDEST_RELATIVE_INTERVAL: f64 = 1.0;
+const INTERVALS: IntervalLayout = IntervalLayout {
+    words: 216.0,
+    values: 200.0,
+    row: 24.0,
+    most_rows: 30,
+    widest: 1.0,
+};
 
 /// Draws the free numbers with their intervals; returns where that ends.
-pub fn draw_fit_parameters(
+fn draw_fit_parameters(
     page: &mut Drawing,
     top: f64,
     letter: &str,
     all: &[FitParameter],
     units: &Units,
 ) -> f64 {
-    let shown = &all[..all.len().min(MOST_NUMBERS_DRAWN)];
-    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS_WIDTH, top + PANEL_TITLE_HEIGHT);
+    let shown = &all[..all.len().min(INTERVALS.most_rows)];
+    let corner = DVec2::new(PAGE.left_margin + INTERVALS.words, top + PAGE.panel_title);
     let size = DVec2::new(
-        WIDTH - PAGE_RIGHT_MARGIN - VALUES_WIDTH - corner.x,
-        ROW_HEIGHT * shown.len().max(1) as f64,
+        PAGE.width - PAGE.right_margin - INTERVALS.values - corner.x,
+        INTERVALS.row * shown.len().max(1) as f64,
     );
     let cell = PageRectangle::new(corner, size);
     // The ends of the intervals as parts of the values.
@@ -106,14 +139,14 @@ pub fn draw_fit_parameters(
     };
     let known = shown.iter().flat_map(parts).flatten();
     let widest = known.map(f64::abs).filter(|it| it.is_finite());
-    let widest = widest.fold(0.0, f64::max).min(WIDEST_RELATIVE_INTERVAL);
+    let widest = widest.fold(0.0, f64::max).min(INTERVALS.widest);
     let open = shown
         .iter()
         .flat_map(parts)
-        .any(|end| end.is_none_or(|it| it.abs() > WIDEST_RELATIVE_INTERVAL));
+        .any(|end| end.is_none_or(|it| it.abs() > INTERVALS.widest));
     let end = 110.0
         * if open || widest == 0.0 {
-            WIDEST_RELATIVE_INTERVAL
+            INTERVALS.widest
         } else {
             widest
         };
@@ -121,20 +154,21 @@ pub fn draw_fit_parameters(
         emphasizes_zero: true,
         ..Axis::linear("from the value / %", -end, end)
     };
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, [letter, "95 % intervals"], across, up);
+    let axes = PanelAxes::draw_titled(
+        page,
+        cell,
+        [letter, "95 % intervals"],
+        across,
+        Axis::blank(),
+    );
     for (k, it) in shown.iter().enumerate() {
-        let middle = corner.y + ROW_HEIGHT * (k as f64 + 0.5);
+        let middle = corner.y + INTERVALS.row * (k as f64 + 0.5);
         let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: TextAnchor| {
-            let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
+            let text = Font::embedded().shorten_text(text, FONT_SIZE.tick, room);
             page.draw_centered_label(
                 DVec2::new(x, middle),
                 &text,
-                TICK_FONT_SIZE,
+                FONT_SIZE.tick,
                 anchor,
                 TEXT_COLOR,
             );
@@ -144,7 +178,7 @@ pub fn draw_fit_parameters(
             page,
             corner.x - 10.0,
             &number.words,
-            WORDS_WIDTH + PAGE_LEFT_MARGIN - 16.0,
+            INTERVALS.words + PAGE.left_margin - 16.0,
             TextAnchor::End,
         );
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
@@ -153,7 +187,7 @@ pub fn draw_fit_parameters(
             page,
             cell.opposite_corner().x + 12.0,
             &text,
-            WIDTH - cell.opposite_corner().x - 16.0,
+            PAGE.width - cell.opposite_corner().x - 16.0,
             TextAnchor::Start,
         );
         // An open interval leaves the frame, dashed.
@@ -163,7 +197,7 @@ pub fn draw_fit_parameters(
                 .map(|at| at.with_y(middle))
         };
         let ends = [(low, -1.0), (high, 1.0)].map(|(part, sign)| {
-            let inside = part.filter(|part| part.abs() <= WIDEST_RELATIVE_INTERVAL);
+            let inside = part.filter(|part| part.abs() <= INTERVALS.widest);
             (
                 inside.is_some(),
                 place(inside.unwrap_or(0.0099 * sign * end)),
@@ -185,7 +219,7 @@ pub fn draw_fit_parameters(
             Marker::Circle.draw(page, value, BLUE);
         }
     }
-    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
+    cell.opposite_corner().y + PAGE.panel_axis
 }
 
 /// A fitted number with its interval, without digits below it.
@@ -207,51 +241,36 @@ fn value_with_interval(it: &FitParameter) -> String {
     }
 }
 
-const RESULT_HEIGHT: f64 = 190.0;
-
-const RESIDUALS_HEIGHT: f64 = 70.0;
-
-/// Least pixels between ticks of residuals.
-const RESIDUAL_TICK_SPACING: f64 = 16.0;
-
-/// Between results and their residuals.
-const RESIDUALS_GAP: f64 = 12.0;
-
-/// Heights of a leaf, and between its two views.
-const LEAST_LEAF_HEIGHT: f64 = 110.0;
-
-const LARGEST_LEAF_HEIGHT: f64 = 300.0;
-
-const VIEWS_GAP: f64 = 70.0;
-
-/// Right of the panels, for the key.
-const KEY: f64 = 200.0;
-
 const CONFIDENCE_BAND_COLOR: Color = Color(200, 222, 238);
 
 const MODEL_STROKE: Stroke = Stroke::new(BLUE, 1.6);
 
-/// Half the width of the band of a single experiment, in pixels.
-const SINGLE_EXPERIMENT_HALF_WIDTH: f64 = 5.0;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// Views, and their axes.
-const LEAF_VIEWS: [(&str, [usize; 2]); 3] = [
-    ("from above", [0, 1]),
-    ("from the side", [0, 2]),
-    ("along x", [1, 2]),
+const LEAF_VIEWS: [PlaneView; 3] = [
+    VIEW_FROM_ABOVE,
+    VIEW_FROM_SIDE,
+    PlaneView {
+        title: "along x",
+        axes: [1, 2],
+    },
 ];
 
 /// A result in words, with its unit.
 fn result_label(kind: &str, units: &Units) -> QuantityLabel {
     let (words, unit) = match kind.parse() {
-        Ok(MeasuredQuantity::Tip(axis)) => (format!("{} of the tip", AXES[axis]), &units.length),
-        Ok(MeasuredQuantity::Reaction(axis)) => {
-            (format!("reaction along {}", AXES[axis]), &units.force)
-        }
+        Ok(MeasuredQuantity::Tip(axis)) => (
+            format!("{} of the tip", COORDINATE_NAMES[axis]),
+            &units.length,
+        ),
+        Ok(MeasuredQuantity::Reaction(axis)) => (
+            format!("reaction along {}", COORDINATE_NAMES[axis]),
+            &units.force,
+        ),
         Ok(MeasuredQuantity::Grip(grip, axis)) => {
-            let words = format!("force on grip {} along {}", grip + 1, AXES[axis]);
+            let words = format!(
+                "force on grip {} along {}",
+                grip + 1,
+                COORDINATE_NAMES[axis]
+            );
             (words, &units.force)
         }
         Ok(MeasuredQuantity::Frequency(mode)) => (format!("frequency of mode {mode}"), &None),
@@ -263,24 +282,30 @@ fn result_label(kind: &str, units: &Units) -> QuantityLabel {
 
 /// Draws results of one kind with the model along what varied, and their residuals along the same;
 /// returns where that ends.
-pub fn draw_results(
+fn draw_results(
     page: &mut Drawing,
     top: f64,
     letter: &str,
     units: &Units,
     results: &ResultSeries,
 ) -> f64 {
-    let cell = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, RESULT_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(
+        top + PAGE.panel_title,
+        RESULT_LAYOUT.height,
+        RESULT_LAYOUT.key,
+    );
     let quantity = result_label(results.kind, units);
-    let values = results.all_residuals().flat_map(|(_, r)| {
-        let (band, sd) = (r.band, 2.0 * r.sd);
-        [r.data - sd, r.data + sd, r.model - band, r.model + band]
-    });
+    let values = results
+        .all_residuals()
+        .flat_map(|PlacedResidual { residual: r, .. }| {
+            let (band, sd) = (r.band, 2.0 * r.sd);
+            [r.data - sd, r.data + sd, r.model - band, r.model + band]
+        });
     let up = Axis {
         emphasizes_zero: false,
         ..Axis::linear_covering(&quantity.axis_name(), values)
     };
-    let places = || results.all_residuals().map(|(x, _)| x);
+    let places = || results.all_residuals().map(|it| it.abscissa);
     let across = match results.abscissa_keys {
         Some(keys) => Axis::linear_covering(
             &QuantityLabel::from_keys(&keys.to_string(), units).axis_name(),
@@ -307,13 +332,19 @@ pub fn draw_results(
             None => draw_single_experiments(page, &axes, series),
         }
     }
-    for (x, r) in results.all_residuals() {
+    for PlacedResidual {
+        abscissa: x,
+        residual: r,
+    } in results.all_residuals()
+    {
         let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
         axes.draw_curve(page, &bar, Stroke::new(SECOND_SOLUTION_COLOR, 1.0));
     }
     axes.draw_markers(
         page,
-        results.all_residuals().map(|(x, r)| (x, r.data)),
+        results
+            .all_residuals()
+            .map(|it| (it.abscissa, it.residual.data)),
         Marker::Dot,
         SECOND_SOLUTION_COLOR,
     );
@@ -340,17 +371,23 @@ pub fn draw_results(
     );
     let points = results
         .all_residuals()
-        .map(|(x, r)| (x, r.residual, TEXT_COLOR))
+        .map(|it| ResidualMark {
+            abscissa: it.abscissa,
+            residual: it.residual.residual,
+            color: TEXT_COLOR,
+        })
         .collect();
     draw_residuals(page, cell, across, points)
 }
 
 /// Draws the model through a series of experiments, with its band.
-fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitResidual)]) {
+fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[PlacedResidual]) {
     let mut once = series.to_vec();
-    once.dedup_by_key(|(x, _)| *x);
+    once.dedup_by_key(|it| it.abscissa);
     let line = |of: &dyn Fn(&FitResidual) -> f64| -> Vec<DVec2> {
-        let points: Vec<(f64, f64)> = once.iter().map(|(x, r)| (*x, of(r))).collect();
+        let points: Vec<(f64, f64)> = (once.iter())
+            .map(|it| (it.abscissa, of(it.residual)))
+            .collect();
         axes.smooth_curve(&points).into_iter().flatten().collect()
     };
     let mut band = line(&|r| r.model + r.band);
@@ -360,21 +397,21 @@ fn draw_model_curve(page: &mut Drawing, axes: &PanelAxes, series: &[(f64, &FitRe
     }
     let model: Vec<Option<DVec2>> = line(&|r| r.model).into_iter().map(Some).collect();
     axes.draw_clipped_line(page, &model, MODEL_STROKE);
-    if let [(x, r)] = once[..] {
-        draw_single_experiments(page, axes, &[(x, r)]);
+    if once.len() == 1 {
+        draw_single_experiments(page, axes, &once);
     }
 }
 
 /// Draws the model of single experiments, each with its band.
-fn draw_single_experiments(
-    page: &mut Drawing,
-    axes: &PanelAxes,
-    experiments: &[(f64, &FitResidual)],
-) {
-    for (x, r) in experiments {
+fn draw_single_experiments(page: &mut Drawing, axes: &PanelAxes, experiments: &[PlacedResidual]) {
+    for PlacedResidual {
+        abscissa: x,
+        residual: r,
+    } in experiments
+    {
         let ends = [r.model + r.band, r.model - r.band].map(|y| axes.page_position((*x, y)));
         if let ([Some(top), Some(end)], Some(at)) = (ends, axes.page_position((*x, r.model))) {
-            let half = DVec2::new(SINGLE_EXPERIMENT_HALF_WIDTH, 0.0);
+            let half = DVec2::new(RESULT_LAYOUT.half_band, 0.0);
             page.draw_shape(
                 rectangle_path(top - half, end - top + 2.0 * half),
                 CONFIDENCE_BAND_COLOR,
@@ -385,20 +422,30 @@ fn draw_single_experiments(
     }
 }
 
+/// A residual in standard deviations, as a point of a panel.
+struct ResidualMark {
+    abscissa: f64,
+    residual: f64,
+    color: Color,
+}
+
 /// Draws residuals below a panel along the same axis; returns where they end.
 fn draw_residuals(
     page: &mut Drawing,
     above: PageRectangle,
     across: Axis,
-    points: Vec<(f64, f64, Color)>,
+    points: Vec<ResidualMark>,
 ) -> f64 {
-    let corner = DVec2::new(above.corner.x, above.opposite_corner().y + RESIDUALS_GAP);
-    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESIDUALS_HEIGHT));
-    let sizes = points.iter().map(|(_, residual, _)| residual.abs());
+    let corner = DVec2::new(
+        above.corner.x,
+        above.opposite_corner().y + RESULT_LAYOUT.residuals_gap,
+    );
+    let cell = PageRectangle::new(corner, DVec2::new(above.size.x, RESULT_LAYOUT.residuals));
+    let sizes = points.iter().map(|mark| mark.residual.abs());
     let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
         emphasizes_zero: true,
-        tick_spacing: Some(RESIDUAL_TICK_SPACING),
+        tick_spacing: Some(RESULT_LAYOUT.residual_ticks),
         ..Axis::linear("residual", -most, most)
     };
     let axes = PanelAxes { cell, across, up };
@@ -409,28 +456,72 @@ fn draw_residuals(
         let from = corner + DVec2::new(0.0, fraction * cell.size.y);
         page.draw_line(from, from.with_x(cell.opposite_corner().x), two);
     }
-    for (x, residual, color) in points {
-        axes.draw_markers(page, [(x, residual)], Marker::Dot, color);
+    for mark in points {
+        let at = (mark.abscissa, mark.residual);
+        axes.draw_markers(page, [at], Marker::Dot, mark.color);
     }
     let mut key = Legend::right_of(cell);
     let note = "in standard deviations";
     key.add_marker(page, "data less model", note, Marker::Dot, TEXT_COLOR);
-    cell.opposite_corner().y + PANEL_AXIS_HEIGHT
+    cell.opposite_corner().y + PAGE.panel_axis
+}
+
+/// A measured point of a vein, as a view shows it.
+struct MeasuredPoint {
+    /// Counted from 0.
+    rod: usize,
+    at: (f64, f64),
+}
+
+/// A leaf and its measured points along one of the axes, with axes that cover both.
+struct LeafView {
+    title: &'static str,
+    across: Axis,
+    up: Axis,
+    curves: Vec<Vec<(f64, f64)>>,
+    points: Vec<MeasuredPoint>,
+}
+
+impl LeafView {
+    fn of_leaf(view: PlaneView, leaf: &FitLeaf, units: &Units) -> Self {
+        let [right, upward] = view.axes;
+        let traced = leaf.traced.iter();
+        let points = traced.filter_map(|(rod, at)| {
+            let at = (at[right]?, at[upward]?);
+            Some(MeasuredPoint { rod: *rod, at })
+        });
+        let points: Vec<MeasuredPoint> = points.collect();
+        let flat = |point: &DVec3| (point[right], point[upward]);
+        let curves = leaf.curves.iter();
+        let curves = curves.map(|curve| curve.iter().map(flat).collect());
+        let curves: Vec<Vec<(f64, f64)>> = curves.collect();
+        let all = || (curves.iter().flatten()).chain(points.iter().map(|point| &point.at));
+        let name = |axis: usize| name_with_unit(COORDINATE_NAMES[axis], units.length.as_deref());
+        LeafView {
+            title: view.title,
+            across: Axis::linear_covering(&name(right), all().map(|point| point.0)),
+            up: Axis::linear_covering(&name(upward), all().map(|point| point.1)),
+            curves,
+            points,
+        }
+    }
 }
 
 /// Draws a leaf in the one or two views in which points were measured, with these, and their
 /// residuals along the veins; returns where that ends.
-pub fn draw_measured_veins(
+fn draw_measured_veins(
     page: &mut Drawing,
     top: f64,
     letter: &str,
-    (experiment, units): (&str, &Units),
+    experiment: &str,
+    units: &Units,
     leaf: &FitLeaf,
     residuals: Vec<&FitResidual>,
 ) -> f64 {
-    let measured = |(_, [a, b]): &(&str, [usize; 2])| {
+    let measured = |view: &PlaneView| {
+        let [a, b] = view.axes;
         let mut points = leaf.traced.iter();
-        points.any(|(_, at)| at[*a].is_some() && at[*b].is_some())
+        points.any(|(_, at)| at[a].is_some() && at[b].is_some())
     };
     let mut views: Vec<_> = LEAF_VIEWS.into_iter().filter(measured).collect();
     if views.is_empty() {
@@ -438,64 +529,53 @@ pub fn draw_measured_veins(
         views = LEAF_VIEWS.into();
     }
     views.truncate(2);
-    let whole = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - KEY;
+    let whole = PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.key;
     let width = match views.len() {
         1 => whole,
-        _ => 0.5 * (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - VIEWS_GAP),
+        _ => 0.5 * (PAGE.width - PAGE.left_margin - PAGE.right_margin - RESULT_LAYOUT.views_gap),
     };
     let count = leaf.curves.len();
-    let panels: Vec<_> = (views.iter())
-        .map(|(_, axes)| {
-            let seen = |at: [Option<f64>; 3]| Some((at[axes[0]]?, at[axes[1]]?));
-            let traced = leaf.traced.iter();
-            let points = traced.filter_map(|(rod, at)| Some((*rod, seen(*at)?)));
-            let points: Vec<(usize, (f64, f64))> = points.collect();
-            let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
-            let curves = leaf.curves.iter();
-            let curves = curves.map(|curve| curve.iter().map(flat).collect());
-            let curves: Vec<Vec<(f64, f64)>> = curves.collect();
-            let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
-            let name = |k: usize| name_with_unit(AXES[axes[k]], units.length.as_deref());
-            let across = Axis::linear_covering(&name(0), all().map(|p| p.0));
-            let up = Axis::linear_covering(&name(1), all().map(|p| p.1));
-            (across, up, curves, points)
-        })
+    let panels: Vec<LeafView> = (views.into_iter())
+        .map(|view| LeafView::of_leaf(view, leaf, units))
         .collect();
-    let tall = |(across, up, ..): &(Axis, Axis, _, _)| {
+    let tall = |panel: &LeafView| {
+        let LeafView { across, up, .. } = panel;
         width * (up.end - up.start) / (across.end - across.start)
     };
     let height = panels
         .iter()
         .map(tall)
         .fold(0.0, f64::max)
-        .clamp(LEAST_LEAF_HEIGHT, LARGEST_LEAF_HEIGHT);
+        .clamp(RESULT_LAYOUT.least_leaf, RESULT_LAYOUT.largest_leaf);
     let experiment = match experiment {
         "as it is" => "traced veins".to_string(),
         name => format!("traced veins, experiment {name}"),
     };
-    let mut below = PageRectangle::left_of_legend(top + PANEL_TITLE_HEIGHT, height, KEY);
-    for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
+    let mut below =
+        PageRectangle::left_of_legend(top + PAGE.panel_title, height, RESULT_LAYOUT.key);
+    let is_single = panels.len() == 1;
+    for (k, view) in panels.into_iter().enumerate() {
         let corner = DVec2::new(
-            PAGE_LEFT_MARGIN + k as f64 * (width + VIEWS_GAP),
-            top + PANEL_TITLE_HEIGHT,
+            PAGE.left_margin + k as f64 * (width + RESULT_LAYOUT.views_gap),
+            top + PAGE.panel_title,
         );
         let cell = PageRectangle::new(corner, DVec2::new(width, height));
         let letter = if k == 0 { letter } else { "" };
-        let what = format!("{experiment}, {view}");
-        let (across, up) = equalize_axis_scales(across, up, cell.size);
+        let what = format!("{experiment}, {}", view.title);
+        let (across, up) = equalize_axis_scales(view.across, view.up, cell.size);
         let panel = PanelAxes::draw_titled(page, cell, [letter, &what], across, up);
-        for (rod, line) in curves.iter().enumerate() {
+        for (rod, line) in view.curves.iter().enumerate() {
             let drawn = panel.smooth_curve(line).into_iter().flatten().map(Some);
             let stroke = Stroke::new(color_of_vein(rod, count), 1.4);
             panel.draw_clipped_line(page, &drawn.collect::<Vec<_>>(), stroke);
         }
-        for (rod, point) in points {
-            if let Some(at) = panel.page_position(point) {
+        for MeasuredPoint { rod, at } in view.points {
+            if let Some(at) = panel.page_position(at) {
                 let rim = Stroke::new(color_of_vein(rod, count), 1.2);
                 page.draw_shape(circle_path(at, 2.6), WHITE, Some(rim));
             }
         }
-        if views.len() == 1 {
+        if is_single {
             let mut key = Legend::right_of(cell);
             key.add_line(page, "model", "each vein in its colour", MODEL_STROKE);
             key.add_entry(page, "traced points", "", |page, cell| {
@@ -504,11 +584,15 @@ pub fn draw_measured_veins(
             });
         }
     }
-    below.corner.y += PANEL_AXIS_HEIGHT - RESIDUALS_GAP;
+    below.corner.y += PAGE.panel_axis - RESULT_LAYOUT.residuals_gap;
     let along = Axis::linear("fraction of the length", 0.0, 1.0);
     let points = residuals.iter().filter_map(|it| {
         let color = color_of_vein(it.rod?.checked_sub(1)?, count);
-        Some((it.sigma?, it.residual, color))
+        Some(ResidualMark {
+            abscissa: it.sigma?,
+            residual: it.residual,
+            color,
+        })
     });
     draw_residuals(page, below, along, points.collect())
 }
@@ -531,19 +615,27 @@ const FEWEST_EXPERIMENTS: usize = 4;
 /// Experiments are in line up to this part of their distance.
 const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 
+/// A result of an experiment, and where a panel has it: the value that varied, or the number of the
+/// experiment.
+#[derive(Clone, Copy)]
+struct PlacedResidual<'f> {
+    pub abscissa: f64,
+    pub residual: &'f FitResidual,
+}
+
 /// Results of one kind, drawn in one panel.
-pub struct ResultSeries<'f> {
-    /// As in the data: `tip_x`.
+struct ResultSeries<'f> {
+    /// The name of its column in the data, such as `tip_x`.
     pub kind: &'f str,
     /// The number of the scenario along which the panel has them; `None`: the numbers of the
     /// experiments.
     pub abscissa_keys: Option<&'f ParameterKeys>,
     /// Series along it, each with its values in ascending order.
-    pub series: Vec<Vec<(f64, &'f FitResidual)>>,
+    pub series: Vec<Vec<PlacedResidual<'f>>>,
 }
 
 impl<'f> ResultSeries<'f> {
-    pub fn all_residuals(&self) -> impl Iterator<Item = (f64, &'f FitResidual)> {
+    fn all_residuals(&self) -> impl Iterator<Item = PlacedResidual<'f>> {
         self.series.iter().flatten().copied()
     }
 }
@@ -552,7 +644,7 @@ type ExperimentSettings = [(ParameterKeys, f64)];
 
 /// The results of all experiments by their kinds. Those of experiments that differ along a line, as
 /// one column varies or several together, are a series; those of others keep their numbers.
-pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
+fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     let leaves = fit.leaves.iter();
     let settings: HashMap<usize, &ExperimentSettings> = leaves
         .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))
@@ -581,13 +673,21 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
                     .last(),
             };
             let Some((to, key)) = found else {
-                numbered.push((of[from].number as f64, of[from]));
+                numbered.push(PlacedResidual {
+                    abscissa: of[from].number as f64,
+                    residual: of[from],
+                });
                 from += 1;
                 continue;
             };
             let keys = &own[from][key].0;
-            let mut series: Vec<_> = (from..to).map(|k| (own[k][key].1, of[k])).collect();
-            series.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut series: Vec<_> = (from..to)
+                .map(|k| PlacedResidual {
+                    abscissa: own[k][key].1,
+                    residual: of[k],
+                })
+                .collect();
+            series.sort_by(|a, b| a.abscissa.total_cmp(&b.abscissa));
             let along = Some(keys);
             let mut of_kind = all[first..].iter_mut();
             match of_kind.find(|it: &&mut ResultSeries| it.abscissa_keys == along) {
@@ -611,7 +711,7 @@ pub fn result_series_by_kind(fit: &Fit) -> Vec<ResultSeries<'_>> {
     all
 }
 
-/// Which of their numbers varies most, if the experiments differ along a line.
+/// Which setting of the experiments varies most, if they differ along a line.
 fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
     let first = settings.first()?;
     let same = |it: &&ExperimentSettings| {

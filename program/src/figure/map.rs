@@ -1,19 +1,14 @@
-//! A map: one panel per method and one colour per outcome or, if waves are shown, per
-//! number of waves of stable leaves. Results of one method along one axis are also drawn as
+//! A map: one panel per method and one color per outcome or, if waves are shown, per number of waves of
+//! stable leaves. Over a single number a panel is a strip, and the results of one method are also drawn as
 //! curves below its strip: the tip and the energy or, where waves are shown, waves and twist.
-//!
-//! One panel of a map: its cells in the colours of their outcomes.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, WIDTH, draw_header,
-};
+use crate::figure::drawing::labels::{Legend, LegendRows, draw_header};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, circle_path,
-    rectangle_path, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, WHITE, circle_path, rectangle_path, vein_color,
 };
 use crate::figure::scenario::{QuantityLabel, name_with_unit};
 use crate::report::map_title;
@@ -24,55 +19,74 @@ use leafdyn::study::{
     SolverSetting,
 };
 
-const SWATCH_SIZE: f64 = 12.0;
+/// Sizes of the panels of a map over two numbers, in pixels.
+struct MapLayout {
+    /// Side of a color in the key.
+    swatch: f64,
+    /// Room below each panel for ticks and, below the last, for the name of the axis.
+    ticks: f64,
+    axis_name: f64,
+    /// Between panels, for the ticks of the right one.
+    gap: f64,
+    most_columns: usize,
+    /// Largest width of a panel, and its height as a part of its width.
+    widest: f64,
+    aspect_ratio: f64,
+    /// Width of a page with one panel.
+    single_page: f64,
+}
 
-/// Room below each panel for ticks and, below the last, for the name of the axis.
-const TICKS_HEIGHT: f64 = 26.0;
+const LAYOUT: MapLayout = MapLayout {
+    swatch: 12.0,
+    ticks: 26.0,
+    axis_name: 26.0,
+    gap: 44.0,
+    most_columns: 3,
+    widest: 470.0,
+    aspect_ratio: 0.86,
+    single_page: 600.0,
+};
 
-const AXIS_NAME_HEIGHT: f64 = 26.0;
-
-/// Between panels, for the ticks of the right one.
-const GAP: f64 = 44.0;
-
-const MOST_PANEL_COLUMNS: usize = 3;
-
-const WIDEST: f64 = 470.0;
-
-/// Explains a map of waves.
 const WAVES_EXPLANATION: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
     of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
 
-/// Width of a page with one panel.
-const SINGLE_PANEL_PAGE_WIDTH: f64 = 600.0;
+/// Sizes of the strip of a method over one number, and of the curves below a single one, in pixels.
+struct StripLayout {
+    /// Height of the strip, and of the gap below it.
+    height: f64,
+    gap: f64,
+    /// Room for the name of the method and for its count.
+    name: f64,
+    count: f64,
+    /// Between the strip of a single method and its curves.
+    curves_gap: f64,
+    /// Heights of panels of several curves, and of one.
+    tall_curves: f64,
+    low_curve: f64,
+}
 
-/// Between the strip of a single method and its curves.
-const CURVES_GAP: f64 = 12.0;
-
-/// Height over width of a panel.
-const PANEL_ASPECT_RATIO: f64 = 0.86;
-
-/// With one axis: height of a method's strip, the gap below it, and room for its name
-/// and count.
-const STRIP_HEIGHT: f64 = 30.0;
-
-const STRIP_GAP: f64 = 9.0;
-
-const METHOD_NAME_WIDTH: f64 = 130.0;
-
-const COUNT_WIDTH: f64 = 100.0;
+const STRIP: StripLayout = StripLayout {
+    height: 30.0,
+    gap: 9.0,
+    name: 130.0,
+    count: 100.0,
+    curves_gap: 12.0,
+    tall_curves: 260.0,
+    low_curve: 150.0,
+};
 
 pub fn draw(map: &Map) -> Drawing {
     let name = &map.request.base.scenario().name;
     let title = format!("{name}: {}", map_title(map.show));
     let width = match (map.request.axes.len(), map.request.methods.len()) {
-        (2, 1) => SINGLE_PANEL_PAGE_WIDTH,
-        _ => WIDTH,
+        (2, 1) => LAYOUT.single_page,
+        _ => PAGE.width,
     };
     let mut drawing = Drawing::new(width, &title);
     let mut end = 0.0;
     drawing.draw_group("header", |page| {
-        draw_header(page, PAGE_LEFT_MARGIN, &title, &header_notes(map), None);
-        end = draw_legend(page, map, NOTES_BASE_LINE + 20.0);
+        draw_header(page, PAGE.left_margin, &title, &header_notes(map), None);
+        end = draw_legend(page, map, PAGE.notes_base_line + 20.0);
         if map.show == MapShow::Waves {
             end = draw_waves_explanation(page, end);
         }
@@ -108,7 +122,7 @@ fn header_notes(map: &Map) -> Vec<String> {
 
 /// Draws the key of the outcomes and marks that occur; returns where it ends.
 fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
-    let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, base, SWATCH_SIZE);
+    let mut key = LegendRows::starting_at(PAGE.left_margin, base, LAYOUT.swatch);
     for outcome in MapOutcome::ALL {
         let shown =
             |row: &MapRow| row.outcome == outcome && stable_waves_shown(map.show, row).is_none();
@@ -155,11 +169,11 @@ fn draw_legend(page: &mut Drawing, map: &Map, base: f64) -> f64 {
 
 /// Draws the explanation of a map of waves; returns where it ends.
 fn draw_waves_explanation(page: &mut Drawing, mut top: f64) -> f64 {
-    let room = page.width - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
-    for line in Font::embedded().wrap_text(WAVES_EXPLANATION, TICK_FONT_SIZE, room) {
-        let base = DVec2::new(PAGE_LEFT_MARGIN, top + TICK_FONT_SIZE);
-        page.draw_label(base, &line, TICK_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
-        top += 1.4 * TICK_FONT_SIZE;
+    let room = page.width - PAGE.left_margin - PAGE.right_margin;
+    for line in Font::embedded().wrap_text(WAVES_EXPLANATION, FONT_SIZE.tick, room) {
+        let base = DVec2::new(PAGE.left_margin, top + FONT_SIZE.tick);
+        page.draw_label(base, &line, FONT_SIZE.tick, TextAnchor::Start, NOTE_COLOR);
+        top += 1.4 * FONT_SIZE.tick;
     }
     top + 6.0
 }
@@ -190,20 +204,23 @@ fn draw_panels(
     start: f64,
 ) -> f64 {
     let methods = &map.request.methods;
-    let columns = y.map_or(1, |_| methods.len().clamp(1, MOST_PANEL_COLUMNS));
+    let columns = y.map_or(1, |_| methods.len().clamp(1, LAYOUT.most_columns));
     let (corner, size, pitch) = match y {
         Some(_) => {
-            let left = PAGE_LEFT_MARGIN + 18.0;
-            let room = WIDTH - PAGE_RIGHT_MARGIN - left - (columns - 1) as f64 * GAP;
-            let width = (room / columns as f64).min(WIDEST);
-            let size = DVec2::new(width, PANEL_ASPECT_RATIO * width);
-            let pitch = size + DVec2::new(GAP, PANEL_TITLE_HEIGHT + TICKS_HEIGHT + 6.0);
-            (DVec2::new(left, start + PANEL_TITLE_HEIGHT), size, pitch)
+            let left = PAGE.left_margin + 18.0;
+            let room = PAGE.width - PAGE.right_margin - left - (columns - 1) as f64 * LAYOUT.gap;
+            let width = (room / columns as f64).min(LAYOUT.widest);
+            let size = DVec2::new(width, LAYOUT.aspect_ratio * width);
+            let pitch = size + DVec2::new(LAYOUT.gap, PAGE.panel_title + LAYOUT.ticks + 6.0);
+            (DVec2::new(left, start + PAGE.panel_title), size, pitch)
         }
         None => {
-            let left = PAGE_LEFT_MARGIN + METHOD_NAME_WIDTH;
-            let size = DVec2::new(WIDTH - PAGE_RIGHT_MARGIN - COUNT_WIDTH - left, STRIP_HEIGHT);
-            let pitch = DVec2::new(0.0, STRIP_HEIGHT + STRIP_GAP);
+            let left = PAGE.left_margin + STRIP.name;
+            let size = DVec2::new(
+                PAGE.width - PAGE.right_margin - STRIP.count - left,
+                STRIP.height,
+            );
+            let pitch = DVec2::new(0.0, STRIP.height + STRIP.gap);
             (DVec2::new(left, start + 10.0), size, pitch)
         }
     };
@@ -225,23 +242,29 @@ fn draw_panels(
         last = cell;
     }
     if let (None, [_]) = (y, methods.as_slice()) {
-        return draw_curves(drawing, map, x, last, last.opposite_corner().y + CURVES_GAP);
+        return draw_curves(
+            drawing,
+            map,
+            x,
+            last,
+            last.opposite_corner().y + STRIP.curves_gap,
+        );
     }
-    let end = last.opposite_corner().y + TICKS_HEIGHT;
-    let across = columns as f64 * (size.x + GAP) - GAP;
+    let end = last.opposite_corner().y + LAYOUT.ticks;
+    let across = columns as f64 * (size.x + LAYOUT.gap) - LAYOUT.gap;
     let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
     drawing.draw_label(
         below,
         &x.axis.title(),
-        TEXT_FONT_SIZE,
+        FONT_SIZE.text,
         TextAnchor::Middle,
         TEXT_COLOR,
     );
     if let Some(y) = y {
         let middle = DVec2::new(24.0, 0.5 * (corner.y + last.opposite_corner().y));
-        drawing.draw_rotated_label(middle, &y.axis.title(), TEXT_FONT_SIZE, TEXT_COLOR);
+        drawing.draw_rotated_label(middle, &y.axis.title(), FONT_SIZE.text, TEXT_COLOR);
     }
-    end + AXIS_NAME_HEIGHT
+    end + LAYOUT.axis_name
 }
 
 /// Draws a method's name and count, above a panel or to both sides of a strip.
@@ -255,77 +278,88 @@ fn draw_method_name(
     let (name, count) = (method.word(), outcome_count_text(map, method));
     if above {
         let base = cell.corner - DVec2::new(0.0, 8.0);
-        page.draw_label(base, name, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+        page.draw_label(base, name, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
         let base = base.with_x(cell.opposite_corner().x);
-        return page.draw_label(base, &count, TICK_FONT_SIZE, TextAnchor::End, NOTE_COLOR);
+        return page.draw_label(base, &count, FONT_SIZE.tick, TextAnchor::End, NOTE_COLOR);
     }
     let [left, right] = cell.midline();
     let gap = DVec2::new(10.0, 0.0);
     page.draw_centered_label(
         left - gap,
         name,
-        TEXT_FONT_SIZE,
+        FONT_SIZE.text,
         TextAnchor::End,
         TEXT_COLOR,
     );
     page.draw_centered_label(
         right + gap,
         &count,
-        TICK_FONT_SIZE,
+        FONT_SIZE.tick,
         TextAnchor::Start,
         NOTE_COLOR,
     );
 }
 
-/// Smaller variations are rounding.
+/// Extent of an axis of values that vary by less, which is rounding.
 const ROUNDING_VARIATION: f64 = 1e-9;
 
-const TALL_CURVE_PANEL: f64 = 260.0;
+/// A curve over the number that varies.
+struct MapCurve {
+    name: &'static str,
+    color: Color,
+    value: fn(&MapRow) -> Option<f64>,
+}
 
-const LOW_CURVE_PANEL: f64 = 150.0;
+/// A panel with curves over the number that varies.
+struct CurvePanel {
+    title: &'static str,
+    axis_name: String,
+    curves: Vec<MapCurve>,
+}
 
-/// A curve: its name, its colour, and its value in a row.
-type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
-
-/// The titles of the panels, the names of their axes, and their curves.
-fn curve_panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
+fn curve_panels(map: &Map) -> Vec<CurvePanel> {
+    let curve = |name, color: usize, value| MapCurve {
+        name,
+        color: CURVE_COLORS[color],
+        value,
+    };
     let units = &map.request.base.scenario().units;
     let length = units.length.as_deref();
     match map.show {
         MapShow::Outcomes => vec![
-            (
-                "where the tip is",
-                name_with_unit("tip", length),
-                vec![
-                    ("x", CURVE_COLORS[0], |row| row.tip_x),
-                    ("y", CURVE_COLORS[1], |row| row.tip_y),
-                    ("z", CURVE_COLORS[2], |row| row.tip_z),
+            CurvePanel {
+                title: "where the tip is",
+                axis_name: name_with_unit("tip", length),
+                curves: vec![
+                    curve("x", 0, |row| row.tip_x),
+                    curve("y", 1, |row| row.tip_y),
+                    curve("z", 2, |row| row.tip_z),
                 ],
-            ),
-            (
-                "energy",
-                name_with_unit("energy", units.energy().as_deref()),
-                vec![("energy", CURVE_COLORS[3], |row| row.energy)],
-            ),
+            },
+            CurvePanel {
+                title: "energy",
+                axis_name: name_with_unit("energy", units.energy().as_deref()),
+                curves: vec![curve("energy", 3, |row| row.energy)],
+            },
         ],
         MapShow::Waves => vec![
-            (
-                "waves along the margins, of stable leaves",
-                "waves".into(),
-                vec![("waves", CURVE_COLORS[0], MapRow::stable_waves)],
-            ),
-            (
-                "their amplitude",
-                name_with_unit("amplitude", Some("L")),
-                vec![("amplitude", CURVE_COLORS[1], |row| {
+            CurvePanel {
+                title: "waves along the margins, of stable leaves",
+                axis_name: "waves".into(),
+                curves: vec![curve("waves", 0, MapRow::stable_waves)],
+            },
+            CurvePanel {
+                title: "their amplitude",
+                axis_name: name_with_unit("amplitude", Some("L")),
+                curves: vec![curve("amplitude", 1, |row| {
                     row.stable_waves().and(row.margin_amplitude)
                 })],
-            ),
-            (
-                "mean twist of the veins",
-                name_with_unit("twist", Some("rad")),
-                vec![("twist", CURVE_COLORS[3], |row| row.twist)],
-            ),
+            },
+            CurvePanel {
+                title: "mean twist of the veins",
+                axis_name: name_with_unit("twist", Some("rad")),
+                curves: vec![curve("twist", 3, |row| row.twist)],
+            },
         ],
     }
 }
@@ -340,57 +374,65 @@ fn draw_curves(
 ) -> f64 {
     let values = &map.request.axes[0].values;
     let mut top = start;
-    for (what, name, curves) in curve_panels(map) {
+    for panel in curve_panels(map) {
+        let curves = &panel.curves;
         let height = if curves.len() > 1 {
-            TALL_CURVE_PANEL
+            STRIP.tall_curves
         } else {
-            LOW_CURVE_PANEL
+            STRIP.low_curve
         };
         let cell = PageRectangle::new(
-            DVec2::new(strip.corner.x, top + PANEL_TITLE_HEIGHT),
+            DVec2::new(strip.corner.x, top + PAGE.panel_title),
             DVec2::new(strip.size.x, height),
         );
-        let lines = curves.iter().map(|(_, _, of)| {
+        let lines = curves.iter().map(|curve| {
             let mut line: Vec<(f64, f64)> = values.iter().map(|&x| (x, f64::NAN)).collect();
             for row in &map.rows {
-                line[row.cell].1 = of(row).unwrap_or(f64::NAN);
+                line[row.cell].1 = (curve.value)(row).unwrap_or(f64::NAN);
             }
             line
         });
         let lines: Vec<_> = lines.collect();
         let known = lines.iter().flatten().map(|point| point.1);
-        let up = Axis::linear_covering(&name, known.filter(|value| value.is_finite()))
+        let up = Axis::linear_covering(&panel.axis_name, known.filter(|value| value.is_finite()))
             .with_least_extent(ROUNDING_VARIATION);
         page.draw_group("curves", |page| {
-            let axes = PanelAxes::draw_titled(page, cell, ["", what], x.axis.clone(), up);
+            let axes = PanelAxes::draw_titled(page, cell, ["", panel.title], x.axis.clone(), up);
             let mut key = Legend::right_of(cell);
-            for ((name, color, _), line) in curves.iter().zip(lines) {
-                axes.draw_curve(page, &line, Stroke::new(*color, 1.6));
-                axes.draw_markers(page, line, Marker::Dot, *color);
-                key.add_marked_line(page, name, "", *color);
+            for (curve, line) in curves.iter().zip(lines) {
+                axes.draw_curve(page, &line, Stroke::new(curve.color, 1.6));
+                axes.draw_markers(page, line, Marker::Dot, curve.color);
+                key.add_marked_line(page, curve.name, "", curve.color);
             }
         });
-        top = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        top = cell.opposite_corner().y + PAGE.panel_axis;
     }
     top
 }
 
-/// Smaller cells have no gaps between them and no marks.
-const LEAST_SEPARATED_CELL: f64 = 5.0;
+/// What a cell of this size in pixels has.
+struct CellMarks {
+    /// Smaller cells have no gaps between them and no marks.
+    separated: f64,
+    /// Smaller cells have no numbers.
+    numbered: f64,
+    number_font: f64,
+}
 
-/// Smaller cells have no numbers.
-const LEAST_NUMBERED_CELL: f64 = 13.0;
+const CELL: CellMarks = CellMarks {
+    separated: 5.0,
+    numbered: 13.0,
+    number_font: 8.0,
+};
 
-const NUMBER_FONT_SIZE: f64 = 8.0;
+/// Color where leaves are stable.
+pub const STABLE_GROUND_COLOR: Color = Color(226, 236, 226);
 
-/// Of stable leaves.
-pub const PALE: Color = Color(226, 236, 226);
-
-/// More waves than this have the same colour.
+/// More waves than this have the same color.
 const MOST_WAVES_DISTINGUISHED: f64 = 2.5;
 
-/// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
-/// light. Those that are alike without colours also differ in their marks.
+/// Colors that the color-blind can distinguish (Okabe and Ito); that of right answers is
+/// light. Those that are alike without colors also differ in their marks.
 fn outcome_color(outcome: MapOutcome) -> Color {
     match outcome {
         MapOutcome::Right => Color(170, 214, 240),
@@ -405,18 +447,18 @@ fn outcome_color(outcome: MapOutcome) -> Color {
 }
 
 /// Waves along the margins, where these are shown and the leaf is stable.
-pub fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
+fn stable_waves_shown(show: MapShow, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
 /// Fills a cell, with the mark of its outcome if it has one and is large enough.
-pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
+fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
     page.draw_shape(
         rectangle_path(cell.corner, cell.size),
         outcome_color(outcome),
         None,
     );
-    if cell.size.min_element() < LEAST_SEPARATED_CELL {
+    if cell.size.min_element() < CELL.separated {
         return;
     }
     let inset = 0.25 * cell.size;
@@ -435,21 +477,21 @@ pub fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome
     }
 }
 
-pub fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
+fn fill_waves(page: &mut Drawing, cell: PageRectangle, waves: f64) {
     let color = match waves {
-        0.0 => PALE,
+        0.0 => STABLE_GROUND_COLOR,
         waves => vein_color((waves - 1.0) / (MOST_WAVES_DISTINGUISHED - 1.0)),
     };
     page.draw_shape(rectangle_path(cell.corner, cell.size), color, None);
 }
 
-/// Indices from this one on have the same colour.
+/// Indices from this one on have the same color.
 pub const DARKEST_MORSE_INDEX: usize = 4;
 
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
 pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize) {
     let color = match index {
-        0 => PALE,
+        0 => STABLE_GROUND_COLOR,
         1 => Color(255, 240, 222),
         2 => Color(252, 224, 194),
         3 => Color(246, 204, 168),
@@ -460,7 +502,7 @@ pub fn fill_cell_by_index(page: &mut Drawing, cell: PageRectangle, index: usize)
 
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
 /// none.
-pub fn mark_unconfirmed_reference(
+fn mark_unconfirmed_reference(
     page: &mut Drawing,
     cell: PageRectangle,
     reference: ReferenceConfidence,
@@ -476,9 +518,9 @@ pub fn mark_unconfirmed_reference(
 }
 
 /// Stroke of the longest stable step.
-pub const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
+const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
-pub struct VariedAxis {
+struct VariedAxis {
     pub axis: Axis,
     /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
@@ -486,7 +528,7 @@ pub struct VariedAxis {
 
 impl VariedAxis {
     /// Cells in the order given, each around its value.
-    pub fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
+    fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -520,7 +562,7 @@ impl VariedAxis {
 }
 
 /// A panel; with one axis it is a strip.
-pub struct MapPanel<'a> {
+struct MapPanel<'a> {
     axes: PanelAxes,
     x: &'a VariedAxis,
     y: Option<&'a VariedAxis>,
@@ -542,11 +584,7 @@ impl<'a> MapPanel<'a> {
             labelled,
             ..unnamed(&x.axis)
         };
-        let strip = Axis {
-            ticks: TickPlacement::WholeNumbers(Vec::new()),
-            ..Axis::linear("", 0.0, 1.0)
-        };
-        let up = y.map_or(strip, |y| unnamed(&y.axis));
+        let up = y.map_or(Axis::blank(), |y| unnamed(&y.axis));
         let axes = PanelAxes { cell, across, up };
         MapPanel { axes, x, y }
     }
@@ -584,7 +622,7 @@ impl<'a> MapPanel<'a> {
 
     fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
         let mut cell = self.cell_rectangle(row.cell);
-        let large = cell.size.min_element() >= LEAST_SEPARATED_CELL;
+        let large = cell.size.min_element() >= CELL.separated;
         if large {
             let inset = DVec2::splat(0.4);
             cell.corner += inset;
@@ -602,11 +640,11 @@ impl<'a> MapPanel<'a> {
             (_, _, Some(waves)) if waves > 0.0 => waves.to_string(),
             _ => return,
         };
-        if cell.size.min_element() >= LEAST_NUMBERED_CELL {
+        if cell.size.min_element() >= CELL.numbered {
             page.draw_centered_label(
                 cell.middle(),
                 &number,
-                NUMBER_FONT_SIZE,
+                CELL.number_font,
                 TextAnchor::Middle,
                 WHITE,
             );
@@ -614,7 +652,7 @@ impl<'a> MapPanel<'a> {
     }
 
     /// Draws the longest step known to be stable, across every row or column.
-    pub fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
+    fn draw_stable_step(&self, page: &mut Drawing, request: &MapRequest) {
         let along_x = request.axes[0]
             .keys
             .contains_solver_setting(SolverSetting::Step);

@@ -1,8 +1,7 @@
 //! Figures, one file or few for the result of each verb.
 //!
-//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a
-//! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
-//! `png` write the same drawing in both formats.
+//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a header, keys, and panels
+//! with axes or in space. SVG and PNG are written from the same drawing.
 
 mod boundary;
 mod chart;
@@ -11,7 +10,6 @@ pub(crate) mod drawing;
 mod fit;
 pub(crate) mod leaf;
 mod map;
-mod modes;
 mod motion;
 mod rod;
 pub(crate) mod scenario;
@@ -23,9 +21,8 @@ pub use crate::figure::chart::{draw_chart as chart, draw_scaling as scaling};
 pub use crate::figure::check::draw as check;
 pub use crate::figure::drawing::Drawing;
 pub use crate::figure::fit::draw as fit;
-pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria};
+pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria, draw_modes as modes};
 pub use crate::figure::map::draw as map;
-pub use crate::figure::modes::draw as modes;
 pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as filmstrip, write_film};
 pub use crate::figure::sensitivity::draw as sensitivity;
 pub use crate::figure::trace::draw as trace;
@@ -72,7 +69,6 @@ mod tests {
         }
     }
 
-    /// A scenario with units.
     fn in_cm() -> Scenario {
         let mut scenario = scenario();
         scenario.units.length = Some("cm".into());

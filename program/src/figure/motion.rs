@@ -1,23 +1,19 @@
-//! The energies of a moving leaf and the position of its tip over time.
-//!
-//! A moving leaf as a GIF, in the same view as the film strip.
-//!
-//! A moving leaf at several instants.
+//! A moving leaf: its energies and the position of its tip over time, its shapes at several instants, and
+//! a film as GIF in the same view.
 
 use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
-use crate::figure::drawing::labels::{
-    HEADER, Legend, LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, SIDE_MARGIN, SMALL_LINE_WIDTH_FACTOR, SmallPanels,
-    TEXT_FONT_SIZE, new_page, panel_letters,
+use crate::figure::drawing::labels::{Legend, LegendRows, new_page};
+use crate::figure::drawing::space::{
+    BoxMargins, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, common_bounding_box,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, common_bounding_box};
+use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR,
-    TextAnchor, WHITE, is_drawable, polyline_path, vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, PanelCaption,
+    SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE, is_drawable, panel_letters,
+    polyline_path, vein_color,
 };
-use crate::figure::leaf::DrawnVeins;
-use crate::figure::scenario::{FigureSetting, name_with_unit};
+use crate::figure::scenario::{COORDINATE_NAMES, FigureSetting, name_with_unit};
 use crate::report::numbers::{format_four_digits, number_in_unit};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::units::TIME;
@@ -27,21 +23,27 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
 use std::io::Write;
+use std::ops::Range;
 use tiny_skia::Pixmap;
 
-const ENERGIES_HEIGHT: f64 = 300.0;
+/// Heights of the panels over time, in pixels.
+struct EnergyLayout {
+    energies: f64,
+    balance: f64,
+    tip: f64,
+    /// Gap above the lower panels, for the tick labels of the upper ones.
+    between: f64,
+    /// Width right of the panels, for the key.
+    key: f64,
+}
 
-const BALANCE_HEIGHT: f64 = 120.0;
-
-const TIP_HEIGHT: f64 = 200.0;
-
-/// Gap above the lower panels, for the tick labels of the upper ones.
-const BETWEEN: f64 = 30.0;
-
-const BOTTOM_MARGIN: f64 = 4.0;
-
-/// Right of the panels, for the key.
-const KEY: f64 = 200.0;
+const ENERGY_LAYOUT: EnergyLayout = EnergyLayout {
+    energies: 300.0,
+    balance: 120.0,
+    tip: 200.0,
+    between: 30.0,
+    key: 200.0,
+};
 
 pub fn header_notes(record: &Record) -> Vec<String> {
     let mut notes = vec![
@@ -57,11 +59,11 @@ pub fn header_notes(record: &Record) -> Vec<String> {
 
 pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
-    let upper = HEADER + PANEL_TITLE_HEIGHT;
-    let lower = upper + ENERGIES_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(record), None);
-    let lowest = lower + BALANCE_HEIGHT + BETWEEN + PANEL_TITLE_HEIGHT;
-    drawing.height = lowest + TIP_HEIGHT + PANEL_AXIS_HEIGHT + BOTTOM_MARGIN;
+    let upper = PAGE.header + PAGE.panel_title;
+    let lower = upper + ENERGY_LAYOUT.energies + ENERGY_LAYOUT.between + PAGE.panel_title;
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(record), None);
+    let lowest = lower + ENERGY_LAYOUT.balance + ENERGY_LAYOUT.between + PAGE.panel_title;
+    drawing.height = lowest + ENERGY_LAYOUT.tip + PAGE.panel_axis + PAGE.bottom_margin;
     let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
@@ -73,7 +75,7 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let energy = name_with_unit("energy", unit.as_deref());
     let across = Axis::linear("", 0.0, end);
     let up = Axis::linear_covering(&energy, values.chain([0.0]));
-    let cell = PageRectangle::left_of_legend(upper, ENERGIES_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(upper, ENERGY_LAYOUT.energies, ENERGY_LAYOUT.key);
     drawing.draw_group("energies", |page| {
         let what = "where the energy is";
         let axes = PanelAxes::draw_titled(page, cell, ["(a)", what], across.clone(), up);
@@ -86,7 +88,7 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
             draw_legend_line(page, &mut key, curve);
         }
     });
-    let cell = PageRectangle::left_of_legend(lower, BALANCE_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(lower, ENERGY_LAYOUT.balance, ENERGY_LAYOUT.key);
     let name = name_with_unit("balance", unit.as_deref());
     let up = Axis::linear_covering(&name, balance.ordinates().chain([0.0]));
     drawing.draw_group("balance", |page| {
@@ -95,7 +97,7 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
         let axes = PanelAxes::draw_titled(page, cell, ["(b)", what], across, up);
         axes.draw_curve(page, &balance.points, Stroke::new(TEXT_COLOR, 1.3));
     });
-    let cell = PageRectangle::left_of_legend(lowest, TIP_HEIGHT, KEY);
+    let cell = PageRectangle::left_of_legend(lowest, ENERGY_LAYOUT.tip, ENERGY_LAYOUT.key);
     drawing.draw_group("tip", |page| {
         draw_tip_coordinates(page, record, &scenario.units, cell, end)
     });
@@ -111,7 +113,7 @@ fn draw_tip_coordinates(
     end: f64,
 ) {
     let coordinate = |axis: usize| NamedCurve {
-        name: ["x", "y", "z"][axis],
+        name: COORDINATE_NAMES[axis],
         color: CURVE_COLORS[axis],
         points: (record.moments.iter())
             .map(|moment| (moment.time, moment.tip[axis]))
@@ -176,25 +178,32 @@ fn energy_curves(record: &Record) -> Vec<NamedCurve> {
     curves
 }
 
-/// Duration of the film in hundredths of a second, and its most pictures.
-const FILM_DURATION: f64 = 1000.0;
+/// Number, size and delays of the pictures of a film.
+struct FilmFormat {
+    /// Time that the film takes, in hundredths of a second.
+    duration: f64,
+    most_pictures: usize,
+    /// How long a picture is shown: browsers show shorter delays for longer.
+    shortest_delay: usize,
+    longest_delay: usize,
+    /// Size of the page: half as many as it has pixels.
+    page: DVec2,
+    title_height: f64,
+    margins: BoxMargins,
+}
 
-const MOST_FILM_PICTURES: usize = 140;
-
-/// Delays of a picture: browsers show shorter ones for longer.
-const SHORTEST_DELAY: usize = 2;
-
-const LONGEST_DELAY: usize = 100;
-
-/// Size of the page: half as many as it has pixels.
-const FILM_PAGE_SIZE: DVec2 = DVec2::new(320.0, 240.0);
-
-const TITLE_HEIGHT: f64 = 26.0;
-
-const MARGINS: BoxMargins = BoxMargins {
-    left: 46.0,
-    right: 42.0,
-    below: 42.0,
+const FILM: FilmFormat = FilmFormat {
+    duration: 1000.0,
+    most_pictures: 140,
+    shortest_delay: 2,
+    longest_delay: 100,
+    page: DVec2::new(320.0, 240.0),
+    title_height: 26.0,
+    margins: BoxMargins {
+        left: 46.0,
+        right: 42.0,
+        below: 42.0,
+    },
 };
 
 /// Index of a pixel that has not changed.
@@ -219,19 +228,16 @@ pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> 
         .map_init(ColorPalette::new, |palette, (veins, time)| {
             let text = format!("{}, t = {}", record.scenario, format_four_digits(*time));
             palette.nearest_color_indices(&rasterize(&draw_picture(
-                veins,
-                bounds,
-                setting,
-                (&text, *time),
+                veins, bounds, setting, &text, *time,
             )))
         })
         .collect();
     encode_gif(&pictures, &picture_delays(&times), out).map_err(io::Error::other)
 }
 
-/// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
+/// At most `FILM.most_pictures` of the shapes, including the first and the last.
 fn sampled_shapes(film: &[ShapeSnapshot]) -> Vec<&ShapeSnapshot> {
-    let count = film.len().min(MOST_FILM_PICTURES);
+    let count = film.len().min(FILM.most_pictures);
     let last = film.len().saturating_sub(1);
     let place = |k: usize| k * last / (count - 1).max(1);
     (0..count).map(|k| &film[place(k)]).collect()
@@ -244,12 +250,12 @@ fn picture_delays(times: &[f64]) -> Vec<u16> {
         return Vec::new();
     };
     let count = times.len() as f64;
-    let moving = FILM_DURATION * (count - 1.0) / count;
+    let moving = FILM.duration * (count - 1.0) / count;
     let mut elapsed = 0;
     let ends = times[1..]
         .iter()
         .map(|time| moving * (time - from) / (to - from));
-    (ends.chain([FILM_DURATION]))
+    (ends.chain([FILM.duration]))
         .map(|end| {
             let end = if end.is_finite() {
                 end.round() as usize
@@ -258,7 +264,7 @@ fn picture_delays(times: &[f64]) -> Vec<u16> {
             };
             let delay = end
                 .saturating_sub(elapsed)
-                .clamp(SHORTEST_DELAY, LONGEST_DELAY);
+                .clamp(FILM.shortest_delay, FILM.longest_delay);
             elapsed += delay;
             delay as u16
         })
@@ -269,15 +275,16 @@ fn draw_picture(
     veins: &DrawnVeins,
     bounds: [DVec3; 2],
     setting: &FigureSetting,
-    (text, time): (&str, f64),
+    text: &str,
+    time: f64,
 ) -> Drawing {
-    let mut page = Drawing::new(FILM_PAGE_SIZE.x, text);
-    page.height = FILM_PAGE_SIZE.y;
+    let mut page = Drawing::new(FILM.page.x, text);
+    page.height = FILM.page.y;
     let cell = PageRectangle::new(
-        DVec2::new(0.0, TITLE_HEIGHT),
-        FILM_PAGE_SIZE - DVec2::new(0.0, TITLE_HEIGHT),
+        DVec2::new(0.0, FILM.title_height),
+        FILM.page - DVec2::new(0.0, FILM.title_height),
     );
-    let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
+    let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, FILM.margins, None);
     scene.draw_box(&mut page);
     scene.draw_axes(&mut page, 36.0);
     scene.draw_direction_arrows(&mut page, true, time);
@@ -287,14 +294,14 @@ fn draw_picture(
         SMALL_LINE_WIDTH_FACTOR * veins.line_width(),
     );
     let corner = DVec2::new(10.0, 17.0);
-    page.draw_label(corner, text, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+    page.draw_label(corner, text, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
     page
 }
 
-/// Vein colours in several tints, greys, and the colours of markers.
+/// Vein colors in several tints, greys, and the colors of markers.
 struct ColorPalette {
     colors: Vec<Color>,
-    /// Indices found so far.
+    /// Nearest colors found so far.
     indices_by_color: HashMap<[u8; 3], u8>,
 }
 
@@ -319,7 +326,7 @@ impl ColorPalette {
         }
     }
 
-    /// The index of the nearest colour for every pixel.
+    /// The index of the nearest color for every pixel.
     fn nearest_color_indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
         let rgb = pixels.data().chunks_exact(4);
         rgb.map(|rgba| {
@@ -344,9 +351,7 @@ fn encode_gif(
     delays: &[u16],
     out: &mut dyn Write,
 ) -> Result<(), gif::EncodingError> {
-    let [width, height] = (2.0 * FILM_PAGE_SIZE)
-        .to_array()
-        .map(|pixels| pixels as u16);
+    let [width, height] = (2.0 * FILM.page).to_array().map(|pixels| pixels as u16);
     let colors = ColorPalette::new().colors.into_iter();
     let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
     table.resize(3 * 256, 0);
@@ -354,7 +359,7 @@ fn encode_gif(
     encoder.set_repeat(gif::Repeat::Infinite)?;
     let mut before: Option<&Vec<u8>> = None;
     for (picture, &delay) in pictures.iter().zip(delays) {
-        let (rows, pixels) = changed_rows(before, picture, usize::from(width));
+        let ChangedRows { rows, pixels } = changed_rows(before, picture, usize::from(width));
         encoder.write_frame(&gif::Frame {
             delay,
             top: rows.start as u16,
@@ -370,15 +375,18 @@ fn encode_gif(
     Ok(())
 }
 
-/// The rows in which a picture differs from the one before, at least one, and their
-/// pixels.
-fn changed_rows(
-    before: Option<&Vec<u8>>,
-    picture: &[u8],
-    width: usize,
-) -> (std::ops::Range<usize>, Vec<u8>) {
+/// Rows of a picture that differ from the one before, at least one, and the indices of their pixels.
+struct ChangedRows {
+    rows: Range<usize>,
+    pixels: Vec<u8>,
+}
+
+fn changed_rows(before: Option<&Vec<u8>>, picture: &[u8], width: usize) -> ChangedRows {
     let Some(before) = before else {
-        return (0..picture.len() / width, picture.to_vec());
+        return ChangedRows {
+            rows: 0..picture.len() / width,
+            pixels: picture.to_vec(),
+        };
     };
     let pixels = before.iter().zip(picture);
     let pixels = pixels.map(|(a, b)| if a == b { UNCHANGED_PIXEL_INDEX } else { *b });
@@ -388,13 +396,16 @@ fn changed_rows(
     let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
     let rows = first..last + 1;
     let changed = &pixels[rows.start * width..rows.end * width];
-    (rows, changed.to_vec())
+    ChangedRows {
+        pixels: changed.to_vec(),
+        rows,
+    }
 }
 
-/// Below the notes.
+/// From the notes to the key below them, in pixels.
 const LEGEND_BASE_LINE: f64 = 20.0;
 
-/// Colour of the earlier path of the tip.
+/// Color of the earlier path of the tip.
 const EARLIER_PATH_COLOR: Color = Color(240, 190, 176);
 
 /// Most points of the tip's path that are drawn between two panels.
@@ -409,9 +420,9 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
         .collect();
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
     let top = if has_path {
-        HEADER + LEGEND_BASE_LINE
+        PAGE.header + LEGEND_BASE_LINE
     } else {
-        HEADER
+        PAGE.header
     };
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shapes.len(), &setting, top);
     let mut notes = header_notes(record);
@@ -419,14 +430,17 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
     notes.extend(first.map_or(Vec::new(), |veins| veins.leaf_notes(&setting)));
     let width = panels.grid_width();
     notes.push(format!("a square of the grid is {width} wide"));
-    let mut drawing = new_page(SIDE_MARGIN, &name, &notes, first);
+    let mut drawing = new_page(PAGE.side_margin, &name, &notes, first);
     drawing.height = panels.bottom();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     let strokes = [SECOND_SOLUTION_COLOR, EARLIER_PATH_COLOR].map(|color| Stroke::new(color, 1.0));
     if has_path {
         drawing.draw_group("key", |page| {
-            let mut key =
-                LegendRows::starting_at(SIDE_MARGIN, NOTES_BASE_LINE + LEGEND_BASE_LINE, 22.0);
+            let mut key = LegendRows::starting_at(
+                PAGE.side_margin,
+                PAGE.notes_base_line + LEGEND_BASE_LINE,
+                22.0,
+            );
             for (name, stroke) in ["the tip's way since the picture before", "and before that"]
                 .into_iter()
                 .zip(strokes)
@@ -446,8 +460,12 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
                 "t = {}",
                 number_in_unit(format_four_digits(time), &scenario.units, TIME)
             );
-            let caption = (letter.as_str(), when.as_str(), NOTE_COLOR);
-            let scene = panels.draw_empty_panel(page, (index, time), OBLIQUE_VIEW, caption);
+            let caption = PanelCaption {
+                letter: &letter,
+                text: &when,
+                color: NOTE_COLOR,
+            };
+            let scene = panels.draw_empty_panel(page, index, time, OBLIQUE_VIEW, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path
                     .iter()
@@ -507,8 +525,8 @@ mod film_tests {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
         let mut decoder = options.read_info(bytes).unwrap();
-        let width = 2 * FILM_PAGE_SIZE.x as usize;
-        let mut canvas = vec![0; 4 * width * 2 * FILM_PAGE_SIZE.y as usize];
+        let width = 2 * FILM.page.x as usize;
+        let mut canvas = vec![0; 4 * width * 2 * FILM.page.y as usize];
         let (mut delays, mut pictures) = (Vec::new(), Vec::new());
         while let Some(frame) = decoder.read_next_frame().unwrap() {
             assert_eq!((frame.left, usize::from(frame.width)), (0, width));
@@ -549,7 +567,7 @@ mod film_tests {
         assert_eq!(repeat, gif::Repeat::Infinite);
         assert_eq!(pictures.len(), 101);
         assert_eq!(total(&delays), 1000);
-        // Every picture shows its instant, in colours that are close enough.
+        // Every picture shows its instant, in colors that are close enough.
         let stills = record.film.iter();
         let shapes: Vec<DrawnVeins> = stills
             .map(|it| DrawnVeins::from_motion(&record, it, &scenario))
@@ -558,7 +576,7 @@ mod film_tests {
         for k in [0, 50, 100] {
             let time = record.moments[k].time;
             let text = format!("{}, t = {}", record.scenario, format_four_digits(time));
-            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, (&text, time)));
+            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, &text, time));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =
@@ -567,7 +585,7 @@ mod film_tests {
             let worst = off.iter().filter(|&&off| off > 48).count();
             assert!(worst < off.len() / 2000, "picture {k}: {worst} are off");
         }
-        // Five veins, five colours.
+        // Five veins, five colors.
         let pixels = pictures[0].chunks_exact(4);
         let seen: HashSet<[u8; 3]> = pixels.map(|c| [c[0], c[1], c[2]]).collect();
         for vein in 0..5 {

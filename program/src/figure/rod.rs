@@ -1,69 +1,83 @@
 //! A single rod at rest in one large view: of the plane in which it lies, or in space; with its loads,
 //! its supports and its unloaded shape.
 
-use crate::figure::drawing::labels::{
-    LegendRows, NOTES_BASE_LINE, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT,
-    PANEL_TITLE_HEIGHT, PageRectangle, WIDTH, draw_panel_title, new_page,
-};
+use crate::figure::drawing::labels::{LegendRows, SUPPORT_NAMES, new_page};
 use crate::figure::drawing::markers::{
-    ForceArrow, draw_support_marker, draw_tip_marker, draw_vein_markers, force_arrows,
+    ForceArrow, RodPoint, draw_support_marker, draw_tip_marker, force_arrows,
 };
-use crate::figure::drawing::space::{BoxMargins, OBLIQUE_VIEW, SpacePanel, padded_box};
+use crate::figure::drawing::space::{
+    BoxMargins, OBLIQUE_VIEW, PlaneView, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT,
+    VIEW_FROM_SIDE, draw_plane_panel, padded_box,
+};
+use crate::figure::drawing::veins::{DrawnVeins, draw_vein_markers};
 use crate::figure::drawing::{
-    Drawing, DrawingPath, FRAME_COLOR, PathStep, Stroke, TEXT_COLOR, curve_between_fractions,
-    is_drawable, polyline_path,
+    Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
+    curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::leaf::{DrawnVeins, draw_plane_panel};
 use crate::figure::scenario::FigureSetting;
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Scenario, SupportKind};
 
-/// Heights of the view.
-const LOWEST: f64 = 240.0;
+/// Sizes of the view of a rod.
+struct RodLayout {
+    /// Least and largest height, in pixels.
+    lowest: f64,
+    highest: f64,
+    /// Margins around the box in space.
+    margins: BoxMargins,
+    /// Width of the rod, in pixels.
+    line: f64,
+    /// Padding around the rod and its arrows, as a fraction of the largest extent.
+    padding: f64,
+}
 
-const HIGHEST: f64 = 560.0;
+const LAYOUT: RodLayout = RodLayout {
+    lowest: 240.0,
+    highest: 560.0,
+    margins: BoxMargins {
+        left: 90.0,
+        right: 60.0,
+        below: 44.0,
+    },
+    line: 2.4,
+    padding: 0.07,
+};
 
-const BOTTOM: f64 = 4.0;
+/// Which shapes of a rod look different, in its extents.
+struct RodVisibility {
+    /// A rod that leaves a plane of two axes by less is drawn in that plane.
+    flat: f64,
+    /// An unloaded shape nearer to the rod is not drawn.
+    unloaded: f64,
+    /// An unloaded shape larger than this, of a coiled rod, is cut off.
+    farthest: f64,
+}
 
-/// Padding around the rod and its arrows, as a fraction of the largest extent.
-const PADDING: f64 = 0.07;
+const VISIBILITY: RodVisibility = RodVisibility {
+    flat: 0.02,
+    unloaded: 0.004,
+    farthest: 4.0,
+};
 
-/// A rod within this fraction of its extent of a plane is drawn in that.
-const FLAT: f64 = 0.02;
-
-/// Unloaded shapes nearer than this to the rod are not drawn, in its extents.
-const VISIBLE: f64 = 0.004;
-
-/// An unloaded shape that is so many times as large as a coiled rod is cut off.
-const FARTHEST: f64 = 4.0;
-
-/// Points of the unloaded shape.
+/// Segments of which the unloaded shape is drawn.
 const UNLOADED_SHAPE_POINTS: usize = 96;
-
-const LINE: f64 = 2.4;
 
 const UNLOADED_SHAPE_STROKE: Stroke = Stroke::new(FRAME_COLOR, 1.4);
 
-/// Half the length of a wall, the depth of its hatching, and the strokes of that.
-const HALF_WALL_LENGTH: f64 = 15.0;
+/// The wall that clamps an end of a rod, in pixels.
+struct ClampWall {
+    half_length: f64,
+    hatching_depth: f64,
+    /// Strokes to each side of the middle.
+    hatching_strokes: i32,
+}
 
-const HATCHING_DEPTH: f64 = 8.0;
-
-const HATCHING_STROKES: i32 = 3;
-
-/// Names of planes, and their two axes.
-const VIEW_PLANES: [(&str, [usize; 2]); 3] = [
-    ("from above", [0, 1]),
-    ("from the side", [0, 2]),
-    ("from the front", [1, 2]),
-];
-
-const MARGINS: BoxMargins = BoxMargins {
-    left: 90.0,
-    right: 60.0,
-    below: 44.0,
+const WALL: ClampWall = ClampWall {
+    half_length: 15.0,
+    hatching_depth: 8.0,
+    hatching_strokes: 3,
 };
 
 /// What is drawn of a rod, in units of its length.
@@ -85,21 +99,21 @@ pub fn draw(
     notes: &[String],
 ) -> Drawing {
     let rod = DrawnRod::from_equilibrium(leaf, scenario, veins);
-    let mut page = new_page(PAGE_LEFT_MARGIN, &leaf.scenario, notes, None);
+    let mut page = new_page(PAGE.left_margin, &leaf.scenario, notes, None);
     let mut top = 0.0;
     page.draw_group("key", |page| top = rod.draw_legend(page));
     let (low, high) = rod.bounding_corners();
     let extent = high - low;
-    let corner = DVec2::new(PAGE_LEFT_MARGIN, top + PANEL_TITLE_HEIGHT);
-    let width = WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN;
+    let corner = DVec2::new(PAGE.left_margin, top + PAGE.panel_title);
+    let width = PAGE.width - PAGE.left_margin - PAGE.right_margin;
     let height = match rod.viewing_plane() {
-        Some((what, axes)) => {
+        Some(PlaneView { title, axes }) => {
             let [across, up] = axes.map(|axis| extent[axis]);
-            let height = (width * up / across).clamp(LOWEST, HIGHEST);
+            let height = (width * up / across).clamp(LAYOUT.lowest, LAYOUT.highest);
             let cell = PageRectangle::new(corner, DVec2::new(width, height));
             let scale = (width / across).min(height / up);
             page.draw_group("rod", |page| {
-                draw_panel_title(page, corner, "", what);
+                draw_panel_title(page, corner, "", title);
                 let camera = draw_plane_panel(page, 0.5 * (low + high), setting, cell, scale, axes);
                 rod.draw(page, cell, |point| camera.project_point(point));
                 let taken = rod
@@ -107,24 +121,24 @@ pub fn draw(
                     .map(|point| camera.project_point(point));
                 camera.draw_arrows(page, &setting.direction_arrows(true, 0.0), cell, taken);
             });
-            height + PANEL_AXIS_HEIGHT
+            height + PAGE.panel_axis
         }
         None => {
-            let cell = PageRectangle::new(corner, DVec2::new(width, HIGHEST));
+            let cell = PageRectangle::new(corner, DVec2::new(width, LAYOUT.highest));
             let bounds = padded_box(low, high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, MARGINS, None);
+            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, LAYOUT.margins, None);
             page.draw_group("rod", |page| {
                 draw_panel_title(page, corner, "", "in space, with its shadow on the floor");
                 scene.draw_box(page);
                 scene.draw_axes(page, 38.0);
                 scene.draw_direction_arrows(page, true, 0.0);
-                scene.draw_shadows(page, veins, LINE);
+                scene.draw_shadows(page, veins, LAYOUT.line);
                 rod.draw(page, cell, |point| scene.project_point(point));
             });
-            HIGHEST
+            LAYOUT.highest
         }
     };
-    page.height = (corner.y + height + BOTTOM).ceil();
+    page.height = (corner.y + height + PAGE.bottom_margin).ceil();
     page
 }
 
@@ -134,7 +148,7 @@ impl<'a> DrawnRod<'a> {
         let at = |k: usize| {
             natural
                 .vein_pose(0, k as f64 / UNLOADED_SHAPE_POINTS as f64)
-                .0
+                .position
                 / veins.unit
         };
         let mut unloaded: Vec<DVec3> = (0..=UNLOADED_SHAPE_POINTS)
@@ -153,7 +167,9 @@ impl<'a> DrawnRod<'a> {
             .zip(&unloaded)
             .any(|(k, natural)| {
                 let there = point(k as f64 / UNLOADED_SHAPE_POINTS as f64);
-                there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.largest_extent())
+                there.is_some_and(|it| {
+                    it.distance(*natural) > VISIBILITY.unloaded * veins.largest_extent()
+                })
             });
         let extent = |(low, high): (DVec3, DVec3)| (high - low).max_element();
         let own = extent((veins.low, veins.high));
@@ -162,7 +178,7 @@ impl<'a> DrawnRod<'a> {
             .fold((DVec3::ZERO, DVec3::ZERO), |(low, high), &it| {
                 (low.min(it), high.max(it))
             });
-        let cut_off = extent(whole) > FARTHEST * own && own > 0.0;
+        let cut_off = extent(whole) > VISIBILITY.farthest * own && own > 0.0;
         if cut_off {
             let near = |it: &&DVec3| it.length() < 1.5 * own;
             let count = unloaded.iter().take_while(near).count();
@@ -170,7 +186,10 @@ impl<'a> DrawnRod<'a> {
         }
         let forces = force_arrows(scenario, veins.largest_extent(), |sigma| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
-            Some((point(sigma)?, (there? - before?).normalize_or_zero()))
+            Some(RodPoint {
+                position: point(sigma)?,
+                tangent: (there? - before?).normalize_or_zero(),
+            })
         });
         DrawnRod {
             veins,
@@ -196,36 +215,37 @@ impl<'a> DrawnRod<'a> {
             });
         let extent = (high - low).max_element();
         let extent = if extent > 1e-9 { extent } else { 1.0 };
-        let padding = DVec3::splat(PADDING * extent);
+        let padding = DVec3::splat(LAYOUT.padding * extent);
         (low - padding, high + padding)
     }
 
     /// The plane of two axes in which it is seen, unless it leaves every such plane.
-    fn viewing_plane(&self) -> Option<(&'static str, [usize; 2])> {
+    fn viewing_plane(&self) -> Option<PlaneView> {
         let (low, high) = self.bounding_corners();
-        let extent = high - low - DVec3::splat(2.0 * PADDING * (high - low).max_element());
-        let seen = |(_, [a, b]): &(&str, [usize; 2])| extent[*a].min(extent[*b]);
-        let best = VIEW_PLANES.into_iter().reduce(|one, other| {
+        let extent = high - low - DVec3::splat(2.0 * LAYOUT.padding * (high - low).max_element());
+        let seen = |view: &PlaneView| extent[view.axes[0]].min(extent[view.axes[1]]);
+        let views = [VIEW_FROM_ABOVE, VIEW_FROM_SIDE, VIEW_FROM_FRONT].into_iter();
+        let best = views.reduce(|one, other| {
             if seen(&other) > seen(&one) {
                 other
             } else {
                 one
             }
         })?;
-        let across = 3 - best.1[0] - best.1[1];
-        (extent[across] <= FLAT * extent.max_element()).then_some(best)
+        let across = 3 - best.axes[0] - best.axes[1];
+        (extent[across] <= VISIBILITY.flat * extent.max_element()).then_some(best)
     }
 
     /// Draws the key; returns where it ends.
     fn draw_legend(&self, page: &mut Drawing) -> f64 {
-        let mut key = LegendRows::starting_at(PAGE_LEFT_MARGIN, NOTES_BASE_LINE + 22.0, 26.0);
+        let mut key = LegendRows::starting_at(PAGE.left_margin, PAGE.notes_base_line + 22.0, 26.0);
         let own = self
             .veins
             .veins
             .first()
             .map_or(TEXT_COLOR, |vein| vein.color);
         key.add_entry(page, "at rest", |page, cell| {
-            cell.draw_midline(page, Stroke::new(own, LINE))
+            cell.draw_midline(page, Stroke::new(own, LAYOUT.line))
         });
         if !self.unloaded_shape.is_empty() {
             let name = match self.is_cut_off {
@@ -237,13 +257,8 @@ impl<'a> DrawnRod<'a> {
             });
         }
         let veins = self.veins;
-        for (how, name) in [
-            (SupportKind::Clamped, "clamp"),
-            (SupportKind::Pinned, "pinned"),
-        ] {
-            let mut grips = veins.grips.iter();
-            let gripped = grips.any(|grip| grip.support == how);
-            let ends = veins.base_support == how || veins.tip_support == Some(how);
+        for (how, name) in SUPPORT_NAMES {
+            let (ends, gripped) = (veins.has_held_ends(how), veins.has_grips(how));
             match how {
                 SupportKind::Clamped if ends => key.add_entry(page, name, |page, cell| {
                     let [left, right] = cell.midline();
@@ -276,7 +291,10 @@ impl<'a> DrawnRod<'a> {
             );
         }
         for vein in &self.veins.veins {
-            page.draw_stroke(vein.projected_path(&place), Stroke::new(vein.color, LINE));
+            page.draw_stroke(
+                vein.projected_path(&place),
+                Stroke::new(vein.color, LAYOUT.line),
+            );
         }
         for force in &self.forces {
             force.draw(page, cell, &place);
@@ -310,12 +328,12 @@ fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: SupportKind)
 
 /// Draws a wall across the end of a rod, hatched behind.
 fn draw_wall(page: &mut Drawing, at: DVec2, inward: DVec2, size: f64) {
-    let along = size * HALF_WALL_LENGTH * inward.perp();
+    let along = size * WALL.half_length * inward.perp();
     page.draw_line(at - along, at + along, Stroke::new(TEXT_COLOR, 2.0));
     let mut path: DrawingPath = Vec::new();
-    for k in -HATCHING_STROKES..=HATCHING_STROKES {
-        let from = at + f64::from(k) / f64::from(HATCHING_STROKES) * along;
-        let behind = size * HATCHING_DEPTH * (0.6 * inward.perp() - inward);
+    for k in -WALL.hatching_strokes..=WALL.hatching_strokes {
+        let from = at + f64::from(k) / f64::from(WALL.hatching_strokes) * along;
+        let behind = size * WALL.hatching_depth * (0.6 * inward.perp() - inward);
         path.extend([PathStep::Move(from), PathStep::Line(from + behind)]);
     }
     page.draw_stroke(path, Stroke::new(TEXT_COLOR, 1.0));

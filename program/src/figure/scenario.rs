@@ -1,9 +1,8 @@
-//! What loads and holds a leaf, by veins and fractions of their lengths: figures place these marks on
-//! the shapes that they draw, and pages have them as data.
+//! What figures and pages show of a scenario: arrows of loads, marks of supports, the directions of gravity
+//! and wind, units and names of axes, and its numbers in words.
 //!
-//! Settings of figures from the scenario: units of length, gravity and wind.
-//!
-//! The numbers of a scenario in words, with their units: for pictures.
+//! Loads and supports are told by veins and fractions of their lengths: figures place them on the shapes that
+//! they draw, and pages have them as data.
 
 use crate::report::numbers::format_four_digits;
 use ListEntryOwner::*;
@@ -11,16 +10,24 @@ use glam::DVec3;
 use leafdyn::scenario::{Key, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
 
-/// Length of the arrow of the largest force or moment, as a part of the leaf's largest extent, and the
-/// shortest arrow, as a part of that.
-const LONGEST: f64 = 0.16;
+/// Arrows of loads.
+struct LoadArrows {
+    /// Length of the arrow of the largest force or moment, as a part of the leaf's largest extent.
+    longest: f64,
+    /// Length of the shortest arrow, as a part of the longest.
+    shortest: f64,
+    /// Length of the arrow of the largest force along a vein, as a part of the leaf's largest extent, and
+    /// how many such arrows there are.
+    distributed: f64,
+    distributed_count: usize,
+}
 
-const SHORTEST: f64 = 0.35;
-
-/// Length of the arrow of the largest force along a vein, likewise, and how many there are.
-const DISTRIBUTED_ARROW_LENGTH: f64 = 0.07;
-
-const COUNT: usize = 9;
+const LOAD_ARROWS: LoadArrows = LoadArrows {
+    longest: 0.16,
+    shortest: 0.35,
+    distributed: 0.07,
+    distributed_count: 9,
+};
 
 /// What acts at a point of a vein.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -40,9 +47,9 @@ pub struct LoadMark {
     pub action: LoadKind,
     /// The number of the vein, from 1.
     pub vein: usize,
-    /// Fraction of its length.
+    /// Fraction of the length of the vein.
     pub at: f64,
-    /// Of length one; of a moment: its axis.
+    /// Unit vector of a force, or about which a moment turns.
     pub direction: DVec3,
     /// In the scenario's units.
     pub size: f64,
@@ -65,7 +72,7 @@ pub struct SupportMark {
     pub part: ParsedKey,
     /// The number of the vein, from 1.
     pub vein: usize,
-    /// Fractions of its length.
+    /// Fractions of the length of the vein, from and to.
     pub at: [f64; 2],
     #[serde(serialize_with = "serialize_support")]
     pub held: SupportKind,
@@ -103,15 +110,26 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let along = scenario.distributed.iter().flatten().zip(1..);
     let along: Vec<_> = along
         .flat_map(|(force, vein)| {
-            let at = (0..COUNT).map(|k| k as f64 / (COUNT - 1) as f64);
+            let at = (0..LOAD_ARROWS.distributed_count)
+                .map(|k| k as f64 / (LOAD_ARROWS.distributed_count - 1) as f64);
             let of = |s: f64| DVec3::from_array(force.each_ref().map(|profile| profile.at(s)));
             at.map(move |s| (vein, s, of(s)))
         })
         .collect();
     let kinds = [
-        (LoadKind::Distributed, along, DISTRIBUTED_ARROW_LENGTH, 0.0),
-        (LoadKind::Force, single, LONGEST, SHORTEST),
-        (LoadKind::Moment, moments, LONGEST, SHORTEST),
+        (LoadKind::Distributed, along, LOAD_ARROWS.distributed, 0.0),
+        (
+            LoadKind::Force,
+            single,
+            LOAD_ARROWS.longest,
+            LOAD_ARROWS.shortest,
+        ),
+        (
+            LoadKind::Moment,
+            moments,
+            LOAD_ARROWS.longest,
+            LOAD_ARROWS.shortest,
+        ),
     ];
     let marks = kinds
         .into_iter()
@@ -182,14 +200,14 @@ pub struct FigureSetting {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct DirectionArrow {
     pub name: &'static str,
-    /// Of length one.
+    /// Unit vector.
     pub direction: DVec3,
 }
 
 /// Names of the axes as fractions of L, with what they mean.
 const FRACTION_AXIS_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
 
-const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
+pub const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl FigureSetting {
     pub fn from_scenario(scenario: &Scenario) -> Self {
@@ -293,18 +311,18 @@ pub fn name_with_unit(name: &str, unit: Option<&str>) -> String {
 /// What the entries of a list belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ListEntryOwner {
-    /// Nothing that has a name.
+    /// Nothing that has a name of its own.
     Plain,
     /// The three axes, along or about which the quantity is; before them, the veins.
     Along,
     About,
     Veins,
-    /// Gaps between neighbouring veins.
+    /// The gaps between neighboring veins.
     Gaps,
 }
 
 /// Keys with their words and what the entries of their lists belong to.
-const WORDS: &[(&str, &str, ListEntryOwner)] = &[
+const KEY_WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("leaf.rods", "number of veins", Plain),
     ("leaf.length", "length", Veins),
     ("leaf.fan", "angle at the base", Veins),
@@ -376,7 +394,7 @@ const WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("method.segments", "segments a vein", Plain),
 ];
 
-/// Of more keys than this only the first and the last are named.
+/// Where more keys vary together, only the first and the last are named.
 const MOST_KEYS_NAMED: usize = 3;
 
 /// A number of a scenario.
@@ -407,10 +425,17 @@ impl QuantityLabel {
         QuantityLabel { words, unit }
     }
 
-    /// The same as the name of an axis.
+    /// The words with the unit, as the name of an axis.
     pub fn axis_name(&self) -> String {
         name_with_unit(&self.words, self.unit.as_deref())
     }
+}
+
+/// How the number of a key is called.
+#[derive(Clone, Copy)]
+struct KeyWords {
+    words: &'static str,
+    entries: ListEntryOwner,
 }
 
 /// A key as it is written: `scale:load.point[0].force[2]`, `rest.bend_2.value[1]`.
@@ -421,7 +446,7 @@ struct KeyPart<'t> {
     row: Option<usize>,
     list: Option<&'t str>,
     indices: Vec<usize>,
-    named: Option<(&'static str, ListEntryOwner)>,
+    named: Option<KeyWords>,
 }
 
 impl<'t> KeyPart<'t> {
@@ -444,8 +469,8 @@ impl<'t> KeyPart<'t> {
             names.join(".")
         };
         let named = |path: &str| {
-            let found = WORDS.iter().find(|row| row.0 == path);
-            found.map(|row| (row.1, row.2))
+            let found = KEY_WORDS.iter().find(|row| row.0 == path);
+            found.map(|&(_, words, entries)| KeyWords { words, entries })
         };
         let last = pieces.len().saturating_sub(1);
         let list = match named(&joined(&pieces)) {
@@ -470,7 +495,7 @@ impl<'t> KeyPart<'t> {
     }
 
     fn words(&self) -> String {
-        let Some((words, entries)) = self.named else {
+        let Some(KeyWords { words, entries }) = self.named else {
             return self.text.into();
         };
         let mut words = words.to_string();
@@ -481,7 +506,7 @@ impl<'t> KeyPart<'t> {
         };
         if let (Along | About, Some((&axis, veins))) = (entries, indices.split_last()) {
             let by = if entries == Along { "along" } else { "about" };
-            words += &format!(" {by} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?"));
+            words += &format!(" {by} {}", COORDINATE_NAMES.get(axis).unwrap_or(&"?"));
             indices = veins;
         }
         match (entries, indices) {
@@ -509,10 +534,10 @@ impl<'t> KeyPart<'t> {
     }
 }
 
-/// One number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
+/// Words for one number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
 fn words_for_several_veins(parts: &[KeyPart]) -> Option<String> {
     let first = parts.first().filter(|_| parts.len() > 1)?;
-    let (words, entries) = first.named?;
+    let KeyWords { words, entries } = first.named?;
     let alike = |part: &KeyPart| {
         let plain = part.list.is_none() && part.indices.len() == 1;
         plain && part.path == first.path && part.scale == first.scale
@@ -551,7 +576,7 @@ mod tests {
 
     #[test]
     fn every_key_with_words_is_one_of_the_format() {
-        for (path, ..) in WORDS {
+        for (path, ..) in KEY_WORDS {
             let known = Key::from_path(path).is_some() || path.starts_with("method.");
             assert!(known, "{path}");
         }

@@ -1,53 +1,54 @@
 //! What a change of each number does to the tip of a leaf or, if that is held, to the force on its
 //! holder: signed bars along each axis.
 
-use crate::figure::drawing::axes::{Axis, PanelAxes, TickPlacement};
+use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    HEADER, PAGE_LEFT_MARGIN, PAGE_RIGHT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, TICK_FONT_SIZE, WIDTH, new_page,
-};
+use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::{
-    BLUE, Drawing, FRAME_COLOR, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, VERMILION,
-    rectangle_path,
+    BLUE, Drawing, FONT_SIZE, FRAME_COLOR, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, VERMILION, rectangle_path,
 };
-use crate::figure::scenario::{QuantityLabel, name_with_unit};
+use crate::figure::scenario::{COORDINATE_NAMES, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, round_to_error};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Sensitivity};
 use leafdyn::scenario::{Scenario, Units};
 
-/// Room left of the panels, for the numbers in words, and between the panels.
-const WORDS: f64 = 216.0;
+/// Sizes of the rows of bars, in pixels.
+struct BarLayout {
+    /// Left of the panels, for the numbers in words, and between the panels.
+    words: f64,
+    gap: f64,
+    /// Height of a row, and of a bar in it.
+    row: f64,
+    bar: f64,
+    /// From a bar to its value.
+    value_gap: f64,
+    /// Room for the values beside the longest bars, as a fraction of the panel.
+    value_room: f64,
+    /// Least distance between ticks.
+    ticks: f64,
+    most_rows: usize,
+}
 
-const GAP: f64 = 16.0;
-
-const ROW: f64 = 34.0;
-
-const BAR: f64 = 12.0;
-
-/// From a bar to its value.
-const BAR_VALUE_GAP: f64 = 4.0;
-
-/// Room for the values beside the longest bars, as a fraction of the panel.
-const VALUE_ROOM_FRACTION: f64 = 0.42;
-
-/// Least pixels between ticks.
-const TICKS: f64 = 40.0;
+const LAYOUT: BarLayout = BarLayout {
+    words: 216.0,
+    gap: 16.0,
+    row: 34.0,
+    bar: 12.0,
+    value_gap: 4.0,
+    value_room: 0.42,
+    ticks: 40.0,
+    most_rows: 40,
+};
 
 /// Values are shown to this part of them.
 const SHOWN_VALUE_PRECISION: f64 = 5e-3;
 
-const BOTTOM: f64 = 4.0;
-
-const MOST_ROWS: usize = 40;
-
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
 const RELATIVE_CHANGE: f64 = 0.01;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// What changes with a number.
+/// What a change of one number of the scenario does.
 struct SensitivityRow {
     words: String,
     change_text: String,
@@ -106,7 +107,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         .map(|it| SensitivityRow::from_sensitivity(it, units))
         .collect();
     rows.sort_by(|a, b| b.change_length().total_cmp(&a.change_length()));
-    rows.truncate(MOST_ROWS);
+    rows.truncate(LAYOUT.most_rows);
     let reaction = found.iter().any(|found| found.reaction.is_some());
     let (what, unit) = match reaction {
         true => ("force on the holder", units.force.as_deref()),
@@ -125,22 +126,26 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
             format_error_bound(error)
         ));
     }
-    let mut page = new_page(PAGE_LEFT_MARGIN, &name, &notes, None);
-    let height = ROW * rows.len().max(1) as f64;
-    page.height = HEADER + PANEL_TITLE_HEIGHT + height + PANEL_AXIS_HEIGHT + BOTTOM;
-    let width = (WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - WORDS - 2.0 * GAP) / 3.0;
-    let corner = DVec2::new(PAGE_LEFT_MARGIN + WORDS, HEADER + PANEL_TITLE_HEIGHT);
+    let mut page = new_page(PAGE.left_margin, &name, &notes, None);
+    let height = LAYOUT.row * rows.len().max(1) as f64;
+    page.height = PAGE.header + PAGE.panel_title + height + PAGE.panel_axis + PAGE.bottom_margin;
+    let width =
+        (PAGE.width - PAGE.left_margin - PAGE.right_margin - LAYOUT.words - 2.0 * LAYOUT.gap) / 3.0;
+    let corner = DVec2::new(
+        PAGE.left_margin + LAYOUT.words,
+        PAGE.header + PAGE.panel_title,
+    );
     page.draw_group("words", |page| {
         for (k, row) in rows.iter().enumerate() {
-            let middle = corner + DVec2::new(-10.0, ROW * (k as f64 + 0.5));
-            let room = WORDS + PAGE_LEFT_MARGIN - 16.0;
+            let middle = corner + DVec2::new(-10.0, LAYOUT.row * (k as f64 + 0.5));
+            let room = LAYOUT.words + PAGE.left_margin - 16.0;
             for (text, up, color) in [
                 (&row.words, -6.5, TEXT_COLOR),
                 (&row.change_text, 7.0, NOTE_COLOR),
             ] {
-                let text = Font::embedded().shorten_text(text, TICK_FONT_SIZE, room);
+                let text = Font::embedded().shorten_text(text, FONT_SIZE.tick, room);
                 let at = middle + DVec2::new(0.0, up);
-                page.draw_centered_label(at, &text, TICK_FONT_SIZE, TextAnchor::End, color);
+                page.draw_centered_label(at, &text, FONT_SIZE.tick, TextAnchor::End, color);
             }
         }
     });
@@ -149,12 +154,12 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         (rows.iter()).flat_map(|row| [0, 1, 2].map(|axis| row.significant_component(axis).abs()));
     let largest = largest.filter(|it| it.is_finite()).fold(0.0, f64::max);
     let end = if largest > 0.0 {
-        (1.0 + 2.0 * VALUE_ROOM_FRACTION) * largest
+        (1.0 + 2.0 * LAYOUT.value_room) * largest
     } else {
         1.0
     };
-    for (axis, of) in AXES.into_iter().enumerate() {
-        let shift = DVec2::new(axis as f64 * (width + GAP), 0.0);
+    for (axis, of) in COORDINATE_NAMES.into_iter().enumerate() {
+        let shift = DVec2::new(axis as f64 * (width + LAYOUT.gap), 0.0);
         let cell = PageRectangle::new(corner + shift, DVec2::new(width, height));
         let name = if axis == 1 {
             name_with_unit(what, unit)
@@ -163,11 +168,11 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         };
         let across = Axis {
             emphasizes_zero: true,
-            tick_spacing: Some(TICKS),
+            tick_spacing: Some(LAYOUT.ticks),
             ..Axis::linear(&name, -end, end)
         };
         page.draw_group("changes", |page| {
-            draw_bars(page, cell, (&format!("along {of}"), across), &rows, axis);
+            draw_bars(page, cell, &format!("along {of}"), across, &rows, axis);
         });
     }
     page
@@ -177,30 +182,26 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
 fn draw_bars(
     page: &mut Drawing,
     cell: PageRectangle,
-    (what, across): (&str, Axis),
+    what: &str,
+    across: Axis,
     rows: &[SensitivityRow],
     axis: usize,
 ) {
-    let up = Axis {
-        ticks: TickPlacement::WholeNumbers(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    let axes = PanelAxes::draw_titled(page, cell, ["", what], across, up);
+    let axes = PanelAxes::draw_titled(page, cell, ["", what], across, Axis::blank());
     // Values are in the unit of the labels of the axis.
     let unit = 10f64.powi(axes.across.label_power_of_ten());
     let Some(zero) = axes.page_position((0.0, 0.0)) else {
         return;
     };
     for (k, row) in rows.iter().enumerate() {
-        let middle = cell.corner.y + ROW * (k as f64 + 0.5);
+        let middle = cell.corner.y + LAYOUT.row * (k as f64 + 0.5);
         let value = row.significant_component(axis);
         let Some(end) = axes.page_position((value, 0.0)).filter(|_| value != 0.0) else {
             continue;
         };
         let color = if value > 0.0 { BLUE } else { VERMILION };
-        let corner = DVec2::new(zero.x.min(end.x), middle - 0.5 * BAR);
-        let size = DVec2::new((end.x - zero.x).abs(), BAR);
+        let corner = DVec2::new(zero.x.min(end.x), middle - 0.5 * LAYOUT.bar);
+        let size = DVec2::new((end.x - zero.x).abs(), LAYOUT.bar);
         page.draw_shape(rectangle_path(corner, size), color, None);
         let side = value.signum();
         let anchor = if value > 0.0 {
@@ -208,12 +209,12 @@ fn draw_bars(
         } else {
             TextAnchor::End
         };
-        let at = DVec2::new(end.x + side * BAR_VALUE_GAP, middle);
+        let at = DVec2::new(end.x + side * LAYOUT.value_gap, middle);
         let shown = round_to_error(value, SHOWN_VALUE_PRECISION * value.abs()) / unit;
         page.draw_centered_label(
             at,
             &format_four_digits(shown),
-            TICK_FONT_SIZE,
+            FONT_SIZE.tick,
             anchor,
             NOTE_COLOR,
         );

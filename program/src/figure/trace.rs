@@ -2,13 +2,13 @@
 //! varies, and the leaf at some of the points.
 
 use crate::figure::drawing::axes::{Axis, PanelAxes};
-use crate::figure::drawing::labels::{
-    HEADER, LabelPlacement, Legend, PAGE_LEFT_MARGIN, PANEL_AXIS_HEIGHT, PANEL_TITLE_HEIGHT,
-    PageRectangle, SmallPanels, new_page, panel_letters,
-};
+use crate::figure::drawing::labels::{LabelPlacement, Legend, LegendText, new_page};
 use crate::figure::drawing::markers::Marker;
-use crate::figure::drawing::{CURVE_COLORS, Drawing, Stroke, TEXT_COLOR};
-use crate::figure::leaf::{DrawnVeins, longest_curve};
+use crate::figure::drawing::space::SmallPanels;
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve};
+use crate::figure::drawing::{
+    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, panel_letters,
+};
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
 use crate::report::{
@@ -18,29 +18,36 @@ use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{ForceDisplacementLine, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
-const DIAGRAM: f64 = 380.0;
+/// Heights of the panels of a trace, in pixels.
+struct TraceLayout {
+    /// The first panel, and further ones.
+    diagram: f64,
+    further: f64,
+    /// The panel of force against displacement, and the gap above it.
+    force_line: f64,
+    between: f64,
+    /// Width right of the panels, for the key.
+    key: f64,
+    most_leaves: usize,
+}
 
-/// Height of the further panels.
-const FURTHER_PANEL_HEIGHT: f64 = 220.0;
+const LAYOUT: TraceLayout = TraceLayout {
+    diagram: 380.0,
+    further: 220.0,
+    force_line: 240.0,
+    between: 26.0,
+    key: 190.0,
+    most_leaves: 8,
+};
 
-/// Right of the panel, for the key.
-const KEY: f64 = 190.0;
-
-const FORCE_LINE_HEIGHT: f64 = 240.0;
-
-const BETWEEN: f64 = 26.0;
-
-/// Most leaves drawn.
-const MOST_LEAVES: usize = 8;
-
-/// Smaller differences are invisible in small panels, in lengths.
-const VISIBLE: f64 = 0.04;
+/// Leaves whose points differ by less, in lengths, look the same in small panels.
+const VISIBLE_DIFFERENCE: f64 = 0.04;
 
 /// Equal parts of each vein at whose ends leaves are compared.
 const COMPARED_PARTS_PER_VEIN: usize = 8;
 
-/// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
-const ROUNDING: f64 = 1e-7;
+/// Variations of the twist, in radians, and of tips, in lengths, that are rounding.
+const ROUNDING_VARIATION: f64 = 1e-7;
 
 pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -58,36 +65,36 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
-    let mut drawing = new_page(PAGE_LEFT_MARGIN, &name, &header_notes(trace), None);
+    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(trace), None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
-    let mut below = HEADER;
+    let mut below = PAGE.header;
     for (place, &quantity) in quantities.iter().enumerate() {
         let height = if place == 0 {
-            DIAGRAM
+            LAYOUT.diagram
         } else {
-            FURTHER_PANEL_HEIGHT
+            LAYOUT.further
         };
-        let cell = PageRectangle::left_of_legend(below + PANEL_TITLE_HEIGHT, height, KEY);
+        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, LAYOUT.key);
         drawing.draw_group("branches", |page| {
             let axis = varied_number_axis(trace, &varied);
-            draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
+            draw_branches(page, trace, axis, quantity, &shown, cell, &letter());
             if place == 0 {
                 draw_legend(page, trace, cell);
             }
         });
-        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        below = cell.opposite_corner().y + PAGE.panel_axis;
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = PageRectangle::left_of_legend(
-            below + BETWEEN + PANEL_TITLE_HEIGHT,
-            FORCE_LINE_HEIGHT,
-            KEY,
+            below + LAYOUT.between + PAGE.panel_title,
+            LAYOUT.force_line,
+            LAYOUT.key,
         );
         drawing.draw_group("law", |page| {
             draw_force_displacement_line(page, trace, law, branch, cell, &letter())
         });
-        below = cell.opposite_corner().y + PANEL_AXIS_HEIGHT;
+        below = cell.opposite_corner().y + PAGE.panel_axis;
     }
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     drawing.height = panels.bottom();
@@ -138,8 +145,10 @@ fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| largest_leaf_distance(point(at), point(other)) <= VISIBLE;
-        if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
+        let alike = |&other: &[usize; 2]| {
+            largest_leaf_distance(point(at), point(other)) <= VISIBLE_DIFFERENCE
+        };
+        if shown.len() < LAYOUT.most_leaves && !shown.iter().any(alike) {
             shown.push(at);
         }
     }
@@ -210,7 +219,10 @@ fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
     let units = &trace.units;
     let (name, least) = match quantity {
         TraceShow::Energy => (name_with_unit("energy", units.energy().as_deref()), 0.0),
-        TraceShow::Twist => (name_with_unit("mean twist", Some("rad")), ROUNDING),
+        TraceShow::Twist => (
+            name_with_unit("mean twist", Some("rad")),
+            ROUNDING_VARIATION,
+        ),
         TraceShow::Reaction(axis) => {
             let force = format!("reaction along {}", TraceShow::Tip(axis));
             (name_with_unit(&force, units.force.as_deref()), 0.0)
@@ -222,7 +234,7 @@ fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
         tip => {
             let longest = longest_curve(points().take(1).flat_map(|point| &point.curves));
             let name = name_with_unit(&format!("{tip} of the tip"), units.length.as_deref());
-            (name, ROUNDING * longest)
+            (name, ROUNDING_VARIATION * longest)
         }
     };
     Axis::linear_covering(&name, points().map(|point| point.figure_value(quantity)))
@@ -236,7 +248,8 @@ fn tip_coordinate(point: &TracePoint, axis: usize) -> f64 {
 fn draw_branches(
     page: &mut Drawing,
     trace: &Trace,
-    (across, quantity): (Axis, TraceShow),
+    across: Axis,
+    quantity: TraceShow,
     shown: &[[usize; 2]],
     cell: PageRectangle,
     letter: &str,
@@ -264,11 +277,11 @@ fn draw_branches(
         let line: Vec<(f64, f64)> = points.iter().map(|point| at(point)).collect();
         let drawn = axes.smooth_curve(&line);
         let mut begun = 0;
-        for (count, stable) in stability_pieces(&points, origin.is_some()) {
+        for StretchOfBranch { segments, stable } in stretches_of_branch(&points, origin.is_some()) {
             let width = if stable { 2.0 } else { 1.2 };
             let stroke =
                 Stroke::new(CURVE_COLORS[b % CURVE_COLORS.len()], width).with_dashes(!stable);
-            let piece: Vec<Option<DVec2>> = (drawn[begun..begun + count].iter())
+            let piece: Vec<Option<DVec2>> = (drawn[begun..begun + segments].iter())
                 .flat_map(|run| {
                     if run.is_empty() {
                         vec![None]
@@ -278,7 +291,7 @@ fn draw_branches(
                 })
                 .collect();
             axes.draw_clipped_line(page, &piece, stroke);
-            begun += count;
+            begun += segments;
         }
         labels.avoid_curve(&axes, &line);
     }
@@ -308,7 +321,10 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
             None => "first branch".into(),
             Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
         };
-        (name, branch_end_phrase(&branch.end).into())
+        LegendText {
+            name,
+            note: branch_end_phrase(&branch.end).into(),
+        }
     });
     key.add_curves(page, branches);
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
@@ -325,21 +341,29 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
     }
 }
 
-/// How many segments of a branch between these points are equally stable, one after the other, and
-/// whether they are stable. With an `origin` the first of the points is that where it leaves another
-/// branch.
-fn stability_pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
-    let mut pieces: Vec<(usize, bool)> = Vec::new();
+/// Successive segments of a branch that are all stable, or all unstable.
+struct StretchOfBranch {
+    segments: usize,
+    stable: bool,
+}
+
+/// The stretches of a branch through these points, one after the other. With an `origin` the first of
+/// the points is where the branch leaves another.
+fn stretches_of_branch(points: &[&TracePoint], origin: bool) -> Vec<StretchOfBranch> {
+    let mut stretches: Vec<StretchOfBranch> = Vec::new();
     for (k, pair) in points.windows(2).enumerate() {
         // The index of a critical point is the one after it, but that of the other branch.
         let of = if origin && k == 0 { pair[1] } else { pair[0] };
         let stable = of.index == 0;
-        match pieces.last_mut() {
-            Some((count, same)) if *same == stable => *count += 1,
-            _ => pieces.push((1, stable)),
+        match stretches.last_mut() {
+            Some(last) if last.stable == stable => last.segments += 1,
+            _ => stretches.push(StretchOfBranch {
+                segments: 1,
+                stable,
+            }),
         }
     }
-    pieces
+    stretches
 }
 
 /// Draws force against displacement of the tip, and the fitted line.

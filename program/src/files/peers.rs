@@ -12,7 +12,6 @@ const PEER_TABLE_COLUMNS: [&str; 7] = [
     "program", "scenario", "rods", "knob", "seconds", "error", "outcome",
 ];
 
-/// Most bytes of a table.
 const MOST_TABLE_BYTES: u64 = 16 << 20;
 
 /// Most rows: a chart of more is unreadable.
@@ -21,7 +20,6 @@ const MOST_TABLE_ROWS: usize = 10_000;
 /// Most programs in one chart, each a marker and a line of the key.
 const MOST_PROGRAMS: usize = 100;
 
-/// Most characters of a cell.
 const MOST_CELL_CHARACTERS: usize = 200;
 
 /// Reads a table.
@@ -41,15 +39,27 @@ pub fn read_peer_measurements(file: &Path) -> Result<Vec<PeerMeasurement>, FileE
         return Err(refused(what));
     }
     parse_peer_table(&bytes)
-        .map_err(|(line, problem)| refused(format!("{shown}:{line}: {problem}")))
+        .map_err(|TableError { line, problem }| refused(format!("{shown}:{line}: {problem}")))
 }
 
-/// Parses the rows; an error has the line and the problem.
-fn parse_peer_table(bytes: &[u8]) -> Result<Vec<PeerMeasurement>, (u64, String)> {
+/// What is wrong with a table.
+#[derive(Debug)]
+struct TableError {
+    line: u64,
+    problem: String,
+}
+
+impl TableError {
+    fn at(line: u64) -> impl Fn(String) -> Self {
+        move |problem| TableError { line, problem }
+    }
+}
+
+fn parse_peer_table(bytes: &[u8]) -> Result<Vec<PeerMeasurement>, TableError> {
     let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header = table
         .headers()
-        .map_err(|error| (1, csv_error_message(&error)))?;
+        .map_err(|error| TableError::at(1)(csv_error_message(&error)))?;
     let header = header.clone();
     let mut columns = [0; PEER_TABLE_COLUMNS.len()];
     for (column, name) in columns.iter_mut().zip(PEER_TABLE_COLUMNS) {
@@ -59,7 +69,7 @@ fn parse_peer_table(bytes: &[u8]) -> Result<Vec<PeerMeasurement>, (u64, String)>
             _ => {
                 let wanted = PEER_TABLE_COLUMNS.join(", ");
                 let what = format!("the first line must name the columns {wanted}, each once");
-                return Err((1, what));
+                return Err(TableError::at(1)(what));
             }
         };
     }
@@ -68,33 +78,31 @@ fn parse_peer_table(bytes: &[u8]) -> Result<Vec<PeerMeasurement>, (u64, String)>
     for record in table.records() {
         let record = record.map_err(|error| {
             let line = error.position().map_or(0, csv::Position::line);
-            (line, csv_error_message(&error))
+            TableError::at(line)(csv_error_message(&error))
         })?;
-        let line = record.position().map_or(0, csv::Position::line);
+        let refused = TableError::at(record.position().map_or(0, csv::Position::line));
         if record.len() != header.len() {
             let (found, wanted) = (record.len(), header.len());
             let what = format!("{found} cells, not {wanted} as in the first line");
-            return Err((line, what));
+            return Err(refused(what));
         }
         let cell = columns.map(|column| record[column].trim());
         if rows.len() == MOST_TABLE_ROWS {
-            return Err((
-                line,
-                format!("more than {MOST_TABLE_ROWS} rows: take fewer"),
-            ));
+            let what = format!("more than {MOST_TABLE_ROWS} rows: take fewer");
+            return Err(refused(what));
         }
         for (name, cell) in PEER_TABLE_COLUMNS.into_iter().zip(cell) {
             if cell.chars().count() > MOST_CELL_CHARACTERS {
                 let what = format!("{name}: more than {MOST_CELL_CHARACTERS} characters");
-                return Err((line, what));
+                return Err(refused(what));
             }
         }
-        let row = parse_peer_row(cell).map_err(|problem| (line, problem))?;
+        let row = parse_peer_row(cell).map_err(&refused)?;
         let (_, settings) = row.knob.split_once(' ').unwrap_or_default();
         programs.insert(format!("{} {settings}", row.program));
         if programs.len() > MOST_PROGRAMS {
             let what = "programs, each with its settings: take fewer";
-            return Err((line, format!("more than {MOST_PROGRAMS} {what}")));
+            return Err(refused(format!("more than {MOST_PROGRAMS} {what}")));
         }
         rows.push(row);
     }
@@ -153,7 +161,7 @@ mod tests {
 
     #[track_caller]
     fn refused(text: &[u8], line: u64, part: &str) {
-        let (at, problem) = parse_peer_table(text).unwrap_err();
+        let TableError { line: at, problem } = parse_peer_table(text).unwrap_err();
         assert_eq!(at, line, "{problem}");
         assert!(problem.contains(part), "{part} in {problem}");
     }

@@ -1,17 +1,12 @@
 //! The files of a simulation, which grow while it runs.
 //!
-//! Every output is written at once to `motion.csv` (or `motion.npy`) and `energy.csv`,
-//! under temporary names, so that memory does not grow. At the end of the run the files
-//! get their final names, and figures and a summary are made from them.
-//!
-//! The leaf at all outputs: `motion.csv`, or `motion.npy` for long motions.
-//!
-//! `energy.csv`: energies and the tip at all outputs.
-//!
-//! A file that grows during a run.
+//! Every output is written at once to `motion.csv` (`motion.npy` for long motions), which has the leaf, and to
+//! `energy.csv`, which has energies and the tip, under temporary names, so that memory does not grow. At the
+//! end of the run the files get their final names, and figures and a summary are made from them.
 
+use crate::files::atomic;
 use crate::files::atomic::DraftFile;
-use crate::files::{FileKind, FileSelection, atomic, write_result_files};
+use crate::files::result_files::{FileKind, FileSelection, write_result_files};
 use crate::report::table::{append_csv_rows, table_header};
 use crate::report::{FileError, ResultDocument};
 use glam::DVec3;
@@ -82,7 +77,7 @@ impl MotionRecording {
         MotionRecording::begin_with_frame(folder, simulation, selection, &frame)
     }
 
-    /// The same with another first output.
+    /// Begins a recording whose first output is this frame.
     pub fn begin_with_frame(
         folder: &Path,
         simulation: &Simulation,
@@ -272,21 +267,19 @@ const NPY_HEADER_BYTES: usize = 128;
 
 /// The file format of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MotionFormat {
+enum MotionFormat {
     Csv,
     Npy,
 }
 
 /// Size of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MotionSize {
+struct MotionSize {
     pub rods: usize,
-    /// Nodes of each rod.
     pub nodes: usize,
 }
 
 impl MotionSize {
-    /// Nodes of all rods.
     pub fn rows(self) -> usize {
         self.rods * self.nodes
     }
@@ -294,7 +287,7 @@ impl MotionSize {
 
 impl MotionFormat {
     /// The format for this number of outputs.
-    pub fn for_outputs(size: MotionSize, outputs: usize) -> Self {
+    fn for_outputs(size: MotionSize, outputs: usize) -> Self {
         match size.rows().saturating_mul(outputs) {
             0..=MOST_CSV_ROWS => MotionFormat::Csv,
             _ => MotionFormat::Npy,
@@ -309,7 +302,7 @@ impl MotionFormat {
     }
 
     /// Bytes of an output, in a table approximately.
-    pub fn bytes_per_output(self, size: MotionSize) -> u64 {
+    fn bytes_per_output(self, size: MotionSize) -> u64 {
         let row = match self {
             MotionFormat::Csv => MOTION_COLUMNS.split(',').count() * BYTES_PER_NUMBER,
             MotionFormat::Npy => NUMBERS_PER_NODE * size_of::<f64>(),
@@ -318,19 +311,14 @@ impl MotionFormat {
     }
 
     /// The header of a file with this number of outputs.
-    pub fn file_header(self, size: MotionSize, outputs: usize) -> Vec<u8> {
+    fn file_header(self, size: MotionSize, outputs: usize) -> Vec<u8> {
         match self {
             MotionFormat::Csv => table_header(MOTION_COLUMNS),
             MotionFormat::Npy => npy_header(size, outputs),
         }
     }
 
-    pub fn write_output(
-        self,
-        frame: &Frame,
-        stations: &[f64],
-        out: &mut Vec<u8>,
-    ) -> io::Result<()> {
+    fn write_output(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
         let nodes = 0..frame.positions.len();
         match self {
             MotionFormat::Csv => {
@@ -354,7 +342,7 @@ impl MotionFormat {
     }
 
     /// Reads the positions of all nodes at some outputs, given in increasing order.
-    pub fn read_positions(
+    fn read_positions(
         self,
         size: MotionSize,
         outputs: &[usize],
@@ -371,7 +359,7 @@ impl MotionFormat {
     }
 }
 
-/// All numbers of a node.
+/// Position, rotation as a quaternion, linear and angular velocity of a node.
 fn node_numbers(frame: &Frame, node: usize) -> [f64; NUMBERS_PER_NODE] {
     let (r, q) = (frame.positions[node], frame.rotations[node]);
     let velocity = &frame.velocities[node];
@@ -434,15 +422,15 @@ fn read_npy_positions(
     Ok(points)
 }
 
-pub const ENERGY_FILE_NAME: &str = "energy.csv";
+const ENERGY_FILE_NAME: &str = "energy.csv";
 
-/// Approximate bytes of a row.
-pub const ENERGY_BYTES: u64 = 200;
+/// Approximate bytes of a row of the table of energies.
+const ENERGY_BYTES: u64 = 200;
 
-pub const ENERGY_COLUMNS: &str =
+const ENERGY_COLUMNS: &str =
     "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z,error";
 
-pub fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()> {
+fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()> {
     let tip = moment.tip.to_array();
     let OutputSample {
         time,
@@ -454,12 +442,12 @@ pub fn write_energies(moment: &OutputSample, out: &mut Vec<u8>) -> io::Result<()
     append_csv_rows([(time, steps, energy, tip, error)], out)
 }
 
-pub struct GrowingFile {
-    /// The finished file.
+struct GrowingFile {
+    /// The path that the file has once it is complete.
     file: PathBuf,
     draft: DraftFile,
     out: File,
-    /// Data to be appended.
+    /// Rows that are not yet written.
     buffer: Vec<u8>,
 }
 
@@ -490,7 +478,7 @@ impl GrowingFile {
     }
 
     /// Replaces the beginning of the file; nothing can be appended after that.
-    pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
+    fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let replaced = self.out.rewind().and_then(|()| self.out.write_all(bytes));
         replaced.map_err(|reason| self.write_error(reason))
     }

@@ -1,7 +1,7 @@
 //! The scenario whose results a folder holds: the JSON files in it name its file; and files that
 //! results must not replace.
 
-use crate::files::WrittenResult;
+use crate::files::result_files::WrittenResult;
 use crate::report::FileError;
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
@@ -45,7 +45,7 @@ pub fn relative_source_path(folder: &Path, file: &Path) -> String {
     relative.display().to_string()
 }
 
-/// The path without `..`.
+/// Resolves `..` in a path by its text alone.
 fn resolve_parent_components(path: PathBuf) -> PathBuf {
     let mut plain = PathBuf::new();
     for component in path.components() {

@@ -1,7 +1,7 @@
 //! The data of the page: results, thinned to what is visible, with large arrays as
 //! base64 of little-endian numbers.
 
-use crate::figure::leaf::{node_stride, replace_undrawable_points};
+use crate::figure::drawing::veins::{node_stride, replace_undrawable_points};
 use crate::figure::scenario::{DirectionArrow, LoadMark, SupportMark};
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
@@ -41,13 +41,13 @@ pub struct PageData {
     pub rods: usize,
     /// The numbers, from 1, of those that are drawn.
     pub drawn: Vec<usize>,
-    /// Their lengths.
+    /// Lengths of the drawn veins.
     pub lengths: Vec<f64>,
-    /// Their colours.
+    /// Colors of the drawn veins.
     pub colors: Vec<String>,
     /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
     pub leaves: Vec<PageLeaf>,
-    /// Its modes, if their shapes were requested.
+    /// The modes of the leaf at rest, if their shapes were requested.
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<PageChart>,
@@ -118,7 +118,7 @@ pub struct PageChart {
 
 #[derive(Default, Serialize)]
 pub struct PageCurve {
-    /// Which of the choices it belongs to.
+    /// The choice among quantities with which the curve is shown.
     pub choice: usize,
     pub name: String,
     pub color: usize,
@@ -168,7 +168,7 @@ impl PageLeaf {
         }
     }
 
-    /// A leaf as coarse centrelines, for one of many.
+    /// A leaf as coarse centerlines, for one of many.
     pub fn from_centerlines(
         label: String,
         stations: &[f64],
@@ -212,7 +212,7 @@ fn are_unequally_spaced(stations: &[f64]) -> bool {
     stations.any(|(k, station)| (station - k as f64 / last).abs() > 1e-9)
 }
 
-/// Vectors as 32-bit numbers.
+/// Encodes vectors as 32-bit numbers in base64.
 pub fn encode_vectors(vectors: impl Iterator<Item = DVec3>) -> String {
     encode_floats(vectors.flat_map(|vector| vector.to_array()))
 }

@@ -3,8 +3,8 @@
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
 
+use crate::figure::drawing::veins::{node_stride, replace_undrawable_points};
 use crate::figure::drawing::{Color, color_of_vein};
-use crate::figure::leaf::{node_stride, replace_undrawable_points};
 use glam::{DVec3, Vec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
@@ -15,7 +15,7 @@ use std::io::Write;
 /// Most shapes of a film: each has all vertices.
 const MOST_FILM_SHAPES: usize = 61;
 
-/// Most segments of a vein.
+/// Most segments of a vein: finer ones are thinned.
 const MOST_SEGMENTS_PER_VEIN: usize = 32;
 
 /// Length of a film in seconds, as the unit of time is not known.
@@ -34,21 +34,33 @@ const GLTF_ARRAY_BUFFER: u32 = 34962;
 
 const GLTF_ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// A leaf at rest.
+/// The centerlines of a leaf at a time.
+struct ShapeAtTime<'s> {
+    time: f64,
+    curves: &'s [Vec<DVec3>],
+}
+
+/// Writes a leaf at rest.
 pub fn write_leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
-    let leaf = [(0.0, &shape.curves[..])];
+    let leaf = [ShapeAtTime {
+        time: 0.0,
+        curves: &shape.curves,
+    }];
     write_shapes(&equilibrium.scenario, &leaf, shape.longest(), out)
 }
 
-/// A moving leaf.
+/// Writes a motion, of which some shapes are left out.
 pub fn write_motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let film = &record.film;
     let last = film.len().saturating_sub(1);
     let stride = last.div_ceil(MOST_FILM_SHAPES - 1).max(1);
     let kept = (0..film.len()).filter(|&k| k.is_multiple_of(stride) || k == last);
-    let shape = |k: usize| (record.moments[film[k].moment].time, &film[k].curves[..]);
-    let shapes: Vec<(f64, &[Vec<DVec3>])> = kept.map(shape).collect();
+    let shape = |k: usize| ShapeAtTime {
+        time: record.moments[film[k].moment].time,
+        curves: &film[k].curves,
+    };
+    let shapes: Vec<ShapeAtTime> = kept.map(shape).collect();
     write_shapes(&record.scenario, &shapes, record.length, out)
 }
 
@@ -105,7 +117,7 @@ impl GltfBuffer {
 /// Writes shapes at times; the first is the base of the morph targets.
 fn write_shapes(
     name: &str,
-    shapes: &[(f64, &[Vec<DVec3>])],
+    shapes: &[ShapeAtTime],
     longest: f64,
     out: &mut dyn Write,
 ) -> io::Result<()> {
@@ -115,7 +127,7 @@ fn write_shapes(
     };
     let thinned = shapes
         .iter()
-        .map(|(_, curves)| curves.iter().map(thin).collect());
+        .map(|shape| shape.curves.iter().map(thin).collect());
     let thinned: Vec<Vec<Vec<DVec3>>> = thinned.collect();
     let radius = RELATIVE_VEIN_RADIUS * longest;
     let first = thinned.first();
@@ -164,8 +176,8 @@ fn write_shapes(
 }
 
 /// The animation: at the time of a shape its weight is one and all others are zero.
-fn morph_animation(file: &mut GltfBuffer, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
-    let (start, end) = (shapes[0].0, shapes[shapes.len() - 1].0);
+fn morph_animation(file: &mut GltfBuffer, shapes: &[ShapeAtTime]) -> Value {
+    let (start, end) = (shapes[0].time, shapes[shapes.len() - 1].time);
     let rate = if end > start {
         FILM_SECONDS / (end - start)
     } else {
@@ -173,7 +185,7 @@ fn morph_animation(file: &mut GltfBuffer, shapes: &[(f64, &[Vec<DVec3>])]) -> Va
     };
     let times = shapes
         .iter()
-        .map(|(time, _)| [((time - start) * rate) as f32]);
+        .map(|shape| [((shape.time - start) * rate) as f32]);
     let times: Vec<[f32; 1]> = times.collect();
     let mut weights = vec![[0.0]; shapes.len() * (shapes.len() - 1)];
     // The first shape is the base.
@@ -230,7 +242,7 @@ fn write_container(
     Ok(())
 }
 
-/// Converts a colour from sRGB to linear RGB, opaque.
+/// Converts a color from sRGB to linear RGB, opaque.
 fn linear_color(Color(red, green, blue): Color) -> [u8; 4] {
     let of = |value: u8| {
         let value = f64::from(value) / 255.0;

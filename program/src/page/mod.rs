@@ -24,9 +24,9 @@ mod results;
 pub mod vtk;
 
 use crate::figure::FigureFunction;
-use crate::figure::drawing::formats::hex_color;
-use crate::figure::drawing::{Drawing, color_of_vein, formats};
-use crate::figure::leaf::is_vein_drawn;
+use crate::figure::drawing::formats::{escape_xml, hex_color, write_svg};
+use crate::figure::drawing::veins::is_vein_drawn;
+use crate::figure::drawing::{Drawing, color_of_vein};
 use crate::figure::scenario::{FigureSetting, LoadMark, load_marks, support_marks};
 pub use crate::page::data::{PageData, PageLeaf};
 use crate::report;
@@ -66,13 +66,13 @@ pub trait PageResult: ReportedResult {
     fn fill_page_data(&self, view: &mut PageData, units: &Units);
 }
 
-/// One of several shapes.
+/// A shape of the leaf among several.
 pub struct ShapeInSeries<'r> {
     /// Its time, or its number.
     pub time: f64,
     /// Fractions of the length at which its nodes are.
     pub stations: &'r [f64],
-    /// The centrelines of its veins.
+    /// The centerlines of its veins.
     pub curves: &'r [Vec<DVec3>],
 }
 
@@ -130,7 +130,7 @@ pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
     view
 }
 
-/// The same without any result.
+/// The data of a page that shows a scenario without a result.
 pub fn page_data_without_result(scenario: &Scenario) -> PageData {
     let count = scenario.rods.len();
     let drawn: Vec<usize> = (1..=count)
@@ -183,13 +183,13 @@ fn assemble_html(view: &PageData, still: &Drawing) -> String {
     let (mut data, mut figure) = (Vec::new(), Vec::new());
     // Writing to memory cannot fail.
     let _ = report::write_json(view, &mut data);
-    let _ = formats::write_svg(still, &mut figure);
+    let _ = write_svg(still, &mut figure);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     let figure = String::from_utf8_lossy(&figure).into_owned();
     let scripts = PAGE_SCRIPTS.concat();
     let parts = [
-        ("TITLE", formats::escape_xml(&view.title)),
+        ("TITLE", escape_xml(&view.title)),
         ("STYLE", PAGE_CSS.into()),
         ("FIGURE", figure),
         ("DATA", data),
@@ -226,7 +226,7 @@ mod tests {
         scenario
     }
 
-    /// The data of a page.
+    /// The data that stand in the text of a page.
     fn data(page: &str) -> Value {
         let (_, rest) = page.split_once("type=\"application/json\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()

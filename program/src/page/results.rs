@@ -72,7 +72,7 @@ fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -
 impl PageResult for Equilibria {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::equilibria;
 
-    /// Equilibria side by side.
+    /// Lists all equilibria, to be shown side by side.
     fn fill_page_data(&self, view: &mut PageData, units: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();
@@ -251,7 +251,7 @@ fn curve_with_leaves<P>(points: &[P], place: impl Fn(&P) -> (f64, f64)) -> PageC
     }
 }
 
-/// Names and colours the curves by their numbers, and numbers the leaves of their points.
+/// Names and colors the curves by their numbers, and numbers the leaves of their points.
 fn number_curves(what: &str, mut curves: Vec<PageCurve>) -> Vec<PageCurve> {
     let mut first = 0;
     for (number, curve) in curves.iter_mut().enumerate() {

@@ -1,9 +1,9 @@
 //! A chart as text, and as rows of `chart.csv` and `chart_rods.csv`, one per measurement;
 //! `chart.json` has the same values under the same names.
 
+use crate::report::document::{ReportedResult, contender_name};
 use crate::report::numbers::{duration_text, format_error_bound, veins_text_for_count};
 use crate::report::table::{LabelledLines, label_first_line, text_cell};
-use crate::report::{ReportedResult, contender_name};
 use leafdyn::scenario::Units;
 use leafdyn::study::{
     Chart, ChartRow, FastestByAccuracy, PeerProgram, ReferenceSolution, ScalingStudy,
@@ -33,7 +33,7 @@ impl ReportedResult for Chart {
         lines.extend(
             (self.scaling.iter()).flat_map(|it| label_first_line("veins", scaling_lines(it))),
         );
-        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.clone())));
+        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.to_string())));
         lines
     }
 }
@@ -69,7 +69,7 @@ fn measurement_line(chart: &Chart) -> String {
 }
 
 /// A line of a table: time, error, method and setting.
-fn table_line((time, error): (f64, f64), method: &str, knob: &str) -> String {
+fn table_line(time: f64, error: f64, method: &str, knob: &str) -> String {
     let (time, error) = (duration_text(time), format_error_bound(error));
     format!("{time:>10}  {error:<9} {method}, {knob}")
 }
@@ -77,17 +77,17 @@ fn table_line((time, error): (f64, f64), method: &str, knob: &str) -> String {
 fn pareto_front_lines(chart: &Chart) -> Vec<String> {
     let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
-        let point = row.seconds_and_error()?;
-        let line = table_line(point, contender_name(row.contender), &row.knob.to_string());
-        Some((point, line))
+        let (time, error) = row.seconds_and_error()?;
+        let (name, knob) = (contender_name(row.contender), row.knob.to_string());
+        Some((time, table_line(time, error, name, &knob)))
     });
     let peers = chart.peers.iter().filter(|peer| peer.pareto);
     let peers = peers.filter_map(|peer| {
-        let point = peer.seconds_and_error()?;
-        Some((point, table_line(point, &peer.name, &peer.knob)))
+        let (time, error) = peer.seconds_and_error()?;
+        Some((time, table_line(time, error, &peer.name, &peer.knob)))
     });
     let mut entries: Vec<_> = rows.chain(peers).collect();
-    entries.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0));
+    entries.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     entries.into_iter().map(|(_, line)| line).collect()
 }
 
@@ -169,7 +169,7 @@ fn peer_lines(chart: &Chart) -> Vec<String> {
                 Some(ratio) => format!("{} times the default's time", format_ratio(ratio)),
                 None => "the default is nowhere as accurate".into(),
             };
-            let line = table_line((peer.seconds.median, error), name, &peer.knob);
+            let line = table_line(peer.seconds.median, error, name, &peer.knob);
             lines.push(format!("{line}: {ratio}"));
         }
         for peer in rows().filter(|peer| peer.true_error.is_none()) {

@@ -1,13 +1,15 @@
 //! The text report of a check.
 
+use crate::report::document::{
+    ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name,
+};
 use crate::report::numbers::{
     duration_text, format_as_accurate, format_error_bound, format_position, grids_text,
     negative_eigenvalues_text, number_in_unit, position_decimals, position_error_text,
     upper_bound_text, veins_text,
 };
-use crate::report::relax::equilibrium_phrase;
+use crate::report::relax::{doubt_with_option, equilibrium_phrase};
 use crate::report::table::{LabelledLines, label_first_line};
-use crate::report::{ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH};
@@ -27,9 +29,10 @@ impl ReportedResult for Check {
         lines.extend(self.solution().into_iter().flat_map(shooting_detail_lines));
         // Otherwise the verdict explains why the leaf is not at rest.
         if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
-            lines.push(("remark", remark.clone()));
+            lines.push(("remark", remark.to_string()));
         }
-        lines.extend(label_first_line("doubtful", self.relaxed.doubts.clone()));
+        let doubts = self.relaxed.doubts.iter().map(doubt_with_option);
+        lines.extend(label_first_line("doubtful", doubts));
         lines
     }
 }

@@ -1,6 +1,6 @@
 //! The text report of a fit, and its table.
 
-use crate::report::ReportedResult;
+use crate::report::document::ReportedResult;
 use crate::report::numbers::{
     count_in_words, duration_text, format_five_digits, number_in_key_unit, round_to_error,
 };
@@ -11,7 +11,6 @@ use std::io;
 use std::io::Write;
 use std::path::Path;
 
-/// Most candidates that are listed.
 const MOST_CANDIDATES_LISTED: usize = 5;
 
 impl ReportedResult for Fit {
@@ -57,7 +56,7 @@ impl ReportedResult for Fit {
             .map(|candidate| {
                 let (bits, part) = (candidate.bits, candidate.shrinks);
                 let text = match &candidate.remark {
-                    Some(remark) => remark.clone(),
+                    Some(remark) => remark.to_string(),
                     None => {
                         format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it")
                     }
@@ -76,11 +75,11 @@ impl ReportedResult for Fit {
     }
 
     fn remarks(&self) -> LabelledLines {
-        label_first_line("remark", self.remarks.clone())
+        label_first_line("remark", self.remarks.iter().map(ToString::to_string))
     }
 }
 
-/// One line on what a file was read as.
+/// A line on what a file of data was read as.
 fn data_file_line(file: &DataFile) -> String {
     let name = Path::new(&file.file).file_name();
     let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());

@@ -1,12 +1,12 @@
 //! A map as text, and its rows as CSV.
 
+use crate::report::document::{ReportedResult, map_title};
 use crate::report::numbers::{
     duration_text, format_five_digits, number_in_key_unit, number_in_unit,
 };
 use crate::report::table::{LabelledLines, append_csv_rows, label_first_line, text_cell};
-use crate::report::{ReportedResult, map_title};
 use leafdyn::scenario::Units;
-use leafdyn::study::{Map, MapOutcome, MapRow};
+use leafdyn::study::{Map, MapOutcome, MapRemark};
 use std::fmt::Write as _;
 use std::io;
 use std::io::Write;
@@ -15,13 +15,12 @@ use std::io::Write;
 const MAP_COLUMNS: &str = "method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,\
     error_estimate,margin_waves,margin_amplitude,twist,seconds,reference";
 
-/// Most jumps that are listed.
 const MOST_JUMPS_LISTED: usize = 5;
 
 /// A map, and the work that was done for it.
 pub struct ReportedMap<'m> {
     pub map: &'m Map,
-    /// Total time.
+    /// Time that the map took.
     pub seconds: f64,
 }
 
@@ -112,11 +111,11 @@ pub fn write_map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
     append_csv_rows([header], out)?;
     // The columns of the axes, then those of the row.
     let rows = map.rows.iter().map(|row| {
-        let detail = text_cell(&row.detail).into();
-        let row = MapRow {
-            detail,
-            ..row.clone()
-        };
+        let mut row = row.clone();
+        if let Some(MapRemark::Refused(why)) = &mut row.remark {
+            // In words of the user, too.
+            *why = text_cell(why.trim_start()).into();
+        }
         (request.texts(row.cell), row)
     });
     append_csv_rows(rows, out)

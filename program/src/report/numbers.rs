@@ -17,7 +17,7 @@ pub fn veins_text(equilibrium: &Equilibrium) -> String {
     veins_text_for_count(equilibrium.shape.rods.len(), equilibrium.shape.joined)
 }
 
-/// The same for any leaf.
+/// How many veins there are, and whether their tips are joined.
 pub fn veins_text_for_count(count: usize, joined: bool) -> String {
     let tips = match joined {
         _ if count == 1 => "",
@@ -43,7 +43,7 @@ pub fn negative_eigenvalues_text(count: Option<usize>) -> String {
     count.map_or(String::new(), |count| format!(" ({count})"))
 }
 
-/// The grids of a relaxation.
+/// The grids of a relaxation, as in `grids of 8, 16 segments a vein`.
 pub fn grids_text(equilibrium: &Equilibrium) -> String {
     let grids = equilibrium.accuracy.segments.iter();
     let grids: Vec<String> = grids.map(usize::to_string).collect();
@@ -157,7 +157,6 @@ pub fn format_as_accurate(equilibrium: &Equilibrium, value: f64, size: f64) -> S
     }
 }
 
-/// A position with `decimals` decimals.
 pub fn format_position(point: [f64; 3], decimals: usize) -> String {
     let least = 0.5 * 10f64.powi(-(decimals as i32));
     let [x, y, z] = point.map(|value| match value.abs() < least {
@@ -179,17 +178,25 @@ pub fn format_ten_digits(value: f64) -> String {
     format!("{value:.*}", (DIGITS_WITHOUT_ERROR - exponent) as usize)
 }
 
-/// The digits of a finite number with `decimals` decimals after the first, and their power of ten:
-/// rounding may raise it.
-fn digits_and_exponent(value: f64, decimals: usize) -> (String, i32) {
+/// A number in scientific notation.
+struct ScientificNumber {
+    mantissa: String,
+    exponent: i32,
+}
+
+/// A finite number with `decimals` decimals after the first digit; rounding may raise the power of ten.
+fn round_scientific(value: f64, decimals: usize) -> ScientificNumber {
     let digits = format!("{value:.decimals$e}");
     let (mantissa, power) = digits.split_once('e').unwrap_or((&digits, "0"));
-    (mantissa.into(), power.parse().unwrap_or(0))
+    ScientificNumber {
+        mantissa: mantissa.into(),
+        exponent: power.parse().unwrap_or(0),
+    }
 }
 
 /// The power of ten of a number rounded likewise.
 fn rounded_exponent(value: f64, decimals: usize) -> i32 {
-    digits_and_exponent(value, decimals).1
+    round_scientific(value, decimals).exponent
 }
 
 /// A number with at most five digits.
@@ -219,7 +226,7 @@ pub fn format_four_digits(value: f64) -> String {
     }
     let exponent = rounded_exponent(size, 3);
     if !(-3..6).contains(&exponent) {
-        let (mantissa, exponent) = digits_and_exponent(size, 2);
+        let ScientificNumber { mantissa, exponent } = round_scientific(size, 2);
         return format!("{minus}{mantissa}×10{}", superscript(exponent));
     }
     let decimals = (3 - exponent).max(0) as usize;

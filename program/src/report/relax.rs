@@ -1,11 +1,9 @@
-//! The text report of a relaxation.
-//!
-//! A blade in the report of a relaxation.
-//!
-//! All equilibria of a leaf, as text.
-//!
-//! The stability margin of a leaf, as text.
+//! The text report of a relaxation: the leaf at rest, the blade of which it is made, its modes and
+//! sensitivities, all of its equilibria, and its stability margin.
 
+use crate::report::document::{
+    ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase,
+};
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
     format_five_digits, format_position, format_within_error, grids_text,
@@ -13,12 +11,11 @@ use crate::report::numbers::{
     position_error_text, round_to_error, upper_bound_text, veins_text,
 };
 use crate::report::table::{LabelledLines, label_first_line};
-use crate::report::{ReportedResult, relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::DVec3;
 use leafdyn::numbers::largest;
 use leafdyn::relax::{
-    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, Event,
-    InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
+    Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
+    Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
     COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
@@ -65,14 +62,14 @@ impl ReportedResult for Equilibrium {
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
-            let sizes = (reaction.force, moments(&reaction.moments));
-            let force = reaction_text(self, sizes, reaction.error);
+            let moment = moments(&reaction.moments);
+            let force = reaction_text(self, reaction.force, moment, reaction.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
-            let sizes = (grip.force, grip.moment.map_or(0.0, DVec3::length));
-            let force = reaction_text(self, sizes, grip.error);
+            let moment = grip.moment.map_or(0.0, DVec3::length);
+            let force = reaction_text(self, grip.force, moment, grip.error);
             let force = number_in_unit(format!("({force})"), units, FORCE);
             let grip = format!("{force} on the holder of grip {}", number + 1);
             lines.push(("grip", grip));
@@ -102,8 +99,19 @@ impl ReportedResult for Equilibrium {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
+        let doubts = self.doubts.iter().map(doubt_with_option);
+        [remark, label_first_line("doubtful", doubts)].concat()
+    }
+}
+
+/// A doubt on an equilibrium, with the option that helps.
+pub fn doubt_with_option(doubt: &EquilibriumDoubt) -> String {
+    match doubt {
+        EquilibriumDoubt::UnconfirmedPath | EquilibriumDoubt::UnconfirmedEquilibrium => {
+            format!("{doubt}; relax with --all looks for the others")
+        }
+        _ => doubt.to_string(),
     }
 }
 
@@ -123,7 +131,7 @@ pub fn equilibrium_phrase(equilibrium: &Equilibrium) -> String {
     }
 }
 
-/// That it is one of a circle of equilibria, if it is.
+/// Says that an equilibrium is one of a circle of equilibria, if it is.
 fn zero_energy_rotation_line(equilibrium: &Equilibrium) -> String {
     match (
         equilibrium.stability.neutral_directions,
@@ -167,7 +175,8 @@ const FORCE_ERROR_FACTOR: f64 = 20.0;
 /// accurate it is.
 fn reaction_text(
     equilibrium: &Equilibrium,
-    (force, moment): (DVec3, f64),
+    force: DVec3,
+    moment: f64,
     error: Option<f64>,
 ) -> String {
     if let Some(error) = error {
@@ -371,7 +380,7 @@ fn solver_work_line(equilibrium: &Equilibrium) -> String {
 }
 
 /// The lines about a blade.
-pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
+fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     let length = |it: f64| number_in_unit(format_five_digits(it), units, LENGTH);
     let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, COUPLE_STIFFNESS);
     let mass = |it: f64| match units.grams() {
@@ -454,7 +463,7 @@ impl ReportedResult for Equilibria {
 
     fn remarks(&self) -> LabelledLines {
         let more = "there may be more: no number of starts proves that these are all";
-        let remark = label_first_line("remark", self.remark.clone());
+        let remark = label_first_line("remark", self.remark());
         [remark, label_first_line("remark", Some(more.into()))].concat()
     }
 }
@@ -489,17 +498,18 @@ fn equilibrium_line(number: usize, found: &FoundEquilibrium, units: &Units) -> S
 const SINGLE_GRID_PRECISION: f64 = 1e-3;
 
 /// The lines about a margin of a leaf of this length, the smallest push first.
-pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
+fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| critical_tip_force_line((margin, push), length, units))
+        .map(|push| critical_tip_force_line(margin, push, length, units))
         .collect();
     lines.extend(stable_directions_line(margin, units));
     let unknown = margin.pushes.iter();
     let unknown = unknown.filter(|push| push.kind == InstabilityKind::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
-        let why = push.remark.as_deref().unwrap_or_default();
+        let why = push.remark.as_ref().map(ToString::to_string);
+        let why = why.unwrap_or_default();
         let which = direction_text(margin, push);
         match push.more_than.filter(|least| *least > 0.0) {
             Some(least) => {
@@ -519,13 +529,14 @@ pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> 
         }
         None => {}
     }
-    lines.extend(margin.remark.clone());
+    lines.extend(margin.remark.as_ref().map(ToString::to_string));
     lines
 }
 
 /// A push under which stability is lost.
 fn critical_tip_force_line(
-    (margin, push): (&Margin, &CriticalTipForce),
+    margin: &Margin,
+    push: &CriticalTipForce,
     length: f64,
     units: &Units,
 ) -> String {
@@ -588,7 +599,7 @@ fn energy_barrier_line(barrier: &Barrier, length: f64, units: &Units) -> String 
     )
 }
 
-pub fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
+fn tip_text(tip: DVec3, length: f64, units: &Units) -> String {
     let tip = format_position(
         tip.to_array(),
         decimals_for_error(SINGLE_GRID_PRECISION * length),

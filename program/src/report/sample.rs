@@ -2,14 +2,15 @@
 //! motion, and made-up studies of it.
 
 use glam::{DQuat, DVec3};
-use leafdyn::relax::{Equilibrium, Method, Outcome};
+use leafdyn::relax::{Equilibrium, Outcome};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
 use leafdyn::simulate::{Frame, OutputSample, Record, ShapeSnapshot, Simulation, snapshot_indices};
 use leafdyn::study::{
-    AccuracySetting, BaseScenario, Chart, ChartOutcome, ChartRow, Check, Map, MapMethod,
-    MapOutcome, MapRequest, MapRow, NeutralDirection, PeerProgram, ReferenceConfidence,
-    ReferenceSolution, ScalingRow, ScalingStudy, ShootingResult, ShootingSolution, TimingSpread,
+    AccuracySetting, BaseScenario, Chart, ChartOutcome, ChartRemark, ChartRow, ChartRowRemark,
+    Check, Map, MapMethod, MapOutcome, MapRemark, MapRequest, MapRow, NeutralDirection,
+    PeerProgram, ReferenceConfidence, ReferenceSolution, ScalingRow, ScalingStudy, ShootingResult,
+    ShootingSolution, TimingSpread,
 };
 use leafdyn::{relax, simulate};
 
@@ -35,7 +36,7 @@ pub fn sample_scenario(name: &str, rods: usize) -> Scenario {
 /// A leaf at rest on one grid, with an error estimate as if from several.
 pub fn sample_equilibrium(rods: usize, segments: usize) -> Equilibrium {
     let options = relax::Options {
-        method: Method::default().on_grid(Some(segments)),
+        method: relax::SemiImplicit::on_grid(Some(segments)).into(),
         ..relax::Options::default()
     };
     let mut leaf = relax::relax(&sample_scenario("fan", rods), &options, &mut |_| {}).unwrap();
@@ -111,7 +112,9 @@ pub fn sample_map() -> Map {
     .unwrap();
     let row = |cell: usize, method: MapMethod| {
         let outcome = match method {
-            MapMethod::ToRest(Method::SemiImplicit(_)) if cell < 5 => MapOutcome::Right,
+            MapMethod::ToRest(method) if method.semi_implicit().is_some() && cell < 5 => {
+                MapOutcome::Right
+            }
             _ => MapOutcome::ALL[cell],
         };
         let rests = !matches!(
@@ -127,7 +130,9 @@ pub fn sample_map() -> Map {
             _ => ReferenceConfidence::Confirmed,
         };
         let row = MapRow {
-            detail: format!("said of cell {cell}, \"quoted\""),
+            remark: Some(MapRemark::Refused(format!(
+                "said of cell {cell}, \"quoted\""
+            ))),
             seconds: 0.012345,
             cell,
             method,
@@ -244,7 +249,7 @@ pub fn sample_chart() -> Chart {
             difference: Some(1e-14),
             neutral: None,
         }),
-        remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
+        remarks: vec![ChartRemark::PeersOfAnotherLeaf { rows: 1 }],
         rows: vec![
             sample_chart_row("semi-implicit", Tolerance(1e-2), 1e-3, 1e-4),
             sample_chart_row("semi-implicit", Tolerance(1e-6), 2e-3, 1e-8),
@@ -258,7 +263,7 @@ pub fn sample_chart() -> Chart {
                 true_error: None,
                 error_estimate: None,
                 ending: ChartOutcome::Ended(Outcome::NotAtRest),
-                remark: Some("perturbations grow".into()),
+                remark: Some(ChartRowRemark::NoAccurateGrid { finest: 512 }),
                 ..sample_chart_row("single-shooting", Tolerance(1e-6), 7e-2, 1.0)
             },
         ],

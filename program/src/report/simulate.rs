@@ -1,6 +1,6 @@
 //! The text report of a simulation.
 
-use crate::report::ReportedResult;
+use crate::report::document::ReportedResult;
 use crate::report::numbers::{
     duration_text, format_error_bound, format_five_digits, format_position, format_within_error,
     number_in_unit, position_error_text, round_to_error, veins_text_for_count,
@@ -44,8 +44,9 @@ impl ReportedResult for Record {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark().map(|it| it.to_string()));
+        let doubts = self.doubts.iter().map(ToString::to_string);
+        [remark, label_first_line("doubtful", doubts)].concat()
     }
 }
 

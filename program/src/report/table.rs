@@ -1,7 +1,6 @@
-//! Layout of results: labelled lines for the console, rows for CSV.
-//!
-//! Tables of a leaf: `centerlines.csv`, `modes.csv` and `sensitivity.csv`, with every rod at
-//! every station, for spreadsheets and scripts.
+//! Layout of results: labeled lines for the console, and tables as CSV. A table of several scenarios has
+//! the scalars of their JSON; `centerlines.csv`, `modes.csv` and `sensitivity.csv` have every rod at every
+//! station.
 
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
@@ -67,22 +66,30 @@ pub fn csv_writer_without_header<W: Write>(out: W) -> csv::Writer<W> {
     builder.has_headers(false).from_writer(out)
 }
 
-/// One table of several results, each given as its scenario's file, its exit status and
-/// its JSON, whose scalar values are the cells. Columns are named by their keys, those of
+/// What came of one of several scenarios.
+pub struct ScenarioOutput {
+    /// Path of the scenario's file.
+    pub file: String,
+    pub exit_status: i32,
+    /// Its result, or why there is none.
+    pub json: Vec<u8>,
+}
+
+/// One table of several results. The scalar values of their JSON are the cells. Columns are named by their keys, those of
 /// nested objects by both keys (`work_steps`); lists are left out, except tips.
-pub fn table_of_json_results(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
+pub fn table_of_json_results(results: &[ScenarioOutput]) -> io::Result<Vec<u8>> {
     let mut columns: Vec<String> = Vec::new();
     let mut rows: Vec<HashMap<String, String>> = Vec::new();
-    for (file, status, json) in results {
-        let FlattenedJson(mut cells) = serde_json::from_slice(json)?;
+    for output in results {
+        let FlattenedJson(mut cells) = serde_json::from_slice(&output.json)?;
         let head = [
-            ("file", text_cell(file).into()),
-            ("exit_status", status.to_string()),
+            NamedCell::new("file", text_cell(&output.file).into()),
+            NamedCell::new("exit_status", output.exit_status.to_string()),
         ];
-        cells.retain(|(name, _)| name != "exit_status");
-        cells.splice(0..0, head.map(|(name, cell)| (name.to_string(), cell)));
+        cells.retain(|cell| cell.name != "exit_status");
+        cells.splice(0..0, head);
         let mut after = 0;
-        for (name, _) in &cells {
+        for NamedCell { name, .. } in &cells {
             after = 1 + match columns.iter().position(|column| column == name) {
                 Some(known) => known,
                 None => {
@@ -91,7 +98,7 @@ pub fn table_of_json_results(results: &[(String, i32, Vec<u8>)]) -> io::Result<V
                 }
             };
         }
-        rows.push(cells.into_iter().collect());
+        rows.push(cells.into_iter().map(|it| (it.name, it.cell)).collect());
     }
     columns.retain(|column| column != "error");
     columns.push("error".into());
@@ -104,8 +111,21 @@ pub fn table_of_json_results(results: &[(String, i32, Vec<u8>)]) -> io::Result<V
     table.into_inner().map_err(|error| error.into_error())
 }
 
+/// A cell of a table, and the name of its column.
+struct NamedCell {
+    name: String,
+    cell: String,
+}
+
+impl NamedCell {
+    fn new(name: impl Into<String>, cell: String) -> Self {
+        let name = name.into();
+        NamedCell { name, cell }
+    }
+}
+
 /// A JSON value as named cells; that of a scalar has no name.
-struct FlattenedJson(Vec<(String, String)>);
+struct FlattenedJson(Vec<NamedCell>);
 
 impl<'de> Deserialize<'de> for FlattenedJson {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -113,7 +133,7 @@ impl<'de> Deserialize<'de> for FlattenedJson {
 
         impl Cells {
             fn single_cell<E>(cell: impl ToString) -> Result<FlattenedJson, E> {
-                Ok(FlattenedJson(vec![(String::new(), cell.to_string())]))
+                Ok(FlattenedJson(vec![NamedCell::new("", cell.to_string())]))
             }
         }
 
@@ -167,14 +187,15 @@ impl<'de> Deserialize<'de> for FlattenedJson {
                             let tip = object.next_value::<Option<[f64; 3]>>()?;
                             for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
                                 let cell = tip.map(|tip| format!("{:?}", tip[axis]));
-                                cells.push((format!("{key}_{name}"), cell.unwrap_or_default()));
+                                let name = format!("{key}_{name}");
+                                cells.push(NamedCell::new(name, cell.unwrap_or_default()));
                             }
                         }
                         _ => {
                             let FlattenedJson(inner) = object.next_value()?;
-                            for (name, cell) in inner {
+                            for NamedCell { name, cell } in inner {
                                 let below = if name.is_empty() { "" } else { "_" };
-                                cells.push((format!("{key}{below}{name}"), cell));
+                                cells.push(NamedCell::new(format!("{key}{below}{name}"), cell));
                             }
                         }
                     }
@@ -263,7 +284,7 @@ pub fn write_modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::
     table.flush()
 }
 
-/// The columns from `x` onwards.
+/// Cells of `centerlines.csv` from the column `x` onwards.
 fn node_columns(node: &NodeState) -> [f64; 19] {
     let NodeState {
         position: r,
@@ -281,11 +302,20 @@ fn node_columns(node: &NodeState) -> [f64; 19] {
     .map(|value| value + 0.0)
 }
 
-/// The derivative of a station's position with respect to a number; rods are counted from 1.
 const SENSITIVITY_HEADER: &str = "key,value,rod,sigma,d_x,d_y,d_z,error";
 
-/// Cells of a row.
-type SensitivityTableRow<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
+/// A row of `sensitivity.csv`, with the columns of its header in this order.
+#[derive(Serialize)]
+struct SensitivityTableRow<'s> {
+    key: &'s str,
+    value: f64,
+    /// Counted from 1.
+    rod: usize,
+    sigma: f64,
+    /// Derivative of the position there with respect to the number of this key.
+    derivative: [f64; 3],
+    error: Option<f64>,
+}
 
 /// `sensitivity.csv`: a row for every number and station, or for the tips where only
 /// they are known.
@@ -296,17 +326,22 @@ pub fn write_sensitivity_table(leaf: &Equilibrium, out: &mut dyn Write) -> io::R
 }
 
 fn sensitivity_table_rows(of: &Sensitivity) -> Vec<SensitivityTableRow<'_>> {
-    let row = |(rod, sigma): (usize, f64), d: &DVec3, error| -> SensitivityTableRow {
-        (&of.key, of.value, rod + 1, sigma, d.to_array(), error)
+    let row = |rod: usize, sigma: f64, derivative: &DVec3, error| SensitivityTableRow {
+        key: &of.key,
+        value: of.value,
+        rod: rod + 1,
+        sigma,
+        derivative: derivative.to_array(),
+        error,
     };
     if of.positions.is_empty() {
         let tips = of.tips.iter().enumerate();
-        return tips.map(|(j, d)| row((j, 1.0), d, of.tip_error)).collect();
+        return tips.map(|(j, d)| row(j, 1.0, d, of.tip_error)).collect();
     }
     let rods = of.positions.iter().enumerate();
     rods.flat_map(|(j, rod)| {
         let nodes = of.stations.iter().zip(rod);
-        nodes.map(move |(sigma, d)| row((j, *sigma), d, of.positions_error))
+        nodes.map(move |(sigma, d)| row(j, *sigma, d, of.positions_error))
     })
     .collect()
 }
@@ -333,8 +368,12 @@ mod tests {
             assert!(!runs, "{cell}");
             assert!(cell == name || cell == format!("'{name}"));
         }
-        let refused = br#"{ "scenario": "=1+1", "tolerance": -1e-6 }"#.to_vec();
-        let table = table_of_json_results(&[("@a.toml".into(), 2, refused)]).unwrap();
+        let output = ScenarioOutput {
+            file: "@a.toml".into(),
+            exit_status: 2,
+            json: br#"{ "scenario": "=1+1", "tolerance": -1e-6 }"#.to_vec(),
+        };
+        let table = table_of_json_results(&[output]).unwrap();
         let table = String::from_utf8(table).unwrap();
         assert!(table.contains("'@a.toml,2,'=1+1,-1e-6"), "{table}");
     }

@@ -1,5 +1,7 @@
 //! A trace, and a boundary, as text and as rows of CSV: every point of every branch or curve.
 
+use crate::report::document::{ReportedResult, branch_end_phrase, stability_phrase};
+use crate::report::numbers;
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, decimals_for_error, duration_text, format_error_bound, format_five_digits,
     format_four_digits, format_within_error, number_in_unit, position_error_text, round_to_error,
@@ -8,7 +10,6 @@ use crate::report::numbers::{
 use crate::report::table::{
     LabelledLines, csv_writer_without_header, label_first_line, table_header,
 };
-use crate::report::{ReportedResult, branch_end_phrase, numbers, stability_phrase};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH};
@@ -69,11 +70,11 @@ impl ReportedResult for Trace {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
         let advice = label_first_line("advice", option_advice(self));
         [
             remark,
-            label_first_line("doubtful", self.doubts.clone()),
+            label_first_line("doubtful", self.doubts.iter().map(ToString::to_string)),
             advice,
         ]
         .concat()
@@ -90,7 +91,7 @@ fn option_advice(trace: &Trace) -> Vec<String> {
         advice.push("branches cross here that are not followed: --switch follows them".into());
     }
     if trace.until.is_none() {
-        let losses = trace.branches.iter().map(TraceBranch::destabilizations);
+        let losses = trace.branches.iter().map(TraceBranch::index_increase_count);
         let first = losses
             .enumerate()
             .find(|(_, losses)| *losses >= MANY_STABILITY_LOSSES);
@@ -129,7 +130,7 @@ fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<Strin
     }
     let last = branch.points.last();
     lines.extend(last.map(|point| format!("  to {}", point_values_text(trace, point))));
-    lines.extend(branch.remark.iter().map(|remark| format!("  {remark}")));
+    lines.extend(branch.remark().map(|remark| format!("  {remark}")));
     lines
 }
 
@@ -300,8 +301,12 @@ impl ReportedResult for StabilityBoundary {
     }
 
     fn remarks(&self) -> LabelledLines {
-        let remark = label_first_line("remark", self.remark.clone());
-        [remark, label_first_line("doubtful", self.doubts.clone())].concat()
+        let remark = label_first_line("remark", self.remark.as_ref().map(ToString::to_string));
+        [
+            remark,
+            label_first_line("doubtful", self.doubts.iter().map(ToString::to_string)),
+        ]
+        .concat()
     }
 }
 

@@ -2,12 +2,12 @@
 
 use crate::files;
 use crate::report::contender_name;
+use crate::verbs::exit::{ExitStatus, Refusal};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::completed_fraction;
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, Refusal};
 use clap::{Args, ValueHint};
 use leafdyn::study::{
     Chart as Charted, ChartOptions, ChartProgress, ParameterKeys, SolverConfig, VaryError,

@@ -1,7 +1,7 @@
 //! `leafdyn check`: compares the shapes found by two independent methods.
 
+use crate::verbs::exit::{ExitStatus, Refusal};
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
-use crate::verbs::{ExitStatus, Refusal};
 use clap::Args;
 use leafdyn::study;
 use leafdyn::study::{Check as Checked, CheckOptions, CheckVerdict};

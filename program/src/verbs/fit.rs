@@ -1,14 +1,14 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
+use crate::verbs::exit::{ExitStatus, Refusal, print_note};
 use crate::verbs::progress::{completed_fraction, format_duration};
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
-use crate::verbs::{ExitStatus, Refusal, print_note};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
-    Data, DataReadingOptions, Fit as Fitted, FitBudget, FitRequest, FitStep, FreeParameter,
+    Data, DataFileOptions, Fit as Fitted, FitCostLimit, FitRequest, FitStep, FreeParameter,
     MeasuredColumn, RowFilter,
 };
 use std::num::NonZeroUsize;
@@ -65,7 +65,7 @@ pub struct FitArguments {
 const UNANNOUNCED_FIT_SECONDS: f64 = 300.0;
 
 /// Says what a fit takes at most, if that may be long.
-fn announce_budget(name: &str, budget: FitBudget) {
+fn announce_budget(name: &str, budget: FitCostLimit) {
     if budget.seconds > UNANNOUNCED_FIT_SECONDS {
         let (most, time) = (budget.evaluations, format_duration(budget.seconds));
         let leaves = match budget.leaves {
@@ -78,7 +78,6 @@ fn announce_budget(name: &str, budget: FitBudget) {
     }
 }
 
-/// Parses the distance of rows.
 fn parse_row_stride(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number from 1")
 }
@@ -98,7 +97,7 @@ impl FitArguments {
     fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
         let base = job.base.clone();
         let mut data = Data {
-            reading: DataReadingOptions {
+            reading: DataFileOptions {
                 columns: self.column.clone(),
                 every: self.every,
                 rows: self.rows.clone(),

@@ -2,8 +2,8 @@
 //! the program for editors, shells and readers.
 
 use crate::files;
-use crate::verbs::{Cli, ExitStatus, Refusal, show_report, write_standard_output};
-use clap::{Args, CommandFactory, ValueEnum, ValueHint};
+use crate::verbs::exit::{ExitStatus, Refusal, show_report, write_standard_output};
+use clap::{Args, Command, ValueEnum, ValueHint};
 use clap_complete::Shell;
 use leafdyn::scenario::schema;
 use std::io::ErrorKind;
@@ -33,9 +33,9 @@ pub struct CompletionsArguments {
 }
 
 impl CompletionsArguments {
-    pub fn run(self) -> Result<ExitStatus, Refusal> {
+    pub fn run(self, mut program: Command) -> Result<ExitStatus, Refusal> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "leafdyn", &mut script);
+        clap_complete::generate(self.shell, &mut program, "leafdyn", &mut script);
         write_standard_output(&script)?;
         Ok(ExitStatus::Success)
     }
@@ -51,8 +51,7 @@ pub struct ManArguments {
 }
 
 impl ManArguments {
-    pub fn run(self) -> Result<ExitStatus, Refusal> {
-        let mut program = Cli::command();
+    pub fn run(self, mut program: Command) -> Result<ExitStatus, Refusal> {
         program.build();
         let page = match self.verb.as_deref() {
             None => clap_mangen::Man::new(program),
@@ -99,36 +98,49 @@ enum ExampleScenario {
 }
 
 impl ExampleScenario {
-    /// Its name, its text, and the next command.
-    fn contents(self) -> (&'static str, &'static str, &'static str) {
+    fn file_stem(self) -> &'static str {
         match self {
-            ExampleScenario::Leaf => ("leaf", include_str!("examples/leaf.toml"), "relax FILE"),
-            ExampleScenario::Blade => ("blade", include_str!("examples/blade.toml"), "relax FILE"),
-            ExampleScenario::Rod => ("rod", include_str!("examples/rod.toml"), "relax FILE"),
-            ExampleScenario::PullTest => (
-                "pull-test",
-                include_str!("examples/pull-test.toml"),
-                "trace FILE --vary load.tip_force[0]=1.5..5",
-            ),
-            ExampleScenario::Motion => (
-                "motion",
-                include_str!("examples/motion.toml"),
-                "simulate FILE",
-            ),
+            ExampleScenario::Leaf => "leaf",
+            ExampleScenario::Blade => "blade",
+            ExampleScenario::Rod => "rod",
+            ExampleScenario::PullTest => "pull-test",
+            ExampleScenario::Motion => "motion",
+        }
+    }
+
+    fn toml_text(self) -> &'static str {
+        match self {
+            ExampleScenario::Leaf => include_str!("examples/leaf.toml"),
+            ExampleScenario::Blade => include_str!("examples/blade.toml"),
+            ExampleScenario::Rod => include_str!("examples/rod.toml"),
+            ExampleScenario::PullTest => include_str!("examples/pull-test.toml"),
+            ExampleScenario::Motion => include_str!("examples/motion.toml"),
+        }
+    }
+
+    /// The verb and options with which to go on.
+    fn next_command(self) -> &'static str {
+        match self {
+            ExampleScenario::Leaf | ExampleScenario::Blade | ExampleScenario::Rod => "relax FILE",
+            ExampleScenario::PullTest => "trace FILE --vary load.tip_force[0]=1.5..5",
+            ExampleScenario::Motion => "simulate FILE",
         }
     }
 }
 
 impl NewArguments {
     pub fn run(self) -> Result<ExitStatus, Refusal> {
-        let (name, text, next) = self.example.contents();
-        let file = self.file.unwrap_or_else(|| format!("{name}.toml").into());
+        let example = self.example;
+        let name = format!("{}.toml", example.file_stem());
+        let file = self.file.unwrap_or_else(|| name.into());
         let path = file.display();
-        files::write_new_file(&file, text.as_bytes()).map_err(|reason| match reason.kind() {
-            ErrorKind::AlreadyExists => format!("{path}: is there already: name another file"),
-            _ => format!("{path}: cannot be written: {reason}"),
-        })?;
-        let next = next.replace("FILE", &path.to_string());
+        files::write_new_file(&file, example.toml_text().as_bytes()).map_err(
+            |reason| match reason.kind() {
+                ErrorKind::AlreadyExists => format!("{path}: is there already: name another file"),
+                _ => format!("{path}: cannot be written: {reason}"),
+            },
+        )?;
+        let next = example.next_command().replace("FILE", &path.to_string());
         show_report(&format!(
             "{path}: written; change it, then\n  leafdyn {next}\n"
         ))?;

@@ -1,9 +1,9 @@
 //! `leafdyn map`: maps where each method fails.
 
 use crate::report;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
 use crate::verbs::progress::completed_fraction;
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::study;
 use leafdyn::study::{
@@ -13,7 +13,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 /// What is told of an option that is gone.
-const SHARD: &str = "--shard is gone: give each job a part of the range, as in --vary KEY=1..5:5 and KEY=6..10:5, \
+const SHARD_REFUSAL: &str = "--shard is gone: give each job a part of the range, as in --vary KEY=1..5:5 and KEY=6..10:5, \
                      with an --out DIR of its own, and join the rows of their map.csv; or loop in Python";
 
 /// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
@@ -55,7 +55,7 @@ impl MapArguments {
             ..VerbTraits::default()
         };
         if self.shard.is_some() {
-            return Err(SHARD.into());
+            return Err(SHARD_REFUSAL.into());
         }
         self.request
             .run_each_scenario::<Cells>(traits, |job| self.run_scenario(job))
@@ -71,7 +71,7 @@ impl MapArguments {
         )?;
         request.limit = job.limit.clone();
         let clock = Instant::now();
-        let rows = solve(job, &request);
+        let rows = solve_cells(job, &request);
         if job.is_interrupted() && rows.is_empty() {
             return Err(InterruptedRun("no cell was finished").into());
         }
@@ -96,7 +96,7 @@ impl MapArguments {
 }
 
 /// The rows of all cells or, of a run that a signal ends, those of the finished ones.
-fn solve(job: &ScenarioJob, request: &MapRequest) -> Vec<MapRow> {
+fn solve_cells(job: &ScenarioJob, request: &MapRequest) -> Vec<MapRow> {
     let cells = interleave((0..request.cells()).collect());
     let mut line = job.progress_line();
     let (mut rows, mut finished) = (Vec::new(), 0);

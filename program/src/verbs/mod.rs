@@ -1,7 +1,9 @@
-//! The command line, with one file per verb. All computations are in the library.
+//! The command line: verbs, parsing and exit status. All computations are in the library; a verb has a
+//! file of its own.
 
 mod chart;
 mod check;
+mod exit;
 mod fit;
 mod help;
 mod map;
@@ -11,22 +13,15 @@ mod request;
 mod simulate;
 mod trace;
 
-use crate::report::RefusalDocument;
-use crate::{files, report};
+use crate::verbs::exit::{
+    ExitStatus, Refusal, note_json_output, print_note, print_refusal_json,
+    refusal_with_option_names, report_refusal, stop_at_once_on_interrupt,
+};
 use clap::error::{ContextKind, ErrorKind};
-use clap::{Parser, Subcommand};
-use leafdyn::memory::TooMuch;
-use leafdyn::relax::{Limit, RefusedOption};
-use leafdyn::scenario::{ScenarioError, printable};
-use std::error::Error;
+use clap::{CommandFactory, Parser, Subcommand};
+use std::env;
 use std::ffi::OsString;
-use std::io::{IsTerminal, Write};
-use std::iter::successors;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use std::{env, io, process, thread};
 
 /// What the program says without a verb.
 const HELP_WITHOUT_VERB: &str = "\
@@ -71,37 +66,10 @@ impl Cli {
             Verb::Trace(trace) => trace.run(),
             Verb::New(new) => new.run(),
             Verb::Schema(schema) => schema.run(),
-            Verb::Completions(completions) => completions.run(),
-            Verb::Man(man) => man.run(),
+            Verb::Completions(completions) => completions.run(Cli::command()),
+            Verb::Man(man) => man.run(Cli::command()),
         };
         done.map_err(refusal_with_option_names)
-    }
-}
-
-/// The first error of this kind among the causes of a refusal, itself included.
-fn find_cause<E: Error + 'static>(refusal: &Refusal) -> Option<&E> {
-    let first: &(dyn Error + 'static) = &**refusal;
-    let mut causes = successors(Some(first), |&error| error.source());
-    causes.find_map(|error| error.downcast_ref())
-}
-
-/// A refusal with what it is about as the user types it: options, overrides, and the limit on
-/// memory.
-fn refusal_with_option_names(refusal: Refusal) -> Refusal {
-    if let Some(RefusedOption {
-        option,
-        value,
-        reason,
-    }) = find_cause(&refusal)
-    {
-        return format!("--{} {value}: {reason}", option.replace('_', "-")).into();
-    }
-    if let Some(error) = find_cause::<ScenarioError>(&refusal) {
-        return error.message_with_option("--set").into();
-    }
-    match find_cause::<TooMuch>(&refusal) {
-        Some(too_much) => format!("{too_much}, or raise the limit with --memory").into(),
-        None => refusal,
     }
 }
 
@@ -114,7 +82,7 @@ pub fn main() -> ExitCode {
 pub fn main_with(arguments: Vec<OsString>) -> u8 {
     // Found before parsing, which may fail.
     let json = arguments.iter().any(|argument| argument == "--json");
-    IS_JSON_OUTPUT.store(json, Ordering::Relaxed);
+    note_json_output(json);
     let command_line = match Cli::try_parse_from(arguments) {
         Ok(command_line) => command_line,
         Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
@@ -144,26 +112,6 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
     status.exit_code() as u8
 }
 
-/// Whether standard output is JSON.
-static IS_JSON_OUTPUT: AtomicBool = AtomicBool::new(false);
-
-/// Reports an error on standard error and, with `json`, as JSON on standard output.
-fn report_refusal(error: &str, json: bool) -> ExitStatus {
-    print_note(&format!("error: {error}"));
-    if json {
-        print_refusal_json(error, ExitStatus::Refused as i32);
-    }
-    ExitStatus::Refused
-}
-
-fn print_refusal_json(error: &str, exit_status: i32) {
-    let mut bytes = Vec::new();
-    if report::write_json(&RefusalDocument::new(error, exit_status), &mut bytes).is_ok() {
-        // A failure to report the error cannot be reported.
-        let _ = write_standard_output(&bytes);
-    }
-}
-
 /// How to get a scenario, if none is named.
 fn scenario_suggestion(error: &clap::Error) -> &'static str {
     let missing = error.kind() == ErrorKind::MissingRequiredArgument;
@@ -177,198 +125,5 @@ fn scenario_suggestion(error: &clap::Error) -> &'static str {
              leafdyn new leaf        writes leaf.toml; leafdyn new --help: what else there is\n  \
              leafdyn relax leaf.toml"
         }
-    }
-}
-
-/// Why a request was refused or failed: a message that says what to change.
-type Refusal = Box<dyn Error + Send + Sync>;
-
-/// Exit status of the process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(i32)]
-enum ExitStatus {
-    /// At rest within the tolerance; of a check: both methods agree; of a
-    /// simulation: followed to its end; of a chart: its reference is confirmed.
-    Success = 0,
-    /// The run ended otherwise: not at rest within the tolerance; of a check:
-    /// the methods differ or could not be compared; of a simulation: it ended
-    /// early; of a chart: its reference is not confirmed. The results are written
-    /// in any case.
-    Failure = 1,
-    /// The request was refused, or its result could not be written.
-    Refused = 2,
-    /// Ctrl-C ended the run, or another signal. What was found until then is written, if it is of
-    /// use.
-    Interrupted = 128 + SIGINT,
-}
-
-impl ExitStatus {
-    fn from_success(success: bool) -> Self {
-        match success {
-            true => ExitStatus::Success,
-            false => ExitStatus::Failure,
-        }
-    }
-
-    /// The number that the process ends with: of a signal 128 and its number.
-    fn exit_code(self) -> i32 {
-        match self {
-            ExitStatus::Interrupted => 128 + FIRST_SIGNAL.load(Ordering::Relaxed),
-            _ => self as i32,
-        }
-    }
-
-    /// That of a run that ended with this refusal.
-    fn from_refusal(refusal: &Refusal) -> Self {
-        match find_cause::<InterruptedRun>(refusal) {
-            Some(_) => ExitStatus::Interrupted,
-            None => ExitStatus::Refused,
-        }
-    }
-}
-
-/// A signal ended a run that has found nothing of use.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {}", signal_phrase(), .0)]
-struct InterruptedRun(&'static str);
-
-/// The signals that end a run: a closed terminal, Ctrl-C, and a request to end.
-#[cfg(unix)]
-const SIGHUP: i32 = 1;
-
-const SIGINT: i32 = 2;
-
-#[cfg(unix)]
-const SIGTERM: i32 = 15;
-
-/// The first signal that came.
-static FIRST_SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
-
-/// What is told of a run that a signal ended.
-fn signal_phrase() -> &'static str {
-    match FIRST_SIGNAL.load(Ordering::Relaxed) {
-        #[cfg(unix)]
-        SIGHUP => "stopped by SIGHUP",
-        #[cfg(unix)]
-        SIGTERM => "stopped by SIGTERM",
-        _ => "stopped by Ctrl-C",
-    }
-}
-
-/// Time after a signal in which a run ends by itself, with what it has found.
-const GRACE_AFTER_SIGNAL: Duration = Duration::from_secs(10);
-
-/// A run that ends with what it has found, once this is `true`; without one the process ends at
-/// once.
-static CANCEL: Mutex<Option<Arc<AtomicBool>>> = Mutex::new(None);
-
-/// Makes Ctrl-C and other signals that ask the process to end do so at once, without half-written
-/// files; or, where a part of a result is of use, with that.
-#[cfg(unix)]
-fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
-    let hangup = (!ignores_hangup()).then_some(SIGHUP);
-    let signals = [SIGINT, SIGTERM].into_iter().chain(hangup);
-    let mut signals = signal_hook::iterator::Signals::new(signals)?;
-    thread::spawn(move || signals.forever().for_each(handle_signal));
-    Ok(())
-}
-
-/// Makes Ctrl-C end the process at once, without half-written files; or, where a part of a result
-/// is of use, with that.
-#[cfg(windows)]
-fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
-    ctrlc::set_handler(|| handle_signal(SIGINT))?;
-    Ok(())
-}
-
-/// Whether whoever started the process made it survive the end of its terminal, as `nohup` does; where
-/// that cannot be told, a hangup ends the process as if it were not handled.
-#[cfg(unix)]
-fn ignores_hangup() -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    ignored.is_none_or(|mask| mask & (1 << (SIGHUP - 1)) != 0)
-}
-
-/// Ends the process after a signal: at once, or with what it has found.
-fn handle_signal(signal: i32) {
-    if let Some(cancel) = cancel().as_ref()
-        && !cancel.load(Ordering::Relaxed)
-    {
-        FIRST_SIGNAL.store(signal, Ordering::Relaxed);
-        cancel.store(true, Ordering::Relaxed);
-        clear_progress_line();
-        print_note("stopping with what was found so far; Ctrl-C again: at once, without it");
-        thread::spawn(|| {
-            thread::sleep(GRACE_AFTER_SIGNAL);
-            exit_after_signal();
-        });
-        return;
-    }
-    FIRST_SIGNAL.store(signal, Ordering::Relaxed);
-    exit_after_signal();
-}
-
-/// Ends the process after a signal.
-fn exit_after_signal() -> ! {
-    files::remove_unfinished_files();
-    clear_progress_line();
-    let stopped = signal_phrase();
-    print_note(&format!(
-        "{stopped}: nothing of an unfinished result is kept"
-    ));
-    let status = ExitStatus::Interrupted.exit_code();
-    if IS_JSON_OUTPUT.load(Ordering::Relaxed) {
-        print_refusal_json(stopped, status);
-    }
-    process::exit(status);
-}
-
-fn clear_progress_line() {
-    if io::stderr().is_terminal() {
-        let _ = write!(io::stderr(), "\r\x1b[2K");
-    }
-}
-
-/// The limit of a run that ends with what it has found when the process is stopped.
-fn limit_until_interrupt() -> Limit {
-    let cancel = Arc::new(AtomicBool::new(false));
-    *self::cancel() = Some(cancel.clone());
-    Limit {
-        cancel: Some(cancel),
-        ..Limit::default()
-    }
-}
-
-/// What Ctrl-C cancels.
-fn cancel() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
-    // It is only replaced as a whole, so it is valid even if the lock is poisoned.
-    CANCEL.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Prints a line to standard error; failures are ignored.
-fn print_note(line: &str) {
-    let _ = writeln!(io::stderr(), "{}", printable(line));
-}
-
-/// Prints a report to standard output.
-fn show_report(report: &str) -> Result<(), Refusal> {
-    write_standard_output(printable(report).as_bytes())
-}
-
-/// Writes to standard output. Whoever reads a report may close it when he has seen enough
-/// (`| head`); of JSON half is of no use.
-fn write_standard_output(bytes: &[u8]) -> Result<(), Refusal> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-        Err(error)
-            if error.kind() == io::ErrorKind::BrokenPipe
-                && !IS_JSON_OUTPUT.load(Ordering::Relaxed) =>
-        {
-            Ok(())
-        }
-        Err(error) => Err(format!("cannot write to standard output: {error}").into()),
-        Ok(()) => Ok(()),
     }
 }

@@ -6,7 +6,7 @@ use std::io;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Shorter runs show no line, which would only flicker.
+/// Runs that take less time show no progress line, which would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);
 
 /// Most redraws of the line per second.
@@ -101,7 +101,7 @@ pub fn completed_fraction(done: usize, all: usize) -> Option<f64> {
     Some(done as f64 / all.max(1) as f64)
 }
 
-/// Where a number is between two others, from 0 to 1; linearly, or by logarithms.
+/// Where a number is between two others, from 0 to 1, linearly or by logarithms.
 pub fn range_fraction(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
     let place = |value: f64| if log { value.abs().ln() } else { value };
     let fraction = (place(at) - place(from)) / (place(to) - place(from));

@@ -1,13 +1,14 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
 use crate::files::{FileKind, LIVE_PAGE_FILE};
+use crate::report::doubt_with_option;
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study;
@@ -119,7 +120,7 @@ impl RelaxArguments {
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.print_remark(equilibrium.remark.as_ref());
         for doubt in &equilibrium.doubts {
-            job.print_remark(Some(doubt));
+            job.print_remark(Some(doubt_with_option(doubt)));
         }
         let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
         let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;
@@ -189,7 +190,7 @@ impl RelaxArguments {
     }
 
     fn find_all_equilibria(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
-        let Method::SemiImplicit(how) = self.method_with_options()? else {
+        let Some(how) = self.method_with_options()?.semi_implicit() else {
             return Err("--all: only with the method semi-implicit".into());
         };
         let mut line = job.progress_line();

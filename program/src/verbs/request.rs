@@ -1,17 +1,15 @@
-//! The options common to all verbs, and how a verb runs over its scenarios: folders,
-//! files and output.
-//!
-//! One scenario of a request, and the delivery of its result.
+//! The options common to all verbs, and how a verb runs over its scenarios: one after the other or in
+//! parallel, each with a folder, and how the result of each is delivered: files, a report, or JSON.
 
 use crate::files::{FileKind, FileSelection, ResultDocument, WrittenResult};
-use crate::report::table::{file_list_text, table_of_json_results};
+use crate::report::table::{ScenarioOutput, file_list_text, table_of_json_results};
 use crate::report::{RefusalDocument, ReportedResult};
-use crate::verbs::help::EXPERT_OPTIONS_HEADING;
-use crate::verbs::progress::{ProgressLine, completed_fraction};
-use crate::verbs::{
+use crate::verbs::exit::{
     ExitStatus, InterruptedRun, Refusal, find_cause, limit_until_interrupt, print_note,
     refusal_with_option_names, report_refusal, show_report, signal_phrase, write_standard_output,
 };
+use crate::verbs::help::EXPERT_OPTIONS_HEADING;
+use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::{files, live, report};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
@@ -94,7 +92,7 @@ fn parse_file_kinds(list: &str) -> Result<FileKinds, String> {
         .map(FileKinds)
 }
 
-/// Parses one of these words.
+/// A parser of options that takes one of these words.
 pub fn word_parser<T>(
     words: impl IntoIterator<Item = &'static str>,
 ) -> impl TypedValueParser<Value = T>
@@ -107,7 +105,7 @@ where
 /// How a verb treats its scenarios.
 #[derive(Clone, Copy, Default)]
 pub struct VerbTraits<'f> {
-    /// Whether it varies numbers of the scenario and settings of methods.
+    /// Whether the verb varies numbers of the scenario and settings of methods.
     pub varies_numbers: bool,
     /// Whether the stations in its files can be chosen.
     pub has_station_choice: bool,
@@ -137,7 +135,7 @@ impl ScenarioArguments {
             true => limit_until_interrupt(),
             false => Limit::default(),
         };
-        let job = |file: &Path| self.open_job::<R>(file, traits, (&selection, &limit));
+        let job = |file: &Path| self.open_job::<R>(file, traits, &selection, &limit);
         if let [file] = self.scenarios.as_slice() {
             let done = run_catching_panics(&job(file)?, &run);
             let done = done.map_err(|refusal| self.refusal_with_option(traits, refusal))?;
@@ -171,7 +169,10 @@ impl ScenarioArguments {
             });
             let done = done.map_err(|refusal| {
                 let status = ExitStatus::from_refusal(&refusal);
-                (refusal_with_option_names(refusal).to_string(), status)
+                UnsolvedScenario {
+                    refusal: refusal_with_option_names(refusal).to_string(),
+                    status,
+                }
             });
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.runs_in_parallel, line.lock()) {
@@ -217,7 +218,7 @@ impl ScenarioArguments {
             return Err("standard input can be read only once: name one - and files".into());
         }
         if !self.is_single_scenario() && selection.kinds.contains(&FileKind::Csv) {
-            let (folder, name) = self.table_location::<R>();
+            let (folder, name) = (self.table_folder(), Self::table_name::<R>());
             files::check_inputs(folder, &[&name], self.input_files(traits))?;
             if self.out.is_none() {
                 files::check_table(&folder.join(name), &self.scenarios)?;
@@ -226,25 +227,29 @@ impl ScenarioArguments {
         Ok(())
     }
 
-    /// All files that are read.
+    /// The scenarios and the other files that the verb reads.
     fn input_files<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
         self.scenarios.iter().chain(traits.input_files)
     }
 
-    /// The folder and the name of the table of several scenarios.
-    fn table_location<R: WrittenResult>(&self) -> (&Path, String) {
-        let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
+    /// The folder of the table of several scenarios.
+    fn table_folder(&self) -> &Path {
+        self.out.as_deref().unwrap_or(Path::new("out"))
+    }
+
+    /// The file name of a table of several results.
+    fn table_name<R: WrittenResult>() -> String {
+        match R::JSON.and_then(|name| name.strip_suffix(".json")) {
             None | Some("summary") => "table.csv".to_string(),
             Some(verb) => format!("{verb}_table.csv"),
-        };
-        (self.out.as_deref().unwrap_or(Path::new("out")), name)
+        }
     }
 
     /// Outputs the results of several scenarios, and writes their table.
     fn output_results<R: WrittenResult>(
         &self,
         selection: &FileSelection,
-        all: Vec<Result<DeliveredResult, (String, ExitStatus)>>,
+        all: Vec<Result<DeliveredResult, UnsolvedScenario>>,
     ) -> Result<ExitStatus, Refusal> {
         let mut status = ExitStatus::Success;
         let (mut documents, mut errors) = (Vec::new(), Vec::new());
@@ -257,12 +262,13 @@ impl ScenarioArguments {
                     }
                     (done.status, done.error, done.json)
                 }
-                Err((error, this)) => {
+                Err(UnsolvedScenario { refusal, status }) => {
                     let mut json = Vec::new();
-                    report::write_json(&RefusalDocument::new(&error, this.exit_code()), &mut json)?;
-                    unsolved += usize::from(this == ExitStatus::Interrupted);
-                    let told = (this != ExitStatus::Interrupted).then_some(error);
-                    (this, told, json)
+                    let document = RefusalDocument::new(&refusal, status.exit_code());
+                    report::write_json(&document, &mut json)?;
+                    unsolved += usize::from(status == ExitStatus::Interrupted);
+                    let told = (status != ExitStatus::Interrupted).then_some(refusal);
+                    (status, told, json)
                 }
             };
             status = status.max(this);
@@ -270,7 +276,11 @@ impl ScenarioArguments {
                 status = status.max(ExitStatus::Refused);
             }
             errors.extend(error);
-            documents.push((file.display().to_string(), this.exit_code(), json));
+            documents.push(ScenarioOutput {
+                file: file.display().to_string(),
+                exit_status: this.exit_code(),
+                json,
+            });
         }
         for error in errors {
             print_note(&format!("error: {error}"));
@@ -283,7 +293,7 @@ impl ScenarioArguments {
             ));
         }
         if selection.kinds.contains(&FileKind::Csv) {
-            let (out, name) = self.table_location::<R>();
+            let (out, name) = (self.table_folder(), Self::table_name::<R>());
             let rows = table_of_json_results(&documents)?;
             let file = files::write_table(out, &name, &rows)?;
             if !self.json {
@@ -291,7 +301,7 @@ impl ScenarioArguments {
             }
         }
         if self.json {
-            let texts = documents.iter().map(|(_, _, json)| json.trim_ascii());
+            let texts = documents.iter().map(|output| output.json.trim_ascii());
             let texts: Vec<_> = texts.collect();
             write_standard_output(
                 &[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat(),
@@ -331,7 +341,8 @@ impl ScenarioArguments {
         &self,
         path: &Path,
         traits: VerbTraits,
-        (selection, limit): (&FileSelection, &Limit),
+        selection: &FileSelection,
+        limit: &Limit,
     ) -> Result<ScenarioJob, Refusal> {
         let (file, text) = match path.to_str() {
             Some("-") => ("standard input".into(), read_standard_input()?),
@@ -384,7 +395,6 @@ impl ScenarioArguments {
         })
     }
 
-    /// Whether it is about one scenario only.
     fn is_single_scenario(&self) -> bool {
         self.scenarios.len() == 1
     }
@@ -405,7 +415,7 @@ pub struct ScenarioJob {
     pub(super) json: bool,
     /// Whether the report says what it took.
     pub(super) verbose: bool,
-    /// Whether it is the only one of its request.
+    /// Whether the request names no other scenario.
     pub(super) is_only_scenario: bool,
     pub scenario: Scenario,
     /// The scenario as a base for varied numbers.
@@ -414,14 +424,14 @@ pub struct ScenarioJob {
     pub selection: FileSelection,
     pub(super) file: String,
     pub(super) source: String,
-    /// Whether several run in parallel.
+    /// Whether scenarios of the request run in parallel.
     pub(super) runs_in_parallel: bool,
     /// When the run ends with what it has found: at a signal, if that is of use.
     pub limit: Limit,
 }
 
 /// The lines that list files, or why these could not be written.
-pub type FileLines = Result<Vec<String>, Refusal>;
+type FileLines = Result<Vec<String>, Refusal>;
 
 /// The delivered result of a scenario.
 pub struct DeliveredResult {
@@ -434,8 +444,14 @@ pub struct DeliveredResult {
     pub(super) error: Option<String>,
 }
 
+/// One of several scenarios without a result: why it was refused, or that the run was stopped.
+struct UnsolvedScenario {
+    refusal: String,
+    status: ExitStatus,
+}
+
 /// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.
-pub fn run_catching_panics(
+fn run_catching_panics(
     job: &ScenarioJob,
     run: impl Fn(&ScenarioJob) -> Result<DeliveredResult, Refusal>,
 ) -> Result<DeliveredResult, Refusal> {
@@ -453,7 +469,7 @@ fn panic_message(cause: &(dyn Any + Send)) -> String {
 }
 
 impl ScenarioJob {
-    /// Its progress line; hidden if scenarios run in parallel, which share one.
+    /// The progress line of the scenario; hidden if scenarios run in parallel, which share one.
     pub fn progress_line(&self) -> ProgressLine {
         ProgressLine::new(&self.scenario.name, !self.runs_in_parallel)
     }

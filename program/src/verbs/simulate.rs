@@ -2,11 +2,11 @@
 
 use crate::files::MotionRecording;
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::progress::{ProgressLine, format_duration, range_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal, print_note};
 use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
@@ -21,7 +21,7 @@ const FINER_GRID_ANNOUNCED_SECONDS: f64 = 5.0;
 const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
 /// What is told of an option that is gone.
-const RESUME: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
+const RESUME_REFUSAL: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
                       none is continued; leave it out to simulate from the beginning";
 
 /// What is told where no output but the first was made.
@@ -55,6 +55,14 @@ pub struct SimulateArguments {
     resume: bool,
 }
 
+/// A simulation that has ended, with what was recorded of it.
+struct RecordedRun {
+    simulation: Simulation,
+    recording: MotionRecording,
+    /// Why it ended early.
+    stopped: Option<Stopped>,
+}
+
 impl SimulateArguments {
     pub fn run(self) -> Result<ExitStatus, Refusal> {
         let traits = VerbTraits {
@@ -63,7 +71,7 @@ impl SimulateArguments {
             ..VerbTraits::default()
         };
         if self.resume {
-            return Err(RESUME.into());
+            return Err(RESUME_REFUSAL.into());
         }
         self.request
             .run_each_scenario::<Record>(traits, |job| self.run_scenario(job))
@@ -88,20 +96,18 @@ impl SimulateArguments {
             show_progress(&mut line, run);
             true
         }) {
-            let (simulation, recording, stopped) = self.run_and_record(run, &mut line, job)?;
-            if job.is_interrupted() && (last.is_some() || simulation.frames().1 == 0) {
+            let run = self.run_and_record(run, &mut line, job)?;
+            if job.is_interrupted() && (last.is_some() || run.simulation.frames().1 == 0) {
                 // A run on a coarser grid is whole.
                 break;
             }
-            let (simulation, _, stopped) = last.insert((simulation, recording, stopped));
-            motion.end_run(simulation, *stopped);
+            let run = last.insert(run);
+            motion.end_run(&mut run.simulation, run.stopped);
             announce_duration(&motion, job, FINER_GRID_ANNOUNCED_SECONDS);
         }
         drop(line);
         match last {
-            Some((simulation, mut recording, stopped)) => {
-                self.deliver(&simulation, &mut recording, stopped, job)
-            }
+            Some(run) => self.deliver(run, job),
             None if job.is_interrupted() => Err(NOT_MOVED.into()),
             None => Err("the motion was not followed".into()),
         }
@@ -113,7 +119,7 @@ impl SimulateArguments {
         mut simulation: Simulation,
         line: &mut ProgressLine,
         job: &ScenarioJob,
-    ) -> Result<(Simulation, MotionRecording, Option<Stopped>), Refusal> {
+    ) -> Result<RecordedRun, Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
         let mut recording = MotionRecording::begin(folder, &mut simulation, selection)?;
         let bytes = recording.expected_bytes(&simulation);
@@ -131,17 +137,16 @@ impl SimulateArguments {
                 }
             }
         }
-        Ok((simulation, recording, stopped))
+        Ok(RecordedRun {
+            simulation,
+            recording,
+            stopped,
+        })
     }
 
-    fn deliver(
-        &self,
-        simulation: &Simulation,
-        recording: &mut MotionRecording,
-        stopped: Option<Stopped>,
-        job: &ScenarioJob,
-    ) -> Result<DeliveredResult, Refusal> {
-        let record = recording.finished_record(simulation, stopped)?;
+    fn deliver(&self, mut run: RecordedRun, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let (recording, stopped) = (&mut run.recording, run.stopped);
+        let record = recording.finished_record(&run.simulation, stopped)?;
         job.print_remark(record.remark());
         for doubt in &record.doubts {
             job.print_remark(Some(doubt));

@@ -1,11 +1,11 @@
 //! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
 use crate::report::numbers::format_five_digits;
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
 use crate::verbs::progress::range_fraction;
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use crate::verbs::{ExitStatus, InterruptedRun, Refusal};
 use clap::Args;
 use leafdyn::study;
 use leafdyn::study::{

@@ -1,15 +1,14 @@
-//! What the README and the pages of `docs` show can be done: every command runs,
-//! here or in one of three scripts, prints what the page says, and links lead
-//! somewhere.
+//! The pages say what is so: every command on them runs and prints what stands there, every file and
+//! folder that the page on the architecture names is there, and the page on formats lists every key of a
+//! scenario once.
 
+use leafdyn::scenario::Key;
 use leafdyn_testing::root;
 use leafdyn_testing::workplace::program;
 use std::collections::HashSet;
-use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
+use std::{env, fs};
 use tempfile::TempDir;
 
 /// Scripts that run what takes long or needs other programs.
@@ -253,4 +252,62 @@ fn links_lead_to_files_and_headings() {
             }
         }
     }
+}
+
+/// Where a path on the page begins.
+const ROOMS: [&str; 6] = ["src/", "program/", "python/", "web/", "tests/", "benches/"];
+
+#[test]
+fn every_path_on_the_page_exists() {
+    let page = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let quoted = page.split('`').skip(1).step_by(2);
+    let paths: Vec<&str> = quoted
+        .filter(|it| ROOMS.iter().any(|room| it.starts_with(room)))
+        .collect();
+    assert!(paths.len() > 40, "{paths:?}");
+    for path in paths {
+        assert!(root().join(path).exists(), "{path} is no file or folder");
+    }
+}
+
+#[test]
+fn ten_questions_are_answered_by_files() {
+    let page = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let (_, section) = page.split_once("\n## Where is ...?\n").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let answers: Vec<&str> = section
+        .lines()
+        .filter(|line| line.starts_with("- "))
+        .collect();
+    assert!(answers.len() >= 10, "{answers:?}");
+    for answer in answers {
+        assert!(answer.contains(".rs`"), "{answer}");
+    }
+}
+
+/// Paths of the keys in the lists under the names of their tables.
+fn documented(page: &str) -> Vec<String> {
+    let (_, section) = page.split_once("\n## The scenario\n").unwrap();
+    let (section, _) = section.split_once("\n### ").unwrap();
+    let (mut table, mut paths) = (String::new(), Vec::new());
+    for line in section.lines() {
+        if let Some(name) = line.strip_prefix("**`[") {
+            let name = name.split(']').next().unwrap().trim_start_matches('[');
+            table = format!("{name}.");
+        }
+        let entry = line.strip_prefix("- ").and_then(|it| it.split_once(" ("));
+        let names = entry.map_or("", |(names, _)| names);
+        let names = names.split('`').skip(1).step_by(2);
+        paths.extend(names.map(|name| format!("{table}{name}")));
+    }
+    paths.sort();
+    paths
+}
+
+#[test]
+fn every_key_stands_once_on_the_page_of_formats() {
+    let page = fs::read_to_string(root().join("docs/formats.md")).unwrap();
+    let mut keys: Vec<String> = Key::all().map(|key| key.path().to_owned()).collect();
+    keys.sort();
+    assert_eq!(documented(&page), keys);
 }

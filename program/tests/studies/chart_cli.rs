@@ -292,7 +292,7 @@ fn peers_stand_beside_our_own_methods() {
     assert!((ratio * ours / 2000.0 - 1.0).abs() < 1e-12);
     assert_eq!(chart["peers"][1]["ratio"], Value::Null);
     let remarks = chart["remarks"].to_string();
-    contains(&remarks, &["1 row of --peers is about another leaf"]);
+    contains(&remarks, &["1 row of peers is about another leaf"]);
     let parts = [">slow</text>", ">not-converged max-nodes</text>"];
     contains(&place.picture("out/chart"), &parts);
 }

@@ -31,7 +31,7 @@ fn soft_leaf_with_many() {
     assert_eq!(saddle.equilibrium.stability.negative_eigenvalues, Some(18));
     let plain = all.found.iter().filter(|one| one.plain).count();
     assert_eq!(plain, 1, "the plain start is told");
-    assert!(all.found[0].plain && all.remark.is_none());
+    assert!(all.found[0].plain && all.remarks.is_empty());
     for one in &all.found {
         let residual = one.equilibrium.accuracy.residual.unwrap();
         assert!(residual < 1e-7, "{residual}");

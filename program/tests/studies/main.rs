@@ -5,7 +5,6 @@ mod chart_cli;
 mod check_cli;
 mod equilibria;
 mod keys;
-mod map_cli;
 mod map_outcomes;
 mod margin;
 mod simulate_choice;

@@ -43,6 +43,9 @@ class Equilibrium(Viewed):
     outcome = Attribute[str]("""How the run ended, in one word: ``"converged"`` and so on, as in ``summary.json``.""")
     success = Attribute[bool]("Whether the leaf is at rest within the tolerance.")
     remark = Attribute[str | None]("What would help, if the run did not succeed.")
+    remark_code = Attribute[str | None](
+        """The remark in one word, such as ``"step-limit"``, which stays when the sentence changes; none without one."""
+    )
     doubts = Attribute[list[str]]("What can hardly be meant: a vein that is stretched far, say, or a fan in degrees.")
     rods = Attribute[int]("The number of rods N.")
     joined = Attribute[bool]("Whether the tips are one point.")

@@ -154,6 +154,7 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "scenario": scenario,
         "success": said["outcome"] in ("converged", "converged-after-saddle", "saddle"),
         "remark": said.get("remark"),
+        "remark_code": said.get("remark_code"),
         "doubts": said.get("doubts", []),
         "rods": len(positions),
         "joined": scenario.joined,

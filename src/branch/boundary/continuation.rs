@@ -13,9 +13,9 @@ use crate::branch::boundary::singular_point::{
     BoundarySeed, SingularPoint, TwoParameterEquations, TwoParameterProblem,
 };
 use crate::branch::continuation::BranchEnd;
+use crate::branch::convergence::VerificationFailure;
 use crate::branch::critical::CriticalKind;
 use crate::branch::equations::CorrectorFailure;
-use crate::branch::refine::VerificationFailure;
 use crate::leaf::Grid;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};

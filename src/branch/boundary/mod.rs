@@ -49,11 +49,10 @@ pub use crate::branch::boundary::singular_point::{
 };
 use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
 use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
+use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::refine::{
-    ExtrapolatedPoint, VerificationFailure, index_at, on_finer, refine_critical,
-};
+use crate::branch::refine::{index_at, on_finer, refine_critical};
 use crate::branch::{EquilibriumPoint, prolong_field, restrict_field};
 use crate::leaf::{Grid, NodalField, State};
 use crate::relax::accuracy::transfer::{prolong, restrict};

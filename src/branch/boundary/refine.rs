@@ -1,6 +1,10 @@
-//! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
+//! Points of a stability boundary on finer and finer grids.
 //!
-//! A point of a boundary, extrapolated over finer and finer grids.
+//! A point is sought at the same value of one of the parameters on all grids or, where the
+//! boundary goes along neither, in the plane across it; special points where they are on each
+//! grid. On a finer grid Newton's method begins at the point extrapolated from the grids before.
+//! The matrix of a nearly rigid leaf loses digits on finer grids: its points are found by a secant
+//! method, from coarse grids on, and their parameters are extrapolated to no softening.
 
 use crate::branch::boundary::codimension_two::{CodimensionTwoKind, locate_codimension_two};
 use crate::branch::boundary::singular_point::{
@@ -8,12 +12,16 @@ use crate::branch::boundary::singular_point::{
     TwoParameterProblem, TwoParameterState,
 };
 use crate::branch::boundary::{boundary_point_on_coarser, boundary_point_on_finer};
+use crate::branch::convergence::{
+    EXACT_PARAMETER_ERROR, GridLimits, MAX_GRIDS, NestedGridPoint, Relocation, VerificationFailure,
+    verify_over_grids,
+};
 use crate::branch::critical::CriticalKind;
 use crate::branch::equations::CorrectorFailure;
 use crate::branch::family::stiffest_condensed;
 use crate::branch::refine::{
-    CUBIC_EXTRAPOLATION_WEIGHTS, FINEST_GRID_RATIO, NEARLY_RIGID, PARABOLIC_EXTRAPOLATION_WEIGHTS,
-    REGULARIZATION_COMPLIANCES, VerificationFailure,
+    CUBIC_EXTRAPOLATION_WEIGHTS, FINEST_GRID_RATIO, PARABOLIC_EXTRAPOLATION_WEIGHTS,
+    REGULARIZATION_COMPLIANCES, is_nearly_rigid,
 };
 use crate::leaf::{Grid, State};
 use crate::newton::Contraction;
@@ -22,27 +30,16 @@ use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::accuracy::transfer::{GridLevel, predict_on_finer_grid, weights};
 use glam::DVec3;
 
-/// Least and largest number of grids of a point, that of a nearly rigid leaf, and segments of
-/// the finest grid.
+/// Least number of grids of a point, and largest of a point of a nearly rigid leaf.
 const MIN_POINT_GRIDS: usize = 3;
 
-const GRIDS: usize = 6;
-
 const MAX_RIGID_LEAF_GRIDS: usize = 4;
-
-const FINEST: usize = 4096;
-
-/// Displacements from grid to grid must decrease, unless below this (lengths).
-const NEGLIGIBLE_DISPLACEMENT: f64 = 1e-4;
 
 /// Largest error of the tips (lengths) of a point whose parameters are known.
 const LARGEST_NEUTRAL_TIP_ERROR: f64 = 1e-3;
 
 /// Largest iteration error of Newton's method on a grid, as a part of the error allowed.
 const ITERATION_ERROR_FRACTION: f64 = 1e-3;
-
-/// Parameters with errors below this part of their ranges are exact.
-const EXACT_PARAMETER_ERROR: f64 = 1e-12;
 
 /// First compliance by which matrices of nearly rigid leaves are softened, and the largest ratio
 /// of the errors of successive, smaller ones.
@@ -74,7 +71,7 @@ pub struct BoundaryAccuracy {
 impl BoundaryAccuracy {
     /// Whether errors of the tips and of the parameters are small enough, on the `last` grid or on
     /// one after which there are others; `exact`: whether the parameters are as sought.
-    fn is_reached(&self, tips: f64, numbers: [f64; 2], (exact, last): (bool, bool)) -> bool {
+    fn is_reached(&self, tips: f64, numbers: [f64; 2], exact: bool, last: bool) -> bool {
         match last {
             false => tips <= self.tips && exact,
             true => {
@@ -95,6 +92,22 @@ pub struct UnverifiedBoundaryPoint {
     pub fixed_parameter: Option<usize>,
 }
 
+/// A point of a boundary on a grid.
+struct LocatedBoundaryPoint {
+    point: SingularPoint,
+    /// Derivative of the vanishing function along the boundary, where that alone determines the
+    /// position of the point on it: at a crossing. (At a cusp the parameters are stationary along
+    /// the boundary.)
+    slope_along: Option<f64>,
+}
+
+/// What distinguishes a point from others of its boundary.
+#[derive(Clone, Copy)]
+struct BoundaryPointCondition {
+    special: Option<CodimensionTwoKind>,
+    fixed_parameter: Option<usize>,
+}
+
 /// Verifies a point on as many grids as necessary; they must agree on index and
 /// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
 /// coarser ones if possible.
@@ -104,11 +117,9 @@ pub fn refine(
     step: &UnverifiedBoundaryPoint,
     accuracy: BoundaryAccuracy,
 ) -> Result<VerifiedBoundaryPoint, VerificationFailure> {
-    let rigid = TwoParameterEquations::new(plane, grid.clone())
-        .leaves
-        .leaf_at(step.point.solution.params)?
-        .least_compliance();
-    if rigid * NEARLY_RIGID < 1.0
+    let mut manifold = TwoParameterEquations::new(plane, grid.clone());
+    let leaf = manifold.leaves.leaf_at(step.point.solution.params)?;
+    if is_nearly_rigid(leaf)
         && let Some((grid, point)) = boundary_point_on_coarser(plane, grid, &step.point)
     {
         let step = UnverifiedBoundaryPoint {
@@ -119,100 +130,180 @@ pub fn refine(
             return Ok(verified);
         }
     }
-    verify_from_grid(plane, grid, step, accuracy)
+    verify_over_grids(NestedBoundaryPoint::new(plane, grid, step, accuracy))
 }
 
-/// The same, starting from this grid.
-fn verify_from_grid(
-    plane: &TwoParameterProblem,
-    grid: &Grid,
-    step: &UnverifiedBoundaryPoint,
+/// A point of a boundary that is verified on finer and finer grids.
+struct NestedBoundaryPoint<'a> {
+    manifold: TwoParameterEquations<'a>,
+    /// The point on the present grid.
+    located: LocatedBoundaryPoint,
+    condition: BoundaryPointCondition,
+    /// The index that all grids must have.
+    index: usize,
+    /// Whether the leaf is nearly rigid, and the compliance by which its matrix is softened.
+    rigid: bool,
+    regularization: Option<f64>,
+    /// The leaf in its state on each grid so far, and the parameters there.
+    levels: Vec<GridLevel>,
+    params: Vec<[f64; 2]>,
+    contraction: Contraction,
+    table: BoundaryConvergenceTable,
     accuracy: BoundaryAccuracy,
-) -> Result<VerifiedBoundaryPoint, VerificationFailure> {
-    let mut manifold = TwoParameterEquations::new(plane, grid.clone());
-    let mut near = step.point.clone();
-    let given = step
-        .fixed_parameter
-        .or_else(|| fixable_parameter(&manifold, &near));
-    let given = given.filter(|_| step.special.is_none());
-    let mut table =
-        BoundaryConvergenceTable::new(given.map(|which| (which, near.solution.params[which])));
-    let (mut moved, mut factorizations) = (f64::INFINITY, 0);
-    let mut contraction = Contraction::default();
-    let (mut levels, mut params) = (Vec::<GridLevel>::new(), Vec::new());
-    let enough = accuracy.sought.max(EXACT_PARAMETER_ERROR);
-    let mut softening = None;
-    for level in 0..GRIDS {
-        if level > 0 {
-            (manifold, near) = boundary_point_on_finer(&mut manifold, &near)?;
-        }
-        let mut start = near.solution.clone();
-        let believed = table.tips.best().map_or(0, |best| best.columns + 1);
-        predict_spot(&levels, &params, believed, &mut start);
-        let rigid = manifold
-            .leaves
-            .leaf_at(near.solution.params)?
-            .least_compliance()
-            * NEARLY_RIGID
-            < 1.0;
-        let (point, along) = match (step.special, rigid) {
-            (None, false) => {
-                let left = ITERATION_ERROR_FRACTION * enough;
-                let from = (&near, &start);
-                let found = newton_or_secant(&mut manifold, from, given, left, &mut contraction)?;
-                table.iteration_error = larger(table.iteration_error, found.1);
-                (found.0, None)
-            }
-            _ => relocated(&mut manifold, &near, step.special, given)?,
-        };
-        factorizations += manifold.factorizations;
-        let shift = near
-            .solution
-            .state
-            .largest_displacement_to(&point.solution.state);
-        if shift > moved.max(NEGLIGIBLE_DISPLACEMENT) {
-            return Err(VerificationFailure::OtherBranch);
-        }
-        if point.index != step.point.index {
-            return Err(VerificationFailure::OtherIndex);
-        }
-        if level > 0 {
-            moved = shift;
-        }
-        near = point;
-        levels.push(GridLevel {
-            leaf: manifold.leaves.leaf_at(near.solution.params)?.clone(),
-            state: near.solution.state.clone(),
+    factorizations: usize,
+}
+
+impl<'a> NestedBoundaryPoint<'a> {
+    fn new(
+        plane: &'a TwoParameterProblem<'a>,
+        grid: &Grid,
+        step: &UnverifiedBoundaryPoint,
+        accuracy: BoundaryAccuracy,
+    ) -> Self {
+        let manifold = TwoParameterEquations::new(plane, grid.clone());
+        let point = step.point.clone();
+        let given = step
+            .fixed_parameter
+            .or_else(|| fixable_parameter(&manifold, &point));
+        let given = given.filter(|_| step.special.is_none());
+        let fixed = given.map(|which| FixedParameter {
+            which,
+            value: point.solution.params[which],
         });
-        params.push(near.solution.params);
-        let sought = (step.special, given);
-        let numbers = match (rigid, softening) {
-            (false, _) => BoundaryParameters::without_regularization(near.solution.params),
-            (true, Some(known)) => unregularized_parameters(&mut manifold, &near, sought, known)?,
-            (true, None) => {
-                least_regularized_parameters(&mut manifold, &near, sought, (&table, along))?
-            }
-        };
-        softening = rigid.then_some(numbers.regularization);
-        table.push(&mut manifold, (&near, along), &numbers)?;
-        if level + 1 < MIN_POINT_GRIDS {
-            continue;
-        }
-        let exact = table.is_exact(enough);
-        let last = level + 1 == if rigid { MAX_RIGID_LEAF_GRIDS } else { GRIDS }
-            || 2 * manifold.grid().segments() > FINEST;
-        let tips = table.tips.best().map_or(f64::INFINITY, |best| best.error);
-        if accuracy.is_reached(tips, table.errors(), (exact, last)) {
-            return Ok(VerifiedBoundaryPoint {
-                factorizations,
-                ..table.verified_point(&manifold, &near, step.special)
-            });
-        }
-        if last {
-            break;
+        NestedBoundaryPoint {
+            manifold,
+            condition: BoundaryPointCondition {
+                special: step.special,
+                fixed_parameter: given,
+            },
+            index: point.index,
+            located: LocatedBoundaryPoint {
+                point,
+                slope_along: None,
+            },
+            rigid: false,
+            regularization: None,
+            levels: Vec::new(),
+            params: Vec::new(),
+            contraction: Contraction::default(),
+            table: BoundaryConvergenceTable::new(fixed),
+            accuracy,
+            factorizations: 0,
         }
     }
-    Err(VerificationFailure::Inaccurate)
+
+    /// The error of the parameters below which no finer grid is needed.
+    fn sought_error(&self) -> f64 {
+        self.accuracy.sought.max(EXACT_PARAMETER_ERROR)
+    }
+
+    /// The point on the present grid by Newton's method from its prediction, or by the secant
+    /// method if that fails; the estimated iteration error is recorded in the table.
+    fn newton_or_secant(
+        &mut self,
+        near: &SingularPoint,
+        start: TwoParameterState,
+    ) -> Result<SingularPoint, CorrectorFailure> {
+        let accuracy = ITERATION_ERROR_FRACTION * self.sought_error();
+        let (manifold, given) = (&mut self.manifold, self.condition.fixed_parameter);
+        let search = near.search(manifold, given, start, (accuracy, LARGEST_GUESS_DISTANCE));
+        let frozen = near.kind == CriticalKind::Branching;
+        let found = search.newton(manifold, frozen, &mut self.contraction);
+        let (found, left) = found.or_else(|_| {
+            let search = search_from_previous_grid(manifold, near, given);
+            search.secant(manifold).map(|found| (found, 0.0))
+        })?;
+        let point = near.with_search_result(manifold, found);
+        self.table.iteration_error = larger(self.table.iteration_error, left);
+        Ok(point)
+    }
+}
+
+impl NestedGridPoint for NestedBoundaryPoint<'_> {
+    type Verified = VerifiedBoundaryPoint;
+
+    fn locate(&mut self, level: usize) -> Result<Relocation, VerificationFailure> {
+        let near = if level > 0 {
+            let (finer, near) = boundary_point_on_finer(&mut self.manifold, &self.located.point)?;
+            self.manifold = finer;
+            near
+        } else {
+            self.located.point.clone()
+        };
+        let mut start = near.solution.clone();
+        let believed = self.table.tips.best().map_or(0, |best| best.columns + 1);
+        predict_spot(&self.levels, &self.params, believed, &mut start);
+        self.rigid = is_nearly_rigid(self.manifold.leaves.leaf_at(near.solution.params)?);
+        self.located = match (self.condition.special, self.rigid) {
+            (None, false) => LocatedBoundaryPoint {
+                point: self.newton_or_secant(&near, start)?,
+                slope_along: None,
+            },
+            _ => relocated(&mut self.manifold, &near, self.condition)?,
+        };
+        self.factorizations += self.manifold.factorizations;
+        let point = &self.located.point;
+        let shift = (near.solution.state).largest_displacement_to(&point.solution.state);
+        Ok(Relocation {
+            displacement: if level > 0 { shift } else { f64::INFINITY },
+            tangent_cosine: 1.0,
+            same_index: point.index == self.index,
+        })
+    }
+
+    fn segments(&self) -> usize {
+        self.manifold.grid().segments()
+    }
+
+    fn grid_limits(&self) -> GridLimits {
+        GridLimits {
+            least: MIN_POINT_GRIDS,
+            most: match self.rigid {
+                true => MAX_RIGID_LEAF_GRIDS,
+                false => MAX_GRIDS,
+            },
+        }
+    }
+
+    fn tabulate(&mut self, _: usize) -> Result<(), VerificationFailure> {
+        let (manifold, located) = (&mut self.manifold, &self.located);
+        let solution = &located.point.solution;
+        self.levels.push(GridLevel {
+            leaf: manifold.leaves.leaf_at(solution.params)?.clone(),
+            state: solution.state.clone(),
+        });
+        self.params.push(solution.params);
+        let condition = self.condition;
+        let numbers = match (self.rigid, self.regularization) {
+            (false, _) => BoundaryParameters::without_regularization(solution.params),
+            (true, Some(known)) => {
+                unregularized_parameters(manifold, &located.point, condition, known)?
+            }
+            (true, None) => {
+                least_regularized_parameters(manifold, located, condition, &self.table)?
+            }
+        };
+        self.regularization = self.rigid.then_some(numbers.regularization);
+        Ok(self.table.push(manifold, located, &numbers)?)
+    }
+
+    fn extrapolated(
+        &mut self,
+        level: usize,
+        last: bool,
+    ) -> Result<Option<VerifiedBoundaryPoint>, VerificationFailure> {
+        if level + 1 < MIN_POINT_GRIDS {
+            return Ok(None);
+        }
+        let (table, point) = (&self.table, &self.located.point);
+        let exact = table.is_exact(self.sought_error());
+        let tips = table.tips.best().map_or(f64::INFINITY, |best| best.error);
+        let reached = (self.accuracy).is_reached(tips, table.errors(), exact, last);
+        Ok(reached.then(|| VerifiedBoundaryPoint {
+            factorizations: self.factorizations,
+            ..table.verified_point(&self.manifold, point, self.condition.special)
+        }))
+    }
 }
 
 /// The parameter that can be fixed while a point is sought across the boundary, if there is
@@ -237,24 +328,25 @@ fn fixable_parameter(manifold: &TwoParameterEquations, point: &SingularPoint) ->
         .find(|&k| changes[k] && sine(k) > SMALLEST_SEARCH_ANGLE_SINE)
 }
 
-/// The point on this grid, to rounding; for a crossing also the derivative of the other
-/// eigenvalue along the boundary, which alone determines the position of the crossing on it.
-/// (At a cusp the parameters are stationary along it.)
+/// The point on this grid, to rounding, by secant methods.
 fn relocated(
     manifold: &mut TwoParameterEquations,
     near: &SingularPoint,
-    special: Option<CodimensionTwoKind>,
-    given: Option<usize>,
-) -> Result<(SingularPoint, Option<f64>), CorrectorFailure> {
-    if let Some(special) = special {
+    condition: BoundaryPointCondition,
+) -> Result<LocatedBoundaryPoint, CorrectorFailure> {
+    if let Some(special) = condition.special {
         let (point, slope) = locate_codimension_two(manifold, near, special)?;
-        return Ok((
+        return Ok(LocatedBoundaryPoint {
             point,
-            (special == CodimensionTwoKind::Crossing).then_some(slope),
-        ));
+            slope_along: (special == CodimensionTwoKind::Crossing).then_some(slope),
+        });
     }
-    let found = search_from_previous_grid(manifold, near, given).secant(manifold)?;
-    Ok((near.with_search_result(manifold, found), None))
+    let search = search_from_previous_grid(manifold, near, condition.fixed_parameter);
+    let found = search.secant(manifold)?;
+    Ok(LocatedBoundaryPoint {
+        point: near.with_search_result(manifold, found),
+        slope_along: None,
+    })
 }
 
 /// Predicts the point on the next grid from those on at least two coarser ones: the last ones,
@@ -277,30 +369,6 @@ fn predict_spot(
         [0, 1].map(|i| (params.iter().zip(&weights).map(|(at, part)| part * at[i])).sum());
 }
 
-/// The point on this grid by Newton's method from its prediction, or by the secant method if
-/// that fails; and the estimated iteration error.
-fn newton_or_secant(
-    manifold: &mut TwoParameterEquations,
-    (near, start): (&SingularPoint, &TwoParameterState),
-    given: Option<usize>,
-    accuracy: f64,
-    contraction: &mut Contraction,
-) -> Result<(SingularPoint, f64), CorrectorFailure> {
-    let search = near.search(
-        manifold,
-        given,
-        start.clone(),
-        (accuracy, LARGEST_GUESS_DISTANCE),
-    );
-    let frozen = near.kind == CriticalKind::Branching;
-    let found = search.newton(manifold, frozen, contraction);
-    let (found, left) = found.or_else(|_| {
-        let search = search_from_previous_grid(manifold, near, given);
-        search.secant(manifold).map(|found| (found, 0.0))
-    })?;
-    Ok((near.with_search_result(manifold, found), left))
-}
-
 /// The search for the point, starting from that on the previous grid.
 fn search_from_previous_grid(
     manifold: &TwoParameterEquations,
@@ -319,21 +387,21 @@ fn search_from_previous_grid(
 /// until rounding errors, here or on the finest grid, exceed those of extrapolation.
 fn least_regularized_parameters(
     manifold: &mut TwoParameterEquations,
-    near: &SingularPoint,
-    sought: (Option<CodimensionTwoKind>, Option<usize>),
-    (table, along): (&BoundaryConvergenceTable, Option<f64>),
+    located: &LocatedBoundaryPoint,
+    condition: BoundaryPointCondition,
+    table: &BoundaryConvergenceTable,
 ) -> Result<BoundaryParameters, CorrectorFailure> {
     let largest = |[a, b]: [f64; 2]| larger(a, b);
-    let mut numbers = unregularized_parameters(manifold, near, sought, FIRST_REGULARIZATION)?;
+    let near = &located.point;
+    let mut numbers = unregularized_parameters(manifold, near, condition, FIRST_REGULARIZATION)?;
     let finest = FINEST_GRID_RATIO * manifold.grid().segments() as f64;
     for softening in REGULARIZATION_COMPLIANCES {
-        let rounding =
-            table.rounding_errors_of_parameters(manifold, (near, along), softening, finest)?;
+        let rounding = table.rounding_errors_of_parameters(manifold, located, softening, finest)?;
         let left = largest(numbers.errors);
         if largest(rounding) > left {
             break;
         }
-        match unregularized_parameters(manifold, near, sought, softening) {
+        match unregularized_parameters(manifold, near, condition, softening) {
             Ok(better) if largest(better.errors) < REGULARIZATION_ERROR_RATIO * left => {
                 numbers = better
             }
@@ -348,16 +416,16 @@ fn least_regularized_parameters(
 fn unregularized_parameters(
     manifold: &mut TwoParameterEquations,
     near: &SingularPoint,
-    (special, given): (Option<CodimensionTwoKind>, Option<usize>),
+    condition: BoundaryPointCondition,
     softening: f64,
 ) -> Result<BoundaryParameters, CorrectorFailure> {
     let grid = manifold.grid().clone();
     let mut values_by_softening = [[0.0; 2]; 4];
-    let mut search = search_from_previous_grid(manifold, near, given);
+    let mut search = search_from_previous_grid(manifold, near, condition.fixed_parameter);
     for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
         let mut soft = TwoParameterEquations::new(manifold.leaves.family, grid.clone());
         soft.regularize(softening * (k + 1) as f64);
-        search.solution = match special {
+        search.solution = match condition.special {
             Some(special) => {
                 let solution = search.solution;
                 let near = SingularPoint {
@@ -426,17 +494,17 @@ pub struct VerifiedBoundaryPoint {
 
 /// Both parameters at a point on a grid.
 #[derive(Default)]
-pub struct BoundaryParameters {
-    pub values: [f64; 2],
+struct BoundaryParameters {
+    values: [f64; 2],
     /// Compliance by which the matrix was softened, in units of L^2/A, and the error of the
     /// extrapolation to zero.
-    pub regularization: f64,
-    pub errors: [f64; 2],
+    regularization: f64,
+    errors: [f64; 2],
 }
 
 impl BoundaryParameters {
     /// Without softening.
-    pub fn without_regularization(values: [f64; 2]) -> Self {
+    fn without_regularization(values: [f64; 2]) -> Self {
         BoundaryParameters {
             values,
             ..BoundaryParameters::default()
@@ -444,13 +512,21 @@ impl BoundaryParameters {
     }
 }
 
+/// A parameter that is the same on all grids.
+#[derive(Clone, Copy)]
+struct FixedParameter {
+    /// The first of both parameters, 0, or the second, 1.
+    which: usize,
+    value: f64,
+}
+
 /// The values to be extrapolated.
 #[derive(Default)]
-pub struct BoundaryConvergenceTable {
-    pub tips: Richardson,
+struct BoundaryConvergenceTable {
+    tips: Richardson,
     numbers: [Richardson; 2],
-    /// The parameter that is fixed on all grids, if there is one, and its value.
-    fixed_parameter: Option<(usize, f64)>,
+    /// The parameter that is fixed on all grids, if there is one.
+    fixed_parameter: Option<FixedParameter>,
     /// Errors of the parameters due to rounding of the matrix on a grid, and their amplification
     /// by extrapolation to zero softening.
     rounded: [f64; 2],
@@ -458,11 +534,11 @@ pub struct BoundaryConvergenceTable {
     /// Errors of the parameters due to softening.
     regularization_errors: [f64; 2],
     /// Largest iteration error of Newton's method.
-    pub iteration_error: f64,
+    iteration_error: f64,
 }
 
 impl BoundaryConvergenceTable {
-    pub fn new(given: Option<(usize, f64)>) -> Self {
+    fn new(given: Option<FixedParameter>) -> Self {
         BoundaryConvergenceTable {
             fixed_parameter: given,
             amplified: 1.0,
@@ -471,16 +547,19 @@ impl BoundaryConvergenceTable {
     }
 
     /// Errors of the parameters due to rounding of a matrix with so much softening, on so many
-    /// segments; `along` is the derivative of the vanishing function along the boundary.
-    pub fn rounding_errors_of_parameters(
+    /// segments.
+    fn rounding_errors_of_parameters(
         &self,
         manifold: &mut TwoParameterEquations,
-        (point, along): (&SingularPoint, Option<f64>),
+        located: &LocatedBoundaryPoint,
         softening: f64,
         segments: f64,
     ) -> Result<[f64; 2], CorrectorFailure> {
+        let point = &located.point;
         let (across, slope) = match self.fixed_parameter {
-            Some((which, _)) => point.crossing_at_fixed_parameter(manifold, which),
+            Some(FixedParameter { which, .. }) => {
+                point.crossing_at_fixed_parameter(manifold, which)
+            }
             None => (point.normal.clone(), point.slope),
         };
         let leaf = manifold.leaves.leaf_at(point.solution.params)?;
@@ -488,22 +567,23 @@ impl BoundaryConvergenceTable {
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
             let own = (rounding / slope * across.params[i]).abs();
-            let along = along.map_or(0.0, |slope| rounding / slope * point.tangent.params[i]);
+            let along = (located.slope_along)
+                .map_or(0.0, |slope| rounding / slope * point.tangent.params[i]);
             own + along.abs()
         }))
     }
 
-    pub fn push(
+    fn push(
         &mut self,
         manifold: &mut TwoParameterEquations,
-        (point, along): (&SingularPoint, Option<f64>),
+        located: &LocatedBoundaryPoint,
         numbers: &BoundaryParameters,
     ) -> Result<(), CorrectorFailure> {
-        let state = &point.solution.state;
+        let state = &located.point.solution.state;
         let segments = state.segments() as f64;
         let rounding = self.rounding_errors_of_parameters(
             manifold,
-            (point, along),
+            located,
             numbers.regularization,
             segments,
         )?;
@@ -523,7 +603,7 @@ impl BoundaryConvergenceTable {
         Ok(())
     }
 
-    pub fn errors(&self) -> [f64; 2] {
+    fn errors(&self) -> [f64; 2] {
         [0, 1].map(|i| match self.fixed_value(i) {
             Some(_) => 0.0,
             None => (self.numbers[i].best()).map_or(f64::INFINITY, |best| best.error),
@@ -532,17 +612,17 @@ impl BoundaryConvergenceTable {
 
     /// The value of a parameter, if it is fixed.
     fn fixed_value(&self, i: usize) -> Option<f64> {
-        let given = self.fixed_parameter.filter(|(which, _)| *which == i);
-        given.map(|(_, value)| value)
+        let given = self.fixed_parameter.filter(|fixed| fixed.which == i);
+        given.map(|fixed| fixed.value)
     }
 
     /// Whether the errors of both parameters are below this, or below rounding.
-    pub fn is_exact(&self, enough: f64) -> bool {
+    fn is_exact(&self, enough: f64) -> bool {
         let mut errors = self.errors().into_iter().zip(self.rounded);
         errors.all(|(error, rounded)| error <= enough.max(rounded))
     }
 
-    pub fn verified_point(
+    fn verified_point(
         &self,
         manifold: &TwoParameterEquations,
         point: &SingularPoint,
@@ -605,7 +685,7 @@ mod tests {
             sought: 1e-7,
         };
         let reached = |tips, number, last| {
-            accuracy.is_reached(tips, [0.0, number], (number <= accuracy.sought, last))
+            accuracy.is_reached(tips, [0.0, number], number <= accuracy.sought, last)
         };
         assert!(reached(1e-2, 1e-7, false) && reached(1e-2, 1e-5, true));
         assert!(!reached(1e-2, 1e-6, false) && !reached(1e-2, 1e-4, true));

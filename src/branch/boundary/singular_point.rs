@@ -5,12 +5,12 @@
 //! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
 
 use crate::branch;
+use crate::branch::convergence::ExtrapolatedPoint;
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{BranchEquations, CorrectorFailure, ITERATIONS, STIFF};
 use crate::branch::family::{
     LeafFamily, OutOfRange, force_parameter_derivative, unbalanced_forces,
 };
-use crate::branch::refine::ExtrapolatedPoint;
 use crate::branch::{
     add_scaled, combine_fields, dot, equations, increments_between, scale_field, scaled_sum,
 };

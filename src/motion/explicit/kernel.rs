@@ -1,16 +1,11 @@
 //! The explicit method's loop over a pack of rods: a whole time step, from the forces of
 //! its segments to the new positions of its nodes.
 //!
-//! It processes the pack in blocks. The forces of a block's segments
-//! ([`segments`]) stay in the innermost caches until its nodes have
-//! moved ([`nodes`]). Nodes that have moved are not read again: the force of the segment before
+//! It processes the pack in blocks. The forces of a block's segments stay in the innermost caches
+//! until its nodes have moved by a kick of all forces and a drift free of them. Nodes that have moved are not read again: the force of the segment before
 //! the next block's first node is carried over from the previous block, and
-//! the new positions are written to other arrays, since neighbouring rods are coupled
+//! the new positions are written to other arrays, since neighboring rods are coupled
 //! to the old ones.
-//!
-//! The motion of nodes: a kick by all forces, then a drift free of them.
-//!
-//! Internal forces of the midpoint element.
 //!
 //! The element is that of [`crate::rod`], with the force not as an independent
 //! unknown but given by the strains, n = H (v - v0), which has the same
@@ -30,36 +25,31 @@
 //!
 //! S = sigma + c w w^T is the derivative of the rotation vector. As it maps
 //! vectors along w to themselves, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
-//! written as 1 + B delta. B is a polynomial in delta ([`B`]): a segment costs one
+//! written as 1 + B delta. B is a polynomial in delta ([`rotation_vector_series`]): a segment costs one
 //! division and no root.
 //!
 //! What is the same along all directors needs none of them: H and A are split into their
 //! values along d2 and the excess along d1 and d3. For round sections that are straight at
 //! rest d1 alone is left, which saves a quarter of the operations.
-//!
-//! Material data of rods, for the loops over their nodes.
 
-use crate::leaf::Loads;
-pub use crate::motion::explicit::packs::{AlignedArray, PackLayout};
+use crate::leaf::{Loads, NodalMoment};
+use crate::motion::explicit::layout::{AlignedArray, BlockMaterial, NODES_PER_BLOCK, PackLayout};
 use crate::rotation::{HALF_ANGLE_POLYNOMIAL, Quaternions};
-use crate::simd::{Lanes, MAX_LANES, Vectors, array_chunks, array_chunks_mut, slice, slice_mut};
-use glam::DVec3;
+use crate::simd::{
+    ArraySpan, Lanes, MAX_LANES, Vectors, array_chunks, array_chunks_mut, slice, slice_mut,
+};
 use pulp::Simd;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// Nodes of a block. Measured: with half as many, steps of short rods take 1.05 times as long,
-/// due to the beginnings and ends of the loops; more gain nothing.
-pub const NODES_PER_BLOCK: usize = 224;
-
 /// What moves besides the positions: arrays of a pack.
 #[derive(Clone, Debug)]
 pub struct PackMotion {
-    /// Rotations as quaternions, normalised up to rounding and the truncation error of [`nodes`].
+    /// Rotations as quaternions, normalized up to rounding and the truncation error of [`COS`].
     pub q: [AlignedArray; 4],
     /// Velocities, half a step behind or ahead.
     pub v: [AlignedArray; 3],
-    /// Angular momenta along the lab axes, likewise.
+    /// Angular momenta along the lab axes at the time of the velocities.
     pub p: [AlignedArray; 3],
 }
 
@@ -71,7 +61,7 @@ pub struct StrainHistory {
     pub earlier: [[AlignedArray; 3]; 2],
 }
 
-/// Constitutive law at an instant.
+/// Constitutive law in a step.
 #[derive(Clone, Copy, Debug)]
 pub struct StepLaw {
     /// Whether there is internal friction.
@@ -87,8 +77,8 @@ pub struct StepLaw {
     pub stores_strains: bool,
 }
 
-/// Forces of the segments of a block on their ends. Node i of the block is at WIDTH + i, and at
-/// WIDTH - 1 the last one of the block before.
+/// Forces of the segments of a block on their ends. Node i of the block is at MAX_LANES + i, and at
+/// MAX_LANES - 1 the last one of the block before.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct BlockForces {
@@ -109,7 +99,7 @@ impl BlockForces {
         }
     }
 
-    /// The entries before a pack.
+    /// Sets the entries before a pack.
     fn begin_pack(&mut self) {
         for array in self.n.iter_mut().chain(&mut self.right) {
             array[MAX_LANES - 1] = 0.0;
@@ -137,24 +127,24 @@ pub struct PackStep<'a> {
     /// Force per displacement and unit of sigma of the coupling to the rod before each, and
     /// after it, if there is any coupling.
     pub coupling: Option<[[f64; 3]; 2]>,
-    /// Moments and forces on the nodes of the whole leaf besides, laid out as positions, if there
-    /// are any.
+    /// Moments and forces on the nodes of the whole leaf besides those of segments, coupling and
+    /// `loads`, laid out as positions, if there are any.
     pub applied: Option<&'a [[AlignedArray; 3]; 2]>,
     pub motion: &'a mut PackMotion,
-    /// Block by block.
+    /// Material, block by block.
     pub material: &'a [Arc<BlockMaterial>],
     pub past: &'a mut StrainHistory,
     pub law: StepLaw,
-    /// Without the force on a shared tip.
+    /// Loads without the force on a shared tip.
     pub loads: Loads,
-    /// Nodes and sizes of the dead moments on a single rod.
-    pub moments: &'a [(usize, DVec3)],
+    /// Dead moments on a single rod.
+    pub moments: &'a [NodalMoment],
     pub velocity_factor: f64,
     pub kick: f64,
     pub drift: f64,
-    /// Whether quaternions are normalised; rounding and truncated series slowly change their
+    /// Whether quaternions are normalized; rounding and truncated series slowly change their
     /// length.
-    pub normalise: bool,
+    pub normalize: bool,
     pub block: &'a mut BlockForces,
 }
 
@@ -171,17 +161,12 @@ pub struct StepTotals {
     pub last_force: [f64; 3],
 }
 
-/// Nodes of the blocks of a pack of `rods`, up to the last node, in whole groups of `width`: the
-/// index of the first and their number.
-fn block_spans(
-    layout: PackLayout,
-    rods: usize,
-    width: usize,
-) -> impl Iterator<Item = (usize, usize)> {
+/// Nodes of the blocks of a pack of `rods`, up to the last node, in whole groups of `width`.
+fn block_spans(layout: PackLayout, rods: usize, width: usize) -> impl Iterator<Item = ArraySpan> {
     let end = (rods - 1) * layout.stride + layout.segments + 1;
     (0..end).step_by(NODES_PER_BLOCK).map(move |start| {
         let nodes = (end - start).next_multiple_of(width);
-        (start, nodes.min(NODES_PER_BLOCK))
+        ArraySpan::new(start, nodes.min(NODES_PER_BLOCK))
     })
 }
 
@@ -194,10 +179,13 @@ impl pulp::WithSimd for PackStep<'_> {
         let mut totals = StepTotals::default();
         let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
         self.block.begin_pack();
-        for (start, count) in block_spans(layout, rods.len(), S::F64_LANES) {
-            let nodes = BlockNodes {
-                start,
+        for span in block_spans(layout, rods.len(), S::F64_LANES) {
+            let ArraySpan {
+                first: start,
                 count,
+            } = span;
+            let nodes = BlockNodes {
+                span,
                 first: layout.node_index(rods.start, start),
                 x: self.positions,
                 q: &self.motion.q,
@@ -217,7 +205,7 @@ impl pulp::WithSimd for PackStep<'_> {
                     }
                 }
             }
-            for (node, moment) in self.moments {
+            for NodalMoment { node, moment } in self.moments {
                 let node = node.wrapping_sub(start);
                 if node < count {
                     for c in 0..3 {
@@ -225,7 +213,7 @@ impl pulp::WithSimd for PackStep<'_> {
                     }
                 }
             }
-            energy = energy + self.kick_and_drift(simd, (start, count));
+            energy = energy + self.kick_and_drift(simd, span);
             self.block.advance_block();
         }
         // Velocities were sums of two.
@@ -257,10 +245,13 @@ impl pulp::WithSimd for PackForces<'_> {
         let (layout, rods) = (self.layout, self.layout.pack_rods(self.pack));
         let mut block = BlockForces::new();
         let sums = &mut SegmentSums::zero(simd);
-        for (start, count) in block_spans(layout, rods.len(), S::F64_LANES) {
-            let nodes = BlockNodes {
-                start,
+        for span in block_spans(layout, rods.len(), S::F64_LANES) {
+            let ArraySpan {
+                first: start,
                 count,
+            } = span;
+            let nodes = BlockNodes {
+                span,
                 first: layout.node_index(rods.start, start),
                 x: self.positions,
                 q: &self.motion.q,
@@ -288,34 +279,35 @@ const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
 impl PackStep<'_> {
-    /// Moves the nodes of the block `range` (index of the first, count) with the forces in
+    /// Moves the nodes of a block, at `span` in the arrays of the pack, with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
     /// kick. Every node rotates as a torque-free body with one axis of symmetry:
     /// about its angular momentum, and about its own axis.
     #[inline(always)]
-    pub fn kick_and_drift<S: Simd>(&mut self, simd: S, range: (usize, usize)) -> Lanes<S> {
+    fn kick_and_drift<S: Simd>(&mut self, simd: S, span: ArraySpan) -> Lanes<S> {
         // In two loops: the processor overlaps iterations of short ones.
         let none = [[0.0; 3]; 2];
         let moving = match (self.coupling, self.applied) {
             (coupling, Some([moments, _])) => {
-                self.add_moments(range, moments);
-                self.translate_nodes::<S, true, true>(simd, range, coupling.unwrap_or(none))
+                self.add_moments(span, moments);
+                self.translate_nodes::<S, true, true>(simd, span, coupling.unwrap_or(none))
             }
-            (Some(coupling), None) => self.translate_nodes::<S, true, false>(simd, range, coupling),
-            (None, None) => self.translate_nodes::<S, false, false>(simd, range, none),
+            (Some(coupling), None) => self.translate_nodes::<S, true, false>(simd, span, coupling),
+            (None, None) => self.translate_nodes::<S, false, false>(simd, span, none),
         };
-        let turning = match self.normalise {
-            true => self.rotate_nodes::<S, true>(simd, range),
-            false => self.rotate_nodes::<S, false>(simd, range),
+        let turning = match self.normalize {
+            true => self.rotate_nodes::<S, true>(simd, span),
+            false => self.rotate_nodes::<S, false>(simd, span),
         };
         moving + turning
     }
 
     /// Adds moments on the nodes to those of the segments.
-    fn add_moments(&mut self, (start, nodes): (usize, usize), moments: &[AlignedArray; 3]) {
+    fn add_moments(&mut self, span: ArraySpan, moments: &[AlignedArray; 3]) {
+        let nodes = span.count;
         let first = self
             .layout
-            .node_index(self.layout.pack_rods(self.pack).start, start);
+            .node_index(self.layout.pack_rods(self.pack).start, span.first);
         for (left, moments) in self.block.left.iter_mut().zip(moments) {
             let moments = &moments[first..first + nodes];
             for (left, moment) in left[MAX_LANES..].iter_mut().zip(moments) {
@@ -326,26 +318,29 @@ impl PackStep<'_> {
 
     /// Velocities and positions.
     #[inline(always)]
-    fn translate_nodes<S: Simd, const COUPLING_REASON: bool, const APPLIED: bool>(
+    fn translate_nodes<S: Simd, const COUPLED: bool, const APPLIED: bool>(
         &mut self,
         simd: S,
-        range: (usize, usize),
+        span: ArraySpan,
         coupling: [[f64; 3]; 2],
     ) -> Lanes<S> {
-        let (start, nodes) = range;
-        let own = |array| slice(array, (0, nodes));
+        let ArraySpan {
+            first: start,
+            count: nodes,
+        } = span;
+        let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
         let weight = own(&material.load_length);
-        let coupled = array_chunks(&material.coupling_weights, (0, nodes));
+        let coupled = array_chunks(&material.coupling_weights, ArraySpan::new(0, nodes));
         let (mass, per_mass) = (own(&material.mass), own(&material.inverse_mass));
-        let n_right = array_chunks(&self.block.n, (MAX_LANES, nodes));
-        let n_left = array_chunks(&self.block.n, (MAX_LANES - 1, nodes));
+        let n_right = array_chunks(&self.block.n, ArraySpan::new(MAX_LANES, nodes));
+        let n_left = array_chunks(&self.block.n, ArraySpan::new(MAX_LANES - 1, nodes));
         let stride = self.layout.stride;
         let first = self
             .layout
             .node_index(self.layout.pack_rods(self.pack).start, start);
-        let of_rods = |first| array_chunks(self.positions, (first, nodes));
+        let of_rods = |first| array_chunks(self.positions, ArraySpan::new(first, nodes));
         let (before, x, after) = (
             of_rods(first - stride),
             of_rods(first),
@@ -353,15 +348,15 @@ impl PackStep<'_> {
         );
         let forces = array_chunks(
             self.applied.map_or(self.positions, |[_, forces]| forces),
-            (first, nodes),
+            ArraySpan::new(first, nodes),
         );
         let [next_x, next_y, next_z] = &mut self.next;
         let mut next = [
-            slice_mut(next_x, range),
-            slice_mut(next_y, range),
-            slice_mut(next_z, range),
+            slice_mut(next_x, span),
+            slice_mut(next_y, span),
+            slice_mut(next_z, span),
         ];
-        let mut v = array_chunks_mut(&mut self.motion.v, range);
+        let mut v = array_chunks_mut(&mut self.motion.v, span);
         let [to_before, to_after] = coupling.map(|coupling| Vectors::splat(simd, coupling));
         let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
         let (keep, kick) = (
@@ -376,7 +371,7 @@ impl PackStep<'_> {
             let force = Vectors::load(simd, &n_right, at) - Vectors::load(simd, &n_left, at);
             let mut force = gravity.mul_add(weight, force);
             let x = Vectors::load(simd, &x, at);
-            if COUPLING_REASON {
+            if COUPLED {
                 let pull = (Vectors::load(simd, &before, at) - x) * to_before;
                 force = pull.mul_add(Lanes::load(simd, coupled[0], at), force);
                 let pull = (Vectors::load(simd, &after, at) - x) * to_after;
@@ -399,30 +394,33 @@ impl PackStep<'_> {
 
     /// Angular momenta and rotations.
     #[inline(always)]
-    fn rotate_nodes<S: Simd, const NORMALISE: bool>(
+    fn rotate_nodes<S: Simd, const NORMALIZE: bool>(
         &mut self,
         simd: S,
-        range: (usize, usize),
+        span: ArraySpan,
     ) -> Lanes<S> {
-        let (start, nodes) = range;
-        let own = |array| slice(array, (0, nodes));
+        let ArraySpan {
+            first: start,
+            count: nodes,
+        } = span;
+        let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
         let (per_inertia, per_spin) = (
             own(&material.inverse_inertia),
             own(&material.inverse_spin_excess),
         );
-        let left = array_chunks(&self.block.left, (MAX_LANES, nodes));
-        let right = array_chunks(&self.block.right, (MAX_LANES - 1, nodes));
+        let left = array_chunks(&self.block.left, ArraySpan::new(MAX_LANES, nodes));
+        let right = array_chunks(&self.block.right, ArraySpan::new(MAX_LANES - 1, nodes));
         let PackMotion { q, p, .. } = &mut *self.motion;
         let [i, j, k, l] = q;
         let q = [
-            slice_mut(i, range),
-            slice_mut(j, range),
-            slice_mut(k, range),
-            slice_mut(l, range),
+            slice_mut(i, span),
+            slice_mut(j, span),
+            slice_mut(k, span),
+            slice_mut(l, span),
         ];
-        let mut p = array_chunks_mut(p, range);
+        let mut p = array_chunks_mut(p, span);
         let keep = Lanes::splat(simd, self.velocity_factor);
         let half_kick = Lanes::splat(simd, 0.5 * self.kick);
         let half_step = Lanes::splat(simd, 0.5 * self.drift);
@@ -453,7 +451,7 @@ impl PackStep<'_> {
             let b = d1.dot(after) * (half_step * per_spin);
             let squared = b * b;
             let (mut c, mut s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
-            if NORMALISE {
+            if NORMALIZE {
                 // Newton's iteration for the length, which is nearly one.
                 let scale = half.neg_mul_add(r.dot(r) + w * w, three_halves);
                 (c, s) = (c * scale, s * scale);
@@ -482,54 +480,63 @@ impl PackStep<'_> {
     }
 }
 
-/// The rate of a strain, from it and the last two.
-#[inline(always)]
-fn strain_rate<S: Simd>(
-    (last, earlier): (&mut [&mut [f64]; 3], &mut [&mut [f64]; 3]),
-    (now, at): (Vectors<S>, usize),
-    rates: [Lanes<S>; 3],
-    remember: bool,
-) -> Vectors<S> {
-    let simd = now.x.simd;
-    let (one, two) = (
-        Vectors::load(simd, last, at),
-        Vectors::load(simd, earlier, at),
-    );
-    if remember {
-        one.store(earlier, at);
-        now.store(last, at);
+/// One kind of strains of a block's segments at the last step and at the one before.
+struct PastStrains<'a> {
+    last: [&'a mut [f64]; 3],
+    earlier: [&'a mut [f64]; 3],
+}
+
+impl PastStrains<'_> {
+    /// The rate of a strain at the entries `at`, which is `now`, from it and the last two with these
+    /// weights; stores it as the last one if `remember`.
+    #[inline(always)]
+    fn rate<S: Simd>(
+        &mut self,
+        at: usize,
+        now: Vectors<S>,
+        weights: [Lanes<S>; 3],
+        remember: bool,
+    ) -> Vectors<S> {
+        let simd = now.x.simd;
+        let (one, two) = (
+            Vectors::load(simd, &self.last, at),
+            Vectors::load(simd, &self.earlier, at),
+        );
+        if remember {
+            one.store(&mut self.earlier, at);
+            now.store(&mut self.last, at);
+        }
+        two.mul_add(weights[2], one.mul_add(weights[1], now.scale(weights[0])))
     }
-    two.mul_add(rates[2], one.mul_add(rates[1], now.scale(rates[0])))
 }
 
 /// The nodes of a block.
 #[derive(Clone, Copy)]
-pub struct BlockNodes<'a> {
-    /// Index of the first in the arrays of the pack, and their number.
-    pub start: usize,
-    pub count: usize,
+struct BlockNodes<'a> {
+    /// Where they are in the arrays of the pack.
+    span: ArraySpan,
     /// Index of the first in the arrays of the leaf.
-    pub first: usize,
-    /// Of the leaf.
-    pub x: &'a [AlignedArray; 3],
-    /// Of the pack.
-    pub q: &'a [AlignedArray; 4],
-    pub material: &'a BlockMaterial,
-    pub law: &'a StepLaw,
+    first: usize,
+    /// Positions of the leaf.
+    x: &'a [AlignedArray; 3],
+    /// Rotations of the pack.
+    q: &'a [AlignedArray; 4],
+    material: &'a BlockMaterial,
+    law: &'a StepLaw,
 }
 
-/// Sums of the loops over segments: see [`crate::motion::explicit::kernel::StepTotals`].
+/// Sums of the loops over segments, as in [`StepTotals`].
 #[derive(Clone, Copy)]
-pub struct SegmentSums<S: Simd> {
-    /// With internal friction.
-    pub friction: Lanes<S>,
-    /// If rest curvatures vary.
-    pub rest_factor_derivative: Lanes<S>,
+struct SegmentSums<S: Simd> {
+    /// Zero without internal friction.
+    friction: Lanes<S>,
+    /// Zero unless rest curvatures vary.
+    rest_factor_derivative: Lanes<S>,
 }
 
 impl<S: Simd> SegmentSums<S> {
     #[inline(always)]
-    pub fn zero(simd: S) -> Self {
+    fn zero(simd: S) -> Self {
         let zero = Lanes::splat(simd, 0.0);
         SegmentSums {
             friction: zero,
@@ -540,7 +547,7 @@ impl<S: Simd> SegmentSums<S> {
 
 /// Forces and moments of the segments after `nodes`, written to `block`.
 #[inline(always)]
-pub fn forces<S: Simd>(
+fn forces<S: Simd>(
     simd: S,
     nodes: BlockNodes,
     past: &mut StrainHistory,
@@ -570,7 +577,7 @@ const SERIES_DELTA_LIMIT: f64 = 0.01;
 
 const SERIES_TERMS: usize = 5;
 
-/// B(delta).
+/// B(delta), the slope of sigma.
 #[inline(always)]
 fn rotation_vector_series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
     let [a, b, c, d, e, ..] = HALF_ANGLE_POLYNOMIAL;
@@ -604,12 +611,7 @@ fn stiffness<S: Simd>(along_2: Lanes<S>, excess_1: Lanes<S>, excess_3: Lanes<S>)
 }
 
 #[inline(always)]
-fn segment_force_loop<
-    S: Simd,
-    const ROUND: bool,
-    const DAMPED: bool,
-    const NEARBY_VALUE_OFFSETS: bool,
->(
+fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST_VARIES: bool>(
     simd: S,
     nodes: BlockNodes,
     past: &mut StrainHistory,
@@ -617,43 +619,45 @@ fn segment_force_loop<
     sums: &mut SegmentSums<S>,
 ) {
     let BlockNodes {
-        start,
-        count,
+        span,
         material,
         law,
         ..
     } = nodes;
+    let ArraySpan {
+        first: start,
+        count,
+    } = span;
     let (x0, x1) = (
-        array_chunks(nodes.x, (nodes.first, count)),
-        array_chunks(nodes.x, (nodes.first + 1, count)),
+        array_chunks(nodes.x, ArraySpan::new(nodes.first, count)),
+        array_chunks(nodes.x, ArraySpan::new(nodes.first + 1, count)),
     );
     let (q0, q1) = (
-        array_chunks(nodes.q, (start, count)),
-        array_chunks(nodes.q, (start + 1, count)),
+        array_chunks(nodes.q, ArraySpan::new(start, count)),
+        array_chunks(nodes.q, ArraySpan::new(start + 1, count)),
     );
-    let own = |array| slice(array, (0, count));
+    let own = |array| slice(array, ArraySpan::new(0, count));
     let (shear, bend) = (own(&material.shear), own(&material.bending_stiffness));
-    let stretch_excess = array_chunks(&material.stretch_excess, (0, count));
-    let bend_excess = array_chunks(&material.bend_excess, (0, count));
-    let rest_force = array_chunks(&material.rest_force, (0, count));
-    let rest_moment = array_chunks(&material.rest_moment, (0, count));
-    let rest_turn = array_chunks(&material.rest_turn, (0, count));
-    let mut force = array_chunks_mut(&mut block.n, (MAX_LANES, count));
-    let mut left = array_chunks_mut(&mut block.left, (MAX_LANES, count));
-    let mut right = array_chunks_mut(&mut block.right, (MAX_LANES, count));
+    let stretch_excess = array_chunks(&material.stretch_excess, ArraySpan::new(0, count));
+    let bend_excess = array_chunks(&material.bend_excess, ArraySpan::new(0, count));
+    let rest_force = array_chunks(&material.rest_force, ArraySpan::new(0, count));
+    let rest_moment = array_chunks(&material.rest_moment, ArraySpan::new(0, count));
+    let rest_turn = array_chunks(&material.rest_turn, ArraySpan::new(0, count));
+    let mut force = array_chunks_mut(&mut block.n, ArraySpan::new(MAX_LANES, count));
+    let mut left = array_chunks_mut(&mut block.left, ArraySpan::new(MAX_LANES, count));
+    let mut right = array_chunks_mut(&mut block.right, ArraySpan::new(MAX_LANES, count));
     let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
     let mut past = DAMPED.then(|| {
-        let range = (start, count);
-        (
-            (
-                array_chunks_mut(last_v, range),
-                array_chunks_mut(earlier_v, range),
-            ),
-            (
-                array_chunks_mut(last_psi, range),
-                array_chunks_mut(earlier_psi, range),
-            ),
-        )
+        [
+            PastStrains {
+                last: array_chunks_mut(last_v, span),
+                earlier: array_chunks_mut(earlier_v, span),
+            },
+            PastStrains {
+                last: array_chunks_mut(last_psi, span),
+                earlier: array_chunks_mut(earlier_psi, span),
+            },
+        ]
     });
     let rates = law.strain_rate_weights.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
@@ -682,24 +686,19 @@ fn segment_force_loop<
         let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, bend_excess[c], at));
         let stiff = bend * two_sigma;
         let mut extra = -load(&rest_moment);
-        if NEARBY_VALUE_OFFSETS {
+        if REST_VARIES {
             extra = extra.scale(rest);
         }
         extra.x = (excess_1 * two_sigma).mul_add(w.x, extra.x);
         if !ROUND {
             extra.z = (excess_3 * two_sigma).mul_add(w.z, extra.z);
         }
-        if NEARBY_VALUE_OFFSETS {
+        if REST_VARIES {
             sums.rest_factor_derivative =
                 sums.rest_factor_derivative + load(&rest_turn).dot(w.mul_add(stiff, extra));
         }
-        if let Some((_, (last, earlier))) = &mut past {
-            let rate = strain_rate(
-                (last, earlier),
-                (w.scale(two_sigma), at),
-                rates,
-                law.stores_strains,
-            );
+        if let Some([_, turn]) = &mut past {
+            let rate = turn.rate(at, w.scale(two_sigma), rates, law.stores_strains);
             let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
             extra = friction.mul_add(retardation, extra);
@@ -734,8 +733,8 @@ fn segment_force_loop<
                 -rest_force.y,
                 excess_3 * v.z - rest_force.z,
             );
-            if let Some(((last, earlier), _)) = &mut past {
-                let rate = strain_rate((last, earlier), (v, at), rates, law.stores_strains);
+            if let Some([stretch, _]) = &mut past {
+                let rate = stretch.rate(at, v, rates, law.stores_strains);
                 let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
                 extra = friction.mul_add(retardation, extra);
@@ -753,123 +752,11 @@ fn segment_force_loop<
 
 /// Vector and scalar parts of unit quaternions.
 #[inline(always)]
-pub fn quaternion<S: Simd>(
-    simd: S,
-    q: &[impl Deref<Target = [f64]>; 4],
-    at: usize,
-) -> (Vectors<S>, Lanes<S>) {
+fn quaternion<S: Simd>(simd: S, q: &[impl Deref<Target = [f64]>; 4], at: usize) -> Quaternions<S> {
     let vector = Vectors::new(
         Lanes::load(simd, &q[0], at),
         Lanes::load(simd, &q[1], at),
         Lanes::load(simd, &q[2], at),
     );
     (vector, Lanes::load(simd, &q[3], at))
-}
-
-/// A node, and the segment from it to the next.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct NodeData {
-    /// H/ds.
-    pub stretch_stiffness: [f64; 3],
-    /// ds v0.
-    pub rest_length: [f64; 3],
-    /// A/ds.
-    pub bending_stiffness: [f64; 3],
-    /// ds u0, times its factor if that is constant.
-    pub rest_turn: [f64; 3],
-    /// Mass; zero for a held node and for a shared tip.
-    pub mass: f64,
-    /// 1/mass; zero for a held node, and for a shared tip.
-    pub inverse_mass: f64,
-    /// 1/J of a node about d2 and d3; zero for a held node.
-    pub inverse_inertia: f64,
-    /// 1/J1 - 1/J.
-    pub inverse_spin_excess: f64,
-    /// Length of rod whose loads act on the node.
-    pub load_length: f64,
-    /// Fraction of the length whose coupling to the rods before and after acts on the node.
-    pub coupling_weights: [f64; 2],
-}
-
-/// The nodes of a block, one array for each number of a [`Node`], and derived
-/// quantities.
-#[derive(Clone, Debug, PartialEq)]
-#[repr(align(64))]
-pub struct BlockMaterial {
-    /// Whether all segments are as stiff along d3 as along d2, and straight at rest.
-    pub round: bool,
-    /// H2/ds, and the excess of H1/ds and H3/ds over it.
-    pub shear: [f64; NODES_PER_BLOCK],
-    pub stretch_excess: [[f64; NODES_PER_BLOCK]; 2],
-    /// H v0: minus the force where the segment has no length.
-    pub rest_force: [[f64; NODES_PER_BLOCK]; 3],
-    /// A2/ds, and the excess of A1/ds and A3/ds over it.
-    pub bending_stiffness: [f64; NODES_PER_BLOCK],
-    pub bend_excess: [[f64; NODES_PER_BLOCK]; 2],
-    pub rest_turn: [[f64; NODES_PER_BLOCK]; 3],
-    /// A u0: minus the moment where the segment is straight.
-    pub rest_moment: [[f64; NODES_PER_BLOCK]; 3],
-    pub mass: [f64; NODES_PER_BLOCK],
-    pub inverse_mass: [f64; NODES_PER_BLOCK],
-    pub inverse_inertia: [f64; NODES_PER_BLOCK],
-    pub inverse_spin_excess: [f64; NODES_PER_BLOCK],
-    pub load_length: [f64; NODES_PER_BLOCK],
-    pub coupling_weights: [[f64; NODES_PER_BLOCK]; 2],
-}
-
-impl BlockMaterial {
-    fn new(nodes: &[NodeData]) -> Self {
-        let gather = |number: &dyn Fn(&NodeData) -> f64| {
-            let mut array = [0.0; NODES_PER_BLOCK];
-            for (slot, node) in array.iter_mut().zip(nodes) {
-                *slot = number(node);
-            }
-            array
-        };
-        let round = |node: &NodeData| {
-            let [_, bend_2, bend_3] = node.bending_stiffness;
-            let [_, shear_2, shear_3] = node.stretch_stiffness;
-            let straight = [&node.rest_turn, &node.rest_length].map(|rest| rest[1..] == [0.0, 0.0]);
-            bend_2 == bend_3 && shear_2 == shear_3 && straight == [true; 2]
-        };
-        BlockMaterial {
-            round: nodes.iter().all(round),
-            shear: gather(&|node| node.stretch_stiffness[1]),
-            stretch_excess: [0, 2]
-                .map(|c| gather(&|node| node.stretch_stiffness[c] - node.stretch_stiffness[1])),
-            rest_force: [0, 1, 2]
-                .map(|c| gather(&|node| node.stretch_stiffness[c] * node.rest_length[c])),
-            bending_stiffness: gather(&|node| node.bending_stiffness[1]),
-            bend_excess: [0, 2]
-                .map(|c| gather(&|node| node.bending_stiffness[c] - node.bending_stiffness[1])),
-            rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
-            rest_moment: [0, 1, 2]
-                .map(|c| gather(&|node| node.bending_stiffness[c] * node.rest_turn[c])),
-            mass: gather(&|node| node.mass),
-            inverse_mass: gather(&|node| node.inverse_mass),
-            inverse_inertia: gather(&|node| node.inverse_inertia),
-            inverse_spin_excess: gather(&|node| node.inverse_spin_excess),
-            load_length: gather(&|node| node.load_length),
-            coupling_weights: [0, 1].map(|side| gather(&|node| node.coupling_weights[side])),
-        }
-    }
-}
-
-/// The nodes of a pack in blocks. Blocks that equal the previous one, or the one
-/// at the same position in the pack before, are shared: they stay in the innermost
-/// cache, and most leaves have few that differ.
-pub fn material_blocks(
-    nodes: &[NodeData],
-    before: Option<&[Arc<BlockMaterial>]>,
-) -> Vec<Arc<BlockMaterial>> {
-    let mut blocks: Vec<Arc<BlockMaterial>> =
-        Vec::with_capacity(nodes.len().div_ceil(NODES_PER_BLOCK));
-    for nodes in nodes.chunks(NODES_PER_BLOCK) {
-        let material = BlockMaterial::new(nodes);
-        let above = before.and_then(|pack| pack.get(blocks.len()));
-        let near = [blocks.last(), above].into_iter().flatten();
-        let same = { near }.find(|other| ***other == material).cloned();
-        blocks.push(same.unwrap_or_else(|| Arc::new(material)));
-    }
-    blocks
 }

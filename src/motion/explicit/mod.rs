@@ -17,57 +17,65 @@
 //! them is reached by a shorter step from the earlier one, off the path, to
 //! which the motion returns. The path does not depend on the times asked for.
 //!
-//! Motion to a given time, and snapshots.
-//!
-//! Moments and forces on the nodes besides those of segments, coupling and dead loads: of the
-//! tissue between neighbouring rods, of loads of single rods, and of wind.
-//!
-//! Drag depends on the velocities at the time of the positions. Known are those half a step before,
-//! and half a step before the last step: it takes their linear extrapolation, so that the method
-//! stays of second order.
-//!
-//! Dead moments on a single rod, and their power.
-//!
-//! Work of loads and rest curvatures that vary in time.
+//! Besides segments, coupling and dead loads, the tissue between neighboring rods, loads of single
+//! rods and wind act on the nodes. Drag depends on the velocities at the time of the positions. Known are
+//! those half a step before, and half a step before the last step: drag takes their linear
+//! extrapolation, so that the method stays of second order.
 //!
 //! A kick takes the means of the loads over its length, and their work is this impulse times the
 //! mean of the velocities before and after it, whatever the loads are within it. Only
 //! the excess over the loads at time 0 is counted, which have a potential.
 
 mod kernel;
+mod layout;
 mod packs;
 mod stable_step;
 #[cfg(test)]
 mod tests;
 
-use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, State};
-use crate::motion::explicit::kernel::{
-    AlignedArray, BlockForces, PackForces, PackLayout, PackStep, StepLaw,
-};
-use crate::motion::explicit::packs::{Pack, vector_at};
+use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
+use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
+use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
+use crate::motion::explicit::packs::{NodeMomentum, Pack};
 pub use crate::motion::explicit::stable_step::StableStep;
 use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, check_resolution,
-    measure, rate_weights,
+    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
+    TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
 };
 use crate::numbers::largest;
 use crate::rod::{RESOLVED_TURN, Wrench};
-use crate::run::Limit;
 use crate::simd::widest_arch;
 use glam::{DQuat, DVec3};
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// Part of the stable time step used.
-const STABLE_STEP_FRACTION: f64 = 0.9;
+/// Steps of the explicit method, and when it does what is not done in every one.
+struct ExplicitSettings {
+    /// Part of the stable time step used: steps longer than the stable one diverge.
+    stable_step_fraction: f64,
+    /// Steps between normalizations of the quaternions: doubled, their lengths are off by twice as many
+    /// rounding errors.
+    normalization_interval: usize,
+    /// Steps between checks of the bending, which are free.
+    bending_check_interval: usize,
+    /// Steps between checks of the energy, which cost as much as some steps.
+    energy_check_interval: usize,
+    /// Number of segments from which rods are distributed to threads. Measured: below
+    /// it waking the threads costs more than it saves.
+    parallel_segments: usize,
+}
 
-/// Steps between normalisations of the quaternions.
-const NORMALISATION_INTERVAL: usize = 8;
+const SETTINGS: ExplicitSettings = ExplicitSettings {
+    stable_step_fraction: 0.9,
+    normalization_interval: 8,
+    bending_check_interval: 200,
+    energy_check_interval: 2000,
+    parallel_segments: 3000,
+};
 
-/// Number of segments from which rods are distributed to threads. Measured: below
-/// it waking the threads costs more than it saves.
-const PARALLEL_SEGMENTS: usize = 3000;
+/// Advice if energy grows, besides a shorter step.
+const ENERGY_GROWTH_ADVICE: &str = "the semi-implicit method";
 
 /// Number of rods that are not divided further: about two portions for every thread.
 fn packs_per_task(rods: usize) -> usize {
@@ -94,18 +102,40 @@ pub struct Explicit {
     /// Length of rods whose loads act on it.
     tip_load_length: f64,
     step: f64,
-    /// Time of the last step, and the time asked for, less than a step later.
+    /// Time of the last step; that of the clock is the time asked for, less than a step later.
     last_step_time: f64,
-    time: f64,
-    steps: usize,
-    /// Time and number of steps at the beginning of steps of the present length.
-    equal_steps_begin: (f64, usize),
+    clock: MotionClock,
+    equal_steps: EqualSteps,
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     balance: EnergyBalance,
     work: VaryingWork,
     parallel: bool,
-    limit: Limit,
+}
+
+/// Where steps of the present length began.
+#[derive(Clone, Copy, Debug, Default)]
+struct EqualSteps {
+    time: f64,
+    /// Number of steps before.
+    steps: usize,
+}
+
+/// What a kick did to the energies.
+struct KickEnergy {
+    exchange: Exchange,
+    /// Twice the kinetic energy in the middle of the kick.
+    twice_kinetic: f64,
+}
+
+/// The air in a kick.
+#[derive(Clone, Copy, Debug)]
+struct KickAir {
+    /// Mean velocity over the kick.
+    velocity: DVec3,
+    /// The velocities of nodes at the time of the positions are the last ones plus this times their
+    /// last change.
+    extrapolation: f64,
 }
 
 /// A rigid rod, whose stiffness the method cannot handle.
@@ -145,20 +175,19 @@ impl Explicit {
             tip_load_length: (0..count).map(tip_weight).sum(),
             step: 0.0,
             last_step_time: 0.0,
-            time: 0.0,
-            steps: 0,
-            equal_steps_begin: (0.0, 0),
+            clock: MotionClock::default(),
+            equal_steps: EqualSteps::default(),
             widths: [0.0; 2],
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
             parallel: layout.packs() > 1
-                && count * leaf.segments() >= PARALLEL_SEGMENTS
+                && count * leaf.segments() >= SETTINGS.parallel_segments
                 && rayon::current_num_threads() > 1,
-            limit: Limit::default(),
             leaf,
             physics,
         };
-        explicit.step = step.unwrap_or_else(|| STABLE_STEP_FRACTION * explicit.stable_step().step);
+        explicit.step =
+            step.unwrap_or_else(|| SETTINGS.stable_step_fraction * explicit.stable_step().step);
         let start = explicit.snapshot();
         explicit.balance.begin(&start);
         Ok(explicit)
@@ -210,31 +239,34 @@ impl Explicit {
     /// One time step of any length; returns twice the kinetic energy at its
     /// beginning.
     pub fn step(&mut self, h: f64) -> f64 {
-        let (exchange, energy) = self.kick_and_drift(h);
-        self.balance.add(exchange);
-        self.steps += 1;
-        self.equal_steps_begin = (self.last_step_time, self.steps);
-        self.time = self.last_step_time;
-        energy
+        let energy = self.kick_and_drift(h);
+        self.balance.add(energy.exchange);
+        self.clock.steps += 1;
+        self.equal_steps = EqualSteps {
+            time: self.last_step_time,
+            steps: self.clock.steps,
+        };
+        self.clock.time = self.last_step_time;
+        energy.twice_kinetic
     }
 
     fn rotation(&self, j: usize, i: usize) -> DQuat {
-        let (p, at) = self.layout.pack_position(j, i);
-        self.packs[p].rotation(at)
+        let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+        self.packs[pack].rotation(entry)
     }
 
     /// Velocity and angular momentum of a node.
-    fn moving(&self, j: usize, i: usize) -> (DVec3, DVec3) {
-        let (p, at) = self.layout.pack_position(j, i);
-        self.packs[p].moving(at)
+    fn momentum(&self, j: usize, i: usize) -> NodeMomentum {
+        let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+        self.packs[pack].momentum(entry)
     }
 
     /// The largest rotation between the ends of a segment, up to
     /// 2 pi, since signs of quaternions are aligned.
     fn largest_turn(&self) -> f64 {
         let deltas = (0..self.layout.rods).flat_map(|j| {
-            let (p, base) = self.layout.pack_position(j, 0);
-            let pack = &self.packs[p];
+            let PackPosition { pack, entry: base } = self.layout.pack_position(j, 0);
+            let pack = &self.packs[pack];
             (base..base + self.layout.segments)
                 .map(|at| (pack.quaternion(at + 1) - pack.quaternion(at)).length_squared())
         });
@@ -247,11 +279,11 @@ impl Explicit {
         self.largest_turn() <= RESOLVED_TURN && self.packs.iter().all(finite)
     }
 
-    fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
-        let exchange = self.kick(0.5 * h, h, true);
+    fn kick_and_drift(&mut self, h: f64) -> KickEnergy {
+        let energy = self.kick(0.5 * h, h, true);
         self.widths = [h, self.widths[0]];
         self.last_step_time += h;
-        exchange
+        energy
     }
 
     /// Time by which velocities lag behind positions: half a step, but zero at the start.
@@ -261,9 +293,8 @@ impl Explicit {
 
     /// Advances velocities, by the forces at the present positions, to the time
     /// `ahead` of these, and positions by the time `drift`.
-    /// Strains are stored as those of the last step if `remember`. Also returns
-    /// twice the kinetic energy in the middle of the kick.
-    fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> (Exchange, f64) {
+    /// Strains are stored as those of the last step if `remember`.
+    fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> KickEnergy {
         let length = self.velocity_lag() + ahead;
         let [from, to] = [
             self.last_step_time - self.velocity_lag(),
@@ -274,21 +305,23 @@ impl Explicit {
         let before_kick = self.excess_load_power(&loads);
         let mut work = 0.0;
         let last = self.leaf.segments();
-        let before = self.moving(0, last).0;
+        let before = self.momentum(0, last).velocity;
         (self.moments).begin_step(
-            (self.leaf.dead_moments_under(loads)).map(|it| (it.node, it.moment)),
+            self.leaf.dead_moments_under(loads),
             self.layout,
             &self.packs,
         );
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
-            let ahead = if last > 0.0 {
-                last / (last + before)
-            } else {
-                0.0
+            let air = KickAir {
+                velocity: self.physics.mean_air([from, to]),
+                extrapolation: if last > 0.0 {
+                    last / (last + before)
+                } else {
+                    0.0
+                },
             };
-            let air = (self.physics.mean_air([from, to]), ahead);
-            applied.update(&self.leaf, (self.layout, &self.positions), &self.packs, air);
+            applied.update(&self.leaf, self.layout, &self.positions, &self.packs, air);
         }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
@@ -325,19 +358,21 @@ impl Explicit {
         }
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
-            work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
+            work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity);
         }
-        work += length * self.moments.excess_load_power(self.layout, &self.packs);
+        work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_curvature_varies() {
             work += self
                 .work
                 .rest_curvature_work(rest, bent, length, self.widths[0]);
         }
-        let exchange = Exchange {
-            dissipated: length * (self.physics.damping * energy + friction),
-            work,
-        };
-        (exchange, energy)
+        KickEnergy {
+            exchange: Exchange {
+                dissipated: length * (self.physics.damping * energy + friction),
+                work,
+            },
+            twice_kinetic: energy,
+        }
     }
 
     fn law(&self, rest: f64, remember: bool) -> StepLaw {
@@ -360,14 +395,17 @@ impl Explicit {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
-        let normalise = self.steps.is_multiple_of(NORMALISATION_INTERVAL);
+        let normalize = self
+            .clock
+            .steps
+            .is_multiple_of(SETTINGS.normalization_interval);
         let (positions, leaf, moments) =
-            (&self.positions, &self.leaf, self.moments.nodal_moments());
+            (&self.positions, &self.leaf, &self.moments.nodal_moments[..]);
         let applied = self.applied.as_ref().map(AppliedLoads::loads);
         let coupled = leaf.coupled();
         let one = |block: &mut BlockForces, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
-            // Those beyond the first and the last rod have no weight. The others of a pack are
-            // alike.
+            // Gaps beyond the first and the last rod have no weight. The others of a pack are
+            // coupled alike.
             let coupling = |gap: usize| leaf.coupling(gap.min(layout.rods - 2)).to_array();
             let rods = layout.pack_rods(p);
             let step = PackStep {
@@ -386,7 +424,7 @@ impl Explicit {
                 velocity_factor: keep,
                 kick,
                 drift,
-                normalise,
+                normalize,
                 block,
             };
             pack.totals = arch.dispatch(step);
@@ -414,17 +452,6 @@ impl Explicit {
     }
 }
 
-/// Part of a step below which differences of time are rounding.
-const TIME_ROUNDING_FRACTION: f64 = 1e-9;
-
-/// Advice if energy grows, besides a shorter step.
-const ENERGY_GROWTH_ADVICE: &str = "the semi-implicit method";
-
-/// Steps between checks of the bending, which are free, and of the energy.
-const BENDING_CHECK_INTERVAL: usize = 200;
-
-const ENERGY_CHECK_INTERVAL: usize = 2000;
-
 impl Explicit {
     /// Positions, rotations and segment forces.
     pub fn present_state(&mut self) -> State {
@@ -448,7 +475,7 @@ impl Explicit {
         state
     }
 
-    pub(super) fn state(&self) -> State {
+    fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes = || self.leaf.rod_index_pairs(0..=n);
         let x = nodes().map(|(j, i)| vector_at(&self.positions, self.layout.node_index(j, i)));
@@ -467,51 +494,47 @@ impl Explicit {
             ENERGY_GROWTH_ADVICE,
         )?;
         // In the balance rotations are at most pi, as in space.
-        check_resolution(&self.leaf, self.time, self.largest_turn())?;
+        check_resolution(&self.leaf, self.clock.time, self.largest_turn())?;
         Ok(now)
     }
 }
 
 impl TimeIntegrator for Explicit {
-    fn time(&self) -> f64 {
-        self.time
+    fn clock(&self) -> &MotionClock {
+        &self.clock
     }
 
-    fn steps(&self) -> usize {
-        self.steps
-    }
-
-    fn set_limit(&mut self, limit: Limit) {
-        self.limit = limit;
+    fn clock_mut(&mut self) -> &mut MotionClock {
+        &mut self.clock
     }
 
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         let h = self.step;
         loop {
             // Times are multiples of the step, so that rounding does not accumulate.
-            let next =
-                self.equal_steps_begin.0 + h * (self.steps + 1 - self.equal_steps_begin.1) as f64;
+            let EqualSteps { time, steps } = self.equal_steps;
+            let next = time + h * (self.clock.steps + 1 - steps) as f64;
             if next > until + TIME_ROUNDING_FRACTION * h {
                 break;
             }
-            if self.limit.reached() {
-                return Err(Stopped::Interrupted { time: self.time });
-            }
-            let (exchange, _) = self.kick_and_drift(h);
-            self.balance.add(exchange);
-            self.steps += 1;
-            (self.last_step_time, self.time) = (next, next);
+            self.clock.check_limit()?;
+            let energy = self.kick_and_drift(h);
+            self.balance.add(energy.exchange);
+            self.clock.steps += 1;
+            (self.last_step_time, self.clock.time) = (next, next);
             let applied = self.applied.as_ref();
             if let Some(half_turn) = applied.and_then(|it| it.half_turn(&self.leaf)) {
-                let time = self.time;
+                let time = self.clock.time;
                 return Err(Stopped::HalfTurn { time, half_turn });
             }
-            let suspect = self.steps.is_multiple_of(BENDING_CHECK_INTERVAL) && !self.is_reliable();
-            if suspect || self.steps.is_multiple_of(ENERGY_CHECK_INTERVAL) {
+            let steps = self.clock.steps;
+            let suspect =
+                steps.is_multiple_of(SETTINGS.bending_check_interval) && !self.is_reliable();
+            if suspect || steps.is_multiple_of(SETTINGS.energy_check_interval) {
                 self.reliable_snapshot()?;
             }
         }
-        self.time = until.max(self.time);
+        self.clock.time = until.max(self.clock.time);
         self.reliable_snapshot()
     }
 
@@ -522,17 +545,19 @@ impl TimeIntegrator for Explicit {
         let path = (self.positions.clone(), moving);
         let (time, widths, work) = (self.last_step_time, self.widths, self.work);
         let mut exchange = Exchange::default();
-        let left = self.time - self.last_step_time;
+        let left = self.clock.time - self.last_step_time;
         if left > TIME_ROUNDING_FRACTION * self.step {
-            exchange += self.kick_and_drift(left).0;
+            exchange += self.kick_and_drift(left).exchange;
         }
-        self.last_step_time = self.time;
-        exchange += self.kick(0.0, 0.0, false).0;
+        self.last_step_time = self.clock.time;
+        exchange += self.kick(0.0, 0.0, false).exchange;
         exchange.work += self.excess_potential();
         let state = self.present_state();
-        let places = self.leaf.rod_index_pairs(0..=self.leaf.segments());
-        let places = places.map(|(j, i)| self.layout.pack_position(j, i));
-        let velocity: Vec<Velocity> = places.map(|(p, at)| self.packs[p].velocity(at)).collect();
+        let nodes = self.leaf.rod_index_pairs(0..=self.leaf.segments());
+        let places = nodes.map(|(j, i)| self.layout.pack_position(j, i));
+        let velocity: Vec<Velocity> = places
+            .map(|place| self.packs[place.pack].velocity(place.entry))
+            .collect();
         self.positions = path.0;
         for (pack, moving) in self.packs.iter_mut().zip(path.1) {
             (pack.motion, pack.past) = moving;
@@ -541,9 +566,15 @@ impl TimeIntegrator for Explicit {
             applied.set_past_velocities(past);
         }
         (self.last_step_time, self.widths, self.work) = (time, widths, work);
-        let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
+        let energy = measure(
+            &mut self.leaf,
+            &self.physics,
+            self.clock.time,
+            &state,
+            &velocity,
+        );
         Snapshot {
-            time: self.time,
+            time: self.clock.time,
             energy: self.balance.present_energy(energy, exchange),
             state,
             velocity,
@@ -551,11 +582,12 @@ impl TimeIntegrator for Explicit {
     }
 }
 
-/// The moments and forces at an instant.
-pub struct AppliedLoads {
+/// The moments and forces on the nodes besides those of segments, coupling and dead loads.
+struct AppliedLoads {
     state: State,
-    /// Those of the tissue's strips at the start.
+    /// How sections at the tissue's strips are aligned at the start.
     alignments: Vec<bool>,
+    /// Moments and forces, node by node.
     nodes: Vec<Wrench>,
     /// Moments and forces, laid out as positions.
     loads: [[AlignedArray; 3]; 2],
@@ -573,7 +605,7 @@ struct NodesInWind {
 
 impl AppliedLoads {
     /// Of a leaf that moves from the state `start`; `None` if nothing acts on the nodes besides.
-    pub fn new(
+    fn new(
         leaf: &DiscreteLeaf,
         physics: &Physics,
         start: &State,
@@ -583,7 +615,7 @@ impl AppliedLoads {
         if !leaf.has_tissue() && leaf.loads.rod_load_factor == 0.0 && wind.is_none() {
             return None;
         }
-        let array = || AlignedArray::zeros(layout.array_lengths()[0]);
+        let array = || AlignedArray::zeros(layout.leaf_array_length());
         let vectors = || std::array::from_fn(|_| array());
         let state = leaf.stress_free_state();
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
@@ -602,33 +634,34 @@ impl AppliedLoads {
     }
 
     /// Moments and forces, laid out as positions.
-    pub fn loads(&self) -> &[[AlignedArray; 3]; 2] {
+    fn loads(&self) -> &[[AlignedArray; 3]; 2] {
         &self.loads
     }
 
     /// The sum of the forces on all tips.
-    pub fn tip_force_sum(&self, layout: PackLayout) -> DVec3 {
+    fn tip_force_sum(&self, layout: PackLayout) -> DVec3 {
         let tips = (0..layout.rods)
             .map(|j| vector_at(&self.loads[1], layout.node_index(j, layout.segments)));
         tips.sum()
     }
 
-    /// Sets the moments and forces to those of the present positions and rotations, in air of a
-    /// velocity; velocities are extrapolated by `ahead` times their last change.
-    pub fn update(
+    /// Sets the moments and forces to those of the present positions and rotations.
+    fn update(
         &mut self,
         leaf: &DiscreteLeaf,
-        (layout, positions): (PackLayout, &[AlignedArray; 3]),
+        layout: PackLayout,
+        positions: &[AlignedArray; 3],
         packs: &[Pack],
-        (air, ahead): (DVec3, f64),
+        air: KickAir,
     ) {
         for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
-            let ((p, at), k) = (layout.pack_position(j, i), self.state.base(j) + i);
+            let PackPosition { pack, entry } = layout.pack_position(j, i);
+            let k = self.state.base(j) + i;
             self.state.x[k] = vector_at(positions, layout.node_index(j, i));
-            self.state.q[k] = packs[p].rotation(at);
+            self.state.q[k] = packs[pack].rotation(entry);
             if let Some(blown) = &mut self.nodes_in_wind {
                 blown.earlier_velocity[k] = blown.velocity[k];
-                blown.velocity[k] = packs[p].moving(at).0;
+                blown.velocity[k] = packs[pack].momentum(entry).velocity;
             }
         }
         self.nodes.fill(Wrench::default());
@@ -636,8 +669,8 @@ impl AppliedLoads {
         leaf.add_own_forces(&mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
             let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);
-            let velocity = |k: usize| now[k] + ahead * (now[k] - earlier[k]);
-            (blown.wind).set_forces(&self.state, air, velocity, &mut blown.forces);
+            let velocity = |k: usize| now[k] + air.extrapolation * (now[k] - earlier[k]);
+            (blown.wind).set_forces(&self.state, air.velocity, velocity, &mut blown.forces);
             for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
                 node.force += *force;
             }
@@ -653,12 +686,12 @@ impl AppliedLoads {
     }
 
     /// Where sections had passed half a turn against each other when loads were last set.
-    pub fn half_turn(&self, leaf: &DiscreteLeaf) -> Option<HalfTurn> {
+    fn half_turn(&self, leaf: &DiscreteLeaf) -> Option<HalfTurn> {
         leaf.half_turn_since(&self.alignments, &self.state)
     }
 
     /// Power of the wind at the mean of the velocities before the last kick and of these.
-    pub fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
+    fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
         let Some(blown) = &self.nodes_in_wind else {
             return 0.0;
         };
@@ -671,58 +704,61 @@ impl AppliedLoads {
     }
 
     /// The velocities that further motion depends on.
-    pub fn past_velocities(&self) -> Vec<DVec3> {
+    fn past_velocities(&self) -> Vec<DVec3> {
         (self.nodes_in_wind.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
     }
 
     /// Replaces these velocities.
-    pub fn set_past_velocities(&mut self, past: Vec<DVec3>) {
+    fn set_past_velocities(&mut self, past: Vec<DVec3>) {
         if let Some(blown) = &mut self.nodes_in_wind {
             blown.velocity = past;
         }
     }
 }
 
-/// The dead moments of a step.
+/// The dead moments on a single rod in a step.
 #[derive(Default)]
-pub struct StepDeadMoments {
-    /// Nodes and sizes.
-    nodal_moments: Vec<(usize, DVec3)>,
-    /// Rotations and angular momenta of these nodes before the step.
-    motions_before: Vec<(DQuat, DVec3)>,
+struct StepDeadMoments {
+    nodal_moments: Vec<NodalMoment>,
+    /// Motions of these nodes before the step.
+    spins_before: Vec<NodeSpin>,
+}
+
+/// Rotation and angular momentum of a node.
+struct NodeSpin {
+    rotation: DQuat,
+    angular_momentum: DVec3,
 }
 
 impl StepDeadMoments {
-    /// Nodes and sizes.
-    pub fn nodal_moments(&self) -> &[(usize, DVec3)] {
-        &self.nodal_moments
-    }
-
-    /// Takes over those of a step that begins.
-    pub fn begin_step(
+    /// Takes over the moments of a step that begins.
+    fn begin_step(
         &mut self,
-        moments: impl Iterator<Item = (usize, DVec3)>,
+        moments: impl Iterator<Item = NodalMoment>,
         layout: PackLayout,
         packs: &[Pack],
     ) {
         self.nodal_moments.clear();
         self.nodal_moments.extend(moments);
-        self.motions_before.clear();
-        for (node, _) in &self.nodal_moments {
-            let (p, at) = layout.pack_position(0, *node);
-            let pack = &packs[p];
-            self.motions_before
-                .push((pack.rotation(at), pack.moving(at).1));
-        }
+        let spins = self.nodal_moments.iter().map(|it| {
+            let PackPosition { pack, entry } = layout.pack_position(0, it.node);
+            NodeSpin {
+                rotation: packs[pack].rotation(entry),
+                angular_momentum: packs[pack].momentum(entry).angular,
+            }
+        });
+        self.spins_before.clear();
+        self.spins_before.extend(spins);
     }
 
-    /// Their power at the mean of the angular momenta before the step and of these.
-    pub fn excess_load_power(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
-        let nodes = self.nodal_moments.iter().zip(&self.motions_before);
-        let power = nodes.map(|((node, moment), (rotation, before))| {
-            let (p, at) = layout.pack_position(0, *node);
-            let momentum = 0.5 * (*before + packs[p].moving(at).1);
-            moment.dot(packs[p].angular_velocity(at, *rotation, momentum))
+    /// Power of the moments at the mean of the angular momenta before the step and of the present ones.
+    fn power(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
+        let nodes = self.nodal_moments.iter().zip(&self.spins_before);
+        let power = nodes.map(|(NodalMoment { node, moment }, before)| {
+            let PackPosition { pack, entry } = layout.pack_position(0, *node);
+            let pack = &packs[pack];
+            let momentum = 0.5 * (before.angular_momentum + pack.momentum(entry).angular);
+            moment.dot(pack.angular_velocity(entry, before.rotation, momentum))
         });
         power.sum()
     }
@@ -730,7 +766,7 @@ impl StepDeadMoments {
 
 /// What the work of varying loads and rest curvatures depends on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct VaryingWork {
+struct VaryingWork {
     /// Loads and factor of the rest curvatures at time 0.
     loads: Loads,
     rest_curvature_factor: f64,
@@ -745,7 +781,7 @@ pub(super) struct VaryingWork {
 }
 
 impl VaryingWork {
-    pub(super) fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Self {
+    fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Self {
         let straightening = leaf.sections.iter().map(|section| {
             let rest = section.rest_curvature;
             section.ds * rest.dot(section.couple_stiffness * rest)
@@ -763,13 +799,7 @@ impl VaryingWork {
     /// Work since the last kick, `width` ago, by the mean factors of the rest curvatures in that
     /// kick and, over `length`, in this one; `bent` is the sum of the rest curvatures
     /// times the present moments.
-    pub(super) fn rest_curvature_work(
-        &mut self,
-        mean: f64,
-        bent: f64,
-        length: f64,
-        width: f64,
-    ) -> f64 {
+    fn rest_curvature_work(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
         let turned = bent + mean * self.twice_straightening_energy;
         let half_impulse = 0.5 * length * (mean - self.rest_curvature_factor);
         self.rate = match width > 0.0 {
@@ -784,19 +814,19 @@ impl VaryingWork {
 
 impl Explicit {
     /// Power of the excess of `loads` over those at time 0, at the present velocities.
-    pub(super) fn excess_load_power(&self, loads: &Loads) -> f64 {
+    fn excess_load_power(&self, loads: &Loads) -> f64 {
         match self.physics.loads_vary() {
-            true => self.excess_load_sum(loads, |j, i| self.moving(j, i).0),
+            true => self.excess_load_sum(loads, |j, i| self.momentum(j, i).velocity),
             false => 0.0,
         }
     }
 
     /// Present potential of the excess of loads and rest curvatures over those at time 0: it
     /// is in the energies, but does not come from the motion.
-    pub(super) fn excess_potential(&self) -> f64 {
+    fn excess_potential(&self) -> f64 {
         let mut work = 0.0;
         if self.physics.loads_vary() {
-            let loads = self.physics.loads(self.time);
+            let loads = self.physics.loads(self.clock.time);
             work -= self.excess_load_sum(&loads, |j, i| {
                 vector_at(&self.positions, self.layout.node_index(j, i))
             });
@@ -810,7 +840,7 @@ impl Explicit {
                 rate,
                 ..
             } = self.work;
-            let rest = self.physics.rest_curvature_factor(self.time);
+            let rest = self.physics.rest_curvature_factor(self.clock.time);
             // The rate after the last kick is nearly that before it.
             work += half_impulse * rate;
             work += (first - rest) * turned;
@@ -825,8 +855,8 @@ impl Explicit {
         let mut sum = 0.0;
         for j in 0..self.layout.rods {
             for i in 0..=self.layout.segments {
-                let (p, at) = self.layout.pack_position(j, i);
-                sum += self.packs[p].load_length(at) * excess.gravity.dot(vectors(j, i));
+                let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+                sum += self.packs[pack].load_length(entry) * excess.gravity.dot(vectors(j, i));
             }
             if j == 0 || !self.leaf.leaf.joined() {
                 sum += excess.tip_force.dot(vectors(j, self.layout.segments));

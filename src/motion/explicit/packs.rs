@@ -1,160 +1,16 @@
-//! Arrays aligned to cache lines.
-//!
-//! Where the nodes of a leaf lie in arrays.
-//!
-//! Conversion of the leaf to the arrays of the explicit method, and back.
+//! Packs of rods in motion: conversion of the leaf to the arrays of the explicit method, and back.
 
 use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
-use crate::motion::explicit::kernel::{
-    BlockMaterial, NODES_PER_BLOCK, NodeData, PackMotion, StepTotals, StrainHistory,
-    material_blocks,
+use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory};
+use crate::motion::explicit::layout::{
+    AlignedArray, BlockMaterial, NodeData, PackLayout, material_blocks, vector_at,
 };
 use crate::motion::physics::Physics;
-use crate::simd::MAX_LANES;
 use glam::{DQuat, DVec3};
-use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 
-/// Numbers in a cache line.
-const NUMBERS_PER_CACHE_LINE: usize = 8;
-
-/// An array of fixed length aligned to a cache line, so that
-/// no group of nodes lies in two. Measured: otherwise steps of long rods take 1.1
-/// times as long.
-#[derive(Debug)]
-pub struct AlignedArray {
-    storage: Vec<f64>,
-    aligned_range: Range<usize>,
-}
-
-impl AlignedArray {
-    pub fn zeros(length: usize) -> Self {
-        let room = vec![0.0; length + NUMBERS_PER_CACHE_LINE];
-        let first = room
-            .as_ptr()
-            .align_offset(NUMBERS_PER_CACHE_LINE * size_of::<f64>());
-        // The offset may be unknown; then it is only slower.
-        let first = first.min(NUMBERS_PER_CACHE_LINE);
-        AlignedArray {
-            storage: room,
-            aligned_range: first..first + length,
-        }
-    }
-}
-
-impl Clone for AlignedArray {
-    fn clone(&self) -> Self {
-        let mut copy = AlignedArray::zeros(self.len());
-        copy.copy_from_slice(self);
-        copy
-    }
-}
-
-impl Deref for AlignedArray {
-    type Target = [f64];
-    #[inline(always)]
-    fn deref(&self) -> &[f64] {
-        &self.storage[self.aligned_range.clone()]
-    }
-}
-
-impl DerefMut for AlignedArray {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [f64] {
-        &mut self.storage[self.aligned_range.clone()]
-    }
-}
-
-impl AsRef<[f64]> for AlignedArray {
-    #[inline(always)]
-    fn as_ref(&self) -> &[f64] {
-        self
-    }
-}
-
-impl AsMut<[f64]> for AlignedArray {
-    #[inline(always)]
-    fn as_mut(&mut self) -> &mut [f64] {
-        self
-    }
-}
-
-/// Rods lie end to end. Short ones are processed several at a time, as a pack: the segments
-/// from one to the next have no stiffness. Measured: leaves of 35 rods of 50 segments take 0.9
-/// times as long as rod by rod.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PackLayout {
-    pub rods: usize,
-    pub segments: usize,
-    /// Entries from a rod to the next: at least one is not a node.
-    pub stride: usize,
-    /// Rods of a pack; the last pack may have fewer.
-    pub rods_per_pack: usize,
-}
-
-impl PackLayout {
-    /// `alike`: whether all neighbours are coupled in the same way, as in a pack they must be.
-    pub fn new(rods: usize, segments: usize, alike: bool) -> Self {
-        let stride = (segments + 2).next_multiple_of(MAX_LANES / 2);
-        // An even number, so that packs begin at multiples of the width.
-        let pack = NODES_PER_BLOCK / (2 * stride) * 2;
-        let (stride, pack) = match alike && rods > 1 && pack > 0 {
-            true => (stride, pack),
-            false => ((segments + 2).next_multiple_of(MAX_LANES), 1),
-        };
-        PackLayout {
-            rods,
-            segments,
-            stride,
-            rods_per_pack: pack,
-        }
-    }
-
-    /// Number of packs.
-    pub fn packs(&self) -> usize {
-        self.rods.div_ceil(self.rods_per_pack)
-    }
-
-    /// Rods of pack `p`.
-    pub fn pack_rods(&self, p: usize) -> std::ops::Range<usize> {
-        p * self.rods_per_pack..((p + 1) * self.rods_per_pack).min(self.rods)
-    }
-
-    /// Entries of a full pack.
-    pub fn pack_entries(&self) -> usize {
-        self.rods_per_pack * self.stride
-    }
-
-    /// The pack of node `i` of rod `j`, and its index there.
-    pub fn pack_position(&self, j: usize, i: usize) -> (usize, usize) {
-        (
-            j / self.rods_per_pack,
-            j % self.rods_per_pack * self.stride + i,
-        )
-    }
-
-    /// Index of node `i` of rod `j` in arrays of the whole leaf.
-    pub fn node_index(&self, j: usize, i: usize) -> usize {
-        self.front_padding() + j * self.stride + i
-    }
-
-    /// Entries before the first node: the first rod reads those of a neighbour there.
-    pub fn front_padding(&self) -> usize {
-        self.stride.next_multiple_of(MAX_LANES)
-    }
-
-    /// Length of arrays of the whole leaf, and of a pack: loops read up to a node beyond.
-    pub fn array_lengths(&self) -> [usize; 2] {
-        let pack = self.pack_entries() + MAX_LANES;
-        [
-            self.front_padding() + self.packs() * self.pack_entries() + pack,
-            pack,
-        ]
-    }
-}
-
-/// The arrays of a pack of rods, except its positions, which its neighbours read.
+/// The arrays of a pack of rods, except its positions, which its neighbors read.
 #[derive(Clone, Debug)]
 pub struct Pack {
     pub motion: PackMotion,
@@ -177,7 +33,7 @@ pub fn layout(leaf: &DiscreteLeaf) -> PackLayout {
 
 /// The positions of all nodes.
 pub fn positions(leaf: &DiscreteLeaf, state: &State, layout: PackLayout) -> [AlignedArray; 3] {
-    let mut x = arrays::<3>(layout.array_lengths()[0]);
+    let mut x = arrays::<3>(layout.leaf_array_length());
     for (j, i) in leaf.rod_index_pairs(0..=leaf.segments()) {
         for c in 0..3 {
             x[c][layout.node_index(j, i)] = state.x[state.base(j) + i][c];
@@ -196,7 +52,7 @@ pub fn packs_at_rest(
     let node = |j, i| node_data(leaf, physics, j, i);
     let materials = materials(layout, node).into_iter().enumerate();
     let packs = materials.map(|(p, material)| {
-        let length = layout.array_lengths()[1];
+        let length = layout.pack_array_length();
         let remembered = if physics.retardation > 0.0 { length } else { 0 };
         let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
         let mut motion = PackMotion {
@@ -209,10 +65,10 @@ pub fn packs_at_rest(
             let mut last = DQuat::IDENTITY;
             for i in 0..=leaf.segments() {
                 let q = state.q[state.base(j) + i];
-                // Signs of neighbouring quaternions are aligned once, and remain so.
+                // Signs of neighboring quaternions are aligned once, and remain so.
                 let flipped = i > 0 && last.dot(q) < 0.0;
                 last = if flipped { -q } else { q };
-                let at = layout.pack_position(j, i).1;
+                let at = layout.pack_position(j, i).entry;
                 for (array, value) in motion.q.iter_mut().zip(last.to_array()) {
                     array[at] = value;
                 }
@@ -231,7 +87,7 @@ pub fn packs_at_rest(
     packs.collect()
 }
 
-/// The nodes of all packs in blocks; those that packs have in common are shared.
+/// The nodes of all packs in blocks; blocks that packs have in common are shared.
 pub fn materials(
     layout: PackLayout,
     node: impl Fn(usize, usize) -> NodeData,
@@ -241,7 +97,7 @@ pub fn materials(
         let mut nodes = vec![NodeData::default(); layout.pack_entries()];
         for j in layout.pack_rods(p) {
             for i in 0..=layout.segments {
-                nodes[layout.pack_position(j, i).1] = node(j, i);
+                nodes[layout.pack_position(j, i).entry] = node(j, i);
             }
         }
         let blocks = material_blocks(&nodes, packs.last().map(|pack| &**pack));
@@ -290,48 +146,69 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
     node
 }
 
+/// Velocity and angular momentum of a node.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeMomentum {
+    pub velocity: DVec3,
+    /// Angular momentum along the lab axes.
+    pub angular: DVec3,
+}
+
+/// Where the material of a node is.
+#[derive(Clone, Copy)]
+pub struct NodeMaterial<'a> {
+    pub block: &'a BlockMaterial,
+    /// Index in the arrays of the block.
+    pub node: usize,
+}
+
 impl Pack {
-    /// The block of a node, and its index there, by its index in the arrays.
-    pub fn node_material(&self, at: usize) -> (&BlockMaterial, usize) {
+    /// The material of the node at an index in the arrays.
+    pub fn node_material(&self, at: usize) -> NodeMaterial<'_> {
         let length = self.material[0].mass.len();
-        (&self.material[at / length], at % length)
+        NodeMaterial {
+            block: &self.material[at / length],
+            node: at % length,
+        }
     }
 
     /// Length of rod whose loads act on a node.
     pub fn load_length(&self, at: usize) -> f64 {
-        let (material, i) = self.node_material(at);
-        material.load_length[i]
+        let NodeMaterial { block, node } = self.node_material(at);
+        block.load_length[node]
     }
 
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn angular_velocity(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
         let d1 = q * DVec3::X;
-        let (material, i) = self.node_material(at);
-        p * material.inverse_inertia[i] + d1 * (d1.dot(p) * material.inverse_spin_excess[i])
+        let NodeMaterial { block, node } = self.node_material(at);
+        p * block.inverse_inertia[node] + d1 * (d1.dot(p) * block.inverse_spin_excess[node])
     }
 
-    /// The quaternion of a node, normalised at intervals only.
+    /// The quaternion of a node, normalized at intervals only.
     pub fn quaternion(&self, at: usize) -> DQuat {
         DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at]))
     }
 
+    /// The rotation of a node.
     pub fn rotation(&self, at: usize) -> DQuat {
         self.quaternion(at).normalize()
     }
 
     /// Velocity and angular momentum of a node.
-    pub fn moving(&self, at: usize) -> (DVec3, DVec3) {
-        (vector_at(&self.motion.v, at), vector_at(&self.motion.p, at))
+    pub fn momentum(&self, at: usize) -> NodeMomentum {
+        NodeMomentum {
+            velocity: vector_at(&self.motion.v, at),
+            angular: vector_at(&self.motion.p, at),
+        }
     }
 
     /// Linear and angular velocity of a node.
     pub fn velocity(&self, at: usize) -> Velocity {
-        let (linear, p) = self.moving(at);
-        let angular = self.angular_velocity(at, self.rotation(at), p);
-        Velocity { angular, linear }
+        let momentum = self.momentum(at);
+        Velocity {
+            angular: self.angular_velocity(at, self.rotation(at), momentum.angular),
+            linear: momentum.velocity,
+        }
     }
-}
-
-pub fn vector_at(arrays: &[AlignedArray; 3], at: usize) -> DVec3 {
-    DVec3::new(arrays[0][at], arrays[1][at], arrays[2][at])
 }

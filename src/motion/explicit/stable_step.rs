@@ -7,7 +7,7 @@
 //! 9.2). The shares are arbitrary; here they are in proportion to the stiffness with which
 //! each segment holds the node, so that a short or stiff segment has most of a mass
 //! that it alone moves fast. With the rate of internal friction from three
-//! strains (see [`crate::motion::friction::rates`]) a mode with the part K of its squared frequency
+//! strains ([`crate::motion::rate_weights`]) a mode with the part K of its squared frequency
 //! from strains and C from coupling satisfies
 //!
 //! ```text
@@ -24,17 +24,15 @@
 //!
 //! and the same bound.
 //!
-//! Masses with which a leaf comes to rest fastest.
-//!
-//! If only the equilibrium matters, masses are arbitrary. With these, the
-//! fastest motion of every single segment and of every coupling between neighbours,
+//! If only the equilibrium matters, masses are arbitrary. With the fictitious ones below, the
+//! fastest motion of every single segment and of every coupling between neighbors,
 //! alone with its share of the masses, has the frequency 2: that bounds the frequencies of
 //! the leaf, the longest stable time step is one, and slow motions are as fast relative
 //! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
 use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
-use crate::motion::explicit::kernel::{NodeData, PackLayout};
+use crate::motion::explicit::layout::{NodeData, PackLayout};
 use crate::motion::explicit::packs::{Pack, materials, node_data};
 use crate::motion::physics::{Physics, WindDrag};
 use glam::{DMat3, DQuat, DVec3};
@@ -51,9 +49,10 @@ pub struct StableStep {
 }
 
 impl StableStep {
-    /// For a leaf with these positions and rotations.
+    /// The longest stable step of a leaf with these positions and rotations.
     pub fn for_leaf(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
-        let (strains, mut limit) = fastest_segment(leaf, physics, state);
+        let fastest = fastest_segment(leaf, physics, state);
+        let (strains, mut limit) = (fastest.squared_frequency, fastest.kind);
         let (coupling, tissue) = (
             coupling_frequency_bound(leaf, physics),
             tissue_frequency_bound(leaf, physics, state),
@@ -89,30 +88,40 @@ impl StableStep {
 /// the rotations of both.
 type SegmentStiffness = [[DMat3; 4]; 4];
 
-/// Stiffness with which a node is held: for displacements along its directors, and for rotations
-/// about them.
-type NodeStiffness = [DVec3; 2];
+/// Stiffness with which a node is held.
+#[derive(Clone, Copy, Debug, Default)]
+struct NodeHold {
+    /// Stiffness for displacements along the node's directors.
+    displacement: DVec3,
+    /// Stiffness for rotations about them.
+    rotation: DVec3,
+}
+
+/// The fastest motion of any single segment.
+struct FastestMotion {
+    squared_frequency: f64,
+    kind: &'static str,
+}
 
 /// Least stiffness of a hold in any direction, as a part of its largest component.
 const MIN_STIFFNESS_FRACTION: f64 = 0.01;
 
-/// Largest squared frequency of any single segment, and the motion it belongs to.
-fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
+/// The fastest motion of any single segment with its shares of the masses.
+fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> FastestMotion {
     let (rods, n) = (leaf.rods(), leaf.segments());
     let joined = leaf.leaf.joined() && rods > 1;
-    let mut held: Vec<NodeStiffness> = vec![[DVec3::ZERO; 2]; state.x.len()];
+    let mut held = vec![NodeHold::default(); state.x.len()];
     for (j, i) in leaf.rod_index_pairs(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
         for end in 0..2 {
             let node = state.base(j) + i + end;
             let hold = node_stiffness(&stiffness, end, state.q[node]);
-            for c in 0..2 {
-                held[node][c] += hold[c];
-            }
+            held[node].displacement += hold.displacement;
+            held[node].rotation += hold.rotation;
         }
     }
     // All rods hold a shared tip, along their own directors: as a scalar.
-    let tips = (0..rods).map(|j| held[state.base(j) + n][0].max_element());
+    let tips = (0..rods).map(|j| held[state.base(j) + n].displacement.max_element());
     let tip: f64 = tips.sum();
     let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
     let tip_mass: f64 = tip_mass.sum();
@@ -130,13 +139,14 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
             }
             let node = state.base(j) + i + end;
             let inertia = physics.inertia(leaf, j, i + end);
-            let [shift, turn] = node_stiffness(&stiffness, end, state.q[node]);
+            let hold = node_stiffness(&stiffness, end, state.q[node]);
+            let (shift, turn) = (hold.displacement, hold.rotation);
             let moving = match joined && i + end == n {
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
-                false => inertia.mass * shift / held[node][0],
+                false => inertia.mass * shift / held[node].displacement,
             };
             let (j1, j2) = (inertia.polar(), inertia.transverse);
-            let turning = DVec3::new(j1, j2, j2) * turn / held[node][1];
+            let turning = DVec3::new(j1, j2, j2) * turn / held[node].rotation;
             let frame = DMat3::from_quat(state.q[node]);
             [(moving, free.displacement), (turning, free.rotation)].map(|(mass, free)| match free {
                 true => {
@@ -157,12 +167,19 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
         }
     }
     let Some((j, i, roots, matrix)) = fastest else {
-        return (0.0, "");
+        return FastestMotion {
+            squared_frequency: 0.0,
+            kind: "",
+        };
     };
     let eigen = matrix.symmetric_eigen();
     let mode = eigen.eigenvectors.column(eigen.eigenvalues.imax());
-    let motion = from_fn(|k| roots[k] * DVec3::from_slice(&mode.as_slice()[3 * k..3 * k + 3]));
-    (largest, motion_kind_name(leaf, state, (j, i), motion))
+    let motion = |k: usize| roots[k] * DVec3::from_slice(&mode.as_slice()[3 * k..3 * k + 3]);
+    let (displacements, rotations) = ([motion(0), motion(1)], [motion(2), motion(3)]);
+    FastestMotion {
+        squared_frequency: largest,
+        kind: motion_kind_name(leaf, state, j, i, displacements, rotations),
+    }
 }
 
 /// Stiffness of a segment that carries the force of its strain.
@@ -178,21 +195,28 @@ fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> SegmentS
 }
 
 /// Stiffness with which a segment holds the node of rotation `q` at its left or right end.
-fn node_stiffness(stiffness: &SegmentStiffness, end: usize, q: DQuat) -> NodeStiffness {
+fn node_stiffness(stiffness: &SegmentStiffness, end: usize, q: DQuat) -> NodeHold {
     let frame = DMat3::from_quat(q);
-    [end, 2 + end].map(|c| {
+    let [displacement, rotation] = [end, 2 + end].map(|c| {
         let seen = frame.transpose() * stiffness[c][c] * frame;
         let hold = DVec3::new(seen.x_axis.x, seen.y_axis.y, seen.z_axis.z);
         hold.max(DVec3::splat(MIN_STIFFNESS_FRACTION * hold.max_element()))
-    })
+    });
+    NodeHold {
+        displacement,
+        rotation,
+    }
 }
 
-/// The dominant kind of a motion of a segment, given by displacements and rotations of its ends.
+/// The dominant kind of a motion of segment `i` of rod `j`, given by the displacements and the
+/// rotations of its ends.
 fn motion_kind_name(
     leaf: &DiscreteLeaf,
     state: &State,
-    (j, i): (usize, usize),
-    [x0, x1, a, b]: [DVec3; 4],
+    j: usize,
+    i: usize,
+    [x0, x1]: [DVec3; 2],
+    [a, b]: [DVec3; 2],
 ) -> &'static str {
     let (section, node) = (leaf.section(j, i), state.base(j) + i);
     let frame = leaf.segment(state, j, i, DVec3::ZERO).frame.transpose();
@@ -300,7 +324,7 @@ pub fn set_fictitious_masses(
                 inertia += 2.0 * (bend + stretch * arm * arm) / ROTATION_FREQUENCY_FRACTION;
             }
             let node = &mut new[i];
-            // Both neighbours pull on a node, and may move as much as it does.
+            // Both neighbors pull on a node, and may move as much as it does.
             for (gap, coupled) in [j.wrapping_sub(1), j]
                 .into_iter()
                 .zip(node.coupling_weights)

@@ -1,5 +1,4 @@
 use crate::leaf::{Grid, Leaf};
-use crate::motion::check_resolution;
 use crate::motion::explicit::*;
 use crate::relax::initial_state;
 use crate::scenario::Scenario;
@@ -63,7 +62,7 @@ fn element_node_loads(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)>
 }
 
 /// The forces of the loops are the gradient of the energy that the relaxation
-/// minimises, with all instruction sets of the processor.
+/// minimizes, with all instruction sets of the processor.
 #[test]
 fn forces_are_those_of_the_element() {
     // Several rods at a time, and their sections round and straight at rest.
@@ -115,20 +114,24 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
         explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
         for (j, i) in leaf.rod_index_pairs(1..=n) {
-            let (v, p) = explicit.moving(j, i);
+            let NodeMomentum {
+                velocity: v,
+                angular: p,
+            } = explicit.momentum(j, i);
             let (force, moment) = expected[state.base(j) + i];
             let moment_error = (p / (0.5 * h) - moment).length();
             assert!(moment_error < allowed, "{j} {i}: {moment_error}");
             if i == n {
                 tip += force;
             } else {
-                let (pack, at) = explicit.layout.pack_position(j, i);
-                let (material, at) = explicit.packs[pack].node_material(at);
-                let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
+                let PackPosition { pack, entry } = explicit.layout.pack_position(j, i);
+                let material = explicit.packs[pack].node_material(entry);
+                let mass = material.block.mass[material.node];
+                let error = (v * (mass / (0.5 * h)) - force).length();
                 assert!(error < allowed, "{j} {i}: {error}");
             }
         }
-        let v = explicit.moving(2, n).0;
+        let v = explicit.momentum(2, n).velocity;
         let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
         assert!(error < allowed, "tip: {error}");
         // Clamped ends do not move.
@@ -154,7 +157,7 @@ fn like_blocks_are_shared() {
     };
     // The clamped end, the middle and the tip.
     assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 5));
-    // Four rods at a time: the first and the last have one neighbour.
+    // Four rods at a time: the first and the last have one neighbor.
     assert_eq!(distinct("rods = 13, length = 1.0", 50), (3, 4));
     assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (3, 3));
 }

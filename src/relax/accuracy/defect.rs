@@ -12,10 +12,6 @@
 //! correction (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes
 //! from which it is integrated, to the solution of the equations themselves, in each round by
 //! the relative error of the linear equations: about a hundredth on 8 segments.
-//!
-//! The first-order response of a leaf to jumps of its fields, and its subtraction.
-//!
-//! The steps of the integration along the veins in defect correction, and their error.
 
 use crate::leaf::{
     DefiniteFactors, DiscreteLeaf, EquationWorkspace, FieldChange, Grid, LinearSolveOutcome,
@@ -29,26 +25,41 @@ use crate::relax::accuracy::transfer::GridLevel;
 use crate::rotation;
 use glam::DVec3;
 
-/// The linear equations are those of the grid this many levels below the finest, but not of
-/// the coarsest.
-const LINEARIZATION_COARSENING_LEVELS: usize = 2;
+/// When and how far a leaf is corrected by its defect.
+struct DefectCorrection {
+    /// The linear equations are those of the grid so many levels below the finest, but not of the
+    /// coarsest. One less makes them four times as accurate, and twice as expensive.
+    levels_below_finest: usize,
+    /// The part of the error assumed to remain after a correction before it has been measured: on a
+    /// grid of n segments this number over n^2.
+    contraction_by_segments: f64,
+    /// The least part assumed.
+    least_contraction: f64,
+    /// The largest measured part with which corrections continue.
+    largest_contraction: f64,
+    /// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
+    /// jumps there tell nothing of the errors at the nodes.
+    largest_growth: f64,
+    /// Errors of rotations allowed in a corrected leaf, in multiples of that of the positions
+    /// (dimensionless): as they are in an extrapolated one.
+    rotation_errors: f64,
+    /// Errors of forces and moments allowed in a corrected leaf, in the same multiples.
+    force_errors: f64,
+    /// Relative accuracy, in the energy norm, of the response to the defect: in a stiff leaf most of
+    /// that norm is stretch, and displacements are a small part of it.
+    response_accuracy: f64,
+}
 
-/// The part of the error assumed to remain after a correction before it has been measured: on
-/// a grid of n segments the first number over n^2, but no less than the second; and the largest
-/// measured part with which corrections continue.
-const EXPECTED_CORRECTION_CONTRACTION: (f64, f64) = (0.64, 0.01);
-
-const LARGEST_CORRECTION_CONTRACTION: f64 = 0.2;
-
-/// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
-/// jumps there tell nothing of the errors at the nodes.
-const MAX_PERTURBATION_GROWTH: f64 = 2.0;
-
-/// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
-/// of that of the positions (dimensionless): as they are in an extrapolated one.
-const ROTATION_ERROR_MULTIPLE: f64 = 10.0;
-
-const FORCE_ERROR_MULTIPLE: f64 = 50.0;
+const CORRECTION: DefectCorrection = DefectCorrection {
+    levels_below_finest: 2,
+    contraction_by_segments: 0.64,
+    least_contraction: 0.01,
+    largest_contraction: 0.2,
+    largest_growth: 2.0,
+    rotation_errors: 10.0,
+    force_errors: 50.0,
+    response_accuracy: 1e-6,
+};
 
 /// The factorised equations of one of the grids.
 pub struct FactorizedLevel {
@@ -58,18 +69,63 @@ pub struct FactorizedLevel {
 }
 
 impl FactorizedLevel {
+    /// The equations of one of the `levels`, assembled anew at rest: those of the last Newton step
+    /// have the forces before it, which differ where rods are rigid.
+    fn new(
+        levels: &[GridLevel],
+        level_number: usize,
+        workspace: &mut EquationWorkspace,
+        work: &mut SolverCounts,
+    ) -> Option<Self> {
+        let GridLevel { leaf, state } = &levels[level_number];
+        let mut system = workspace.equations(leaf);
+        work.force_evaluations += 1;
+        work.factorizations += 1;
+        leaf.assemble(state, &mut system);
+        leaf.add_phase_conditions(state, &mut system);
+        let factors = match leaf.rods() {
+            1 => DefiniteFactors::indefinite_single_rod(&mut system)?,
+            _ => DefiniteFactors::new(&mut system, 0.0)?,
+        };
+        Some(FactorizedLevel {
+            level_number,
+            system,
+            factors,
+        })
+    }
+
     /// The number of the grid.
     pub fn grid(&self) -> usize {
         self.level_number
     }
 }
 
+/// The largest errors of positions, in lengths of the leaf.
+#[derive(Clone, Copy)]
+pub struct PositionErrors {
+    /// At the nodes from which the leaf was integrated.
+    pub at_nodes: f64,
+    /// On either side of the midpoints between them.
+    pub between: f64,
+}
+
+impl PositionErrors {
+    pub fn largest(self) -> f64 {
+        larger(self.at_nodes, self.between)
+    }
+
+    /// Both errors plus that of the integration.
+    fn increased(self, error: f64) -> Self {
+        PositionErrors {
+            at_nodes: self.at_nodes + error,
+            between: self.between + error,
+        }
+    }
+}
+
 /// A leaf on one grid or several, with its error estimated from the equilibrium equations.
 pub struct DefectEstimate {
-    /// The largest error of a position at the nodes from which the leaf was integrated.
-    pub at_nodes: f64,
-    /// The largest error on either side of the midpoints between them.
-    pub between: f64,
+    pub position_errors: PositionErrors,
     /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
     pub rods: Vec<Vec<RodFields>>,
     /// Its potential energy, dimensionless.
@@ -85,40 +141,42 @@ pub struct DefectEstimate {
     pub corrections: usize,
 }
 
-impl DefectEstimate {
-    /// The largest error of a position.
-    pub fn largest(&self) -> f64 {
-        larger(self.at_nodes, self.between)
-    }
+/// What corrections are to reach, and how many may be made.
+#[derive(Clone, Copy)]
+pub struct CorrectionGoal {
+    /// The estimated error of positions that is small enough, in lengths of the leaf.
+    pub error: f64,
+    pub most_corrections: usize,
 }
 
 /// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
-/// segments of the one before, with `columns` extrapolations. If the error is more than
-/// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
+/// segments of the one before, with `columns` extrapolations. If the error is more than that of the
+/// `goal` the leaf is corrected, provided that this reduces it below.
 /// `None` where grips hold veins, whose forces jump there, where the linear equations cannot be
-/// solved, where tissue is so stiff that integration
-/// along the veins is unstable, or where the segments of a single level
-/// are not pairs of equal ones. The equations are factorised, in the memory of the `workspace`, unless
-/// `linear` has them already.
+/// solved, where tissue is so stiff that integration along the veins is unstable, or where the
+/// segments of a single level are not pairs of equal ones. The equations are factorized, in the
+/// memory of the `workspace`, unless `linear` has them already.
 pub fn estimate(
     levels: &[GridLevel],
     columns: usize,
-    (enough, most): (f64, usize),
-    (linear, workspace): (&mut Option<FactorizedLevel>, &mut EquationWorkspace),
+    goal: CorrectionGoal,
+    linear: &mut Option<FactorizedLevel>,
+    workspace: &mut EquationWorkspace,
     work: &mut SolverCounts,
 ) -> Option<DefectEstimate> {
+    let (enough, most) = (goal.error, goal.most_corrections);
     let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
     // The linear equations need two segments between nodes.
     let (parts, grid) = match last {
         0 => (first.grid.coarsened()?, 0),
         _ => (
             first.grid.clone(),
-            last.saturating_sub(LINEARIZATION_COARSENING_LEVELS).max(1),
+            last.saturating_sub(CORRECTION.levels_below_finest).max(1),
         ),
     };
     let widths = (0..parts.segments()).map(|i| parts.segment_width(i));
     let unstable =
-        first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > MAX_PERTURBATION_GROWTH;
+        first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > CORRECTION.largest_growth;
     if unstable || first.has_grips() {
         return None;
     }
@@ -126,17 +184,9 @@ pub fn estimate(
         .as_ref()
         .is_none_or(|linear| linear.level_number != grid)
     {
-        let (system, factors) = factorized(&levels[grid], workspace, work)?;
-        *linear = Some(FactorizedLevel {
-            level_number: grid,
-            system,
-            factors,
-        });
+        *linear = Some(FactorizedLevel::new(levels, grid, workspace, work)?);
     }
-    let level = &levels[grid];
-    let FactorizedLevel {
-        system, factors, ..
-    } = linear.as_mut()?;
+    let (level, linear) = (&levels[grid], linear.as_mut()?);
     let (finest, count) = (&levels[last].leaf.grid, parts.segments());
     let (mut known, mut flow) = (
         extrapolated_node_fields(levels, columns, count),
@@ -144,18 +194,17 @@ pub fn estimate(
     );
     let mut tangents = Tangents::new(level, count);
     let n = level.leaf.segments() as f64;
-    let assumed =
-        (EXPECTED_CORRECTION_CONTRACTION.0 / (n * n)).max(EXPECTED_CORRECTION_CONTRACTION.1);
+    let assumed = (CORRECTION.contraction_by_segments / (n * n)).max(CORRECTION.least_contraction);
     let mut uncorrected = None;
     let mut before = 0.0;
     let mut steps = IntegrationSteps::new(finest.segments() / count / 2, last == 0);
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
-        let integrated = integrate_to_midpoints((first, &parts), &mut flow, &known, steps.count);
-        let Some(response) = tangents.response((system, factors), &integrated.jumps) else {
+        let integrated = integrate_to_midpoints(first, &parts, &mut flow, &known, steps.count);
+        let Some(response) = tangents.response(linear, &integrated.jumps) else {
             break;
         };
-        let largest = larger(response.largest[0], response.largest[1]);
+        let largest = response.position_errors.largest();
         steps.measure(largest);
         // With halved steps the error includes that of the longer ones: its ratio is no measure
         // of the contraction.
@@ -163,7 +212,7 @@ pub fn estimate(
             true => assumed,
             false => largest / before,
         };
-        if !largest.is_finite() || contraction > LARGEST_CORRECTION_CONTRACTION {
+        if !largest.is_finite() || contraction > CORRECTION.largest_contraction {
             break;
         }
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
@@ -173,7 +222,8 @@ pub fn estimate(
         }
         let changes = tangents.changes(&response, &integrated.jumps);
         if corrections == 0 {
-            let estimate = integrated.estimate((first, finest), &known, &changes, response.largest);
+            let errors = response.position_errors;
+            let estimate = integrated.estimate(first, finest, &known, &changes, errors);
             if largest <= enough || out_of_reach {
                 return Some(estimate);
             }
@@ -181,11 +231,11 @@ pub fn estimate(
         } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(
-                turn / ROTATION_ERROR_MULTIPLE,
-                stress / FORCE_ERROR_MULTIPLE,
+                turn / CORRECTION.rotation_errors,
+                stress / CORRECTION.force_errors,
             ) <= enough
             {
-                let errors = response.largest.map(|error| error + steps.error);
+                let errors = response.position_errors.increased(steps.error);
                 let mut forces = known
                     .iter()
                     .flatten()
@@ -195,7 +245,7 @@ pub fn estimate(
                     corrections,
                     energy_error: energy_error(first, &changes, &integrated.jumps)
                         + steps.error * largest,
-                    ..integrated.estimate((first, finest), &known, &changes, errors)
+                    ..integrated.estimate(first, finest, &known, &changes, errors)
                 });
             }
         }
@@ -206,27 +256,8 @@ pub fn estimate(
     uncorrected
 }
 
-/// Assembled anew at rest: the equations of the last Newton step have the forces before it,
-/// which differ where rods are rigid.
-fn factorized(
-    level: &GridLevel,
-    workspace: &mut EquationWorkspace,
-    work: &mut SolverCounts,
-) -> Option<(System, DefiniteFactors)> {
-    let mut system = workspace.equations(&level.leaf);
-    work.force_evaluations += 1;
-    work.factorizations += 1;
-    level.leaf.assemble(&level.state, &mut system);
-    level.leaf.add_phase_conditions(&level.state, &mut system);
-    let factors = match level.leaf.rods() {
-        1 => DefiniteFactors::indefinite_single_rod(&mut system)?,
-        _ => DefiniteFactors::new(&mut system, 0.0)?,
-    };
-    Some((system, factors))
-}
-
-/// A leaf integrated along its rods.
-struct IntegratedLeaf {
+/// A leaf integrated from the ends of the parts of its rods to the midpoints between them.
+struct MidpointIntegration {
     /// After every step from the two ends of a part to its midpoint, part after part.
     slices: Vec<[Vec<StationFields>; 2]>,
     jumps: Vec<Vec<FieldChange>>,
@@ -236,11 +267,12 @@ struct IntegratedLeaf {
 /// The leaf `known` at the nodes of `parts`, integrated from there to the midpoints between
 /// them in `steps` steps, and the jumps there.
 fn integrate_to_midpoints(
-    (leaf, parts): (&DiscreteLeaf, &Grid),
+    leaf: &DiscreteLeaf,
+    parts: &Grid,
     flow: &mut RodIntegrator,
     known: &[Vec<RodFields>],
     steps: usize,
-) -> IntegratedLeaf {
+) -> MidpointIntegration {
     let n = parts.segments();
     let mut slices = vec![[(); 2].map(|()| vec![StationFields::default(); steps]); n];
     let mut jumps = vec![Vec::with_capacity(n); leaf.rods()];
@@ -269,7 +301,7 @@ fn integrate_to_midpoints(
         let work = nodes.map(|(&sigma, node)| leaf.point_force_at(j, sigma).dot(node.x));
         energy -= work.sum::<f64>();
     }
-    IntegratedLeaf {
+    MidpointIntegration {
         slices,
         jumps,
         energy,
@@ -282,15 +314,16 @@ fn at_midpoint(ends: &[Vec<StationFields>; 2], j: usize) -> [RodFields; 2] {
         .map(|slices| slices.last().expect("a step at least").rod(j))
 }
 
-impl IntegratedLeaf {
-    /// An uncorrected leaf with its largest errors at the nodes from which it was integrated and
-    /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
+impl MidpointIntegration {
+    /// An uncorrected leaf with these errors, on the `finest` grid or on the refined one that has the
+    /// ends of all steps.
     fn estimate(
         &self,
-        (leaf, finest): (&DiscreteLeaf, &Grid),
+        leaf: &DiscreteLeaf,
+        finest: &Grid,
         known: &[Vec<RodFields>],
         changes: &[Vec<FieldChange>],
-        [at_nodes, between]: [f64; 2],
+        position_errors: PositionErrors,
     ) -> DefectEstimate {
         let rods = self.rods(known);
         let mut grid = finest.clone();
@@ -298,8 +331,7 @@ impl IntegratedLeaf {
             grid = grid.refined();
         }
         DefectEstimate {
-            at_nodes,
-            between,
+            position_errors,
             rods,
             energy: self.energy,
             energy_error: energy_error(leaf, changes, &self.jumps),
@@ -441,10 +473,6 @@ fn mean(a: &RodFields, b: &RodFields) -> RodFields {
     }
 }
 
-/// Relative accuracy, in the energy norm, of the response: in a stiff leaf most of that
-/// norm is stretch, and displacements are a small part of it.
-const ACCURACY: f64 = 1e-6;
-
 /// The linearised equations of a leaf on a grid that is divided into equal parts of `part`
 /// segments; its fields may jump at their midpoints.
 pub struct Tangents<'a> {
@@ -462,7 +490,7 @@ pub struct JumpResponse {
     solution: NodalField,
     first: usize,
     /// The largest displacements at the ends of the parts, and on either side of the midpoints.
-    pub largest: [f64; 2],
+    position_errors: PositionErrors,
 }
 
 impl<'a> Tangents<'a> {
@@ -482,16 +510,19 @@ impl<'a> Tangents<'a> {
         }
     }
 
-    /// The response to `jumps`; `system` holds the equations and `factors` their factors. `None` where these
-    /// cannot be solved.
-    pub fn response(
+    /// The response of the `linear` equations to `jumps`. `None` where these cannot be solved.
+    fn response(
         &self,
-        (system, factors): (&mut System, &mut DefiniteFactors),
+        linear: &mut FactorizedLevel,
         jumps: &[Vec<FieldChange>],
     ) -> Option<JumpResponse> {
         let leaf = &self.level.leaf;
+        let FactorizedLevel {
+            system, factors, ..
+        } = linear;
         leaf.assemble_jump_correction(&self.behind, jumps, system);
-        let LinearSolveOutcome::Converged(_) = factors.solve(system, ACCURACY) else {
+        let LinearSolveOutcome::Converged(_) = factors.solve(system, CORRECTION.response_accuracy)
+        else {
             return None;
         };
         let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);
@@ -509,7 +540,10 @@ impl<'a> Tangents<'a> {
         Some(JumpResponse {
             solution,
             first: system.first_node(),
-            largest: [at_ends, between],
+            position_errors: PositionErrors {
+                at_nodes: at_ends,
+                between,
+            },
         })
     }
 
@@ -529,7 +563,7 @@ impl<'a> Tangents<'a> {
         }
         let moved = displace_state(state, response);
         let ends = |(j, jumps): (usize, &Vec<FieldChange>)| {
-            let end = |k: usize| self.change(response, &moved, (j, jumps), k);
+            let end = |k: usize| self.change(response, &moved, j, jumps, k);
             (0..=jumps.len()).map(end).collect()
         };
         jumps.iter().enumerate().map(ends).collect()
@@ -541,7 +575,8 @@ impl<'a> Tangents<'a> {
         &self,
         response: &JumpResponse,
         moved: &State,
-        (j, jumps): (usize, &[FieldChange]),
+        j: usize,
+        jumps: &[FieldChange],
         k: usize,
     ) -> FieldChange {
         let GridLevel { leaf, state } = self.level;
@@ -706,20 +741,26 @@ mod tests {
                 tolerance: Some(1e-3),
                 ..Options::default()
             };
-            let (_, found) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let relaxed = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let found = relaxed.on_grids;
             let (mut linear, mut work) = (None, SolverCounts::default());
-            let mut estimated = |enough, most| {
-                let systems = (&mut linear, &mut EquationWorkspace::default());
-                estimate(&found.levels, 1, (enough, most), systems, &mut work).unwrap()
+            let mut estimated = |error, most_corrections| {
+                let goal = CorrectionGoal {
+                    error,
+                    most_corrections,
+                };
+                let workspace = &mut EquationWorkspace::default();
+                estimate(&found.levels, 1, goal, &mut linear, workspace, &mut work).unwrap()
             };
-            let first = estimated(0.0, 0).largest();
+            let first = estimated(0.0, 0).position_errors.largest();
             // The last round only verifies.
             for most in 2..=4_usize {
                 let enough = first * 30.0_f64.powi(1 - most as i32);
                 let estimate = estimated(enough, most);
-                let what = format!("{axial}, {most}: {} of {first}", estimate.largest());
+                let largest = estimate.position_errors.largest();
+                let what = format!("{axial}, {most}: {largest} of {first}");
                 assert!((1..=most).contains(&estimate.corrections), "{what}");
-                assert!(estimate.largest() <= enough, "{what}");
+                assert!(largest <= enough, "{what}");
             }
             assert_eq!(work.factorizations, 1);
         }

@@ -1,8 +1,5 @@
-//! The leaf at the nodes of its grids, extrapolated over them.
-//!
-//! A leaf between two stations where it is known: the equilibrium equations integrated from both.
-//!
-//! A leaf at rest at other stations.
+//! The fields of a leaf between the nodes of its grids: extrapolated over these grids at common nodes,
+//! and by integration of the equilibrium equations between two stations where they are known.
 
 use crate::leaf::{DiscreteLeaf, RodFields, RodIntegrator, StationFields};
 use crate::numbers::larger;
@@ -47,9 +44,18 @@ fn on_grid(level: &GridLevel, j: usize, parts: usize) -> Vec<RodFields> {
     rotations.step_by(stride).map(node).collect()
 }
 
+/// A leaf at all nodes of one of its grids.
+pub struct FieldsAtNodes {
+    /// The number of the grid, from the coarsest.
+    pub grid: usize,
+    /// The fields, rod after rod, dimensionless.
+    pub rods: Vec<Vec<RodFields>>,
+    /// By how much the error of positions exceeds that at the nodes of the coarsest grid.
+    pub added_error: f64,
+}
+
 /// The leaf's fields at all nodes of one of the first `wanted` grids: of the finest where the error
-/// of positions exceeds that at the nodes of the coarsest, `known`, by no more than `allowed`. Also
-/// returns the number of this grid, and the excess.
+/// of positions exceeds that at the nodes of the coarsest, `known`, by no more than `allowed`.
 ///
 /// Nodes added by a grid have the extrapolation of the grids from there on, plus the remainder of
 /// that of the coarser grids, which is small and smooth, interpolated between their nodes. The
@@ -58,8 +64,9 @@ pub fn finer_nodes(
     levels: &[GridLevel],
     columns: usize,
     wanted: usize,
-    [known, allowed]: [f64; 2],
-) -> (usize, Vec<Vec<RodFields>>, f64) {
+    known: f64,
+    allowed: f64,
+) -> FieldsAtNodes {
     let used = levels.len() - 1 - columns;
     let finest = &levels[levels.len() - 1];
     let rods = 0..finest.leaf.rods();
@@ -82,11 +89,11 @@ pub fn finer_nodes(
         }
         (grid, reached, between) = (k, nodes, between + excess);
     }
-    (
+    FieldsAtNodes {
         grid,
-        reached.iter().map(|rod| unpack_nodes(rod)).collect(),
-        between,
-    )
+        rods: reached.iter().map(|rod| unpack_nodes(rod)).collect(),
+        added_error: between,
+    }
 }
 
 /// Adds to the `nodes` of a grid what those of the `coarser` one have more, interpolated between
@@ -206,8 +213,21 @@ const SAFETY: f64 = 2.0;
 /// All rods at one sigma.
 pub type LeafSection = Vec<RodFields>;
 
-/// A leaf at rest at `points` between two stations, given the sections there, and the largest
-/// error of a position in addition to those at the stations: the mean of what is integrated from
+/// A station at which a leaf is known.
+#[derive(Clone, Copy)]
+pub struct KnownSection<'s> {
+    pub sigma: f64,
+    pub section: &'s LeafSection,
+}
+
+/// A leaf at points between two stations.
+pub struct SectionsBetween {
+    pub sections: Vec<LeafSection>,
+    /// The largest error of a position in addition to those at the stations.
+    pub added_error: f64,
+}
+
+/// A leaf at rest at `points` between two stations: the mean of what is integrated from
 /// either side, with weights that fall linearly to zero at the other. `None` where positions
 /// integrated from one station miss the other by more than the distance of the two.
 ///
@@ -216,13 +236,15 @@ pub type LeafSection = Vec<RodFields>;
 pub fn integrate_between_stations(
     flow: &mut RodIntegrator,
     kinks: &[f64],
-    [(from, begin), (to, end)]: [(f64, &LeafSection); 2],
+    ends: [KnownSection; 2],
     points: &[f64],
-) -> Option<(Vec<LeafSection>, f64)> {
+) -> Option<SectionsBetween> {
+    let [from, to] = ends.map(|end| end.sigma);
+    let [begin, end] = ends.map(|end| end.section);
     let forward = points.iter().copied().chain([to]);
-    let mut before = integrate_from_section(flow, kinks, (from, begin), forward);
+    let mut before = integrate_from_section(flow, kinks, ends[0], forward);
     let backward = points.iter().rev().copied().chain([from]);
-    let mut behind = integrate_from_section(flow, kinks, (to, end), backward);
+    let mut behind = integrate_from_section(flow, kinks, ends[1], backward);
     let (there, here) = (before.pop()?, behind.pop()?);
     let mut error = 0.0_f64;
     for j in 0..begin.len() {
@@ -238,7 +260,10 @@ pub fn integrate_between_stations(
     let sections = before.iter().zip(&behind).zip(points);
     let sections =
         sections.map(|((a, b), at)| weighted_mean_section([a, b], (at - from) / (to - from)));
-    Some((sections.collect(), SAFETY * error))
+    Some(SectionsBetween {
+        sections: sections.collect(),
+        added_error: SAFETY * error,
+    })
 }
 
 /// The mean of two sections, the second with this weight.
@@ -257,10 +282,10 @@ pub fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: f64) -> LeafSect
 fn integrate_from_section(
     flow: &mut RodIntegrator,
     kinks: &[f64],
-    (mut at, begin): (f64, &LeafSection),
+    begin: KnownSection,
     points: impl Iterator<Item = f64>,
 ) -> Vec<LeafSection> {
-    let mut section = begin.clone();
+    let (mut at, mut section) = (begin.sigma, begin.section.clone());
     let mut integrate_to = |point: f64| {
         let inside = |kink: &&f64| (**kink - at) * (**kink - point) < 0.0;
         let mut stops: Vec<f64> = kinks.iter().filter(inside).copied().collect();

@@ -1,16 +1,9 @@
-//! How accurate a leaf at rest is: extrapolation, defects, and the leaf between its nodes.
+//! How accurate a leaf at rest is: the leaf on nested grids, their extrapolation, and the error bar from
+//! the extrapolation and from the defect of the equations.
 //!
-//! An equilibrium on nested grids: the leaf on each of them, their extrapolation with its bar, and
-//! the Morse index.
-//!
-//! It is a value: on a finer grid another one takes its place. Whoever needs the leaf more
-//! accurately, or surer of its index, asks [`grids`](crate::relax::grids) for that.
-//!
-//! The error of an equilibrium on nested grids, from these and from the defect on them.
-//!
-//! A leaf on one grid, and from grid to grid: prolongation and prediction.
-//!
-//! A leaf at rest on one grid.
+//! An equilibrium on nested grids is a value: on a finer grid another one takes its place. Whoever
+//! needs the leaf more accurately, or is not sure of its index, asks
+//! [`arrival`](crate::relax::loading::arrival) for that.
 
 pub(crate) mod defect;
 pub(crate) mod fields;
@@ -18,17 +11,17 @@ pub(crate) mod richardson;
 pub(crate) mod transfer;
 
 use crate::leaf::{
-    DiscreteLeaf, EquationWorkspace, Grid, Leaf, RodFields, whole_leaf_changes, whole_leaf_fields,
+    DiscreteLeaf, EquationWorkspace, Grid, Leaf, whole_leaf_changes, whole_leaf_fields,
 };
 use crate::memory;
 use crate::newton::{Contraction, EquilibriumFailure, SolverCounts};
 use crate::numbers::larger;
-use crate::relax::accuracy::defect::{DefectEstimate, FactorizedLevel};
-use crate::relax::accuracy::fields::finer_nodes;
-use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::accuracy::defect::{CorrectionGoal, DefectEstimate, FactorizedLevel};
+use crate::relax::accuracy::fields::{FieldsAtNodes, finer_nodes};
+use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
 use crate::relax::path::Path;
-use crate::relax::problem::{COARSEST, FINEST, RelaxationProblem};
+use crate::relax::plan::{GRIDS, RelaxationProblem, WayFromStart};
 use crate::relax::request::MAX_NODES;
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
@@ -88,8 +81,8 @@ pub struct NestedEquilibrium {
 pub struct History {
     /// The last saddle that it left.
     pub saddle: Option<Saddle>,
-    /// Displacements that would follow from neglecting shear, and stretch.
-    pub shear_stretch_effects: [Option<f64>; 2],
+    /// What neglecting strains of the veins would change.
+    pub strain_effects: StrainEffects,
     /// Largest remaining iteration error on any grid.
     pub iteration_error: f64,
     /// Convergence of Newton's method on the grids so far.
@@ -97,11 +90,29 @@ pub struct History {
     /// Number of pushes off saddles at which the iteration had converged (found by their Morse
     /// index).
     pub saddle_escapes: i32,
-    /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
-    /// led there.
-    pub from_start: Option<(f64, usize)>,
+    /// How far the first equilibrium is from the start, if the leaf began there.
+    pub from_start: Option<WayFromStart>,
     /// Segments of the coarsest grid on which it rests, if there is one.
     pub coarsest: Option<usize>,
+}
+
+/// Largest displacements (lengths), to first order, if a strain of the veins were suppressed;
+/// `None` where that was not computed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StrainEffects {
+    pub shear: Option<f64>,
+    pub stretch: Option<f64>,
+}
+
+impl StrainEffects {
+    /// The effects with displacements in another unit, of which a length has so many.
+    pub fn scaled(self, length: f64) -> Self {
+        let scaled = |effect: Option<f64>| effect.map(|effect| effect * length);
+        StrainEffects {
+            shear: scaled(self.shear),
+            stretch: scaled(self.stretch),
+        }
+    }
 }
 
 /// Where a leaf was when it failed to come to rest, and why.
@@ -166,14 +177,14 @@ impl NestedEquilibrium {
         NestedEquilibrium { levels, ..self }.with_convergence_table()
     }
 
-    /// On all grids but the finest, and that one.
-    pub fn split(mut self) -> (Self, GridLevel) {
+    /// Takes the leaf on its finest grid out of the list.
+    pub fn take_finest(&mut self) -> GridLevel {
         let finest = self.levels.pop().expect("the leaf has settled");
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
-        (self, finest)
+        finest
     }
 
-    /// With that finest grid again.
+    /// With the leaf on its finest grid, which [`take_finest`](Self::take_finest) took, in the list again.
     pub fn rejoin_finest(mut self, finest: GridLevel) -> Self {
         self.levels.push(finest);
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
@@ -305,23 +316,23 @@ impl NestedEquilibrium {
         let grid = leaf.grid.refined();
         let (rods, segments) = (leaf.rods(), grid.segments());
         let allowed = !self.has_fixed_grid
-            && segments <= FINEST
+            && segments <= GRIDS.finest
             && rods * segments <= MAX_NODES
             && memory::check_grid_memory(rods, segments).is_ok()
             && !self.beyond_rounding(segments);
         allowed.then_some(grid)
     }
 
-    /// The finest of the first `wanted` grids between whose nodes the leaf keeps the tolerance, as
-    /// far as it does at the nodes of the coarsest, with the fields and the additional error there.
-    pub fn finer_nodes(&self, wanted: usize) -> (usize, Vec<Vec<RodFields>>, f64) {
+    /// The leaf at the nodes of the finest of the first `wanted` grids at which it keeps the
+    /// tolerance, as far as it does at the nodes of the coarsest.
+    pub fn finer_nodes(&self, wanted: usize) -> FieldsAtNodes {
         let error = self.error().unwrap_or(0.0);
         let allowed = match error <= self.tolerance {
             true => self.tolerance - error,
             false => f64::INFINITY,
         };
         let columns = self.convergence_table.best_column_number();
-        finer_nodes(&self.levels, columns, wanted, [error, allowed])
+        finer_nodes(&self.levels, columns, wanted, error, allowed)
     }
 
     /// The levels from which the next one is predicted: those of the extrapolation, but at
@@ -350,11 +361,13 @@ impl NestedEquilibrium {
     }
 
     /// The potential energy: integrated along the leaf, with an error of second order in the
-    /// defect, or extrapolated as far as it converges as that assumes; and its error, which is
-    /// unknown on a single grid.
-    pub fn energy(&self) -> (f64, Option<f64>) {
+    /// defect, or extrapolated as far as it converges as that assumes.
+    pub fn energy(&self) -> Extrapolated<f64> {
         if let Some(estimate) = &self.estimate {
-            return (estimate.energy, Some(self.energy_error(estimate)));
+            return Extrapolated {
+                value: estimate.energy,
+                error: Some(self.energy_error(estimate)),
+            };
         }
         let finest = &self.levels[self.levels.len().saturating_sub(ENERGY_GRIDS)..];
         let (table, columns) = (
@@ -362,12 +375,34 @@ impl NestedEquilibrium {
             self.convergence_table.best_column_number(),
         );
         let Some(best) = table.few_values_error() else {
-            return (table.column(columns)[0], None);
+            return Extrapolated {
+                value: table.column(columns)[0],
+                error: None,
+            };
         };
         let energy = table.column(columns.min(best.columns))[0];
         let further = (energy - table.column(best.columns)[0]).abs();
-        (energy, Some(best.error + further))
+        Extrapolated {
+            value: energy,
+            error: Some(best.error + further),
+        }
     }
+}
+
+/// The errors of the fields of a leaf that was integrated along its rods.
+#[derive(Clone, Copy)]
+pub struct FieldErrors<'e> {
+    /// The leaf, with its estimated errors along the lab axes at equally many places of each rod.
+    pub estimate: &'e DefectEstimate,
+    /// By which factor they bound the errors.
+    pub safety: f64,
+}
+
+/// A leaf that was integrated along its rods.
+pub struct IntegratedLeaf<'e> {
+    pub estimate: &'e DefectEstimate,
+    /// Bound on the error of its positions, relative to the leaf's length.
+    pub error: f64,
 }
 
 /// The estimate of a whole leaf from that of its half.
@@ -455,20 +490,21 @@ impl NestedEquilibrium {
         let best = self.convergence_table.best();
         let best = best.map(|best| larger(best.error, self.unresolved));
         let most = best.map_or(f64::INFINITY, |best| LARGEST_ESTIMATE_RATIO * best);
-        let too_coarse = !self.has_fixed_grid && segments[0] < COARSEST;
+        let too_coarse = !self.has_fixed_grid && segments[0] < GRIDS.coarsest;
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
-                return Some(SAFETY * estimate.largest() + ROUNDING * segments[0] as f64);
+                return Some(
+                    SAFETY * estimate.position_errors.largest() + ROUNDING * segments[0] as f64,
+                );
             }
             // If nodes are few the midpoints are stations, too.
             Some(estimate) if too_coarse || best.is_none() => {
-                (SAFETY * estimate.largest()).min(most)
+                (SAFETY * estimate.position_errors.largest()).min(most)
             }
             Some(estimate) => {
-                let at_nodes = estimate
-                    .at_nodes
-                    .max(LAYER_ERROR_FRACTION * estimate.between);
+                let errors = estimate.position_errors;
+                let at_nodes = (errors.at_nodes).max(LAYER_ERROR_FRACTION * errors.between);
                 (SAFETY * at_nodes).min(most)
             }
             None => best?,
@@ -490,11 +526,12 @@ impl NestedEquilibrium {
         self.bifurcation_error_factor * ENERGY_SAFETY * estimate.energy_error + rounding
     }
 
-    /// The leaf integrated along its rods, with bounds on the errors of its fields, along the lab axes,
-    /// at equally many places of each rod.
-    pub fn field_errors(&self) -> Option<(&DefectEstimate, f64)> {
-        let estimate = self.estimate.as_ref()?;
-        Some((estimate, self.bifurcation_error_factor * SAFETY))
+    /// The estimated errors of the fields of the leaf integrated along its rods.
+    pub fn field_errors(&self) -> Option<FieldErrors<'_>> {
+        Some(FieldErrors {
+            estimate: self.estimate.as_ref()?,
+            safety: self.bifurcation_error_factor * SAFETY,
+        })
     }
 
     /// Whether the error is within the tolerance; always true on a fixed grid.
@@ -503,14 +540,18 @@ impl NestedEquilibrium {
     }
 
     /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
-    /// corrected, and its error, if that is within the tolerance or the leaf was corrected.
-    pub fn integrated_leaf(&self) -> Option<(&DefectEstimate, f64)> {
+    /// corrected; `None` where its error exceeds the tolerance and was not corrected.
+    pub fn integrated_leaf(&self) -> Option<IntegratedLeaf<'_>> {
         let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
         let error = match estimate.corrections {
-            0 => SAFETY * estimate.largest() + self.iteration_rounding_error(segments),
+            0 => {
+                SAFETY * estimate.position_errors.largest()
+                    + self.iteration_rounding_error(segments)
+            }
             _ => self.error()?,
         };
-        (error <= self.tolerance || estimate.corrections > 0).then_some((estimate, error))
+        (error <= self.tolerance || estimate.corrections > 0)
+            .then_some(IntegratedLeaf { estimate, error })
     }
 
     /// The integrated leaf, if its error was corrected.
@@ -545,10 +586,13 @@ impl NestedEquilibrium {
                 (problem.may_use_single_grid() && self.history.saddle_escapes == 0).then_some(0)
             }
         };
-        let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let (levels, systems) = (&self.levels, (&mut self.factorized_level, workspace));
-        self.estimate =
-            columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
+        let goal = CorrectionGoal {
+            error: self.tolerance / SAFETY - ROUNDING * GRIDS.coarsest as f64,
+            most_corrections: most,
+        };
+        let (levels, linear) = (&self.levels, &mut self.factorized_level);
+        self.estimate = columns
+            .and_then(|columns| defect::estimate(levels, columns, goal, linear, workspace, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.factorized_level = None;
         }

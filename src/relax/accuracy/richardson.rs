@@ -2,34 +2,53 @@
 
 use crate::numbers::{larger, largest};
 
-/// A column of order p is extrapolated further only if its changes from grid
-/// to grid shrink by 2^p, or nearly so: at most this many times less.
-const ORDER_SLACK: f64 = 1.5;
+/// When a column of a table shows the order of its error. The numbers here and in [`SAFETY`] were set
+/// on some 700 runs: random leaves, the paper's, textbook problems, boundary layers.
+struct OrderTest {
+    /// A column of order p is extrapolated further only if its changes from grid to grid shrink by
+    /// 2^p, or nearly so: at most this many times less.
+    slack: f64,
+    /// Changes of the first column that shrink to less than this part of what its order indicates
+    /// are not those of a ds^2 series either.
+    smallest_first_ratio: f64,
+    /// A further column is rejected if it changes the values by more than this part of the change
+    /// by the column before it: it has nothing left to remove.
+    useless_column_ratio: f64,
+}
 
-/// Changes of the first column that shrink to less than this part of what its
-/// order indicates are not those of a ds^2 series either.
-const SMALLEST_FIRST_RATIO: f64 = 0.68;
+const ORDER: OrderTest = OrderTest {
+    slack: 1.5,
+    smallest_first_ratio: 0.68,
+    useless_column_ratio: 0.1,
+};
 
-/// A further column is rejected if it changes the values by more than this part of the change
-/// by the column before it: it has nothing left to remove.
-const USELESS_COLUMN_RATIO: f64 = 0.1;
+/// Safety factors of error estimates.
+struct ExtrapolationSafety {
+    /// On the last change of a column without a proven order.
+    unproven_order: f64,
+    /// Slope of the factor on the last correction over the root of the ratio of the last two.
+    slope: f64,
+    /// The least factor on the last correction, and the largest.
+    least: f64,
+    most: f64,
+    /// On the corrections of few numbers, each weighted by the part of it that those after it must
+    /// reach: of 1,800 forces, moments and energies of random leaves the largest error was 4.6
+    /// times the largest of the corrections so weighted.
+    few_values: f64,
+    few_values_part: f64,
+}
 
-/// Safety factor on the last change of a column without a proven order.
-const UNPROVEN_ORDER_SAFETY: f64 = 3.0;
+const SAFETY: ExtrapolationSafety = ExtrapolationSafety {
+    unproven_order: 3.0,
+    slope: 30.0,
+    least: 1.3,
+    most: 10.0,
+    few_values: 5.0,
+    few_values_part: 1.0 / 32.0,
+};
 
 /// Changes below this, relative to the leaf's length, are rounding.
 const ROUNDING: f64 = 1e-13;
-
-/// The safety factor: its slope over the root of the ratio of the last two
-/// corrections, and its bounds.
-const SAFETY_RATIO_SLOPE: f64 = 30.0;
-
-const SAFETY_FACTOR_BOUNDS: (f64, f64) = (1.3, 10.0);
-
-/// Safety factor on the corrections of few numbers, and the part of each that those after it
-/// must reach: of 1,800 forces, moments and energies of random leaves the largest error was 4.6 times
-/// the largest of the corrections so weighted.
-const FEW_VALUES_SAFETY: (f64, f64) = (5.0, 1.0 / 32.0);
 
 /// The selected column of a table, and its error estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +57,12 @@ pub struct BestColumn {
     pub columns: usize,
     /// Estimate of the largest error of any value.
     pub error: f64,
+}
+
+/// An extrapolated value with a bound on its error, which is unknown on a single grid.
+pub struct Extrapolated<T> {
+    pub value: T,
+    pub error: Option<f64>,
 }
 
 /// Values on successively refined grids, extrapolated over the series in ds^2.
@@ -94,8 +119,7 @@ impl Richardson {
     /// Let D_m be the change by column m on the finest grid: it is the error of column m - 1.
     /// For a clean series the error of column m is a small part of D_m, the smaller the ratio
     /// D_m/D_{m-1} the smaller; the estimate is D_m times a safety factor that rises with
-    /// sqrt(D_m/D_{m-1}). The numbers were set on some 700 runs: random leaves, the paper's,
-    /// textbook problems, boundary layers. Where the first column is not of second order (the
+    /// sqrt(D_m/D_{m-1}). Where the first column is not of second order (the
     /// grids do not resolve the solution yet) the finest grid itself is returned, its last
     /// change as error.
     pub fn best(&self) -> Option<BestColumn> {
@@ -110,23 +134,24 @@ impl Richardson {
                 error: distance(&row[0], &before[0]),
             });
         }
-        while columns > 1 && correction(columns) > USELESS_COLUMN_RATIO * correction(columns - 1) {
+        while columns > 1
+            && correction(columns) > ORDER.useless_column_ratio * correction(columns - 1)
+        {
             columns -= 1;
         }
         if columns < last {
             // Its order is not confirmed: the error estimate is its last change.
             let change = distance(&row[columns], &before[columns]);
             let error = larger(
-                UNPROVEN_ORDER_SAFETY * change,
-                SAFETY_FACTOR_BOUNDS.1 * correction(columns),
+                SAFETY.unproven_order * change,
+                SAFETY.most * correction(columns),
             );
             return Some(BestColumn { columns, error });
         }
         // With two grids the only reference is the size of the leaf, one.
         let previous = if last > 1 { correction(last - 1) } else { 1.0 };
         let ratio = correction(last) / previous.max(ROUNDING);
-        let safety = (SAFETY_RATIO_SLOPE * ratio.sqrt())
-            .clamp(SAFETY_FACTOR_BOUNDS.0, SAFETY_FACTOR_BOUNDS.1);
+        let safety = (SAFETY.slope * ratio.sqrt()).clamp(SAFETY.least, SAFETY.most);
         Some(BestColumn {
             columns,
             error: larger(0.0, safety * correction(last)),
@@ -144,7 +169,7 @@ impl Richardson {
             return Some(best);
         }
         let error =
-            FEW_VALUES_SAFETY.0 * self.largest_correction(best.columns, FEW_VALUES_SAFETY.1);
+            SAFETY.few_values * self.largest_correction(best.columns, SAFETY.few_values_part);
         Some(BestColumn { error, ..best })
     }
 
@@ -165,9 +190,9 @@ impl Richardson {
             let change = self.change(*m);
             let before = distance(&self.table[last - 1][*m], &self.table[last - 2][*m]);
             let (ratio, order) = (change / before, self.expected_change_ratio(*m));
-            let least = SMALLEST_FIRST_RATIO * order;
+            let least = ORDER.smallest_first_ratio * order;
             change > self.noise.max(ROUNDING)
-                && (ratio > ORDER_SLACK * order || *m == 0 && ratio < least)
+                && (ratio > ORDER.slack * order || *m == 0 && ratio < least)
         };
         (0..last.saturating_sub(1)).find(shows_none).unwrap_or(last)
     }

@@ -1,10 +1,6 @@
-//! Prediction of the leaf at rest on a finer grid from those on nested coarser grids.
-//!
-//! Prolongation to the grid with all segments halved or to any other, and restriction.
-//!
-//! Polynomials through the nodes of a grid that are nearest to a point.
-//!
-//! Strains and stress resultants at the nodes of a state.
+//! A leaf at rest on one grid, and its transfer to others: prolongation to the grid with all segments
+//! halved or to any other, restriction, and prediction on a finer grid from several coarser ones by
+//! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
 use crate::rotation;
@@ -371,7 +367,7 @@ impl<const MOST: usize> Stencil<MOST> {
         let skipped = (centred as usize).min(points - count);
         let mut weights = [0.0; MOST];
         for (a, weight) in weights[..count].iter_mut().enumerate() {
-            *weight = lagrange(count, a, place - skipped as f64).0;
+            *weight = lagrange(count, a, place - skipped as f64).value;
         }
         Stencil {
             first: first + skipped,
@@ -410,9 +406,9 @@ impl<const MOST: usize> Stencil<MOST> {
         let place = (sigma - nodes[first]) / width;
         let (mut weights, mut slopes) = ([0.0; MOST], [0.0; MOST]);
         for (a, (weight, slope)) in weights.iter_mut().zip(&mut slopes).take(count).enumerate() {
-            (*weight, *slope) = lagrange(count, a, place);
-            *slope /= width;
-            *weight += beyond * *slope;
+            let basis = lagrange(count, a, place);
+            *slope = basis.slope / width;
+            *weight = basis.value + beyond * *slope;
         }
         [weights, slopes].map(|weights| Stencil {
             first,
@@ -422,27 +418,51 @@ impl<const MOST: usize> Stencil<MOST> {
     }
 }
 
-/// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of the
-/// polynomial through all of them, and its derivative with `t`.
-fn lagrange(count: usize, a: usize, t: f64) -> (f64, f64) {
+/// A Lagrange basis polynomial at one place.
+struct LagrangeBasis {
+    value: f64,
+    /// The derivative.
+    slope: f64,
+}
+
+/// The Lagrange basis polynomial of point `a` of 0, 1, ..., `count` - 1 at `t`: the weight of the
+/// value there in the polynomial through all of these points.
+fn lagrange(count: usize, a: usize, t: f64) -> LagrangeBasis {
     let others = (0..count).filter(|&b| b != a);
-    others.fold((1.0, 0.0), |(weight, slope), b| {
+    let one = LagrangeBasis {
+        value: 1.0,
+        slope: 0.0,
+    };
+    others.fold(one, |LagrangeBasis { value, slope }, b| {
         let apart = a as f64 - b as f64;
         let factor = (t - b as f64) / apart;
-        (weight * factor, slope * factor + weight / apart)
+        LagrangeBasis {
+            value: value * factor,
+            slope: slope * factor + value / apart,
+        }
     })
 }
 
-/// The state of rod `j` at `sigma`, from its dimensionless position and rotation and its stress
-/// resultants along the directors, in the units of the scenario: strains follow from these by
-/// eqs (5) and (6).
+/// A place along a vein.
+#[derive(Clone, Copy)]
+pub struct VeinStation {
+    /// The number of the vein, from 0.
+    pub vein: usize,
+    /// Fraction of its length.
+    pub sigma: f64,
+}
+
+/// The state of a vein at a station, from its dimensionless position and rotation and its stress
+/// resultants n and m along the directors, in the units of the scenario: strains follow from these
+/// by eqs (5) and (6).
 pub fn node_state(
     leaf: &Leaf,
-    (j, sigma): (usize, f64),
-    (position, rotation): (DVec3, DQuat),
+    at: VeinStation,
+    position: DVec3,
+    rotation: DQuat,
     [n, m]: [DVec3; 2],
 ) -> NodeState {
-    let (section, scale) = (leaf.section(j, sigma, 1.0), leaf.scale);
+    let (section, scale) = (leaf.section(at.vein, at.sigma, 1.0), leaf.scale);
     let u = section.rest_curvature + m / section.couple_stiffness;
     NodeState {
         position: position * scale.length,
@@ -454,10 +474,11 @@ pub fn node_state(
     }
 }
 
-/// The same from dimensionless fields along the lab axes.
-pub fn node_state_from_fields(leaf: &Leaf, at: (usize, f64), fields: &RodFields) -> NodeState {
+/// The state of a vein at a station, in the units of the scenario, from dimensionless fields along
+/// the lab axes.
+pub fn node_state_from_fields(leaf: &Leaf, at: VeinStation, fields: &RodFields) -> NodeState {
     let &RodFields { x, q, n, m } = fields;
-    node_state(leaf, at, (x, q), [n, m].map(|vector| q.inverse() * vector))
+    node_state(leaf, at, x, q, [n, m].map(|vector| q.inverse() * vector))
 }
 
 /// The dimensionless fields, along the lab axes, of a state in the units of the scenario.
@@ -474,15 +495,10 @@ pub fn fields_from_node_state(leaf: &Leaf, node: &NodeState) -> RodFields {
 /// All rods of a state in the units of the scenario.
 pub fn rod_shapes(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
     let rod = |j: usize| {
-        let nodes = leaf.grid.sigma().iter().enumerate().map(|(i, sigma)| {
-            let k = state.base(j) + i;
+        let nodes = leaf.grid.sigma().iter().enumerate().map(|(i, &sigma)| {
+            let (at, k) = (VeinStation { vein: j, sigma }, state.base(j) + i);
             let resultants = resultants(leaf, state, j, i);
-            node_state(
-                &leaf.leaf,
-                (j, *sigma),
-                (state.x[k], state.q[k]),
-                resultants,
-            )
+            node_state(&leaf.leaf, at, state.x[k], state.q[k], resultants)
         });
         RodShape {
             length: leaf.leaf.length(j) * leaf.leaf.scale.length,
@@ -526,10 +542,16 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
     [force, moment].map(|vector| to_directors * vector)
 }
 
-/// A leaf settled on one grid.
+/// A leaf at rest on one grid.
 #[derive(Clone)]
 pub struct GridLevel {
     pub leaf: DiscreteLeaf,
+    pub state: State,
+}
+
+/// A state of a leaf at the nodes of a grid, from which the leaf is brought to rest there.
+pub struct StateOnGrid {
+    pub grid: Grid,
     pub state: State,
 }
 
@@ -572,9 +594,9 @@ mod tests {
             let t = 0.37 * count as f64;
             for degree in 0..count as i32 {
                 let term = |a: usize| {
-                    let (weight, slope) = lagrange(count, a, t);
+                    let basis = lagrange(count, a, t);
                     let value = (a as f64).powi(degree);
-                    (weight * value, slope * value)
+                    (basis.value * value, basis.slope * value)
                 };
                 let (weights, slopes): (Vec<f64>, Vec<f64>) = (0..count).map(term).unzip();
                 let slope = match degree {

@@ -1,52 +1,36 @@
-//! The end of the path, reached on one grid or, where stability was lost, on two that agree.
-//!
-//! Nested grids: as fine as the tolerance needs, with an error estimate.
+//! The end of the path of slow loading, reached on one grid or, where stability was lost, on two that
+//! agree; and rest on nested grids, as fine as the tolerance needs, from there or from arcs.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_state, whole_state};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, System, half_state};
 use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::numbers::largest;
-use crate::relax::accuracy::richardson::distance;
 use crate::relax::accuracy::transfer::{
-    GridLevel, positions, predict_on_finer_grid, prolong, restrict, transfer,
+    GridLevel, StateOnGrid, predict_on_finer_grid, prolong, restrict, transfer,
 };
 use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, RelaxationResult, result_with_path,
 };
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
-use crate::relax::path::{Event, Path, Stage};
-use crate::relax::problem::{BUDGET, RelaxationProblem};
+use crate::relax::path::{Event, Path, PathPosition, Stage};
+use crate::relax::plan::{GRIDS, RelaxationProblem, WORK};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
+use crate::relax::same_equilibrium::{
+    is_near_guess, is_own_mirror_image, is_same_energy, is_same_on_two_grids,
+};
 use crate::relax::solve_on_grid::{
-    COARSEST_TURN, GridSolution, InitialGuess, check_stability, find_grid_equilibrium,
+    COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
+    find_grid_equilibrium,
 };
 
-/// Segments of the coarsest grid of a walk, and of the finest on which a lost stability is
-/// confirmed.
-pub const COARSEST: usize = 8;
-
-const FINEST_CONFIRMING_GRID: usize = 64;
-
-/// States on two grids of which no common nodes are farther apart than this (lengths) are the
-/// same equilibrium.
-pub const SAME_EQUILIBRIUM: f64 = 0.05;
-
-/// Energies of the same equilibrium on one grid agree to this part, or of A/L.
-const SAME_ENERGY: f64 = 1e-5;
-
-/// The finest requested grid, in segments of the grid from which it is interpolated.
+/// The finest requested grid, in segments of the grid from which it is interpolated: on a finer one
+/// Newton's method might not converge.
 const LARGEST_GRID_RATIO: usize = 8;
 
-/// Limits on the force evaluations of all walks, and on nodes times these: typical walks take a
-/// dozen, and a few hundred for each loss of stability.
-const MOST_EVALUATIONS: usize = 2500;
-
-const LOADING_BUDGET: usize = BUDGET / 8;
-
-/// The least compliance (L^2/A) on a walk: a stiffer leaf differs from it by its strains of some
-/// millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
+/// The least compliance (L^2/A) of a leaf that is loaded slowly: a stiffer leaf differs from it by its
+/// strains of some millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
 const SMALLEST_LOADING_COMPLIANCE: f64 = 1e-6;
 
 /// What slow loading came to.
@@ -83,12 +67,16 @@ pub fn load_slowly<'a>(
         grid = level.leaf.grid.refined();
         path = Some(walked);
         let mut begun = NestedEquilibrium::without_grids(problem);
-        let (on, state) = guess(problem, &mut begun.history, level, effort);
+        let StateOnGrid { grid: on, state } =
+            state_on_requested_grid(problem, &mut begun.history, level, effort);
         if let Some(half) = half
-            && is_mirrored(half, &state)
+            && is_own_mirror_image(half, &state)
         {
             let reduced = problem.reduced_to_half(Some(half));
-            let guesses = vec![(on.clone(), half_state(half, &state))];
+            let guesses = vec![StateOnGrid {
+                grid: on.clone(),
+                state: half_state(half, &state),
+            }];
             let found = solve_from_guesses(
                 &reduced,
                 NestedEquilibrium::without_grids(&reduced),
@@ -106,13 +94,14 @@ pub fn load_slowly<'a>(
             }
             begun = NestedEquilibrium::without_grids(problem);
         }
-        let last = grid.segments() > FINEST_CONFIRMING_GRID || problem.segments().is_some();
+        let last = grid.segments() > GRIDS.finest_of_loading || problem.segments().is_some();
         let in_valley = RelaxationProblem {
             stays_in_valley: !last,
             ..*problem
         };
         let segments = on.segments();
-        let followed = solve_from_guesses(&in_valley, begun, vec![(on, state)], effort);
+        let guesses = vec![StateOnGrid { grid: on, state }];
+        let followed = solve_from_guesses(&in_valley, begun, guesses, effort);
         let (given_up, out_of_time) = (last && problem.segments().is_none(), problem.out_of_time());
         let must_be_accurate = given_up || !out_of_time && !path_is_stable(&path);
         let end = end_of(&followed, |found| {
@@ -160,8 +149,8 @@ pub fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
 
 /// The coarsest grid on which the leaf is loaded slowly.
 fn coarsest_grid(leaf: &Leaf) -> Grid {
-    let mut grid = grid_of(leaf, COARSEST);
-    while grid.segments() < FINEST_CONFIRMING_GRID
+    let mut grid = grid_of(leaf, GRIDS.coarsest);
+    while grid.segments() < GRIDS.finest_of_loading
         && !resolves_loads(&DiscreteLeaf::new(leaf, grid.clone()))
     {
         grid = grid.refined();
@@ -185,24 +174,21 @@ pub fn follow_load_path(
 ) -> Result<LoadPathEnd, Box<RelaxationFailure>> {
     let mut before: Option<GridLevel> = None;
     loop {
-        let (level, events, end) =
+        let LoadPathRun { level, events, end } =
             follow_path_on_grid(problem, grid.clone(), Stage::Joining, effort);
         let finer = grid.refined();
         let spent = remaining_loading_budget(effort) == 0 || problem.out_of_time();
-        let last = finer.segments() > FINEST_CONFIRMING_GRID || spent;
+        let last = finer.segments() > GRIDS.finest_of_loading || spent;
         match end {
             Ok(()) if events.is_empty() => {
                 let path = Path::STABLE;
                 return Ok(LoadPathEnd { level, path });
             }
             Ok(()) => {
-                let near = before.as_ref().is_some_and(|coarser| {
-                    distance(&positions(coarser, 1), &positions(&level, 2)) < SAME_EQUILIBRIUM
+                let confirmed = before.as_ref().is_some_and(|coarser| {
+                    is_same_on_two_grids(coarser, &level)
+                        || is_of_same_circle(coarser, &level, &mut effort.work)
                 });
-                let confirmed = near
-                    || before
-                        .as_ref()
-                        .is_some_and(|coarser| has_same_energy(coarser, &level, &mut effort.work));
                 if confirmed || last {
                     // On finer grids it is followed: two members of a circle of equilibria
                     // would not be extrapolated.
@@ -214,8 +200,8 @@ pub fn follow_load_path(
                 before = Some(level);
             }
             Err(stop) => {
-                let resolved =
-                    stop != EquilibriumFailure::Unresolved || finer.segments() > FINEST_RESOLVING;
+                let resolved = stop != EquilibriumFailure::Unresolved
+                    || finer.segments() > GRIDS.finest_resolving;
                 if (resolved && last) || spent {
                     return NestedEquilibrium::without_grids(problem)
                         .with_finer_level(level)
@@ -231,40 +217,46 @@ pub fn follow_load_path(
 /// Whether the equilibrium on a coarser grid has, on the grid of `level`, the energy of that
 /// there: it is one of a circle of equilibria then, as of a buckled round column, or its
 /// mirror image.
-fn has_same_energy(coarser: &GridLevel, level: &GridLevel, work: &mut SolverCounts) -> bool {
+fn is_of_same_circle(coarser: &GridLevel, level: &GridLevel, work: &mut SolverCounts) -> bool {
     let GridLevel { leaf, state } = level;
     let mut other = prolong(&coarser.leaf, &coarser.state);
     let mut system = System::new(leaf);
     let index = saddle::converge_saddle(leaf, &mut other, &mut system, work);
     let [a, b] = [state, &other].map(|state| leaf.energy(state));
-    index == Some(0) && (a - b).abs() <= SAME_ENERGY * a.abs().max(1.0)
+    index == Some(0) && is_same_energy(a, b)
 }
 
-/// The initial guess from where a walk arrived: on the grid of the walk, or on the requested
-/// one.
-pub fn guess(
+/// The state in which slow loading ended, on the grid where that was followed or, if a grid is
+/// requested, interpolated to that one.
+pub fn state_on_requested_grid(
     problem: &RelaxationProblem,
     history: &mut History,
     arrived: GridLevel,
     effort: &mut WorkLog,
-) -> (Grid, State) {
+) -> StateOnGrid {
     let Some(segments) = problem.segments() else {
-        return (arrived.leaf.grid, arrived.state);
+        return StateOnGrid {
+            grid: arrived.leaf.grid,
+            state: arrived.state,
+        };
     };
     let grid = Grid::new(segments, problem.leaf.kinks());
     let mut finest = arrived;
     while LARGEST_GRID_RATIO * finest.leaf.segments() < segments {
         let state = prolong(&finest.leaf, &finest.state);
-        let next = (finest.leaf.grid.refined(), InitialGuess::Coarser(state));
+        let next = GridGuess {
+            grid: finest.leaf.grid.refined(),
+            guess: InitialGuess::Coarser(state),
+        };
         finest = find_grid_equilibrium(problem, history, next, effort).level;
     }
     let state = transfer(&finest.leaf, &finest.state, &grid);
-    (grid, state)
+    StateOnGrid { grid, state }
 }
 
 /// Nodes times force evaluations that are left for walks.
 fn remaining_loading_budget(effort: &WorkLog) -> usize {
-    LOADING_BUDGET.saturating_sub(effort.loading_node_evaluations)
+    (WORK.loading_node_evaluations).saturating_sub(effort.loading_node_evaluations)
 }
 
 /// Whether the veins, apart, take their loads without losing their stability. A leaf that
@@ -279,9 +271,19 @@ pub fn takes_loads_stably(
         return true;
     }
     let grid = coarsest_grid(problem.leaf);
-    let (_, events, end) = follow_path_on_grid(problem, grid, Stage::LoadedLeaf, effort);
-    effort.farthest_stage = None;
-    end.is_ok() && events.is_empty()
+    let run = follow_path_on_grid(problem, grid, Stage::LoadedLeaf, effort);
+    effort.farthest_position = None;
+    run.end.is_ok() && run.events.is_empty()
+}
+
+/// Slow loading on one grid.
+struct LoadPathRun {
+    /// The last state.
+    level: GridLevel,
+    /// Where the path lost its stability.
+    events: Vec<Event>,
+    /// Whether it was followed to the end of its last stage.
+    end: Result<(), EquilibriumFailure>,
 }
 
 /// Walks on one grid to the end of a stage.
@@ -290,7 +292,7 @@ fn follow_path_on_grid(
     grid: Grid,
     last: Stage,
     effort: &mut WorkLog,
-) -> (GridLevel, Vec<Event>, Result<(), EquilibriumFailure>) {
+) -> LoadPathRun {
     let leaf =
         DiscreteLeaf::new(problem.leaf, grid).with_compliance_floor(SMALLEST_LOADING_COMPLIANCE);
     let (segments, left) = (leaf.segments(), remaining_loading_budget(effort));
@@ -304,7 +306,7 @@ fn follow_path_on_grid(
         });
     };
     let (before, nodes) = (effort.work.force_evaluations, leaf.rods() * segments);
-    let most = before + (left / nodes).min(MOST_EVALUATIONS);
+    let most = before + (left / nodes).min(WORK.loading_evaluations);
     let mut walk = LoadPath::new(
         &leaf,
         (&mut effort.work, &mut progress),
@@ -313,42 +315,32 @@ fn follow_path_on_grid(
     walk.bias_direction = problem.options.bias_direction;
     let end = walk.run(last);
     let events = std::mem::take(&mut walk.events);
-    let reached = (walk.stage, walk.lambda);
+    let reached = PathPosition {
+        stage: walk.stage,
+        lambda: walk.lambda,
+    };
     let evaluations = walk.work.force_evaluations - before;
-    // Walks on coarse grids are cheap, and yet not many.
-    effort.loading_node_evaluations += evaluations * nodes.max(LOADING_BUDGET / MOST_EVALUATIONS);
+    // On coarse grids slow loading is cheap, and yet not repeated often.
+    let least = WORK.loading_node_evaluations / WORK.loading_evaluations;
+    effort.loading_node_evaluations += evaluations * nodes.max(least);
     let mut state = walk.last();
     if leaf.tips_move_together() {
         state.join_tips();
     }
     leaf.rotate_to_representative(&mut state);
-    effort.farthest_stage = end.is_err().then_some(reached);
-    (GridLevel { leaf, state }, events, end)
+    effort.farthest_position = end.is_err().then_some(reached);
+    LoadPathRun {
+        level: GridLevel { leaf, state },
+        events,
+        end,
+    }
 }
 
-/// Distance of a state from its mirror image, lengths, that is rounding or unfinished iteration.
-const MIRROR_IMAGE_TOLERANCE: f64 = 1e-3;
+/// Newton iterations to the same equilibrium, of any index, on the next grid.
+const NEXT_GRID_ITERATIONS: usize = 12;
 
-/// Whether a state is its own mirror image.
-fn is_mirrored(half: &Leaf, state: &State) -> bool {
-    whole_state(half, &half_state(half, state)).largest_displacement_to(state)
-        < MIRROR_IMAGE_TOLERANCE
-}
-
-/// The finest grid for this comparison.
-const FINEST_COMPARED: usize = 256;
-
-/// The finest grid that is tried when coarser ones do not resolve the bending.
-pub(in crate::relax) const FINEST_RESOLVING: usize = 2048;
-
-/// Newton iterations to the same equilibrium, of any index, on the next grid, their accuracy as a
-/// part of the tolerance, and the largest displacement of a node, in lengths: farther away is
-/// another equilibrium.
-const NEARBY_ITERATIONS: usize = 12;
-
-const NEARBY_ACCURACY: f64 = 1e-3;
-
-const NEARBY: f64 = 0.02;
+/// The accuracy of these, as a part of the tolerance.
+const NEXT_GRID_ACCURACY: f64 = 1e-3;
 
 /// From the start to rest, on as many grids as the tolerance needs. A held leaf whose rest on a coarse
 /// grid leads to none on finer ones is moved to its holders on these.
@@ -364,8 +356,8 @@ pub fn solve_from_start(
         match refine_to_tolerance(problem, found, effort) {
             Err(_)
                 if again
-                    && finer.segments() <= FINEST_COMPARED
-                    && effort.node_evaluations <= BUDGET =>
+                    && finer.segments() <= GRIDS.finest_of_release
+                    && effort.node_evaluations <= WORK.node_evaluations =>
             {
                 grid = finer;
             }
@@ -378,7 +370,7 @@ pub fn solve_from_start(
 pub fn solve_from_guesses(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
-    guesses: Vec<(Grid, State)>,
+    guesses: Vec<StateOnGrid>,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     let found = solve_on_given_grids(problem, begun, guesses, effort)?;
@@ -390,11 +382,12 @@ pub fn solve_from_guesses(
 pub fn solve_on_given_grids(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
-    guesses: Vec<(Grid, State)>,
+    guesses: Vec<StateOnGrid>,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    (guesses.into_iter()).try_fold(begun, |found, (grid, state)| {
-        solve_from_guess(problem, found, (grid, InitialGuess::Coarser(state)), effort)
+    (guesses.into_iter()).try_fold(begun, |found, StateOnGrid { grid, state }| {
+        let guess = InitialGuess::Coarser(state);
+        solve_from_guess(problem, found, GridGuess { grid, guess }, effort)
     })
 }
 
@@ -421,7 +414,7 @@ pub fn refine_to_tolerance(
         found = found.with_error_estimate(problem, &mut effort.workspace, &mut effort.work);
         let mut known = false;
         if found.is_accurate() {
-            (found, known) = check_stability(problem, found, false, effort)?;
+            StabilityCheck { found, known } = check_stability(problem, found, false, effort)?;
         }
         if known {
             let another = needs_another_grid(problem, &found);
@@ -434,7 +427,7 @@ pub fn refine_to_tolerance(
             return found.into_failure(EquilibriumFailure::StepLimit);
         }
         let Some(finer) = found.next_finer_grid() else {
-            (found, _) = check_stability(problem, found, true, effort)?;
+            let found = check_stability(problem, found, true, effort)?.found;
             return Ok(found.with_tolerance_kept(false));
         };
         found = predict_and_solve(problem, found, finer, effort)?;
@@ -448,7 +441,7 @@ fn needs_another_grid(problem: &RelaxationProblem, found: &NestedEquilibrium) ->
     if enough || found.added_for_nodes || found.next_finer_grid().is_none() {
         return false;
     }
-    found.finer_nodes(found.levels.len()).0 + 1 < found.levels.len()
+    found.finer_nodes(found.levels.len()).grid + 1 < found.levels.len()
 }
 
 /// Settles the leaf on the next finer grid, from a guess by the grids before.
@@ -467,14 +460,15 @@ fn predict_and_solve(
             InitialGuess::Predicted(state)
         }
     };
-    solve_from_guess(problem, found, (finer, guess), effort)
+    let next = GridGuess { grid: finer, guess };
+    solve_from_guess(problem, found, next, effort)
 }
 
 /// Settles the leaf on the next finer grid from this guess.
 fn solve_from_guess(
     problem: &RelaxationProblem,
     mut found: NestedEquilibrium,
-    next: (Grid, InitialGuess),
+    next: GridGuess,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
     let GridSolution {
@@ -506,13 +500,13 @@ pub fn on_next_grid(
     leaf.place_held_nodes(&mut state);
     let guess = state.clone();
     let newton = NewtonIteration {
-        accuracy: NEARBY_ACCURACY * tolerance,
-        iterations: NEARBY_ITERATIONS,
+        accuracy: NEXT_GRID_ACCURACY * tolerance,
+        iterations: NEXT_GRID_ITERATIONS,
         work: &mut SolverCounts::default(),
         progress: &mut |_, _| {},
     };
     (newton.solve(&leaf, &mut state, &mut system, INDEFINITE_NEWTON_EQUATIONS)).ok()?;
-    (guess.largest_displacement_to(&state) < NEARBY).then_some(GridLevel { leaf, state })
+    is_near_guess(&guess, &state).then_some(GridLevel { leaf, state })
 }
 
 /// From the start to rest on the first grid that resolves it. A leaf that had to move far
@@ -526,7 +520,10 @@ fn solve_first_grid(
     let mut before: Option<GridLevel> = None;
     let mut failed: Vec<Grid> = Vec::new();
     loop {
-        let from_start = (grid.clone(), InitialGuess::Start);
+        let from_start = GridGuess {
+            grid: grid.clone(),
+            guess: InitialGuess::Start,
+        };
         let settled = find_grid_equilibrium(problem, &mut found.history, from_start, effort);
         let GridSolution {
             level,
@@ -539,7 +536,7 @@ fn solve_first_grid(
         }
         let finer = grid.refined();
         let fixed = problem.segments().is_some();
-        let last = fixed || finer.segments() > FINEST_COMPARED || problem.out_of_time();
+        let last = fixed || finer.segments() > GRIDS.finest_of_release || problem.out_of_time();
         match rest {
             // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
             _ if problem.too_coarse(level.leaf.segments())
@@ -547,7 +544,7 @@ fn solve_first_grid(
             Ok(_) if !moved || fixed => return Ok(found.with_finer_level(level)),
             Ok(_) => {
                 if let Some(coarser) = before.take()
-                    && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_EQUILIBRIUM
+                    && is_same_on_two_grids(&coarser, &level)
                 {
                     return Ok(found.with_levels(vec![coarser, level]));
                 }
@@ -566,10 +563,12 @@ fn solve_first_grid(
                 before = Some(level);
             }
             Err(stop) => {
-                let at_limit = effort.node_evaluations > BUDGET
+                let at_limit = effort.node_evaluations > WORK.node_evaluations
                     || match stop {
                         EquilibriumFailure::Unresolved => {
-                            fixed || finer.segments() > FINEST_RESOLVING || problem.out_of_time()
+                            fixed
+                                || finer.segments() > GRIDS.finest_resolving
+                                || problem.out_of_time()
                         }
                         _ => last,
                     };
@@ -593,14 +592,16 @@ fn is_confirmed_on(
     grid: Grid,
     effort: &mut WorkLog,
 ) -> bool {
-    let from_start = (grid, InitialGuess::Start);
+    let from_start = GridGuess {
+        grid,
+        guess: InitialGuess::Start,
+    };
     let GridSolution {
         level: other,
         iteration_error: rest,
         ..
     } = find_grid_equilibrium(problem, &mut found.history, from_start, effort);
-    let (a, b) = (positions(level, 4), positions(&other, 3));
-    rest.is_ok() && distance(&a, &b) < SAME_EQUILIBRIUM
+    rest.is_ok() && is_same_on_two_grids(level, &other)
 }
 
 /// With up to two of the coarser grids that failed from the start, settled from the
@@ -612,11 +613,12 @@ fn add_coarser_grids(
     effort: &mut WorkLog,
 ) -> NestedEquilibrium {
     for grid in grids.iter().rev().take(2) {
-        let fine = &found.levels[0];
-        let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
-        let restricted = (grid.clone(), InitialGuess::Coarser(guess));
+        let restricted = GridGuess {
+            grid: grid.clone(),
+            guess: InitialGuess::Coarser(restrict(&found.levels[0].state)),
+        };
         let settled = find_grid_equilibrium(problem, &mut found.history, restricted, effort);
-        let there = distance(&positions(&settled.level, 1), &fine) < SAME_EQUILIBRIUM;
+        let there = is_same_on_two_grids(&settled.level, &found.levels[0]);
         if settled.iteration_error.is_err() || settled.left_convex_valley || !there {
             break;
         }
@@ -639,6 +641,7 @@ fn largest_turn(level: &GridLevel) -> f64 {
 mod tests {
     use super::*;
     use crate::leaf::Leaf;
+    use crate::relax::accuracy::richardson::distance;
     use crate::relax::request::{Options, Progress};
     use crate::scenario::Scenario;
 

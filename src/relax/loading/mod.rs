@@ -1,14 +1,11 @@
-//! The path of equilibria on which a leaf is slowly loaded.
-//!
-//! The walk along the path of equilibria: a predictor through the last states, Newton's method
-//! as corrector, and the Morse index watched.
-//!
-//! The leaf under a part of its loading, from the natural leaf to the leaf as it is.
+//! The path of equilibria on which a leaf is loaded slowly, from the natural leaf to the leaf as it is:
+//! a predictor through the last states, Newton's method as corrector, and the Morse index watched; and
+//! a bound on the second variation by which veins cannot buckle on it.
 
 pub(super) mod arrival;
 pub(super) mod snap;
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{PathStep, StepEnd, StepSizes};
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::newton::{
     DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration, SolverCounts,
@@ -20,19 +17,14 @@ use crate::rotation;
 use crate::run::Limit;
 use glam::DVec3;
 
-/// First, shortest and longest steps of lambda. Where an index changes, or where the path ends,
-/// is known to the shortest.
-const FIRST_STEP: f64 = 0.125;
-
-const SHORTEST_STEP: f64 = 1.0 / 512.0;
-
-const LONGEST_STEP: f64 = 0.5;
-
-/// Largest factor on a step after a successful one.
-const GROWTH: f64 = 2.5;
-
-/// Factor on a step that failed.
-const FAILED_STEP_FACTOR: f64 = 0.25;
+/// Steps of a stage. Where an index changes is known to the shortest.
+const STEPS: StepSizes = StepSizes {
+    first: 0.125,
+    shortest: 1.0 / 512.0,
+    longest: 0.5,
+    growth: 2.5,
+    failure: 0.25,
+};
 
 /// The distance of a state from its prediction (lengths, radians) that steps are made for, and
 /// the largest accepted.
@@ -151,36 +143,46 @@ impl<'w> LoadPath<'w> {
     }
 
     fn follow_stage(&mut self) -> Result<(), EquilibriumFailure> {
-        let mut path = Homotopy::new(FIRST_STEP, [SHORTEST_STEP, LONGEST_STEP]);
-        while self.lambda < 1.0 {
+        STEPS.follow(|step| {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
-                return Err(EquilibriumFailure::StepLimit);
+                return StepEnd::Ended(EquilibriumFailure::StepLimit);
             }
-            let part = path.next_lambda();
-            match self.step_to(part, path.is_shortest()) {
+            match self.step_to(step.to, step.is_shortest) {
                 LoadStepOutcome::Stable(drift) => {
-                    self.accept(part);
-                    path.advance(
-                        path.next_step_length() * (WANTED_DRIFT / drift).sqrt().min(GROWTH),
-                    );
-                    continue;
+                    self.accept(step.to);
+                    let growth = (WANTED_DRIFT / drift).sqrt().min(STEPS.growth);
+                    StepEnd::Made { growth }
                 }
                 LoadStepOutcome::Lost(EquilibriumFailure::Unresolved) => {
-                    return Err(EquilibriumFailure::Unresolved);
+                    StepEnd::Ended(EquilibriumFailure::Unresolved)
                 }
-                LoadStepOutcome::Unstable | LoadStepOutcome::Lost(_)
-                    if path.shorten(FAILED_STEP_FACTOR) =>
-                {
-                    continue;
+                LoadStepOutcome::Lost(stop) if !step.is_shortest => StepEnd::TooLong(stop),
+                LoadStepOutcome::Unstable if !step.is_shortest => {
+                    StepEnd::TooLong(EquilibriumFailure::Saddle)
                 }
-                LoadStepOutcome::Unstable => self.branch_aside(part)?,
-                LoadStepOutcome::Lost(_) => self.snap_through(part)?,
+                lost => self.leave_branch(&lost, step),
             }
-            self.previous_states.clear();
-            self.accept(part);
-            path.advance(FIRST_STEP);
+        })
+    }
+
+    /// Goes on from where the path lost its stability: to one side, or to where the leaf snaps.
+    fn leave_branch(
+        &mut self,
+        lost: &LoadStepOutcome,
+        step: &PathStep,
+    ) -> StepEnd<EquilibriumFailure> {
+        let left = match lost {
+            LoadStepOutcome::Unstable => self.branch_aside(step.to),
+            _ => self.snap_through(step.to),
+        };
+        match left {
+            Ok(()) => {
+                self.previous_states.clear();
+                self.accept(step.to);
+                StepEnd::Restarted
+            }
+            Err(stop) => StepEnd::Ended(stop),
         }
-        Ok(())
     }
 
     /// Takes the next state as known.

@@ -1,11 +1,18 @@
-//! A leaf whose stability is lost while it is loaded slowly: down its energy to the next equilibrium.
+//! Where the path of slow loading loses its stability: the leaf moves on, down its energy, to another
+//! equilibrium under the same part of its loading.
+//!
+//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
+//! each solved to convergence, so that segments carry the forces of their strains however stiff
+//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
+//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
+//! is Newton's method.
 
-use crate::leaf::State;
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
 use crate::relax::loading::LoadPath;
 use crate::relax::path::StabilityLoss;
 use crate::relax::saddle::{
-    converge_saddle, displace, escape_saddle, find_unstable_mode, index, lower_energy_side,
+    SideOfSaddle, converge_saddle, displace, escape_saddle, find_unstable_mode, index,
+    lower_energy_side,
 };
 
 /// and the rates above which the motion fails, in general and where segments are unresolved.
@@ -57,19 +64,22 @@ impl LoadPath<'_> {
             return Err(EquilibriumFailure::NoDescent);
         }
         let mode = self.system.solution();
-        let mut found: [Option<(f64, State)>; 2] = [None, None];
+        let mut found: [Option<SideOfSaddle>; 2] = [None, None];
         let mut stopped = EquilibriumFailure::NoDescent;
         for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
             self.next.clone_from(&saddle);
             self.system.set_solution(&mode);
             displace(&self.loading.leaf, &mut self.next, &self.system, sign);
             match self.relax_next_state() {
-                Ok(()) => *found = Some((self.loading.leaf.energy(&self.next), self.next.clone())),
+                Ok(()) => {
+                    *found = Some(SideOfSaddle::new(&self.loading.leaf, self.next.clone()));
+                }
                 Err(stop) => stopped = stop,
             }
         }
-        let (state, equally_open) = lower_energy_side(found).ok_or(stopped)?;
-        self.next = state;
+        let side = lower_energy_side(found).ok_or(stopped)?;
+        self.next = side.state;
+        let equally_open = side.equally_open;
         self.record_event(part, StabilityLoss::Branched { equally_open });
         Ok(())
     }

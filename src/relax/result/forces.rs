@@ -1,13 +1,11 @@
-//! What a leaf exerts on what holds it, and how accurate that is.
-//!
-//! The largest stresses along the veins.
+//! The forces and moments that a leaf exerts on what holds it and the largest stresses along its veins,
+//! with their errors.
 
 use crate::leaf::{DiscreteLeaf, FieldChange, Scale};
 use crate::numbers::{larger, largest};
-use crate::relax::accuracy::defect::DefectEstimate;
-use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
-use crate::relax::accuracy::{NestedEquilibrium, transfer};
+use crate::relax::accuracy::{FieldErrors, NestedEquilibrium, transfer};
 use crate::rod::Wrench;
 use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
@@ -65,14 +63,22 @@ pub struct GripReaction {
 /// finest have no more, need not be small.
 const GRIDS: usize = 4;
 
-/// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows, with
-/// the error; `relative` is that of each of them by unfinished iterations, `rounding` that by
-/// rounding. The error is unknown on a single grid.
-pub(in crate::relax) fn extrapolate_vectors(
+/// Errors of forces on a grid that are not errors of the grid.
+#[derive(Clone, Copy)]
+pub(in crate::relax) struct ForceNoise {
+    /// By unfinished iterations, as a part of the force.
+    relative: f64,
+    /// By rounding of positions, in units of A/L^2.
+    rounding: f64,
+}
+
+/// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows.
+fn extrapolate_vectors(
     levels: &[GridLevel],
     on: impl Fn(&GridLevel) -> Vec<DVec3>,
-    [relative, rounding]: [f64; 2],
-) -> (Vec<DVec3>, Option<f64>) {
+    noise: ForceNoise,
+) -> Extrapolated<Vec<DVec3>> {
+    let ForceNoise { relative, rounding } = noise;
     let levels = &levels[levels.len().saturating_sub(GRIDS)..];
     let values: Vec<Vec<DVec3>> = levels.iter().map(on).collect();
     let all = values.iter().flatten().map(|vector| vector.length());
@@ -90,13 +96,14 @@ pub(in crate::relax) fn extrapolate_vectors(
     let found = table.column(best.map_or(0, |best| best.columns));
     let error = best.map(|best| (best.error + relative) * scale + rounding);
     let vectors = found.chunks(3).map(|it| DVec3::from_slice(it) * scale);
-    (vectors.collect(), error)
+    Extrapolated {
+        value: vectors.collect(),
+        error,
+    }
 }
 
 impl NestedEquilibrium {
-    /// The part of forces by which unfinished iterations, and the size by which rounding of
-    /// positions, may change them.
-    pub fn force_iteration_errors(&self) -> [f64; 2] {
+    fn force_noise(&self) -> ForceNoise {
         let rounding = |leaf: &DiscreteLeaf| {
             STRAIN_ROUNDING * leaf.segments() as f64 * leaf.largest_finite_stiffness()
         };
@@ -105,29 +112,34 @@ impl NestedEquilibrium {
             .last()
             .filter(|level| level.leaf.leaf.has_placed_supports());
         let rounding = held.map_or(0.0, |level| rounding(&level.leaf));
-        [self.history.iteration_error, rounding]
+        ForceNoise {
+            relative: self.history.iteration_error,
+            rounding,
+        }
     }
 
     /// The reaction at a held tip.
     pub fn reaction(&self) -> Option<Reaction> {
         let leaf = &self.levels[0].leaf.leaf;
         let held = leaf.tip_support.as_ref()?;
-        let unfinished = self.force_iteration_errors();
+        let noise = self.force_noise();
         let clamped = held.clamps.is_some();
         let force = |level: &GridLevel| vec![level.leaf.reaction(&level.state).force];
         let moments = |level: &GridLevel| level.leaf.reaction(&level.state).moments;
-        let (forces, mut error) = extrapolate_vectors(&self.levels, force, unfinished);
-        let (mut moments, mut moments_error) =
-            extrapolate_vectors(&self.levels, moments, unfinished);
-        let mut force = forces[0];
-        if let Some((estimate, safety)) = self.field_errors() {
+        let forces = extrapolate_vectors(&self.levels, force, noise);
+        let (mut force, mut error) = (forces.value[0], forces.error);
+        let Extrapolated {
+            value: mut moments,
+            error: mut moments_error,
+        } = extrapolate_vectors(&self.levels, moments, noise);
+        if let Some(FieldErrors { estimate, safety }) = self.field_errors() {
             let tips = || estimate.rods.iter().filter_map(|rod| rod.last());
             let level = &self.levels[0].leaf;
             let off = |of: fn(&FieldChange) -> DVec3| {
                 let tips = estimate.errors.iter().filter_map(|rod| rod.last());
                 tips.map(move |tip| safety * of(tip).length())
             };
-            let bar = |error: f64, size: f64| error + unfinished[0] * size + unfinished[1];
+            let bar = |error: f64, size: f64| error + noise.relative * size + noise.rounding;
             let largest_moment = largest(tips().map(|tip| tip.m.length()));
             let own = bar(off(|tip| tip.force).sum(), force.length());
             let own_of_moments = bar(largest(off(|tip| tip.moment)), largest_moment);
@@ -160,25 +172,24 @@ impl NestedEquilibrium {
         if !leaf.has_grips() {
             return Vec::new();
         }
-        let unfinished = self.force_iteration_errors();
+        let noise = self.force_noise();
         let on = |part: fn(&Wrench) -> DVec3| {
             move |level: &GridLevel| -> Vec<DVec3> {
                 let reactions = level.leaf.grip_reactions(&level.state);
                 reactions.iter().map(part).collect()
             }
         };
-        let (forces, error) = extrapolate_vectors(&self.levels, on(|it| it.force), unfinished);
-        let (moments, moment_error) =
-            extrapolate_vectors(&self.levels, on(|it| it.moment), unfinished);
+        let forces = extrapolate_vectors(&self.levels, on(|it| it.force), noise);
+        let moments = extrapolate_vectors(&self.levels, on(|it| it.moment), noise);
         let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
-        let both = forces.iter().zip(&moments).zip(&scenario.grips);
+        let both = forces.value.iter().zip(&moments.value).zip(&scenario.grips);
         let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
             let clamped = grip.held == SupportKind::Clamped;
             GripReaction {
                 force: *force * scale.force(),
-                error: error.map(|error| error * scale.force()),
+                error: forces.error.map(|error| error * scale.force()),
                 moment: clamped.then(|| *moment * scale.moment()),
-                moment_error: moment_error
+                moment_error: (moments.error)
                     .filter(|_| clamped)
                     .map(|error| error * scale.moment()),
             }
@@ -219,24 +230,24 @@ impl Stresses {
         let each = rods.iter().zip(1..);
         let all = each.flat_map(|(rod, vein)| {
             let here = stations.iter().zip(rod);
-            here.map(move |(sigma, stress)| (vein, *sigma, *stress))
+            here.map(move |(&sigma, &largest)| Stresses {
+                vein,
+                sigma,
+                largest,
+                error: None,
+                rods: Vec::new(),
+            })
         });
         // The first of those that are equal.
-        let larger = |one: (usize, f64, Stress), other: (usize, f64, Stress)| {
-            if other.2.equivalent > one.2.equivalent {
+        let larger = |one: Stresses, other: Stresses| {
+            if other.largest.equivalent > one.largest.equivalent {
                 other
             } else {
                 one
             }
         };
-        let (vein, sigma, largest) = all.reduce(larger)?;
-        Some(Stresses {
-            vein,
-            sigma,
-            largest,
-            error: None,
-            rods,
-        })
+        let largest = all.reduce(larger)?;
+        Some(Stresses { rods, ..largest })
     }
 
     /// With the error by those of forces and moments anywhere: a stress is a norm of both.
@@ -254,8 +265,9 @@ impl Stresses {
     /// forces and moments: a stress is a norm of both, and may be the largest at another station.
     fn integrated(
         self,
-        (scenario, stations): (&Scenario, &[f64]),
-        (estimate, safety): (&DefectEstimate, f64),
+        scenario: &Scenario,
+        stations: &[f64],
+        FieldErrors { estimate, safety }: FieldErrors,
         scale: Scale,
     ) -> Self {
         let places = estimate.errors[0].len() - 1;
@@ -304,7 +316,7 @@ impl Stresses {
             .field_errors()
             .filter(|_| found.integrated_leaf().is_some())
         {
-            return self.integrated((scenario, stations), errors, scale);
+            return self.integrated(scenario, stations, errors, scale);
         }
         let sigma = found.levels[0].leaf.grid.sigma();
         let rods = self.rods.len();
@@ -328,17 +340,20 @@ impl Stresses {
                 .map(|(k, at)| stress(k, resultants(at)))
                 .collect()
         };
-        let (extrapolated, error) =
-            extrapolate_vectors(&found.levels, on, [found.history.iteration_error, 0.0]);
+        let noise = ForceNoise {
+            relative: found.history.iteration_error,
+            rounding: 0.0,
+        };
+        let stresses = extrapolate_vectors(&found.levels, on, noise);
         let told = self.largest.equivalent;
-        let peak = largest(extrapolated.iter().map(|it| it.z));
+        let peak = largest(stresses.value.iter().map(|it| it.z));
         // Between the nodes of the coarsest grid stresses may be larger, but not those at a node.
         let off = match sigma.contains(&self.sigma) {
             true => (told - peak).abs(),
             false => 0.0,
         };
         Stresses {
-            error: error.map(|error| error + off),
+            error: stresses.error.map(|error| error + off),
             ..self
         }
     }

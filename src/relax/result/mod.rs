@@ -1,17 +1,16 @@
-//! What was found, in the units of the scenario.
-//!
-//! The result of a relaxation: the shape, its accuracy and its stability.
-//!
-//! The stability margin of a stable leaf.
-//!
-//! What follows from the outline and the material of a blade, as a part of a result.
+//! The result of a relaxation in the units of the scenario: the shape, its accuracy, its stability with
+//! the margin, and what follows from the outline and the material of a blade.
 
 pub(super) mod forces;
 pub(super) mod report;
 
 use crate::newton::SolverCounts;
+use crate::relax::accuracy::StrainEffects;
 use crate::relax::log::Attempt;
 use crate::relax::path::Path;
+use crate::relax::remark::{
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, serialize_remark,
+};
 use crate::relax::request::Method;
 use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
 use crate::relax::saddle::Saddle;
@@ -79,13 +78,14 @@ pub struct Model {
 }
 
 impl Model {
-    /// Of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
-    /// of these `segments`; the effects are those of shear and stretch.
-    pub fn new(
+    /// The model of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
+    /// of these `segments`.
+    pub(in crate::relax) fn new(
         veins: usize,
-        (rods, planar): (usize, bool),
+        rods: usize,
+        planar: bool,
         segments: &[usize],
-        [shear_effect, stretch_effect]: [Option<f64>; 2],
+        strain_effects: StrainEffects,
     ) -> Self {
         let mirrored = rods < veins;
         let mut phrases = vec![match mirrored {
@@ -110,8 +110,8 @@ impl Model {
             rods,
             planar,
             description: phrases.join("; "),
-            shear_effect,
-            stretch_effect,
+            shear_effect: strain_effects.shear,
+            stretch_effect: strain_effects.stretch,
         }
     }
 }
@@ -284,13 +284,13 @@ pub struct Equilibrium {
     pub method: Method,
     /// How the run ended.
     pub outcome: Outcome,
-    /// Advice if the run did not succeed: one sentence for the user.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    /// Why the run did not succeed and what would help, or what else is to be said of its end.
+    #[serde(flatten, serialize_with = "serialize_remark")]
+    pub remark: Option<EquilibriumRemark>,
     /// Implausible properties: a leaf that is stretched far, inverted, or too long for its
     /// weight and stiffness; and an uncertain stability.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<EquilibriumDoubt>,
     /// Number of rods.
     #[serde(rename = "rods")]
     pub rod_count: usize,
@@ -409,16 +409,16 @@ pub struct Margin {
     pub climbs: usize,
     /// Why a part of it is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<MarginRemark>,
     /// Time of all that is not the solve itself, in seconds.
     pub wall_seconds: f64,
 }
 
 impl Margin {
     /// No margin, with the reason.
-    pub fn none(remark: &str) -> Self {
+    pub fn none(remark: MarginRemark) -> Self {
         Margin {
-            remark: Some(remark.into()),
+            remark: Some(remark),
             ..Margin::default()
         }
     }
@@ -493,7 +493,7 @@ pub struct CriticalTipForce {
     pub mirrored: bool,
     /// Why it is not known, if that is so.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<CriticalTipForceRemark>,
 }
 
 /// How stability is lost.
@@ -596,7 +596,7 @@ impl BladeReport {
             |profiles: &[crate::scenario::Profile; 3]| profiles.each_ref().map(|of| of.at(sigma));
         let tissue = |all: &Vec<crate::scenario::Tissue>| {
             let gap = &all[middle.min(all.len() - 1)];
-            gap.profiles().map(|of| of.at(sigma))
+            gap.stiffness_profiles().map(|of| of.at(sigma))
         };
         let sum = |axis: usize| {
             rods.iter()

@@ -1,31 +1,51 @@
-//! From the settled grids to the result in the units of the scenario.
-//!
-//! Plausibility checks of a leaf at rest: remarks on results that indicate wrong input.
+//! From the leaf on nested grids to the result in the units of the scenario, at its own stations and at
+//! others; with doubts about results that indicate wrong input.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator};
 use crate::newton::EquilibriumFailure;
-use crate::numbers::{format_two_digits, larger};
+use crate::numbers::larger;
 use crate::relax::accuracy::fields::{
-    LeafSection, align_quaternion_sign, integrate_between_stations, weighted_mean_section,
+    KnownSection, LeafSection, SectionsBetween, align_quaternion_sign, integrate_between_stations,
+    weighted_mean_section,
 };
-use crate::relax::accuracy::transfer::{GridLevel, is_planar_level};
-use crate::relax::accuracy::{NestedEquilibrium, transfer};
-use crate::relax::path::{Event, Path, StabilityLoss, Stage};
-use crate::relax::problem::RelaxationProblem;
-use crate::relax::request::Method;
+use crate::relax::accuracy::transfer::{GridLevel, VeinStation, is_planar_level};
+use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
+use crate::relax::path::{Event, Path, PathPosition, StabilityLoss, Stage};
+use crate::relax::plan::RelaxationProblem;
+use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::rotation::Pose;
 use crate::scenario::{
-    LARGEST_PLAUSIBLE_STRETCH, Scenario, obstacle, out_of_reach, plausibility_warnings,
+    LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
+    probable_obstacle_to_rest,
 };
-use crate::shape::{Centerline, RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
+use crate::shape::{
+    Centerline, NodeState, RodShape, STATION_TOLERANCE, Undulation, equally_spaced,
+};
 use glam::DVec3;
+
+/// How a run ended.
+pub struct RunEnd {
+    pub outcome: Outcome,
+    /// What is to be said of it.
+    pub remark: Option<EquilibriumRemark>,
+}
+
+impl RunEnd {
+    pub fn new(outcome: Outcome, remark: impl Into<Option<EquilibriumRemark>>) -> Self {
+        RunEnd {
+            outcome,
+            remark: remark.into(),
+        }
+    }
+}
 
 /// Assembles the result.
 pub fn equilibrium(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    (outcome, remark): (Outcome, Option<String>),
+    end: RunEnd,
     wall_seconds: f64,
 ) -> Equilibrium {
     let finest = found
@@ -34,14 +54,18 @@ pub fn equilibrium(
         .expect("the grid it failed on, at least");
     let (scenario, scale) = (problem.leaf.scenario(), problem.leaf.scale);
     let error = found.error();
-    let (stations, rods, between) = station_fields(problem, found, error.unwrap_or(0.0));
+    let ResultStations {
+        stations,
+        rods,
+        added_error,
+    } = stations_of_result(problem, found, error.unwrap_or(0.0));
     let joined = problem.leaf.joined();
     debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
-    let error_estimate = error.map(|error| (error + between) * scale.length);
-    let (grid, lines) = centerlines(found, finest);
-    let (energy, energy_error) = found.energy();
+    let error_estimate = error.map(|error| (error + added_error) * scale.length);
+    let DrawnCenterlines { grid, lines } = centerlines(found, finest);
+    let energy = found.energy();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = found
         .levels
@@ -51,12 +75,12 @@ pub fn equilibrium(
     Equilibrium {
         scenario: scenario.name.clone(),
         method: problem.options.method,
-        outcome,
-        remark,
+        outcome: end.outcome,
+        remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
         // Wind has no potential.
-        energy: (!problem.leaf.in_wind()).then_some(energy * scale.moment()),
+        energy: (!problem.leaf.in_wind()).then_some(energy.value * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: found.reaction(),
@@ -83,13 +107,10 @@ pub fn equilibrium(
         ),
         model: Model::new(
             rods.len(),
-            (
-                found.solved_rods,
-                problem.planar && found.index == Some(0) && is_planar_level(finest),
-            ),
+            found.solved_rods,
+            problem.planar && found.index == Some(0) && is_planar_level(finest),
             &segments,
-            (found.history.shear_stretch_effects)
-                .map(|effect| effect.map(|effect| effect * scale.length)),
+            found.history.strain_effects.scaled(scale.length),
         ),
         accuracy: Accuracy {
             segments,
@@ -97,7 +118,7 @@ pub fn equilibrium(
             tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
-            energy_error: (energy_error.filter(|_| !problem.leaf.in_wind()))
+            energy_error: (energy.error.filter(|_| !problem.leaf.in_wind()))
                 .map(|error| error * scale.moment()),
         },
         attempts: Vec::new(),
@@ -108,7 +129,7 @@ pub fn equilibrium(
             rods,
             joined,
             curves: (lines.iter())
-                .map(|line| line.iter().map(|(x, _)| *x).collect())
+                .map(|line| line.iter().map(|pose| pose.position).collect())
                 .collect(),
             curve_stations: grid.sigma().to_vec(),
         },
@@ -145,23 +166,36 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
 /// Segments of the coarsest grid from which on its nodes are enough stations.
 const STATIONS: usize = 8;
 
-/// Stations, the rods there in the scenario's units, and the error of the positions in addition
-/// to `error`, that at the nodes of the coarsest grid. The stations are these nodes or, if they
-/// are few, those of the next grid, and all if every node is requested: of a leaf that was
-/// integrated to the tolerance those of the integration, otherwise those of the finest grid that
-/// keeps the tolerance between the nodes of the coarsest.
-fn station_fields(
+/// The leaf at the stations of its result.
+struct ResultStations {
+    /// Fractions of the length.
+    stations: Vec<f64>,
+    /// The rods there, in the units of the scenario.
+    rods: Vec<RodShape>,
+    /// The error of the positions in addition to that at the nodes of the coarsest grid, in lengths
+    /// of the leaf.
+    added_error: f64,
+}
+
+/// The leaf at the stations of its result, with this `error` at the nodes of the coarsest grid. The
+/// stations are these nodes or, if they are few, those of the next grid, and all if every node is
+/// requested: of a leaf that was integrated to the tolerance those of the integration, otherwise those
+/// of the finest grid that keeps the tolerance between the nodes of the coarsest.
+fn stations_of_result(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     error: f64,
-) -> (Vec<f64>, Vec<RodShape>, f64) {
+) -> ResultStations {
     let (first, finest) = (
         &found.levels[0].leaf.grid,
         &found.levels[found.levels.len() - 1],
     );
     let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
-    let (grid, rods, between) = match found.integrated_leaf() {
-        Some((estimate, integrated)) => {
+    let (grid, rods, added_error) = match found.integrated_leaf() {
+        Some(IntegratedLeaf {
+            estimate,
+            error: integrated,
+        }) => {
             let grid = match every_node {
                 true => estimate.grid.clone(),
                 false if few && estimate.grid != *first => first.refined(),
@@ -188,108 +222,128 @@ fn station_fields(
                 true => found.levels.len(),
                 false => found.levels.len().min(1 + usize::from(few)),
             };
-            let (reached, rods, between) = found.finer_nodes(wanted);
-            (found.levels[reached].leaf.grid.clone(), rods, between)
+            let reached = found.finer_nodes(wanted);
+            let grid = found.levels[reached.grid].leaf.grid.clone();
+            (grid, reached.rods, reached.added_error)
         }
     };
     let leaf = problem.leaf;
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let nodes = rod.iter().zip(grid.sigma());
-        let nodes = nodes
-            .map(|(fields, sigma)| transfer::node_state_from_fields(leaf, (j, *sigma), fields));
+        let nodes = nodes.map(|(fields, &sigma)| {
+            transfer::node_state_from_fields(leaf, VeinStation { vein: j, sigma }, fields)
+        });
         RodShape {
             length: leaf.length(j) * leaf.scale.length,
             nodes: nodes.collect(),
         }
     };
     let rods = rods.iter().enumerate().map(rod).collect();
-    (grid.sigma().to_vec(), rods, between)
+    ResultStations {
+        stations: grid.sigma().to_vec(),
+        rods,
+        added_error,
+    }
+}
+
+/// The centerlines that figures show, in the units of the scenario.
+struct DrawnCenterlines<'f> {
+    /// The grid at whose nodes they are given.
+    grid: &'f Grid,
+    lines: Vec<Centerline>,
 }
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
-/// the integration, in units of the scenario.
-fn centerlines<'f>(
-    found: &'f NestedEquilibrium,
-    finest: &'f GridLevel,
-) -> (&'f Grid, Vec<Centerline>) {
+/// the integration.
+fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f GridLevel) -> DrawnCenterlines<'f> {
     let length = finest.leaf.leaf.scale.length;
     if let Some(estimate) = found.corrected_estimate() {
-        let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
-        return (&estimate.grid, estimate.rods.iter().map(line).collect());
+        let pose = |fields: &RodFields| Pose {
+            position: fields.x * length,
+            rotation: fields.q,
+        };
+        let line = |rod: &Vec<RodFields>| rod.iter().map(pose).collect();
+        return DrawnCenterlines {
+            grid: &estimate.grid,
+            lines: estimate.rods.iter().map(line).collect(),
+        };
     }
     let n = finest.leaf.segments();
-    let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);
+    let node = |k: usize| Pose {
+        position: finest.state.x[k] * length,
+        rotation: finest.state.q[k],
+    };
     let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
     let lines = bases.map(|base| (base..=base + n).map(node).collect());
-    (&finest.leaf.grid, lines.collect())
+    DrawnCenterlines {
+        grid: &finest.leaf.grid,
+        lines: lines.collect(),
+    }
 }
 
-/// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
-/// of advice where one helps.
+/// The end of a run, at rest (to the tolerance or not) or stopped before, with a remark
+/// where one helps.
 pub fn outcome(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     stopped: Option<EquilibriumFailure>,
-    reached: Option<(Stage, f64)>,
-) -> (Outcome, Option<String>) {
-    let advice = || advice(problem, found, reached);
-    let finest = found.levels.last().map_or(0, |level| level.leaf.segments());
-    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    reached: Option<PathPosition>,
+) -> RunEnd {
+    let obstacle = || obstacle_to_rest(problem, found, reached);
+    let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
+    let explicit = problem.options.method.is_explicit();
     match stopped {
-        None if found.keeps_tolerance => (
+        None if found.keeps_tolerance => RunEnd::new(
             match (found.index, found.history.saddle) {
                 (Some(1..), _) => Outcome::Saddle,
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
                 _ => Outcome::Converged,
             },
-            found.index.is_none().then(|| match !problem.leaf.loads.has_moments() {
-                _ if problem.leaf.in_wind() => "wind has no potential: energy and eigenvalues are not stated; the leaf rests where its damped motion \
-                     came to rest, and is stable as that motion is".into(),
-                true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
-                     its stability is not known".into(),
-                false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
-            }),
+            found
+                .index
+                .is_none()
+                .then(|| match !problem.leaf.loads.has_moments() {
+                    _ if problem.leaf.in_wind() => EquilibriumRemark::WindWithoutPotential,
+                    true => EquilibriumRemark::IndexNotCounted,
+                    false => EquilibriumRemark::MomentWithoutPotential,
+                }),
         ),
-        None => (
+        None => RunEnd::new(
             Outcome::ToleranceNotReached,
-            Some(match found.beyond_rounding(2 * finest) {
-                true => "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one".into(),
-                false => format!(
-                    "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
-                ),
-            }),
+            match found.beyond_rounding(2 * segments) {
+                true => EquilibriumRemark::ToleranceBelowRounding,
+                false => EquilibriumRemark::ToleranceBeyondFinestGrid { segments },
+            },
         ),
-        Some(EquilibriumFailure::NoDescent) => (
+        Some(EquilibriumFailure::NoDescent) => RunEnd::new(
             Outcome::Diverged,
-            Some(format!(
-                "no step lowers the energy on {finest} segments{}",
-                advice()
-            )),
+            EquilibriumRemark::NoDescent {
+                segments,
+                obstacle: obstacle(),
+            },
         ),
-        Some(stop) => (
+        Some(stop) => RunEnd::new(
             Outcome::NotAtRest,
-            Some(match stop {
-                EquilibriumFailure::StepLimit if problem.out_of_time() => format!(
-                    "the time allowed was over before rest on {finest} segments: allow more"
-                ),
-                EquilibriumFailure::StepLimit if explicit => format!(
-                    "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
-                ),
-                EquilibriumFailure::Memory => format!(
-                    "the factorised matrix of the leaf on {finest} segments does not fit into the memory that is allowed: use fewer rods or segments, or raise the limit on memory"
-                ),
-                EquilibriumFailure::Unresolved => format!(
-                    "a vein bends by more than a right angle within one of {finest} segments{}",
-                    advice()
-                ),
-                EquilibriumFailure::StepLimit if problem.keeps_unstable() => format!(
-                    "Newton's method leads to no equilibrium from this start on {finest} segments: let the leaf relax, which moves it to a stable one"
-                ),
-                _ => format!(
-                    "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
-                    advice()
-                ),
-            }),
+            match stop {
+                EquilibriumFailure::StepLimit if problem.out_of_time() => {
+                    EquilibriumRemark::OutOfTime { segments }
+                }
+                EquilibriumFailure::StepLimit if explicit => {
+                    EquilibriumRemark::ExplicitStepLimit { segments }
+                }
+                EquilibriumFailure::Memory => EquilibriumRemark::OutOfMemory { segments },
+                EquilibriumFailure::Unresolved => EquilibriumRemark::UnresolvedBend {
+                    segments,
+                    obstacle: obstacle(),
+                },
+                EquilibriumFailure::StepLimit if problem.keeps_unstable() => {
+                    EquilibriumRemark::NoEquilibriumFromStart { segments }
+                }
+                _ => EquilibriumRemark::StepLimit {
+                    segments,
+                    obstacle: obstacle(),
+                },
+            },
         ),
     }
 }
@@ -300,20 +354,16 @@ const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 
 /// An inextensible vein that two holders, neighbours along it, keep straight. What pulls it aside
 /// would need infinite forces along it, and any force along it is in balance.
-fn taut_span_remark(leaf: &DiscreteLeaf) -> Option<String> {
+fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
-        let base = [("its base".to_owned(), 0, leaf.leaf.base_pose(j).position)];
+        let base = [(SpanHolder::Base, 0, leaf.leaf.base_pose(j).position)];
         let grips = leaf.rod_grips(j).map(|held| {
-            let sigma = format_two_digits(leaf.grid.sigma()[held.node]);
-            (
-                format!("the grip at {sigma} of its length"),
-                held.node,
-                held.position,
-            )
+            let sigma = leaf.grid.sigma()[held.node];
+            (SpanHolder::Grip(sigma), held.node, held.position)
         });
         let tip = leaf.leaf.tip_support.as_ref();
-        let tip = tip.map(|held| ("its tip".to_owned(), n, held.position));
+        let tip = tip.map(|held| (SpanHolder::Tip, n, held.position));
         base.into_iter().chain(grips).chain(tip).collect::<Vec<_>>()
     };
     let taut = |j: usize, from: usize, to: usize, distance: f64| {
@@ -328,14 +378,9 @@ fn taut_span_remark(leaf: &DiscreteLeaf) -> Option<String> {
         let holders = holders(j);
         let mut spans = holders.windows(2);
         let span = spans.find(|span| taut(j, span[0].1, span[1].1, span[0].2.distance(span[1].2)));
-        span.map(|span| {
-            format!(
-                "vein {} is inextensible and held straight between {} and {}: no finite force in it bears what pulls it aside, \
-                 and what it carries along itself is not determined; give stiffness.axial a number, or move one holder towards the other",
-                j + 1,
-                span[0].0,
-                span[1].0
-            )
+        span.map(|span| RestObstacle::TautSpan {
+            vein: j,
+            between: [span[0].0, span[1].0],
         })
     })
 }
@@ -343,24 +388,22 @@ fn taut_span_remark(leaf: &DiscreteLeaf) -> Option<String> {
 /// Loads that advice names, as a part of the largest.
 const NAMED_LOAD_FRACTION: f64 = 0.1;
 
-/// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
-/// of its loads, and the softest stiffness of the vein that bends most.
-fn advice(
+/// What may have kept a leaf from coming to rest: if nothing else, the part of the loads it reached,
+/// the largest of its loads, and the softest stiffness of the vein that bends most.
+fn obstacle_to_rest(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    reached: Option<(Stage, f64)>,
-) -> String {
-    if let Some(slip) = obstacle(problem.leaf.scenario()) {
-        return format!(": {slip}");
+    reached: Option<PathPosition>,
+) -> Option<RestObstacle> {
+    if let Some(slip) = probable_obstacle_to_rest(problem.leaf.scenario()) {
+        return Some(RestObstacle::Implausible(slip));
     }
-    let Some(level) = found.levels.last() else {
-        return String::new();
-    };
+    let level = found.levels.last()?;
     if let Some(half_turn) = level.leaf.half_turn_near(&level.state) {
-        return format!(": {}", half_turn.sentence());
+        return Some(RestObstacle::HalfTurn { place: half_turn });
     }
-    if let Some(taut) = taut_span_remark(&level.leaf) {
-        return format!(": {taut}");
+    if let Some(taut) = taut_span(&level.leaf) {
+        return Some(taut);
     }
     let bends = |j: usize| {
         let base = level.state.base(j);
@@ -394,86 +437,64 @@ fn advice(
     ];
     let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
     let counts = |(size, _): &&(f64, _)| *size > NAMED_LOAD_FRACTION * largest;
-    let loads: Vec<&str> = named.iter().filter(counts).map(|(_, name)| *name).collect();
-    let load = match loads.is_empty() {
-        true => "the curvatures at rest".to_owned(),
-        false => loads.join(" or "),
-    };
-    let reached = match reached {
-        Some((stage, part)) if part > 0.0 => {
-            format!(" (it came to rest up to {:.2} % of {stage})", 100.0 * part)
-        }
-        _ => String::new(),
-    };
-    let otherwise = match moment.is_some() && problem.leaf.tip_support.is_none() {
-        true => ", or try the method shooting",
-        false => "",
-    };
-    format!(
-        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}{otherwise}",
-        vein + 1
-    )
+    Some(RestObstacle::Loads {
+        reached,
+        loads: named.iter().filter(counts).map(|(_, name)| *name).collect(),
+        stiffness: softest,
+        vein,
+        may_shoot: moment.is_some() && problem.leaf.tip_support.is_none(),
+    })
 }
 
-/// The implausible properties of a leaf at rest, one short sentence each; first those of its
-/// scenario.
-pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
+/// The implausible properties of a leaf at rest, first those of its scenario.
+pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<EquilibriumDoubt> {
     if !leaf.outcome.is_at_rest() {
         return Vec::new();
     }
     let (rods, stations) = (&leaf.shape.rods, &leaf.shape.stations);
-    let mut all = plausibility_warnings(scenario);
-    if out_of_reach(scenario).is_none() {
-        let strained = || stretch_doubt(excess_stretches(scenario, rods, stations));
+    let warnings = plausibility_warnings(scenario).into_iter();
+    let mut all: Vec<_> = warnings.map(EquilibriumDoubt::Implausible).collect();
+    if held_tip_out_of_reach(scenario).is_none() {
+        let strained = || stretch_doubt(scenario, rods, stations);
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
     all
 }
 
-/// Relative stretch beyond the rest stretch, with the vein and the fraction of its length.
-fn excess_stretches<'l>(
-    scenario: &'l Scenario,
-    rods: &'l [RodShape],
-    stations: &'l [f64],
-) -> impl Iterator<Item = (f64, usize, f64)> + 'l {
-    let of = move |(j, rod): (usize, &'l RodShape)| {
-        let rest = &scenario.rods[j].rest_stretch;
-        let nodes = rod.nodes.iter().zip(stations);
-        nodes.map(move |(node, at)| (node.v.x / rest.at(*at) - 1.0, j, *at))
+/// The doubt about a vein that is stretched far beyond its rest stretch.
+fn stretch_doubt(
+    scenario: &Scenario,
+    rods: &[RodShape],
+    stations: &[f64],
+) -> Option<EquilibriumDoubt> {
+    let excess = |at: &VeinStation, node: &NodeState| {
+        node.v.x / scenario.rods[at.vein].rest_stretch.at(at.sigma) - 1.0
     };
-    rods.iter().enumerate().flat_map(of)
-}
-
-fn stretch_doubt(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String> {
-    let (strain, j, at) = strains.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (strain > LARGEST_PLAUSIBLE_STRETCH).then(|| {
-        format!(
-            "vein {} is stretched by {:.0} % at {at:.2} of its length: few materials follow a linear law so far",
-            j + 1,
-            100.0 * strain
-        )
+    let veins = rods.iter().enumerate().flat_map(|(vein, rod)| {
+        let nodes = rod.nodes.iter().zip(stations);
+        nodes.map(move |(node, &sigma)| (VeinStation { vein, sigma }, node))
+    });
+    let stretches = veins.map(|(at, node)| (at, excess(&at, node)));
+    let (at, stretch) = stretches.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (stretch > LARGEST_PLAUSIBLE_STRETCH).then_some(EquilibriumDoubt::Stretched {
+        vein: at.vein,
+        station: at.sigma,
+        stretch,
     })
 }
 
 /// A vein with inverted elements (non-positive stretch).
-fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<String> {
+fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<EquilibriumDoubt> {
     let backwards = |rod: &RodShape| rod.nodes.iter().position(|node| node.v.x <= 0.0);
     let mut rods = rods.iter().enumerate();
-    rods.find_map(|(j, rod)| {
-        let at = stations[backwards(rod)?];
-        Some(format!(
-            "vein {} is turned through itself at {at:.2} of its length, which no body can be: raise stiffness.axial",
-            j + 1
-        ))
+    rods.find_map(|(vein, rod)| {
+        let station = stations[backwards(rod)?];
+        Some(EquilibriumDoubt::Inverted { vein, station })
     })
 }
 
 /// Smallest number of parts into which the stations of a result divide a vein.
 pub(crate) const MIN_STATION_PARTS: usize = 16;
-
-/// Advice if interpolated stations are less accurate than the tolerance.
-pub(crate) const INTERPOLATION_ADVICE: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
-    stations between: ask for a smaller tolerance, or for other stations";
 
 impl Equilibrium {
     /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
@@ -502,7 +523,7 @@ impl Equilibrium {
         }
         if there.outcome.is_success() {
             there.outcome = Outcome::ToleranceNotReached;
-            there.remark = Some(INTERPOLATION_ADVICE.into());
+            there.remark = Some(EquilibriumRemark::InaccurateBetweenStations);
         }
         there
     }
@@ -559,20 +580,24 @@ impl Equilibrium {
             }
             let [begin, end] = [i, i + 1].map(section);
             let ends = [(station, &begin), (next, &end)];
+            let ends = ends.map(|(sigma, section)| KnownSection { sigma, section });
             let found = match at_rest {
                 true => integrate_between_stations(&mut flow, leaf.kinks(), ends, points),
                 false => None,
             };
-            let (sections, error) = found.unwrap_or_else(|| {
+            let found = found.unwrap_or_else(|| {
                 let weight = |at: &f64| (at - station) / (next - station);
                 let mean = |at: &f64| weighted_mean_section([&begin, &end], weight(at));
-                let error = if at_rest { next - station } else { 0.0 };
-                (points.iter().map(mean).collect(), error)
+                SectionsBetween {
+                    sections: points.iter().map(mean).collect(),
+                    added_error: if at_rest { next - station } else { 0.0 },
+                }
             });
-            between = larger(between, error * leaf.scale.length);
-            for (&at, section) in points.iter().zip(&sections) {
-                for (j, fields) in section.iter().enumerate() {
-                    rods[j].push(transfer::node_state_from_fields(&leaf, (j, at), fields));
+            between = larger(between, found.added_error * leaf.scale.length);
+            for (&sigma, section) in points.iter().zip(&found.sections) {
+                for (vein, fields) in section.iter().enumerate() {
+                    let at = VeinStation { vein, sigma };
+                    rods[vein].push(transfer::node_state_from_fields(&leaf, at, fields));
                 }
             }
         }

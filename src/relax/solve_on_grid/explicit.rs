@@ -14,50 +14,63 @@
 use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::motion::{Explicit, Physics, Snapshot, Stopped, TimeIntegrator};
 use crate::newton::{EquilibriumFailure, SolverCounts};
+use crate::relax::plan::WORK;
 use crate::relax::request::RelaxError;
 use crate::relax::saddle;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::run::{Limit, RefusedOption};
 use crate::scenario::Rod;
 
-/// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
-const CHECK_INTERVAL: f64 = 0.25;
+/// The motion with true masses, until the leaf is in a valley of its energy.
+struct MotionIntoValley {
+    /// Time between checks, in units of sqrt(rho L^4/A).
+    check_interval: f64,
+    /// The leaf is in a valley if its energy is convex in so many consecutive checks. More of them make
+    /// the motion longer, fewer take a passage through convex states for a valley.
+    convex_checks: usize,
+    /// And its kinetic energy at most this part of the largest before.
+    kinetic_fraction: f64,
+    /// Time after which the descent begins in any case: soft modes take longer to decide.
+    longest_time: f64,
+    /// Steps between checks of the time limit.
+    steps_between_limit_checks: f64,
+    /// Limit on nodes times these steps: a tenth of a second.
+    node_steps_between_limit_checks: f64,
+}
 
-/// It is in a valley if its energy is convex in this many consecutive checks and its kinetic
-/// energy is at most this part of the maximum.
-const MIN_CONVEX_CHECKS: usize = 3;
+const MOTION: MotionIntoValley = MotionIntoValley {
+    check_interval: 0.25,
+    convex_checks: 3,
+    kinetic_fraction: 1e-2,
+    longest_time: 100.0,
+    steps_between_limit_checks: 2000.0,
+    node_steps_between_limit_checks: 5e6,
+};
 
-const SMALL_KINETIC_FRACTION: f64 = 1e-2;
+/// The descent with fictitious masses to the minimum.
+struct AcceleratedDescent {
+    /// Time step, as a part of the stability limit: beyond one the descent diverges.
+    step: f64,
+    /// Steps between evaluations of the residual, each of which costs as much as a step.
+    steps_per_check: usize,
+    /// Best accuracy that rounding allows, in lengths and radians.
+    least_accuracy: f64,
+    /// Residual at which the remaining distance is first measured, over the accuracy required.
+    first_balance: f64,
+    /// Evaluations without progress after which only rounding is left.
+    stagnant_checks: usize,
+    /// The largest remaining distance, in lengths and radians, that is accepted then.
+    largest_stagnant_distance: f64,
+}
 
-/// Time after which the descent begins in any case: soft modes take longer to decide.
-const LONGEST_MOTION: f64 = 100.0;
-
-/// Time step with fictitious masses, as a part of the stability limit.
-const STEP: f64 = 0.95;
-
-/// Steps between evaluations of the residual.
-const STEPS_PER_CHECK: usize = 200;
-
-/// Steps of the motion into the valley between checks of the time limit.
-const STEPS_BETWEEN_LIMIT_CHECKS: f64 = 2000.0;
-
-/// Limit on nodes times steps in between: a tenth of a second.
-const NODE_STEPS_BETWEEN_CHECKS: f64 = 5e6;
-
-/// Best accuracy that rounding allows.
-const LEAST_ACCURACY: f64 = 1e-10;
-
-/// Residual at which the remaining distance is first measured, over the accuracy required.
-const FIRST_BALANCE: f64 = 0.1;
-
-/// Evaluations without progress after which only rounding is left, if the remaining distance
-/// is no longer than this.
-const STAGNATION: usize = 50;
-
-const LARGEST_STAGNANT_DISTANCE: f64 = 1e-6;
-
-/// Limit on nodes times steps: some ten seconds.
-const BUDGET: usize = 600_000_000;
+const DESCENT: AcceleratedDescent = AcceleratedDescent {
+    step: 0.95,
+    steps_per_check: 200,
+    least_accuracy: 1e-10,
+    first_balance: 0.1,
+    stagnant_checks: 50,
+    largest_stagnant_distance: 1e-6,
+};
 
 const RIGID_RODS_REFUSAL: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
@@ -82,7 +95,8 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     Ok(())
 }
 
-/// Lets the leaf come to rest.
+/// Lets a leaf come to rest by the explicit method; returns the remaining distance to equilibrium, in
+/// lengths and radians.
 pub fn relax_explicitly(
     leaf: &DiscreteLeaf,
     system: &mut System,
@@ -91,7 +105,7 @@ pub fn relax_explicitly(
     let physics = Physics::for_relaxation(&leaf.leaf);
     let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
     let mut motion = motion.map_err(|_| EquilibriumFailure::NoDescent)?;
-    let most_steps = BUDGET / (leaf.rods() * leaf.segments());
+    let most_steps = WORK.explicit_node_steps / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
         true => Ok(()),
         false => find_valley(leaf, &mut motion, system, most_steps, request),
@@ -112,15 +126,15 @@ fn find_valley(
     request: &mut GridRelaxation,
 ) -> Result<(), EquilibriumFailure> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
-    while motion.time() < LONGEST_MOTION {
+    while motion.time() < MOTION.longest_time {
         let now = move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
         fastest = fastest.max(now.energy.kinetic);
-        let slow = now.energy.kinetic <= SMALL_KINETIC_FRACTION * fastest;
+        let slow = now.energy.kinetic <= MOTION.kinetic_fraction * fastest;
         let shift = leaf.neutral_shift();
         let valley = saddle::index(leaf, &now.state, system, shift, request.work) == Some(0);
         convex = if valley { convex + 1 } else { 0 };
         request.left_convex_valley |= !valley;
-        if slow && convex >= MIN_CONVEX_CHECKS {
+        if slow && convex >= MOTION.convex_checks {
             break;
         }
         if motion.steps() > most_steps || request.limit.reached() {
@@ -139,16 +153,17 @@ fn move_to_next_check(
     limit: &Limit,
 ) -> Result<Snapshot, EquilibriumFailure> {
     let begin = motion.time();
-    let steps = STEPS_BETWEEN_LIMIT_CHECKS.min((NODE_STEPS_BETWEEN_CHECKS / nodes as f64).max(1.0));
+    let steps = (MOTION.steps_between_limit_checks)
+        .min((MOTION.node_steps_between_limit_checks / nodes as f64).max(1.0));
     let pieces = match limit.is_none() {
-        false => (CHECK_INTERVAL / (steps * motion.longest_step())).ceil(),
+        false => (MOTION.check_interval / (steps * motion.longest_step())).ceil(),
         true => 1.0,
     };
     let mut piece = 0.0;
     loop {
         piece += 1.0;
         let now = motion
-            .advance(begin + CHECK_INTERVAL * (piece / pieces))
+            .advance(begin + MOTION.check_interval * (piece / pieces))
             .map_err(|stopped| match stopped {
                 Stopped::Unresolved { .. } => EquilibriumFailure::Unresolved,
                 _ => EquilibriumFailure::NoDescent,
@@ -170,23 +185,23 @@ fn descend(
     most_steps: usize,
     request: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
-    let accuracy = request.accuracy.max(LEAST_ACCURACY);
+    let accuracy = request.accuracy.max(DESCENT.least_accuracy);
     let large = (leaf.rods() * leaf.segments()) as f64
-        > NODE_STEPS_BETWEEN_CHECKS / STEPS_BETWEEN_LIMIT_CHECKS;
+        > MOTION.node_steps_between_limit_checks / MOTION.steps_between_limit_checks;
     motion.use_fictitious_masses();
-    let mut balanced = FIRST_BALANCE * accuracy;
+    let mut balanced = DESCENT.first_balance * accuracy;
     let (mut since, mut before) = (0, 0.0);
     let (mut best, mut checks_since_best) = (f64::INFINITY, 0);
     loop {
-        for _ in 0..STEPS_PER_CHECK {
+        for _ in 0..DESCENT.steps_per_check {
             if large && request.limit.reached() {
                 return Err(EquilibriumFailure::StepLimit);
             }
-            let rate = 3.0 / (STEP * (since + 2) as f64);
+            let rate = 3.0 / (DESCENT.step * (since + 2) as f64);
             motion.set_damping(rate);
-            let moving = motion.step(STEP);
+            let moving = motion.step(DESCENT.step);
             // Power of the forces: rate of kinetic energy plus damping loss.
-            let downhill = 0.5 * (moving - before) / STEP + rate * moving;
+            let downhill = 0.5 * (moving - before) / DESCENT.step + rate * moving;
             (since, before) = (since + 1, moving);
             if downhill < 0.0 && since > 3 {
                 motion.stop();
@@ -203,10 +218,11 @@ fn descend(
         if residual < 0.5 * best {
             (best, checks_since_best) = (residual, 0);
         }
-        if residual <= balanced || checks_since_best > STAGNATION {
+        if residual <= balanced || checks_since_best > DESCENT.stagnant_checks {
             let remaining = distance_to_equilibrium(leaf, &state, system, request.work);
-            let stagnates = checks_since_best > STAGNATION;
-            if remaining <= accuracy || stagnates && remaining <= LARGEST_STAGNANT_DISTANCE {
+            let stagnates = checks_since_best > DESCENT.stagnant_checks;
+            if remaining <= accuracy || stagnates && remaining <= DESCENT.largest_stagnant_distance
+            {
                 return Ok(remaining);
             }
             if stagnates {

@@ -6,12 +6,12 @@
 //! the leaf at rest at every step. A step after which it is not near is shortened: where the
 //! shortest does not help, the leaf has lost its stability.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{DiscreteLeaf, GrippedNode, State, System};
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
-use crate::relax::problem::RelaxationProblem;
+use crate::relax::plan::RelaxationProblem;
 use crate::relax::saddle;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation};
 use crate::rotation;
@@ -23,13 +23,14 @@ const LARGEST_GRIP_DISPLACEMENT: f64 = 0.1;
 
 const LARGEST_GRIP_ROTATION: f64 = 0.4;
 
-/// The shortest step, as a part of the longest; the factor on a step that failed, and that on one
-/// after a step that did not.
-const SHORTEST: f64 = 1.0 / 32.0;
-
-const FAILED_STEP_FACTOR: f64 = 0.25;
-
-const GROWTH: f64 = 2.0;
+/// Steps along the path, of which the first and the longest are those in which the grips move by that.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1.0 / 32.0,
+    longest: 1.0,
+    growth: 2.0,
+    failure: 0.25,
+};
 
 /// The largest change of a leaf in a step beside that of its holders (radians, lengths), in the valley
 /// of its energy and elsewhere: one that moves farther may have left its equilibrium.
@@ -76,24 +77,34 @@ pub fn move_grips(
             .collect(),
     };
     let longest = 1.0 / holders.steps();
-    let mut path = Homotopy::new(longest, [SHORTEST * longest, longest]);
+    let steps = StepSizes {
+        first: longest,
+        shortest: STEPS.shortest * longest,
+        longest,
+        ..STEPS
+    };
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
     let mut walk = SupportContinuation {
         leaf,
         system: System::new(leaf),
-        held: GridRelaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit),
+        held: GridRelaxation::new(state, ACCURACY, &mut effort.work, ignored, limit),
         keeps_unstable: problem.keeps_unstable(),
         events: Vec::new(),
     };
     walk.relax_held_leaf(&holders);
-    while path.lambda < 1.0 && !limit.reached() {
-        if walk.step(&holders, path.next_lambda(), path.is_shortest()) {
-            path.advance(GROWTH * path.next_step_length());
-        } else {
-            path.shorten(FAILED_STEP_FACTOR);
+    // Out of time, the leaf is placed where it is held from where it came to.
+    let _ = steps.follow(|step| {
+        if limit.reached() {
+            return StepEnd::Ended(());
         }
-    }
+        match walk.step(&holders, step.to, step.is_shortest) {
+            true => StepEnd::Made {
+                growth: STEPS.growth,
+            },
+            false => StepEnd::TooLong(()),
+        }
+    });
     let SupportContinuation { held, events, .. } = walk;
     let (mut state, near_rest, moved) = (held.state, held.near_rest, held.left_convex_valley);
     effort.node_evaluations +=
@@ -178,11 +189,11 @@ impl SupportContinuation<'_> {
             self.system.set_solution(&mode);
             saddle::displace(leaf, &mut self.held.state, &self.system, sign);
             self.leave_saddles().ok()?;
-            Some((leaf.energy(&self.held.state), self.held.state.clone()))
+            Some(saddle::SideOfSaddle::new(leaf, self.held.state.clone()))
         });
-        let (state, equally_open) =
-            saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
-        self.held.state = state;
+        let side = saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
+        self.held.state = side.state;
+        let equally_open = side.equally_open;
         self.record_event(part, StabilityLoss::Branched { equally_open });
         Ok(())
     }

@@ -1,15 +1,5 @@
-//! How a leaf comes to rest on one grid: the start, held tips that are moved to their places, the
-//! methods, and pushes off saddles.
-//!
-//! The iteration to equilibrium on one grid.
-//!
-//! The count of negative eigenvalues of a leaf at rest, and pushes off saddles.
-//!
-//! The equilibrium that a leaf reaches from a given state, on one grid.
-//!
-//! Segments of the coarsest grid, as requested or as needed.
-//!
-//! The solution methods, each on one grid or without a grid.
+//! How a leaf comes to rest on one grid: from its start or a guess, by the method of the request, off
+//! saddles, with the count of its negative eigenvalues; and how many segments the coarsest grid needs.
 
 pub(crate) mod explicit;
 pub(crate) mod grips;
@@ -21,42 +11,46 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, State, System, h
 use crate::memory;
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::relax::accuracy::transfer::{GridLevel, mirror_level};
-use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationFailure, is_large};
+use crate::relax::accuracy::{
+    History, NestedEquilibrium, RelaxationFailure, StrainEffects, is_large,
+};
 use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
-use crate::relax::problem::{BUDGET, FINEST, RelaxationProblem};
-use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
+use crate::relax::plan::{GRIDS, RelaxationProblem, WORK, WayFromStart};
+use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
-pub use crate::relax::solve_on_grid::semi_implicit::softens;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation, disturb, initial_state};
 use crate::run::{Limit, RefusedOption};
 use glam::DVec3;
 
-/// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
-/// coarse, a looser one saves a step on the finest. On a grid that may be the only one it is
-/// estimated, and subtracted, with the error of the grid.
-const ITERATION_PART: f64 = 1e-3;
+/// Errors of positions and rotations that the iteration on a grid may leave. Half of any of them costs
+/// a step of Newton's method on some of the finest grids.
+struct IterationErrors {
+    /// As a part of the tolerance.
+    usual: f64,
+    /// The part where the first grid is very coarse: that saves a step on the finest.
+    from_coarse: f64,
+    /// The part on a grid that may be the only one, where the error of the iteration is estimated,
+    /// and subtracted, with that of the grid.
+    alone: f64,
+    /// The error on a fixed grid, whose results are meant for comparisons, in lengths and radians.
+    fixed_grid: f64,
+}
 
-const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+const ITERATION_ERRORS: IterationErrors = IterationErrors {
+    usual: 1e-3,
+    from_coarse: 5e-3,
+    alone: 5e-2,
+    fixed_grid: 1e-12,
+};
 
-const ITERATION_PART_ALONE: f64 = 5e-2;
-
-/// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
-const FIXED_ACCURACY: f64 = 1e-12;
-
-/// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
-/// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
-const GUARANTEED_EVALUATIONS: (usize, usize) = (600, 100);
-
-const COARSE_GRID_SEGMENTS: usize = 64;
-
-/// Newton iterations towards an equilibrium of any kind.
+/// Newton iterations towards an equilibrium of any Morse index, from a start that may be far from it.
 const MAX_ITERATIONS: usize = 200;
 
-/// Saddles that are left before the run fails.
-pub const MAX_SADDLES: i32 = 10;
+/// Saddles that a leaf leaves before its relaxation fails.
+const MAX_SADDLES: i32 = 10;
 
 /// Accuracy, in the energy norm, of the effects of shear and stretch: stretch dominates this
 /// norm, to which displacements contribute little.
@@ -72,6 +66,21 @@ pub enum InitialGuess {
     Predicted(State),
     /// A state displaced from a saddle along its unstable mode.
     Pushed(State),
+}
+
+/// A grid, and the initial guess of the iteration there.
+pub struct GridGuess {
+    pub grid: Grid,
+    pub guess: InitialGuess,
+}
+
+/// How close the initial guess of the iteration on a grid is to an equilibrium.
+#[derive(Clone, Copy)]
+struct GuessQuality {
+    /// Whether the iteration begins with Newton's method, without a softened leaf.
+    near_rest: bool,
+    /// Relative accuracy of the conjugate gradients in the first step.
+    cg_tolerance: f64,
 }
 
 /// The end of the iteration on a grid, converged or not.
@@ -91,20 +100,20 @@ pub struct GridSolution {
 pub fn find_grid_equilibrium(
     problem: &RelaxationProblem,
     history: &mut History,
-    (grid, guess): (Grid, InitialGuess),
+    from: GridGuess,
     effort: &mut WorkLog,
 ) -> GridSolution {
-    let mut settled = find_unleaned_equilibrium(problem, history, (grid, guess), effort);
+    let mut settled = find_unleaned_equilibrium(problem, history, from, effort);
     let GridLevel { leaf, state } = &mut settled.level;
     leaf.rotate_to_representative(state);
     settled
 }
 
-/// The same without leaning.
+/// Settles on one grid. A leaf that can turn without resistance is left wherever it came to rest.
 fn find_unleaned_equilibrium(
     problem: &RelaxationProblem,
     history: &mut History,
-    (grid, guess): (Grid, InitialGuess),
+    GridGuess { grid, guess }: GridGuess,
     effort: &mut WorkLog,
 ) -> GridSolution {
     let mut leaf = DiscreteLeaf::new(problem.leaf, grid);
@@ -139,20 +148,25 @@ fn find_unleaned_equilibrium(
     } else {
         leaf.place_held_nodes(&mut state);
     }
-    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let explicit = problem.options.method.is_explicit();
     let windy = leaf.leaf.in_wind();
     // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);
     moved |= windy && from_start;
     if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
-        let how = (near_rest, cg_tolerance);
+        let quality = GuessQuality {
+            near_rest,
+            cg_tolerance,
+        };
         let mut system = effort.workspace.equations(&leaf);
-        let begun = from_start.then(|| (state.clone(), effort.work.steps));
-        let settled =
-            solve_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
-        if let Some((begun, steps)) = begun {
-            let distance = begun.distance(&settled.level.state);
-            history.from_start = Some((distance, effort.work.steps - steps));
+        let (start, steps) = (from_start.then(|| state.clone()), effort.work.steps);
+        let level = GridLevel { leaf, state };
+        let settled = solve_semi_implicit(problem, history, level, &mut system, quality, effort);
+        if let Some(start) = start {
+            history.from_start = Some(WayFromStart {
+                distance: start.distance(&settled.level.state),
+                steps: effort.work.steps - steps,
+            });
         }
         if !is_large(&settled.level.leaf) {
             effort.workspace.take_back(system);
@@ -165,12 +179,12 @@ fn find_unleaned_equilibrium(
     }
     let accuracy = accuracy(problem, history, &leaf);
     let mut system = System::new(&leaf);
+    let (work, limit) = (&mut effort.work, &problem.options.limit);
     let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
-    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
     let mut relaxation = GridRelaxation {
         near_rest,
         left_convex_valley: moved,
-        ..GridRelaxation::new(state, accuracy, out, &problem.options.limit)
+        ..GridRelaxation::new(state, accuracy, work, progress, limit)
     };
     let rest = match (explicit, dead_moment) {
         _ if windy => no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation),
@@ -216,11 +230,8 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
         return half_state(problem.leaf, &initial_state(&whole));
     }
     let mut state = initial_state(leaf);
-    if let Method::SemiImplicit(SemiImplicit {
-        disturbance: Some(number),
-        ..
-    }) = problem.options.method
-    {
+    let how = problem.options.method.semi_implicit();
+    if let Some(number) = how.and_then(|how| how.disturbance) {
         disturb(leaf, number, &mut state);
     }
     state
@@ -230,23 +241,24 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
 fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf) -> f64 {
     let first = history.coarsest.unwrap_or(leaf.segments());
     match problem.segments() {
-        Some(_) => FIXED_ACCURACY,
+        Some(_) => ITERATION_ERRORS.fixed_grid,
         None if problem.too_coarse(first) => {
             match history.coarsest.is_none() && problem.may_use_single_grid() {
-                true => ITERATION_PART_ALONE * problem.tolerance,
-                false => ITERATION_PART_FROM_COARSE * problem.tolerance,
+                true => ITERATION_ERRORS.alone * problem.tolerance,
+                false => ITERATION_ERRORS.from_coarse * problem.tolerance,
             }
         }
-        None => ITERATION_PART * problem.tolerance,
+        None => ITERATION_ERRORS.usual * problem.tolerance,
     }
 }
 
 /// Settles by the semi-implicit method.
 fn solve_semi_implicit(
-    (problem, history): (&RelaxationProblem, &mut History),
-    (leaf, state): (DiscreteLeaf, State),
+    problem: &RelaxationProblem,
+    history: &mut History,
+    GridLevel { leaf, state }: GridLevel,
     system: &mut System,
-    (near_rest, cg_tolerance): (bool, f64),
+    quality: GuessQuality,
     effort: &mut WorkLog,
 ) -> GridSolution {
     let accuracy = accuracy(problem, history, &leaf);
@@ -254,19 +266,22 @@ fn solve_semi_implicit(
         || problem.stays_in_valley
         || problem.too_coarse(leaf.segments());
     let nodes = leaf.rods() * leaf.segments();
-    let (most, least) = GUARANTEED_EVALUATIONS;
-    let granted = (most * COARSE_GRID_SEGMENTS / leaf.segments()).clamp(least, most);
-    let allowed = (BUDGET.saturating_sub(effort.node_evaluations) / nodes).max(granted);
+    let granted = (WORK.guaranteed * WORK.coarse_segments / leaf.segments())
+        .clamp(WORK.guaranteed_on_any_grid, WORK.guaranteed);
+    let left = WORK
+        .node_evaluations
+        .saturating_sub(effort.node_evaluations);
+    let allowed = (left / nodes).max(granted);
     let most_evaluations = effort.work.force_evaluations + allowed;
+    let (work, limit) = (&mut effort.work, &problem.options.limit);
     let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
-    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
     let mut relaxation = GridRelaxation {
-        near_rest,
-        cg_tolerance,
+        near_rest: quality.near_rest,
+        cg_tolerance: quality.cg_tolerance,
         solver: DefiniteSolver::with_contraction(history.contraction),
         most_evaluations,
         convex_only,
-        ..GridRelaxation::new(state, accuracy, out, &problem.options.limit)
+        ..GridRelaxation::new(state, accuracy, work, progress, limit)
     };
     let mut rest = Err(EquilibriumFailure::StepLimit);
     // After earlier pushes off saddles at rest, the softened leaf returned to one.
@@ -278,7 +293,7 @@ fn solve_semi_implicit(
         if let Ok(remaining) = settled {
             history.iteration_error = history.iteration_error.max(remaining);
             if history.coarsest.is_none() && relaxation.solver.direct_solver.is_none() {
-                history.shear_stretch_effects = strain_effects(&leaf, &relaxation.state, system);
+                history.strain_effects = strain_effects(&leaf, &relaxation.state, system);
             }
         }
         if settled != Err(EquilibriumFailure::Saddle) || convex_only {
@@ -329,19 +344,22 @@ fn step_reporter(
     }
 }
 
-/// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
-/// factorisation of the last iteration.
-fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+/// The effects of shear and stretch, by the factorization of the last iteration.
+fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> StrainEffects {
     if system.has_tissue() {
-        return [None; 2];
+        return StrainEffects::default();
     }
-    [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
+    let mut effect = |dropped: DVec3| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {
             LinearSolveOutcome::Converged(_) => Some(system.largest_increment().displacement),
             _ => None,
         }
-    })
+    };
+    StrainEffects {
+        shear: effect(DVec3::new(0.0, 1.0, 1.0)),
+        stretch: effect(DVec3::X),
+    }
 }
 
 /// What is known of the stability on one grid.
@@ -387,20 +405,32 @@ fn count_negative(
     }
 }
 
+/// A leaf whose negative eigenvalues were counted on its finest grid.
+pub struct StabilityCheck {
+    pub found: NestedEquilibrium,
+    /// Whether stability is known, as far as possible; if not, finer grids are needed.
+    pub known: bool,
+}
+
+impl StabilityCheck {
+    fn new(found: NestedEquilibrium, known: bool) -> Self {
+        StabilityCheck { found, known }
+    }
+}
+
 /// Counts the negative eigenvalues on the finest grid. On the first, unless it is the `last`,
 /// the leaf must be clearly stable. If saddles are accepted the number must be that on the
 /// grid before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
-/// equilibrium reached. Returns whether stability is known, as far as possible: if not,
-/// finer grids are needed.
+/// equilibrium reached.
 pub fn check_stability(
     problem: &RelaxationProblem,
-    found: NestedEquilibrium,
+    mut found: NestedEquilibrium,
     last: bool,
     effort: &mut WorkLog,
-) -> Result<(NestedEquilibrium, bool), Box<RelaxationFailure>> {
+) -> Result<StabilityCheck, Box<RelaxationFailure>> {
     let level = found.levels.last().expect("the leaf has settled");
     if !level.leaf.leaf.has_potential() {
-        return Ok((found, true));
+        return Ok(StabilityCheck::new(found, true));
     }
     let compared = !last && found.levels.len() == 1 && problem.segments().is_none();
     if let Some(whole) = problem.whole_leaf {
@@ -410,13 +440,13 @@ pub fn check_stability(
         let index = count.index.unwrap_or(found.index);
         let found = found.with_index(count.clearly_stable, index);
         return match (count.index, found.index) {
-            (None, _) => Ok((found, false)),
-            (_, Some(0)) => Ok((found, true)),
+            (None, _) => Ok(StabilityCheck::new(found, false)),
+            (_, Some(0)) => Ok(StabilityCheck::new(found, true)),
             _ => found.into_failure(EquilibriumFailure::Saddle),
         };
     }
     let before = found.index;
-    let (mut found, mut level) = found.split();
+    let mut level = found.take_finest();
     if found.levels.is_empty() && !effort.workspace.fits(&level.leaf) {
         // Further grids have equations of their own.
         let linear = found.factorized_level.take();
@@ -434,11 +464,12 @@ pub fn check_stability(
     }
     found = found.with_index(count.clearly_stable, count.index.unwrap_or(before));
     let Some(Some(index @ 1..)) = count.index else {
-        return Ok((found.rejoin_finest(level), count.index.is_some()));
+        let known = count.index.is_some();
+        return Ok(StabilityCheck::new(found.rejoin_finest(level), known));
     };
     if problem.keeps_unstable() {
         let known = before == found.index || problem.segments().is_some();
-        return Ok((found.rejoin_finest(level), known));
+        return Ok(StabilityCheck::new(found.rejoin_finest(level), known));
     }
     if problem.stays_in_valley {
         return found
@@ -455,7 +486,10 @@ pub fn check_stability(
     let GridLevel { leaf, mut state } = level;
     let leaning = problem.options.bias_direction;
     saddle::escape_saddle(&leaf, &mut state, &mut system, leaning, work);
-    let pushed = (leaf.grid, InitialGuess::Pushed(state));
+    let pushed = GridGuess {
+        grid: leaf.grid,
+        guess: InitialGuess::Pushed(state),
+    };
     let GridSolution {
         level,
         iteration_error: rest,
@@ -465,12 +499,12 @@ pub fn check_stability(
     match (rest, problem.segments()) {
         (Err(stop), _) => found.into_failure(stop),
         (Ok(_), Some(_)) => check_stability(problem, found, last, effort),
-        (Ok(_), None) => Ok((found, false)),
+        (Ok(_), None) => Ok(StabilityCheck::new(found, false)),
     }
 }
 
-/// Accuracy of the equilibrium.
-const TOLERANCE: f64 = 1e-6;
+/// Tolerance of an equilibrium to which a leaf moves on its own on one grid.
+const MOVED_TO_TOLERANCE: f64 = 1e-6;
 
 /// The stable equilibrium that a leaf reaches from a state on a grid without initial velocity:
 /// saddles are left. `None` if it does not come to rest.
@@ -479,24 +513,22 @@ pub fn relax_from_state(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -
         limit: limit.clone(),
         ..Options::default()
     };
-    let problem = RelaxationProblem::new(leaf, &options, TOLERANCE);
+    let problem = RelaxationProblem::new(leaf, &options, MOVED_TO_TOLERANCE);
     let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
     let mut effort = WorkLog::new(ignored);
     let mut found = NestedEquilibrium::without_grids(&problem);
-    let from = (grid.clone(), InitialGuess::Pushed(state));
+    let from = GridGuess {
+        grid: grid.clone(),
+        guess: InitialGuess::Pushed(state),
+    };
     let settled = find_grid_equilibrium(&problem, &mut found.history, from, &mut effort);
     settled.iteration_error.ok()?;
-    found = found.with_finer_level(settled.level);
-    let mut known = false;
-    while !known {
-        (found, known) = check_stability(&problem, found, true, &mut effort).ok()?;
+    let mut check = StabilityCheck::new(found.with_finer_level(settled.level), false);
+    while !check.known {
+        check = check_stability(&problem, check.found, true, &mut effort).ok()?;
     }
-    found.levels.pop().map(|level| level.state)
+    check.found.levels.pop().map(|level| level.state)
 }
-
-/// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
-/// of 86 were too low by a factor of two.
-const COARSEST_BLADE_GRID: usize = 16;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
 /// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
@@ -531,7 +563,7 @@ pub fn check_segments(
     Ok(segments)
 }
 
-/// Segments of the coarsest grid.
+/// Segments of the coarsest grid: `least`, or as many as resolve rest curvature and dead moments.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
     let moment = leaf.moment_integral_bound();
     let turn = |j: usize| {
@@ -539,15 +571,15 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         let bending = moment / section.couple_stiffness.min_element();
         (section.rest_curvature.length() + bending) * leaf.length(j)
     };
-    let turn = match no_potential::moment_curvature(leaf, FINEST) {
+    let turn = match no_potential::moment_curvature(leaf, GRIDS.finest) {
         Some(rate) => rate * leaf.length(0),
         None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
     };
     let mut segments = match leaf.scenario().blade {
-        Some(_) => least.max(COARSEST_BLADE_GRID),
+        Some(_) => least.max(GRIDS.coarsest_of_blade),
         None => least,
     };
-    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
+    while (segments as f64) * COARSEST_TURN < turn && segments < GRIDS.finest {
         segments *= 2;
     }
     segments

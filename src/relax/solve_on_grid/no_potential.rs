@@ -1,25 +1,18 @@
-//! A single rod under dead moments, at its tip or along it.
+//! Loads without a potential: neither energy nor signs of pivots can guide a relaxation.
 //!
-//! A moment fixed in space has no potential in three dimensions, so that
-//! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
-//! quasi-statically instead: all loads grow together from zero, in steps of
-//! about one radian of tip rotation, each followed by Newton's method with the
-//! exact, unsymmetric tangent.
+//! Dead moments on a single rod (at its tip or along it): all loads grow together from zero, in
+//! steps of about one radian of tip rotation, each followed by Newton's method with the exact,
+//! unsymmetric tangent. Where that would take too many steps, the other loads grow from the shape under
+//! the moments alone, which is computed segment by segment from the clamp: a free rod carries at every
+//! place the sum of the moments beyond it. Where the path ends at a fold, the moments are applied before
+//! the other loads, or after them. A rod that is held elsewhere than at its base is brought there under
+//! the other loads, by their energy, before the moments are applied.
 //!
-//! Where that would take too many steps, the other loads grow from the shape under the moments
-//! alone. A free rod carries at every place the sum of those beyond it, so that this shape can be
-//! computed segment by segment from the clamp.
-//!
-//! Where the path ends at a fold, the moments are applied before the other loads, or after them. A
-//! rod that is held elsewhere than at its base is brought there under the other loads, by their
-//! energy, before the moments are applied.
-//!
-//! A leaf in steady wind, which has no potential: neither energy nor signs of pivots guide it. It
-//! moves, damped as in a relaxation, until it hardly moves any more; then Newton's method with the
-//! exact, unsymmetric matrix finds the balance of all forces with the drag. Where it rests is thus
-//! stable as that motion is.
+//! Steady wind: the leaf moves, damped as in a relaxation, until it hardly moves any more; then
+//! Newton's method with the exact, unsymmetric matrix finds the balance of all forces with the drag.
+//! Where it rests is thus stable as that motion is.
 
-use crate::homotopy::Homotopy;
+use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{
     DiscreteLeaf, Grid, Leaf, Loads, NodalField, State, System, add_to_increment, displacement_part,
 };
@@ -40,8 +33,14 @@ const MAX_ITERATIONS: usize = 15;
 /// Accuracy of all load steps but the last.
 const STEP_ACCURACY: f64 = 1e-3;
 
-/// Smallest load step, as a part of the load.
-const SMALLEST_STEP: f64 = 1e-6;
+/// Load steps, of which the first depends on the load.
+const STEPS: StepSizes = StepSizes {
+    first: 1.0,
+    shortest: 1e-6,
+    longest: 1.0,
+    growth: 1.0,
+    failure: 0.5,
+};
 
 /// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
 /// grid.
@@ -138,45 +137,52 @@ fn apply_loads(
     (step, mut steps): (f64, usize),
 ) -> Result<f64, EquilibriumFailure> {
     let loads = leaf.loads;
-    let mut path = Homotopy::new(step, [SMALLEST_STEP, 1.0]);
+    let sizes = StepSizes {
+        first: step,
+        ..STEPS
+    };
     let mut before = rod.state.clone();
-    let end = loop {
+    let mut error = 0.0;
+    let end = sizes.follow(|step| {
         if steps == 0 || rod.limit.reached() {
-            break Err(EquilibriumFailure::StepLimit);
+            return StepEnd::Ended(EquilibriumFailure::StepLimit);
         }
         steps -= 1;
-        let part = path.next_lambda();
-        let [moments, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        let [moments, others] = order(step.to).map(|part| part.clamp(0.0, 1.0));
         leaf.loads = Loads {
             tip_moment: moments * loads.tip_moment,
             dead_moment_factor: moments * loads.dead_moment_factor,
             ..loads * others
         };
-        let wanted = match part < 1.0 {
+        let wanted = match step.to < 1.0 {
             true => STEP_ACCURACY,
             false => rod.accuracy,
         };
         match newton(leaf, system, rod, wanted) {
-            Ok(remaining) if part == 1.0 => break Ok(remaining),
-            Ok(_) => {
-                path.advance(path.next_step_length());
+            Ok(remaining) => {
+                error = remaining;
                 before.clone_from(&rod.state);
+                StepEnd::Made {
+                    growth: STEPS.growth,
+                }
             }
             Err(stop) => {
                 rod.state.clone_from(&before);
                 let mut coarse =
                     || leaf.assemble(&before, system).largest_turn > COARSE_SEGMENT_BENDING;
-                if !path.shorten(0.5) || stop == EquilibriumFailure::Unresolved && coarse() {
-                    break Err(match coarse() {
-                        true => EquilibriumFailure::Unresolved,
-                        false => EquilibriumFailure::NoDescent,
-                    });
+                let unresolved = stop == EquilibriumFailure::Unresolved;
+                if !step.is_shortest && !(unresolved && coarse()) {
+                    return StepEnd::TooLong(stop);
                 }
+                StepEnd::Ended(match coarse() {
+                    true => EquilibriumFailure::Unresolved,
+                    false => EquilibriumFailure::NoDescent,
+                })
             }
         }
-    };
+    });
     leaf.loads = loads;
-    end
+    end.map(|()| error)
 }
 
 /// Whether moments turn the tip of a free rod so far (at most, as if only the softest stiffness
@@ -267,7 +273,7 @@ const MOTION_ERROR: f64 = 1e-3;
 /// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
 const REST_CHECK_INTERVAL: f64 = 0.5;
 
-const LONGEST_MOTION: f64 = 400.0;
+const LONGEST_TIME_TO_REST: f64 = 400.0;
 
 /// Largest velocity (lengths or radians per unit of time) with which the leaf hardly moves, and the
 /// factor on it where Newton's method led elsewhere.
@@ -324,7 +330,7 @@ fn approach_rest_in_wind(
     let mut end = Err(EquilibriumFailure::StepLimit);
     // Where forces are balanced, as found before, and how far from there the leaf was.
     let mut before: Option<(State, f64)> = None;
-    while until < LONGEST_MOTION && !rest.limit.reached() {
+    while until < LONGEST_TIME_TO_REST && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
             end = Err(EquilibriumFailure::NoDescent);
             break;

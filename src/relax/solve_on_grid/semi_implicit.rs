@@ -10,64 +10,56 @@
 //! positive definite the leaf is in the valley (basin of attraction) of its equilibrium, and
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
-//!
-//! The damped motion of the semi-implicit method: its velocities, and the choice of the next
-//! time step by the energy.
 
-use crate::leaf::{
-    AssemblyTotals, DiscreteLeaf, Increment, Leaf, MassLoad, NodalField, State, System,
-};
+use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
     SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
 };
+use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
+use crate::scenario::CLAMPED_ROD_FREQUENCY;
 
-/// Largest rotation of a node in one step, radians.
-const MAX_TURN: f64 = 1.0;
-
-/// Largest displacement of a node in one step, in units of length.
-const MAX_SHIFT: f64 = 1.0;
-
-/// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
-/// without a test of the energy, whose change is below rounding.
-const NEGLIGIBLE_NEWTON_STEP: f64 = 1e-3;
-
-/// Largest number of steps on one grid.
-const MAX_STEPS: usize = 2000;
-
-/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
-/// one is first settled with this compliance, which also gives its segment forces, and then
-/// with its own.
-const MOVING_COMPLIANCE: f64 = 2e-3;
-
-/// Approximate largest stretch of a softened leaf by its load.
-const MOVING_STRETCH: f64 = 0.05;
-
-/// Accuracy to which a softened leaf is settled.
-const SOFT_ACCURACY: f64 = 1e-1;
-
-/// Factor on the compliance of a softened leaf if Newton's method does not converge from it
-/// with the leaf's own stiffness, and its lower limit.
-const STIFFENING_FACTOR: f64 = 0.1;
-
-const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
-
-/// Newton iterations of a stiff leaf before it is stiffened in steps.
-const STIFF_ITERATIONS: usize = 12;
-
-/// The least compliance of a leaf that moves after so many pushes off saddles.
-fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
-    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
-    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
+/// Limits on the steps of the motion.
+struct MotionStepLimits {
+    /// Largest rotation of a node in a step, radians.
+    turn: f64,
+    /// Largest displacement of a node in a step, lengths. Half of either doubles the steps of a leaf
+    /// that moves far.
+    shift: f64,
+    /// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
+    /// without a test of the energy, whose change is below rounding.
+    negligible: f64,
+    /// Steps on one grid.
+    count: usize,
 }
 
-/// Whether a leaf is so stiff that it is softened while it moves.
-pub fn softens(leaf: &Leaf) -> bool {
-    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
-    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
+const STEP_LIMITS: MotionStepLimits = MotionStepLimits {
+    turn: 1.0,
+    shift: 1.0,
+    negligible: 1e-3,
+    count: 2000,
+};
+
+/// How a stiff leaf is softened while it moves, and stiffened again.
+struct StiffLeafSteps {
+    /// Accuracy (lengths, radians) to which the softened leaf is brought to rest.
+    soft_accuracy: f64,
+    /// Newton iterations with the leaf's own stiffness before it is stiffened in steps.
+    iterations: usize,
+    /// Factor on the compliance in such a step.
+    stiffening: f64,
+    /// The smallest compliance (L^2/A) of a step.
+    smallest_compliance: f64,
 }
+
+const STIFF_LEAF: StiffLeafSteps = StiffLeafSteps {
+    soft_accuracy: 1e-1,
+    iterations: 12,
+    stiffening: 0.1,
+    smallest_compliance: 1e-8,
+};
 
 impl GridRelaxation<'_> {
     /// Lets the leaf come to rest.
@@ -90,7 +82,7 @@ impl GridRelaxation<'_> {
                     // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
-                self.move_to_rest(&soft, system, SOFT_ACCURACY)?;
+                self.move_to_rest(&soft, system, STIFF_LEAF.soft_accuracy)?;
             }
             let before = self.state.clone();
             match self.newton(leaf, system, self.accuracy) {
@@ -101,11 +93,11 @@ impl GridRelaxation<'_> {
             }
             if soften {
                 // The leaf's own stiffness is too far from this one: stiffen the leaf in steps.
-                compliance *= STIFFENING_FACTOR;
+                compliance *= STIFF_LEAF.stiffening;
                 if compliance <= stiffest {
                     return self.move_to_rest(leaf, system, self.accuracy);
                 }
-                if compliance < SMALLEST_MOVING_COMPLIANCE {
+                if compliance < STIFF_LEAF.smallest_compliance {
                     return Err(EquilibriumFailure::NoDescent);
                 }
             }
@@ -122,13 +114,13 @@ impl GridRelaxation<'_> {
     ) -> Result<f64, EquilibriumFailure> {
         let newton = NewtonIteration {
             accuracy,
-            iterations: STIFF_ITERATIONS,
+            iterations: STIFF_LEAF.iterations,
             work: self.work,
             progress: self.progress,
         };
         let equations = NewtonEquations::Definite {
             solver: &mut self.solver,
-            largest: MAX_TURN.min(MAX_SHIFT),
+            largest: STEP_LIMITS.turn.min(STEP_LIMITS.shift),
             shifted: true,
             cg_tolerance: self.cg_tolerance,
         };
@@ -148,13 +140,13 @@ impl GridRelaxation<'_> {
         let mut stalled = StallCounter::default();
         let mut forces = ForceConvergence::new(leaf);
         let mut sums = assembled(leaf, &self.state, system, self.work);
-        for step in 0..MAX_STEPS {
+        for step in 0..STEP_LIMITS.count {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 break;
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
             self.solve_shortening_step(leaf, system, &mut motion, tolerance)?;
-            let (mut size, mut part) = step_size(system, &motion);
+            let MotionStep { mut size, mut part } = MotionStep::new(system, &motion);
             leaf.advance(&self.state, system, part, &mut trial);
             if forces.law_lags(leaf, &self.state, &trial) {
                 let solver = &mut self.solver;
@@ -162,7 +154,7 @@ impl GridRelaxation<'_> {
                     solver.solve_again(system, forces)
                 };
                 system.complete_law(leaf, &self.state, again);
-                (size, part) = step_size(system, &motion);
+                MotionStep { size, part } = MotionStep::new(system, &motion);
                 leaf.advance(&self.state, system, part, &mut trial);
             }
             forces.record_step(size, &self.state, &trial);
@@ -179,7 +171,7 @@ impl GridRelaxation<'_> {
                 motion.newton_step_size = f64::INFINITY;
             }
             if let Some(remaining) = rest
-                && size < NEGLIGIBLE_NEWTON_STEP
+                && size < STEP_LIMITS.negligible
                 && forces.has_converged(accuracy)
                 && satisfies_lengths(leaf, &trial, accuracy)
             {
@@ -267,11 +259,24 @@ impl GridRelaxation<'_> {
     }
 }
 
-/// The size of the next step, and the part of it that is taken.
-fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
-    let size = system.largest_increment();
-    let part = (MAX_TURN / size.rotation).min(MAX_SHIFT / size.displacement);
-    (size.larger(), part.min(motion.largest_step_fraction()))
+/// The next step, as it solves the linear equations.
+struct MotionStep {
+    /// Largest rotation (radians) or displacement (lengths) of a node.
+    size: f64,
+    /// The part of the step that is taken.
+    part: f64,
+}
+
+impl MotionStep {
+    fn new(system: &System, motion: &Motion) -> Self {
+        let size = system.largest_increment();
+        let turn = STEP_LIMITS.turn / size.rotation;
+        let part = turn.min(STEP_LIMITS.shift / size.displacement);
+        MotionStep {
+            size: size.larger(),
+            part: part.min(motion.largest_step_fraction()),
+        }
+    }
 }
 
 /// Assembles the equations in a state.
@@ -285,27 +290,34 @@ fn assembled(
     leaf.assemble(state, system)
 }
 
-/// Damping c: critical for the lowest bending mode of a single rod, whose
-/// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
-const DAMPING: f64 = 2.0 * 3.516;
+/// The time steps of the damped motion, in units of sqrt(rho L^4/A).
+struct DampedTimeSteps {
+    /// Damping c: critical for the lowest bending mode of a single rod.
+    damping: f64,
+    /// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
+    /// Twice as long a one may carry the leaf into another valley.
+    first: f64,
+    /// Shortest time step; a leaf that needs a shorter one does not come to rest.
+    shortest: f64,
+    /// Beyond this time step inertia is negligible: the step becomes Newton's.
+    longest: f64,
+    /// Largest growth factor of the time step.
+    growth: f64,
+    /// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
+    smallest_newton_fraction: f64,
+    /// Relative growth of the energy that is attributed to rounding.
+    energy_slack: f64,
+}
 
-/// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
-const FIRST_STEP: f64 = 0.06;
-
-/// Shortest time step; a leaf that needs a shorter one is not settling.
-const SHORTEST_STEP: f64 = 1e-7;
-
-/// Beyond this time step inertia is negligible: the step becomes Newton's.
-const LONGEST_STEP: f64 = 1e3;
-
-/// Largest growth factor of the time step.
-const MAX_GROWTH: f64 = 4.0;
-
-/// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
-const SMALLEST_STEP_FRACTION: f64 = 1e-3;
-
-/// Relative growth of the energy that is attributed to rounding.
-const ENERGY_SLACK: f64 = 1e-9;
+const TIME_STEPS: DampedTimeSteps = DampedTimeSteps {
+    damping: 2.0 * CLAMPED_ROD_FREQUENCY,
+    first: 0.06,
+    shortest: 1e-7,
+    longest: 1e3,
+    growth: 4.0,
+    smallest_newton_fraction: 1e-3,
+    energy_slack: 1e-9,
+};
 
 /// Velocities, and the time step; an infinite time step is Newton's method.
 pub(in crate::relax) struct Motion {
@@ -329,7 +341,7 @@ impl Motion {
         let velocity = vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()];
         Motion {
             dt: f64::INFINITY,
-            growth: MAX_GROWTH,
+            growth: TIME_STEPS.growth,
             next_velocity: velocity.clone(),
             velocity,
             newton_step_size: f64::INFINITY,
@@ -346,7 +358,7 @@ impl Motion {
     /// `None` if it is Newton's.
     pub(in crate::relax) fn mass_factors(&self) -> Option<[f64; 2]> {
         let dt = self.dt;
-        (!self.is_newton()).then_some([(1.0 / dt + DAMPING) / dt, 1.0 / dt])
+        (!self.is_newton()).then_some([(1.0 / dt + TIME_STEPS.damping) / dt, 1.0 / dt])
     }
 
     /// The longest part of the next step that may be taken.
@@ -362,21 +374,21 @@ impl Motion {
     /// otherwise a shorter time step. False if there is none.
     pub(in crate::relax) fn shorten(&mut self) -> bool {
         let near_rest = self.is_newton() && (self.was_stationary || self.newton_fraction < 1.0);
-        if near_rest && self.newton_fraction > SMALLEST_STEP_FRACTION {
+        if near_rest && self.newton_fraction > TIME_STEPS.smallest_newton_fraction {
             self.newton_fraction /= 2.0;
             return true;
         }
         self.shorten_in_time()
     }
 
-    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
+    /// Shortens the time step; false if it falls below the shortest.
     pub(in crate::relax) fn shorten_in_time(&mut self) -> bool {
         self.dt = match self.dt.is_finite() {
             true => self.dt / 4.0,
-            false => FIRST_STEP,
+            false => TIME_STEPS.first,
         };
         self.growth = 1.0;
-        self.dt >= SHORTEST_STEP
+        self.dt >= TIME_STEPS.shortest
     }
 
     /// Whether the total energy does not grow in a step, of which the fraction `part` is
@@ -393,7 +405,7 @@ impl Motion {
             system.write_velocity(part, self.dt, &mut self.next_velocity);
             next_energy += system.kinetic_energy(&self.next_velocity);
         }
-        let slack = ENERGY_SLACK * (1.0 + energy.abs());
+        let slack = TIME_STEPS.energy_slack * (1.0 + energy.abs());
         next_energy.is_finite() && next_energy <= energy + slack
     }
 
@@ -408,8 +420,8 @@ impl Motion {
         } else if part == 1.0 {
             // The factor doubles up to the largest.
             self.dt *= self.growth;
-            self.growth = (2.0 * self.growth).min(MAX_GROWTH);
-            if self.dt > LONGEST_STEP {
+            self.growth = (2.0 * self.growth).min(TIME_STEPS.growth);
+            if self.dt > TIME_STEPS.longest {
                 self.dt = f64::INFINITY;
             }
         }

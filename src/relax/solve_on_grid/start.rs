@@ -1,9 +1,5 @@
-//! The initial state of a relaxation.
-//!
-//! A relaxation that begins where another leaf is.
-//!
-//! The side to which a leaf turns from a saddle, the same on all grids, in all units, and in
-//! whichever order its veins are numbered.
+//! Where the iteration on a grid begins: the natural leaf with its tips joined along circular arcs,
+//! disturbed on request; and the state and limits of an iteration.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::newton::{DefiniteSolver, SolverCounts};
@@ -80,15 +76,24 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     State::new(leaf.segments(), x, q)
 }
 
-/// Largest slope of a disturbance, and the number of amplitudes.
-const LARGEST_DISTURBANCE_SLOPE: f64 = 0.8;
+/// The disturbances of initial states.
+struct DisturbancePattern {
+    /// Largest slope out of the plane.
+    largest_slope: f64,
+    /// Number of amplitudes, up to the largest.
+    amplitudes: usize,
+    /// Number of waves along the rods.
+    waves_along: usize,
+    /// Number of waves across the leaf.
+    waves_across: usize,
+}
 
-const DISTURBANCE_AMPLITUDES: usize = 4;
-
-/// Waves of a disturbance along the rods and across the leaf.
-const DISTURBANCE_WAVES_ALONG: usize = 3;
-
-const DISTURBANCE_WAVES_ACROSS: usize = 3;
+const DISTURBANCE: DisturbancePattern = DisturbancePattern {
+    largest_slope: 0.8,
+    amplitudes: 4,
+    waves_along: 3,
+    waves_across: 3,
+};
 
 /// Lifts the nodes of an initial state out of the plane of the fan, and rotates them
 /// accordingly: a smooth pattern, the same on all grids, that differs for every second number,
@@ -97,8 +102,8 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     let (pattern, sign) = (number / 2, [1.0, -1.0][number % 2]);
     // Multiples of the golden ratio are equidistributed: a deterministic pseudo-random sequence.
     let golden = |k: usize| 2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0;
-    let size = sign * LARGEST_DISTURBANCE_SLOPE * (1 + pattern % DISTURBANCE_AMPLITUDES) as f64
-        / DISTURBANCE_AMPLITUDES as f64;
+    let size = sign * DISTURBANCE.largest_slope * (1 + pattern % DISTURBANCE.amplitudes) as f64
+        / DISTURBANCE.amplitudes as f64;
     let rods = leaf.rods();
     let joined = leaf.leaf.joined() && rods > 1;
     let longest = (0..rods).map(|j| leaf.leaf.length(j)).fold(0.0, f64::max);
@@ -116,9 +121,9 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
         let base = state.base(j);
         for (i, &sigma) in leaf.grid.sigma().iter().enumerate().skip(1) {
             let (mut lift, mut slope) = (0.0, 0.0);
-            for k in 1..=DISTURBANCE_WAVES_ALONG {
-                for l in 0..DISTURBANCE_WAVES_ACROSS {
-                    let part = golden(1 + 13 * pattern + DISTURBANCE_WAVES_ALONG * l + k)
+            for k in 1..=DISTURBANCE.waves_along {
+                for l in 0..DISTURBANCE.waves_across {
+                    let part = golden(1 + 13 * pattern + DISTURBANCE.waves_along * l + k)
                         / (k * (l + 1)) as f64;
                     let part = part * (PI * l as f64 * across).cos();
                     // Zero slope at the base; waves across the leaf vanish at a joint tip.
@@ -138,13 +143,13 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     }
 }
 
-/// Accuracy of the first solutions with conjugate gradients far from rest.
+/// Relative accuracy of the first solution by conjugate gradients of a leaf far from rest.
 pub const FAR_FROM_REST: f64 = 1e-2;
 
 /// A relaxation on one grid: its state and its parameters.
 pub struct GridRelaxation<'a> {
     pub state: State,
-    /// Of positions and rotations.
+    /// Largest remaining error of positions and rotations, lengths and radians.
     pub accuracy: f64,
     pub work: &'a mut SolverCounts,
     /// Receives the size of every step or, with the explicit method, the largest unbalanced
@@ -172,7 +177,8 @@ impl<'a> GridRelaxation<'a> {
     pub fn new(
         state: State,
         accuracy: f64,
-        (work, progress): (&'a mut SolverCounts, &'a mut dyn FnMut(usize, f64)),
+        work: &'a mut SolverCounts,
+        progress: &'a mut dyn FnMut(usize, f64),
         limit: &'a Limit,
     ) -> Self {
         GridRelaxation {

@@ -18,38 +18,52 @@
 //! E W t^3/12 and twists as G W t^3/3, whatever N is, and in its plane as E t W^3/12, if shear
 //! is stiff: for veins in the middle of equal strips whatever N is; if the outermost veins are the
 //! margins, the stiffness in its plane is larger by the part 2/(N - 1) + 1/N^2.
-//!
-//! A blade as it is given, and the veins and the tissue that follow from it.
-//!
-//! Thickness and moduli of the veins of a blade.
-//!
-//! Reads the table `[blade]`.
 
+mod spline;
 #[cfg(test)]
 mod tests;
 mod veins;
 
-use crate::scenario::blade::veins::{BladeOutline, BladeVein, Spline};
-pub use crate::scenario::blade::veins::{BladePart, BladeProperty};
+pub(super) use crate::scenario::blade::spline::Spline;
+pub(super) use crate::scenario::blade::veins::BladeProperty;
+use crate::scenario::blade::veins::{BladeMaterial, BladeOutline, BladePart, BladeVein};
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
-use crate::scenario::format::item::EntryValue;
-use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::section::poisson;
-use crate::scenario::{Profile, Tissue};
+use crate::scenario::format::error::ScenarioResult;
+use crate::scenario::format::item::{EntryValue, Knots};
+use crate::scenario::profile::Profile;
+use crate::scenario::section::read_poisson;
 use glam::{DQuat, DVec3};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// Places at which the widest one is looked for.
-const WIDTH_SAMPLES: usize = 500;
+/// How densely the width of a blade is looked at, and what an outline may be.
+struct OutlineLimits {
+    /// Equal steps along the blade among whose ends the widest place is looked for.
+    widest_place_steps: usize,
+    /// Steps between two points of an outline at which the width is checked to be positive.
+    steps_between_points: usize,
+    /// Most points of an outline: a smooth one needs far fewer.
+    most_points: usize,
+    /// Range of the least bearing width, a fraction of the largest width. Stiffnesses in the plane go
+    /// with its third power.
+    least_width: RangeInclusive<f64>,
+}
+
+const OUTLINE_LIMITS: OutlineLimits = OutlineLimits {
+    widest_place_steps: 500,
+    steps_between_points: 32,
+    most_points: 1000,
+    least_width: 1e-3..=0.5,
+};
 
 /// A blade, from which the veins of a leaf and the tissue between them follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blade {
-    pub(super) outline: Arc<BladeOutline>,
+    outline: Arc<BladeOutline>,
     /// Whether the outermost veins are the margins.
     pub edges: bool,
-    /// The angle by which it rises from the x-y plane as a whole, in radians.
+    /// The angle by which the blade rises from the x-y plane as a whole, in radians.
     pub elevation: f64,
     pub(super) materials: Vec<BladeMaterial>,
 }
@@ -78,65 +92,56 @@ impl Blade {
 
     /// The least bearing width, if the blade is narrower somewhere.
     pub fn least_width(&self) -> Option<f64> {
-        let BladeOutline {
-            least,
-            largest,
-            has_narrow_part: narrows,
-            ..
-        } = &*self.outline;
-        narrows.then_some(least * largest)
+        let outline = &self.outline;
+        let is_narrow = outline.has_narrow_part;
+        is_narrow.then_some(outline.least * outline.largest)
     }
 
-    /// Where it is widest: a fraction of the length.
+    /// Where the blade is widest: a fraction of the length.
     pub fn widest(&self) -> f64 {
-        let places = (0..=WIDTH_SAMPLES).map(|k| k as f64 / WIDTH_SAMPLES as f64);
+        let steps = OUTLINE_LIMITS.widest_place_steps;
+        let places = (0..=steps).map(|k| k as f64 / steps as f64);
         let wider = |a: f64, b: f64| if self.width(b) > self.width(a) { b } else { a };
         places.fold(0.0, wider)
     }
 
     /// Where vein `j` lies: a fraction of the half width, negative to the right of the midrib.
     pub fn vein_position(&self, j: usize) -> f64 {
-        self.vein_position_and_spacing(j).0
+        (2.0 * j as f64 + 1.0 - self.materials.len() as f64) / self.gaps_in_width()
+    }
+
+    /// How many times the distance of neighbouring veins goes into the width.
+    fn gaps_in_width(&self) -> f64 {
+        let count = self.materials.len();
+        let gaps = if self.edges { count.max(2) - 1 } else { count };
+        gaps as f64
     }
 
     /// Whether all veins meet at the tip.
     pub fn is_pointed(&self) -> bool {
-        let (_, widths) = self.points();
-        widths.last() == Some(&0.0)
+        self.outline.width.values().last() == Some(&0.0)
     }
 
-    /// Where the curvature of its surface at rest is given, as fractions of the length, and its values
-    /// there; `None` if it lies flat.
-    pub(super) fn curvature(&self) -> Option<(&[f64], &[f64])> {
-        let curvature = self.outline.curvature.as_ref()?;
-        Some((curvature.knots(), curvature.values()))
+    /// The curvature of the surface at rest, over fractions of the length; `None` if it lies flat.
+    pub(super) fn curvature(&self) -> Option<&Spline> {
+        self.outline.curvature.as_ref()
     }
 
-    /// Whether it has a mass.
+    /// Whether the mass of every vein is given.
     pub fn has_mass(&self) -> bool {
         self.materials.iter().all(|of| of.mass_density.is_some())
     }
 
-    /// The places of the points of the outline, as fractions of the length, and the widths there.
-    pub(super) fn points(&self) -> (&[f64], &[f64]) {
-        (self.outline.width.knots(), self.outline.width.values())
-    }
-
-    /// The place of vein `j`, as a fraction of the half width, and how far neighbours are apart.
-    fn vein_position_and_spacing(&self, j: usize) -> (f64, f64) {
-        let count = self.materials.len();
-        let gaps = if self.edges { count.max(2) - 1 } else { count };
-        let eta = (2.0 * j as f64 + 1.0 - count as f64) / gaps as f64;
-        (eta, 2.0 / gaps as f64)
+    /// The width over fractions of the length.
+    pub(super) fn width_profile(&self) -> &Spline {
+        &self.outline.width
     }
 
     /// The veins and the tissue between them.
     pub(super) fn parts(&self) -> BladeParts {
         let count = self.materials.len();
-        let etas: Vec<f64> = (0..count)
-            .map(|j| self.vein_position_and_spacing(j).0)
-            .collect();
-        let (_, apart) = self.vein_position_and_spacing(0);
+        let etas: Vec<f64> = (0..count).map(|j| self.vein_position(j)).collect();
+        let apart = 2.0 / self.gaps_in_width();
         let alike = |one: usize, other: usize| self.materials[one] == self.materials[other];
         let vein = |j: usize| {
             let material = self.materials[j].clone();
@@ -160,8 +165,8 @@ impl Blade {
     }
 }
 
-/// So many values, of which one that is `alike` to its image, counted from the other end, is the
-/// same.
+/// Makes `count` values. Where value j is `alike` to its mirror image, value j counted from the other
+/// end, both are one.
 fn build_with_images<T>(
     count: usize,
     alike: impl Fn(usize, usize) -> bool,
@@ -176,7 +181,7 @@ fn build_with_images<T>(
     all
 }
 
-/// What follows from a blade: its veins, and the tissue between them.
+/// The veins of a blade, and the tissue between them.
 pub(super) struct BladeParts {
     /// The places of the veins, as fractions of the half width.
     etas: Vec<f64>,
@@ -187,27 +192,27 @@ pub(super) struct BladeParts {
 }
 
 impl BladeParts {
-    /// A property of every vein, along it.
-    pub(super) fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
+    /// A property along every vein.
+    pub fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
         let each = self.etas.iter().zip(&self.vein_parts);
         each.map(|(eta, part)| part.profile(property, *eta < 0.0))
             .collect()
     }
 
     /// The lengths of the veins.
-    pub(super) fn lengths(&self) -> Vec<f64> {
+    pub fn lengths(&self) -> Vec<f64> {
         self.veins.iter().map(|vein| vein.length).collect()
     }
 
     /// Where the veins begin.
-    pub(super) fn bases(&self) -> Vec<[f64; 3]> {
+    pub fn bases(&self) -> Vec<[f64; 3]> {
         let y = self.etas.iter().map(|eta| eta * self.half_width);
         y.map(|y| [0.0, y, 0.0]).collect()
     }
 
     /// The angle of each vein at its base in the x-y plane, its elevation above that, and the turn
     /// of its section about d1, if the whole blade is turned by `elevation` about -e2.
-    pub(super) fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
+    pub fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
         let each = self.etas.iter().zip(&self.veins);
         each.map(|(eta, vein)| {
             let angle = if *eta < 0.0 {
@@ -220,14 +225,10 @@ impl BladeParts {
         .collect()
     }
 
-    /// The tissue in every gap.
-    pub(super) fn tissue(&self) -> Vec<Tissue> {
+    /// k1, k2, k3 and c1 of the tissue in every gap.
+    pub fn tissue_profiles(&self) -> Vec<[Profile; 4]> {
         let gap = |part: &Arc<BladePart>| {
-            let of = |which| part.profile(BladeProperty::Tissue(which), false);
-            Tissue {
-                stiffness: [of(0), of(1), of(2)],
-                fold: of(3),
-            }
+            [0, 1, 2, 3].map(|which| part.profile(BladeProperty::Tissue(which), false))
         };
         self.gaps.iter().map(gap).collect()
     }
@@ -247,71 +248,9 @@ fn tilt_direction(angle: f64, elevation: f64) -> [f64; 3] {
     [own, up, across.z.atan2(across.y)]
 }
 
-/// Thickness and material of a vein with its tissue.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BladeMaterial {
-    pub thickness: Profile,
-    pub young: Profile,
-    /// Left out: as along the veins.
-    pub young_across: Option<Profile>,
-    /// Left out: that of an isotropic material.
-    pub shear_modulus: Option<Profile>,
-    pub poisson: Profile,
-    /// Mass per volume.
-    pub mass_density: Option<Profile>,
-}
-
-/// Thickness and moduli at one place.
-pub struct LocalMaterial {
-    pub t: f64,
-    pub young: f64,
-    pub across: f64,
-    pub shear: f64,
-}
-
-impl BladeMaterial {
-    pub fn local_material(&self, sigma: f64) -> LocalMaterial {
-        let young = self.young.at(sigma);
-        let across = self.young_across.as_ref();
-        let shear = self.shear_modulus.as_ref();
-        LocalMaterial {
-            t: self.thickness.at(sigma),
-            young,
-            across: across.map_or(young, |it| it.at(sigma)),
-            shear: shear.map_or_else(
-                || young / (2.0 * (1.0 + self.poisson.at(sigma))),
-                |it| it.at(sigma),
-            ),
-        }
-    }
-
-    fn profiles(&self) -> impl Iterator<Item = &Profile> {
-        let given = [&self.thickness, &self.young, &self.poisson];
-        let others = [&self.young_across, &self.shear_modulus, &self.mass_density];
-        given.into_iter().chain(others.into_iter().flatten())
-    }
-
-    pub fn kinks(&self) -> impl Iterator<Item = f64> {
-        self.profiles().flat_map(Profile::kinks).copied()
-    }
-}
-
-/// Most points of an outline.
-const MOST_POINTS: usize = 1000;
-
-/// Where the width between points is looked at, so many times between two.
-const SAMPLES: usize = 32;
-
-/// Largest least bearing width.
-const MAX_LEAST_WIDTH: f64 = 0.5;
-
-/// Least one: stiffnesses in the plane go with its third power.
-const MIN_LEAST_WIDTH: f64 = 1e-3;
-
 /// Reads `[blade]` of a leaf with so many veins; `None` if there is no such table.
-pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
-    let mut table = Key::all().filter(|key| key.table_and_name().0 == "blade");
-    if !table.any(|key| entries.is_given(key)) {
+pub(super) fn read_blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
+    if !entries.has_key_of_table("blade") {
         return Ok(None);
     }
     if let Some(item) = Key::all()
@@ -321,18 +260,18 @@ pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Bla
         let why = "follows from [blade], which is given, too: leave one of them out";
         return Err(item.value_error(why));
     }
-    let quantity = |key| entries.value_or_default(key)?.quantity(rods);
+    let quantity = |key| entries.value_or_default(key)?.profile_per_rod(rods);
     let optional = |key| {
         entries
             .given_value(key)
-            .map(|item| item.quantity(rods))
+            .map(|item| item.profile_per_rod(rods))
             .transpose()
     };
     let thickness = quantity(Key::BladeThickness)?;
     let young = quantity(Key::BladeYoung)?;
     let young_across = optional(Key::YoungAcross)?;
     let shear_modulus = optional(Key::ShearModulus)?;
-    let poisson = poisson(entries.value_or_default(Key::BladePoisson)?, rods)?;
+    let poisson = read_poisson(entries.value_or_default(Key::BladePoisson)?, rods)?;
     let mass_density = optional(Key::BladeMassDensity)?;
     let pick = |all: &Option<Vec<Profile>>, rod: usize| all.as_ref().map(|all| all[rod].clone());
     let materials = (0..rods).map(|rod| BladeMaterial {
@@ -348,30 +287,36 @@ pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Bla
     elevation.refuse_unless(!elevation.value.is_array(), whole)?;
     Ok(Some(Blade {
         elevation: elevation.number()?,
-        outline: Arc::new(outline(entries)?),
+        outline: Arc::new(read_outline(entries)?),
         edges: entries.value_or_default(Key::Edges)?.switch()?,
         materials: materials.collect(),
     }))
 }
 
-fn outline(entries: &Entries) -> ScenarioResult<BladeOutline> {
+fn read_outline(entries: &Entries) -> ScenarioResult<BladeOutline> {
     let item = entries.value_or_default(Key::BladeWidth)?;
-    let width = width(item)?;
+    let width = parse_width_profile(item)?;
     let narrow = entries.value_or_default(Key::LeastWidth)?;
     let least = narrow.number()?;
+    let range = OUTLINE_LIMITS.least_width;
     narrow.refuse_unless(
-        (MIN_LEAST_WIDTH..=MAX_LEAST_WIDTH).contains(&least),
-        format_args!("must be between {MIN_LEAST_WIDTH} and {MAX_LEAST_WIDTH}: a fraction of the largest width"),
+        range.contains(&least),
+        format_args!(
+            "must be between {} and {}: a fraction of the largest width",
+            range.start(),
+            range.end()
+        ),
     )?;
+    let steps = OUTLINE_LIMITS.steps_between_points;
     let knots = width.knots().windows(2);
     let between = knots.flat_map(|pair| {
         let (from, to) = (pair[0], pair[1]);
-        (0..=SAMPLES).map(move |k| (from + k as f64 / SAMPLES as f64 * (to - from), k))
+        (0..=steps).map(move |k| (from + k as f64 / steps as f64 * (to - from), k))
     });
     let (mut largest, mut narrowest) = (0.0_f64, f64::INFINITY);
     for (x, k) in between {
         let [value, ..] = width.value_and_derivatives(x);
-        let inside = k > 0 && k < SAMPLES;
+        let inside = k > 0 && k < steps;
         item.refuse_unless(
             !inside || value > 0.0,
             format_args!(
@@ -387,12 +332,12 @@ fn outline(entries: &Entries) -> ScenarioResult<BladeOutline> {
         width,
         least,
         largest,
-        curvature: curvature(entries)?,
+        curvature: read_curvature(entries)?,
     })
 }
 
 /// The curvature of the surface at rest, over fractions of the length.
-fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
+fn read_curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
     let Some(item) = entries.given_value(Key::RestBend2) else {
         return Ok(None);
     };
@@ -400,9 +345,12 @@ fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
         !item.value.is_array(),
         "a blade bends as a whole: give one number, or one profile",
     )?;
-    let (at, value) = match item.value.is_table() {
+    let Knots { at, value } = match item.value.is_table() {
         true => item.knots()?,
-        false => (vec![0.0, 1.0], vec![item.number()?; 2]),
+        false => Knots {
+            at: vec![0.0, 1.0],
+            value: vec![item.number()?; 2],
+        },
     };
     if value.iter().all(|value| *value == 0.0) {
         return Ok(None);
@@ -412,21 +360,22 @@ fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
                    leave one of them out";
         return Err(twist.value_error(why));
     }
-    Ok(Some(Spline::through(at, value)))
+    Ok(Some(Spline::through_points(at, value)))
 }
 
 /// The width over fractions of the length.
-fn width(item: EntryValue) -> ScenarioResult<Spline> {
+fn parse_width_profile(item: EntryValue) -> ScenarioResult<Spline> {
     if !item.value.is_table() {
         let width = item.number()?;
         item.refuse_unless(width > 0.0, "must be greater than 0")?;
-        return Ok(Spline::through(vec![0.0, 1.0], vec![width; 2]));
+        return Ok(Spline::through_points(vec![0.0, 1.0], vec![width; 2]));
     }
-    let (at, value) = item.knots()?;
+    let Knots { at, value } = item.knots()?;
     let last = at.len() - 1;
+    let most = OUTLINE_LIMITS.most_points;
     item.refuse_unless(
-        last < MOST_POINTS,
-        format_args!("has more than {MOST_POINTS} points: an outline is smooth with far fewer"),
+        last < most,
+        format_args!("has more than {most} points: an outline is smooth with far fewer"),
     )?;
     let list = item.list("value").unwrap_or(item);
     for (k, value) in value.iter().enumerate() {
@@ -439,5 +388,5 @@ fn width(item: EntryValue) -> ScenarioResult<Spline> {
         last > 1 || value[0] + value[1] > 0.0,
         "must be greater than 0 somewhere",
     )?;
-    Ok(Spline::through(at, value))
+    Ok(Spline::through_points(at, value))
 }

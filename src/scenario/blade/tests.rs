@@ -117,12 +117,13 @@ fn veins_lie_within_the_outline() {
         assert!(scenario.joined && blade.vein_position(4) == outermost);
         for j in 0..5 {
             for k in 0..=10 {
-                let (x, q) = natural.vein_pose(j, k as f64 / 10.0);
+                let pose = natural.vein_pose(j, k as f64 / 10.0);
+                let (x, q) = (pose.position, pose.rotation);
                 let y = 0.5 * blade.vein_position(j) * blade.width((x.x / 20.0).clamp(0.0, 1.0));
                 assert!((x.y - y).abs() < 1e-11 && x.z == 0.0, "{j} {k}: {x} {y}");
                 assert!((q * DVec3::Z).distance(DVec3::Z) < 1e-14);
             }
-            let (tip, _) = natural.vein_pose(j, 1.0);
+            let tip = natural.vein_pose(j, 1.0).position;
             assert!(tip.distance(20.0 * DVec3::X) < 1e-11, "{tip}");
         }
     }
@@ -140,12 +141,13 @@ fn veins_of_a_curved_blade_lie_on_a_cylinder() {
             scenario.blade.as_ref().unwrap(),
             Natural::new(&scenario, true),
         );
-        let (middle, _) = natural.vein_pose(2, 1.0);
+        let middle = natural.vein_pose(2, 1.0).position;
         for j in 0..5 {
-            let (tip, _) = natural.vein_pose(j, 1.0);
+            let tip = natural.vein_pose(j, 1.0).position;
             assert!(tip.distance(middle) < 1e-10, "{}", tip.distance(middle));
             for k in (0..=10).filter(|_| curvature > 0.0) {
-                let (x, q) = natural.vein_pose(j, k as f64 / 10.0);
+                let pose = natural.vein_pose(j, k as f64 / 10.0);
+                let (x, q) = (pose.position, pose.rotation);
                 let angle = (x.x).atan2(x.z + 1.0 / curvature);
                 let radius = x.x.hypot(x.z + 1.0 / curvature);
                 assert!((radius * curvature - 1.0).abs() < 1e-11, "{radius}");
@@ -197,7 +199,7 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
     let gap = &leaf.tissue.as_ref().unwrap()[2];
     tissue
         .into_iter()
-        .zip(gap.profiles())
+        .zip(gap.stiffness_profiles())
         .for_each(|(wanted, found)| constant(wanted, found));
     constant(8e-6 * h * t, &leaf.dynamics.density[0]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.

@@ -1,29 +1,26 @@
 //! The veins of a blade, and the tissue between two, as profiles along them.
-//!
-//! The smoothest curve through given points: the natural quintic spline.
-//!
-//! Of all curves W(x) through the points it has the least integral of W'''^2 (I. J. Schoenberg, On
-//! interpolation by spline functions and its minimal properties, 1964): its third and fourth
-//! derivatives vanish at both ends, and between the points it is a polynomial of degree 5 with
-//! four continuous derivatives. So the curvature of a margin has no corners, and three points lie on
-//! a parabola.
 
-use crate::scenario::blade::{BladeMaterial, LocalMaterial};
-use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
-use crate::scenario::{Profile, Property, sorted_distinct};
-use glam::{DMat2, DVec2};
+use crate::numbers::{GAUSS_LEGENDRE_RULE, QuadraturePoint, sorted_distinct};
+use crate::scenario::blade::spline::{Spline, quintic_hermite};
+use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
+use crate::scenario::section::Property;
+use std::any::Any;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Panels between which the place along the blade is interpolated, over a vein's length: x(s) is
 /// then right to rounding.
 const ARC_LENGTH_PANELS: usize = 64;
 
+/// Equal parts of a vein's length over which an integral along it is summed up.
+const INTEGRATION_PANELS: usize = 32;
+
 /// The factor of transverse shear of a plate (E. Reissner, 1945).
-const SHEAR_FACTOR: f64 = 5.0 / 6.0;
+const PLATE_SHEAR_FACTOR: f64 = 5.0 / 6.0;
 
 /// What follows from a blade for its veins, and for the tissue between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BladeProperty {
+pub(in crate::scenario) enum BladeProperty {
     /// A1, A2 and A3, by index.
     Couple(usize),
     /// H1, H2 and H3, by index.
@@ -49,18 +46,26 @@ impl From<Property> for BladeProperty {
     }
 }
 
-/// Most properties that something has.
+/// Properties of a vein; tissue has fewer.
 const MAX_PROPERTIES: usize = 11;
 
+/// The indices of A1 to A3 and H1 to H3 among the properties of a vein.
+const STIFFNESSES: Range<usize> = 0..6;
+
+/// The indices of the rest curvatures among the properties of a vein.
+const REST_CURVATURES: Range<usize> = 6..9;
+
+const DENSITY: usize = 9;
+
 impl BladeProperty {
-    /// Its number among those of a vein, or of tissue.
-    fn number(self) -> usize {
+    /// The index of the property among those of a vein, or of tissue.
+    fn index(self) -> usize {
         match self {
             BladeProperty::Couple(axis) => axis,
             BladeProperty::Force(axis) => 3 + axis,
-            BladeProperty::Rest(axis) => 6 + axis,
-            BladeProperty::Density => 9,
-            BladeProperty::RotaryInertia => 10,
+            BladeProperty::Rest(axis) => REST_CURVATURES.start + axis,
+            BladeProperty::Density => DENSITY,
+            BladeProperty::RotaryInertia => DENSITY + 1,
             BladeProperty::Tissue(which) => which,
         }
     }
@@ -69,24 +74,22 @@ impl BladeProperty {
 /// The outline of a blade: its width over the distance from the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BladeOutline {
-    /// The length.
+    /// From the base to the tip.
     pub length: f64,
     /// The width at fractions of the length.
     pub width: Spline,
     /// The least width from which stiffnesses are computed, as a fraction of the largest.
     pub least: f64,
-    /// The largest width.
     pub largest: f64,
     /// Whether the width falls below the least one.
     pub has_narrow_part: bool,
-    /// The curvature of its surface at rest about the y axis, downwards, at fractions of the length.
+    /// The curvature of the surface at rest about the y axis, downwards, at fractions of the length.
     pub curvature: Option<Spline>,
 }
 
 impl BladeOutline {
-    /// The width at the fraction `x` of the length from which stiffnesses are computed: it
-    /// is nowhere less than the least width, and smooth. It differs from a width w by the part
-    /// (least/w)^4/4.
+    /// The width at the fraction `x` of the length from which stiffnesses are computed: nowhere less
+    /// than the least width, and smooth. It exceeds a width w by the part (least/w)^4/4.
     pub fn bearing_width(&self, x: f64) -> f64 {
         let ([width, ..], least) = (
             self.width.value_and_derivatives(x),
@@ -103,20 +106,71 @@ impl BladeOutline {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BladeVein {
     outline: Arc<BladeOutline>,
-    /// Its place, a fraction of the half width; not negative: its mirror image is the same vein.
+    /// The place of the vein, a fraction of the half width; not negative: the mirror image of a vein is
+    /// the same vein.
     eta: f64,
-    /// Its strip is the width of the blade over this.
+    /// The width of the blade over that of the vein's strip.
     strip_count: f64,
     material: BladeMaterial,
-    /// Its length.
+    /// Arc length of the vein.
     pub length: f64,
     /// x and its first and second derivative by sigma, at the ends of equal panels.
     places: Vec<[f64; 3]>,
-    /// Fractions of its own length at the inner points of the outline.
+    /// Fractions of the vein's length at the inner points of the outline.
     seams: Vec<f64>,
 }
 
-/// 1/cos(phi) of the angle with this tangent.
+/// Thickness and material of a vein with its tissue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BladeMaterial {
+    pub thickness: Profile,
+    /// E, along the veins.
+    pub young: Profile,
+    /// E', across the veins; `None`: the same as along them.
+    pub young_across: Option<Profile>,
+    /// G; `None`: that of an isotropic material.
+    pub shear_modulus: Option<Profile>,
+    pub poisson: Profile,
+    /// Mass per volume.
+    pub mass_density: Option<Profile>,
+}
+
+/// Thickness and moduli at one place.
+pub struct LocalMaterial {
+    pub t: f64,
+    pub young: f64,
+    pub across: f64,
+    pub shear: f64,
+}
+
+impl BladeMaterial {
+    pub fn local_material(&self, sigma: f64) -> LocalMaterial {
+        let young = self.young.at(sigma);
+        let across = self.young_across.as_ref();
+        let shear = self.shear_modulus.as_ref();
+        LocalMaterial {
+            t: self.thickness.at(sigma),
+            young,
+            across: across.map_or(young, |it| it.at(sigma)),
+            shear: shear.map_or_else(
+                || young / (2.0 * (1.0 + self.poisson.at(sigma))),
+                |it| it.at(sigma),
+            ),
+        }
+    }
+
+    fn profiles(&self) -> impl Iterator<Item = &Profile> {
+        let given = [&self.thickness, &self.young, &self.poisson];
+        let others = [&self.young_across, &self.shear_modulus, &self.mass_density];
+        given.into_iter().chain(others.into_iter().flatten())
+    }
+
+    pub fn kinks(&self) -> impl Iterator<Item = f64> {
+        self.profiles().flat_map(Profile::kinks).copied()
+    }
+}
+
+/// 1/cos(phi) of the angle phi whose tangent is `slope`.
 fn secant(slope: f64) -> f64 {
     (1.0 + slope * slope).sqrt()
 }
@@ -138,7 +192,7 @@ impl BladeVein {
             places: Vec::new(),
             seams: Vec::new(),
         };
-        vein.measure();
+        vein.compute_arc_length();
         vein
     }
 
@@ -151,12 +205,12 @@ impl BladeVein {
         [half * slope / length, half * second / (length * length)]
     }
 
-    /// The angle at its base.
+    /// The angle of the vein to the axis of the blade, at the base.
     pub fn angle(&self) -> f64 {
         self.lateral_derivatives(0.0)[0].atan()
     }
 
-    /// Arc length over the fraction `x` of the blade's length.
+    /// The derivative of the arc length by the fraction `x` of the blade's length.
     fn arc_length_derivative(&self, x: f64) -> f64 {
         self.outline.length * secant(self.lateral_derivatives(x)[0])
     }
@@ -164,14 +218,14 @@ impl BladeVein {
     /// The arc length between two fractions, between which the outline is smooth.
     fn arc_length_between(&self, from: f64, to: f64) -> f64 {
         let width = to - from;
-        let part = |(x, weight): &(f64, f64)| {
-            width * weight * self.arc_length_derivative(from + x * width)
+        let part = |point: &QuadraturePoint| {
+            width * point.weight * self.arc_length_derivative(from + point.at * width)
         };
         GAUSS_LEGENDRE_RULE.iter().map(part).sum()
     }
 
-    /// Finds its length, and x at equal distances along it.
-    fn measure(&mut self) {
+    /// Finds the length of the vein, and x at equal distances along the vein.
+    fn compute_arc_length(&mut self) {
         let even = (0..=ARC_LENGTH_PANELS).map(|k| k as f64 / ARC_LENGTH_PANELS as f64);
         let outline = self.outline.clone();
         let curved = outline.curvature.iter().flat_map(Spline::knots);
@@ -206,7 +260,7 @@ impl BladeVein {
         self.seams = knots.iter().filter(inner).map(known).collect();
     }
 
-    /// The fraction x of the blade's length at the fraction sigma of its own.
+    /// The fraction x of the blade's length at the fraction sigma of the vein's.
     fn blade_fraction(&self, sigma: f64) -> f64 {
         let scaled = sigma * ARC_LENGTH_PANELS as f64;
         let k = (scaled as usize).min(ARC_LENGTH_PANELS - 1);
@@ -229,7 +283,7 @@ impl BladeVein {
         [curvature * slope, curvature, sideways]
     }
 
-    /// A1, A2, A3, H1, H2 and H3 at a fraction of its length, where this material is.
+    /// A1, A2, A3, H1, H2 and H3 at a fraction of the vein's length, where this material is.
     fn stiffnesses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 6] {
         let h = self.outline.bearing_width(self.blade_fraction(sigma)) / self.strip_count;
         let (t, young, shear) = (material.t, material.young, material.shear);
@@ -239,12 +293,13 @@ impl BladeVein {
             young * flat / 12.0,
             young * upright / 12.0,
         ];
-        let across = SHEAR_FACTOR * shear * h * t;
+        let across = PLATE_SHEAR_FACTOR * shear * h * t;
         [a1, a2, a3, young * h * t, across, across]
     }
 
-    /// The mass and the moment of inertia per length, those of the blade as it is.
-    fn masses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
+    /// The mass and the moment of inertia per length, of the blade's own width: also where stiffnesses
+    /// follow from a larger one.
+    fn mass_and_inertia(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
         let width = self
             .outline
             .width
@@ -257,29 +312,30 @@ impl BladeVein {
         [mass, 0.5 * mass * (width * width + t * t) / 12.0]
     }
 
-    /// A property at a fraction of its length, without the others.
-    fn property(&self, property: BladeProperty, sigma: f64) -> f64 {
-        match property {
-            BladeProperty::Couple(_) | BladeProperty::Force(_) => {
-                self.stiffnesses(sigma, &self.material.local_material(sigma))[property.number()]
+    /// The property with this index at a fraction of the vein's length, without the others.
+    fn property(&self, index: usize, sigma: f64) -> f64 {
+        match index {
+            index if STIFFNESSES.contains(&index) => {
+                self.stiffnesses(sigma, &self.material.local_material(sigma))[index]
             }
             // Natural leaves are integrated with these.
-            BladeProperty::Rest(axis) => self.rest_curvature(self.blade_fraction(sigma))[axis],
-            BladeProperty::Density => self.masses(sigma, &self.material.local_material(sigma))[0],
-            BladeProperty::RotaryInertia => {
-                self.masses(sigma, &self.material.local_material(sigma))[1]
+            index if REST_CURVATURES.contains(&index) => {
+                let axis = index - REST_CURVATURES.start;
+                self.rest_curvature(self.blade_fraction(sigma))[axis]
             }
-            BladeProperty::Tissue(_) => 0.0,
+            index => {
+                self.mass_and_inertia(sigma, &self.material.local_material(sigma))[index - DENSITY]
+            }
         }
     }
 
-    /// All properties at a fraction of its length, by their numbers.
+    /// All properties at a fraction of the vein's length, by their indices.
     fn properties(&self, sigma: f64) -> [f64; MAX_PROPERTIES] {
         let material = self.material.local_material(sigma);
         let mut all = [0.0; MAX_PROPERTIES];
-        all[..6].copy_from_slice(&self.stiffnesses(sigma, &material));
-        all[6..9].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
-        all[9..].copy_from_slice(&self.masses(sigma, &material));
+        all[STIFFNESSES].copy_from_slice(&self.stiffnesses(sigma, &material));
+        all[REST_CURVATURES].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
+        all[DENSITY..].copy_from_slice(&self.mass_and_inertia(sigma, &material));
         all
     }
 }
@@ -289,8 +345,13 @@ impl BladeVein {
 enum BladePartSource {
     /// A vein.
     Vein(Arc<BladeVein>),
-    /// The tissue between two veins, whose width is that of the blade times a factor.
-    Gap([Arc<BladeVein>; 2], f64),
+    /// The tissue between two veins.
+    Gap {
+        /// The vein that is nearer to the midrib, and the other one.
+        veins: [Arc<BladeVein>; 2],
+        /// The width of the gap over that of the blade.
+        width_fraction: f64,
+    },
 }
 
 /// A vein of a blade, or the tissue between two: what profiles along it are evaluated from.
@@ -298,40 +359,37 @@ enum BladePartSource {
 pub struct BladePart {
     source: BladePartSource,
     kinks: Vec<f64>,
-    /// The least and largest value of every property.
+    /// The least and the largest value of every property.
     extremes: [[f64; 2]; MAX_PROPERTIES],
 }
 
 impl BladePart {
-    pub(super) fn from_vein(vein: Arc<BladeVein>) -> Arc<BladePart> {
+    pub fn from_vein(vein: Arc<BladeVein>) -> Arc<BladePart> {
         BladePart::new(BladePartSource::Vein(vein))
     }
 
     /// The tissue between two veins, `apart` being the difference of their fractions of the half
     /// width.
-    pub(super) fn from_gap(
-        one: &Arc<BladeVein>,
-        other: &Arc<BladeVein>,
-        apart: f64,
-    ) -> Arc<BladePart> {
-        // Its mirror image is the same.
+    pub fn from_gap(one: &Arc<BladeVein>, other: &Arc<BladeVein>, apart: f64) -> Arc<BladePart> {
+        // The gap on the other side of the midrib is then the same part.
         let (near, far) = if one.eta <= other.eta {
             (one, other)
         } else {
             (other, one)
         };
-        BladePart::new(BladePartSource::Gap(
-            [near.clone(), far.clone()],
-            0.5 * apart,
-        ))
+        BladePart::new(BladePartSource::Gap {
+            veins: [near.clone(), far.clone()],
+            width_fraction: 0.5 * apart,
+        })
     }
 
     fn new(source: BladePartSource) -> Arc<BladePart> {
         let kinks = match &source {
             BladePartSource::Vein(vein) => sorted_distinct(vein.material.kinks()),
-            BladePartSource::Gap([one, other], _) => {
-                sorted_distinct(one.material.kinks().chain(other.material.kinks()))
-            }
+            BladePartSource::Gap {
+                veins: [one, other],
+                ..
+            } => sorted_distinct(one.material.kinks().chain(other.material.kinks())),
         };
         let mut part = BladePart {
             source,
@@ -351,251 +409,88 @@ impl BladePart {
     fn properties(&self, sigma: f64) -> [f64; MAX_PROPERTIES] {
         match &self.source {
             BladePartSource::Vein(vein) => vein.properties(sigma),
-            BladePartSource::Gap([one, other], factor) => {
+            BladePartSource::Gap {
+                veins: [one, other],
+                width_fraction,
+            } => {
                 let x = 0.5 * (one.blade_fraction(sigma) + other.blade_fraction(sigma));
-                let w = factor * one.outline.bearing_width(x);
+                let w = width_fraction * one.outline.bearing_width(x);
                 let [a, b] = [one, other].map(|vein| vein.material.local_material(sigma));
                 let mean = |of: fn(&LocalMaterial) -> f64| 0.5 * (of(&a) + of(&b));
                 let (t, across) = (mean(|it| it.t), mean(|it| it.across));
                 let along = mean(|it| it.shear) * t / w;
                 let fold = across * t.powi(3) / (12.0 * w);
                 let mut all = [0.0; MAX_PROPERTIES];
-                all[..4].copy_from_slice(&[along, across * t / w, SHEAR_FACTOR * along, fold]);
+                all[..4].copy_from_slice(&[
+                    along,
+                    across * t / w,
+                    PLATE_SHEAR_FACTOR * along,
+                    fold,
+                ]);
                 all
             }
         }
     }
 
-    /// A property at a fraction of the length.
-    pub fn property_value(&self, property: BladeProperty, sigma: f64) -> f64 {
+    /// A property along the part; with its sign in the mirror image if `image`, for a vein on the other
+    /// side of the midrib.
+    pub fn profile(self: &Arc<BladePart>, property: BladeProperty, image: bool) -> Profile {
+        let turns = image && matches!(property, BladeProperty::Rest(0 | 2));
+        let factor = if turns { -1.0 } else { 1.0 };
+        let [least, most] = self.extremes[property.index()];
+        match least == most {
+            true => Profile::Constant(factor * least),
+            false => Profile::Derived(DerivedProfile::new(self.clone(), property.index(), factor)),
+        }
+    }
+}
+
+impl RodProperties for BladePart {
+    fn value_at(&self, property: usize, sigma: f64) -> f64 {
         match &self.source {
             BladePartSource::Vein(vein) => vein.property(property, sigma),
-            BladePartSource::Gap(..) => self.properties(sigma)[property.number()],
+            BladePartSource::Gap { .. } => self.properties(sigma)[property],
         }
     }
 
-    /// Three properties of a vein at a fraction of its length, if they are of one kind.
-    pub fn three(&self, properties: [BladeProperty; 3], sigma: f64) -> Option<[f64; 3]> {
-        use BladeProperty::{Couple, Force, Rest};
+    /// Three stiffnesses, or three rest curvatures, of a vein.
+    fn three_values_at(&self, properties: [usize; 3], sigma: f64) -> Option<[f64; 3]> {
         let BladePartSource::Vein(vein) = &self.source else {
             return None;
         };
-        match properties {
-            [
-                Couple(_) | Force(_),
-                Couple(_) | Force(_),
-                Couple(_) | Force(_),
-            ] => {
-                let all = vein.stiffnesses(sigma, &vein.material.local_material(sigma));
-                Some(properties.map(|property| all[property.number()]))
-            }
-            [Rest(a), Rest(b), Rest(c)] => {
-                let all = vein.rest_curvature(vein.blade_fraction(sigma));
-                Some([all[a], all[b], all[c]])
-            }
-            _ => None,
+        let all_in = |range: Range<usize>| properties.iter().all(|index| range.contains(index));
+        if all_in(STIFFNESSES) {
+            let all = vein.stiffnesses(sigma, &vein.material.local_material(sigma));
+            return Some(properties.map(|index| all[index]));
         }
+        if all_in(REST_CURVATURES) {
+            let all = vein.rest_curvature(vein.blade_fraction(sigma));
+            return Some(properties.map(|index| all[index - REST_CURVATURES.start]));
+        }
+        None
     }
 
-    /// Fractions inside (0, 1) where the slope of a property may jump.
-    pub fn kinks(&self) -> &[f64] {
+    fn extremes(&self, property: usize) -> [f64; 2] {
+        self.extremes[property]
+    }
+
+    fn kinks(&self) -> &[f64] {
         &self.kinks
     }
 
-    /// Fractions inside (0, 1) where the outline of a vein has its points.
-    pub(in crate::scenario) fn outline_points(&self) -> &[f64] {
+    /// The inner points of the outline, on a vein.
+    fn seams(&self) -> &[f64] {
         match &self.source {
             BladePartSource::Vein(vein) => &vein.seams,
-            BladePartSource::Gap(..) => &[],
+            BladePartSource::Gap { .. } => &[],
         }
     }
 
-    /// The least and the largest value of a property.
-    pub(in crate::scenario) fn extremes(&self, property: BladeProperty) -> [f64; 2] {
-        self.extremes[property.number()]
+    fn integration_panels(&self) -> usize {
+        INTEGRATION_PANELS
     }
 
-    /// A property along it; of a vein on the other side of the midrib if `image`.
-    pub(super) fn profile(self: &Arc<BladePart>, property: BladeProperty, image: bool) -> Profile {
-        let turns = image && matches!(property, BladeProperty::Rest(0 | 2));
-        let [least, most] = self.extremes(property);
-        let factor = if turns { -1.0 } else { 1.0 };
-        match least == most {
-            true => Profile::Constant(factor * least),
-            false => Profile::Blade {
-                part: self.clone(),
-                property,
-                factor,
-            },
-        }
-    }
-}
-
-/// A curve through points, of which the first is at 0 and the last at 1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Spline {
-    at: Vec<f64>,
-    value: Vec<f64>,
-    /// The first and second derivatives at the points.
-    slopes: Vec<DVec2>,
-}
-
-impl Spline {
-    /// Through these points, two or more; two give a line.
-    pub fn through(at: Vec<f64>, value: Vec<f64>) -> Spline {
-        let slopes = match at.len() {
-            2 => vec![DVec2::new(value[1] - value[0], 0.0); 2],
-            _ => spline_derivatives(&at, &value),
-        };
-        Spline { at, value, slopes }
-    }
-
-    /// Where the points are.
-    pub fn knots(&self) -> &[f64] {
-        &self.at
-    }
-
-    /// Their values.
-    pub fn values(&self) -> &[f64] {
-        &self.value
-    }
-
-    /// The value, and the first and second derivative at `x` in [0, 1].
-    pub fn value_and_derivatives(&self, x: f64) -> [f64; 3] {
-        let right = self.at.partition_point(|&knot| knot < x);
-        let k = right.clamp(1, self.at.len() - 1) - 1;
-        let width = self.at[k + 1] - self.at[k];
-        let end = |k: usize| {
-            let DVec2 { x, y } = self.slopes[k];
-            [self.value[k], width * x, width * width * y]
-        };
-        let t = (x - self.at[k]) / width;
-        let [value, slope, second] = quintic_hermite(t, end(k), end(k + 1));
-        [value, slope / width, second / (width * width)]
-    }
-}
-
-/// The polynomial of degree 5 with these values, first and second derivatives at 0 and at 1: its
-/// value and derivatives at `t`.
-pub(super) fn quintic_hermite(t: f64, [f0, d0, c0]: [f64; 3], [f1, d1, c1]: [f64; 3]) -> [f64; 3] {
-    if t == 1.0 {
-        // The sums below would lose a small value next to large ones, or a zero.
-        return [f1, d1, c1];
-    }
-    let rise = f1 - f0;
-    let a3 = 10.0 * rise - 6.0 * d0 - 4.0 * d1 - 1.5 * c0 + 0.5 * c1;
-    let a4 = -15.0 * rise + 8.0 * d0 + 7.0 * d1 + 1.5 * c0 - c1;
-    let a5 = 6.0 * rise - 3.0 * (d0 + d1) - 0.5 * (c0 - c1);
-    [
-        f0 + t * (d0 + t * (0.5 * c0 + t * (a3 + t * (a4 + t * a5)))),
-        d0 + t * (c0 + t * (3.0 * a3 + t * (4.0 * a4 + t * 5.0 * a5))),
-        c0 + t * (6.0 * a3 + t * (12.0 * a4 + t * 20.0 * a5)),
-    ]
-}
-
-/// The derivatives at three points or more. Of the polynomial of degree 5 between two points with
-/// the values f, slopes d and second derivatives c, at a distance h and with rise F,
-///
-/// h^3 f''' = 60 F - 36 h d0 - 24 h d1 - 9 h^2 c0 + 3 h^2 c1,
-/// h^4 f'''' = -360 F + 192 h d0 + 168 h d1 + 36 h^2 c0 - 24 h^2 c1
-///
-/// at the first point, and likewise at the second; both are continuous, and zero at the ends. These
-/// equations for (d, c) are block tridiagonal.
-fn spline_derivatives(at: &[f64], value: &[f64]) -> Vec<DVec2> {
-    let last = at.len() - 1;
-    // What the interval from point k adds to the equations of its ends: the rows are f''' and f''''.
-    let first_end = |k: usize| {
-        let h = at[k + 1] - at[k];
-        let (h2, h3, h4) = (h * h, h.powi(3), h.powi(4));
-        let own = DMat2::from_cols_array(&[-36.0 / h2, 192.0 / h3, -9.0 / h, 36.0 / h2]);
-        let next = DMat2::from_cols_array(&[-24.0 / h2, 168.0 / h3, 3.0 / h, -24.0 / h2]);
-        let rise = value[k + 1] - value[k];
-        (own, next, rise * DVec2::new(60.0 / h3, -360.0 / h4))
-    };
-    let second_end = |k: usize| {
-        let h = at[k + 1] - at[k];
-        let (h2, h3, h4) = (h * h, h.powi(3), h.powi(4));
-        let before = DMat2::from_cols_array(&[-24.0 / h2, -168.0 / h3, -3.0 / h, -24.0 / h2]);
-        let own = DMat2::from_cols_array(&[-36.0 / h2, -192.0 / h3, 9.0 / h, 36.0 / h2]);
-        let rise = value[k + 1] - value[k];
-        (before, own, rise * DVec2::new(60.0 / h3, 360.0 / h4))
-    };
-    // Elimination from the first point on: unknowns[k] = shift[k] - step[k] unknowns[k + 1].
-    let mut eliminated: Vec<(DMat2, DVec2)> = Vec::with_capacity(last);
-    let mut unknowns = vec![DVec2::ZERO; last + 1];
-    for k in 0..=last {
-        let (mut own, mut right) = (DMat2::ZERO, DVec2::ZERO);
-        if let Some((step, shift)) = eliminated.last() {
-            let (before, here, known) = second_end(k - 1);
-            own += here - before * *step;
-            right -= known + before * *shift;
-        }
-        if k == last {
-            unknowns[k] = own.inverse() * right;
-            break;
-        }
-        let (here, next, known) = first_end(k);
-        own -= here;
-        right += known;
-        let inverse = own.inverse();
-        eliminated.push((inverse * -next, inverse * right));
-    }
-    for (k, (step, shift)) in eliminated.into_iter().enumerate().rev() {
-        unknowns[k] = shift - step * unknowns[k + 1];
-    }
-    unknowns
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[track_caller]
-    fn close(found: f64, wanted: f64, within: f64) {
-        assert!((found - wanted).abs() < within, "{found} {wanted}");
-    }
-
-    #[test]
-    fn lines_and_parabolas_are_what_they_are() {
-        let line = Spline::through(vec![0.0, 1.0], vec![2.0, -1.0]);
-        assert_eq!(line.value_and_derivatives(0.25), [1.25, -3.0, 0.0]);
-        let parabola = |x: f64| 1.2 + x * (4.0 - 5.0 * x);
-        for at in [vec![0.0, 0.3, 1.0], vec![0.0, 0.1, 0.2, 0.7, 0.9, 1.0]] {
-            let value = at.iter().map(|&x| parabola(x)).collect();
-            let spline = Spline::through(at, value);
-            for x in [0.0, 0.05, 0.3, 0.65, 1.0] {
-                let [value, slope, second] = spline.value_and_derivatives(x);
-                close(value, parabola(x), 1e-13);
-                close(slope, 4.0 - 10.0 * x, 1e-11);
-                close(second, -10.0, 1e-10);
-            }
-        }
-    }
-
-    /// All derivatives up to the fourth are continuous, the last two vanish at the ends, and every
-    /// other curve through the points has a larger integral of W'''^2.
-    #[test]
-    fn it_is_the_natural_quintic_spline() {
-        let at = vec![0.0, 0.15, 0.4, 0.5, 0.8, 1.0];
-        let spline = Spline::through(at.clone(), vec![1.0, 1.7, 2.0, 2.3, 1.1, 0.0]);
-        // From the polynomial on one side of a knot.
-        let third_and_fourth = |knot: f64, side: f64| {
-            let h = 1e-3 * side;
-            let [_, _, c0] = spline.value_and_derivatives(knot + 1e-14 * side);
-            let [c1, c2, c3] =
-                [1.0, 2.0, 3.0].map(|k| spline.value_and_derivatives(knot + k * h)[2]);
-            let third = (-11.0 * c0 + 18.0 * c1 - 9.0 * c2 + 2.0 * c3) / (6.0 * h);
-            [third, (2.0 * c0 - 5.0 * c1 + 4.0 * c2 - c3) / (h * h)]
-        };
-        let scale = third_and_fourth(0.45, 1.0)[1].abs();
-        for &knot in &at[1..5] {
-            let [left, right] = [-1.0, 1.0].map(|side| third_and_fourth(knot, side));
-            close(left[0], right[0], 1e-6 * scale);
-            close(left[1], right[1], 1e-4 * scale);
-        }
-        for [third, fourth] in [third_and_fourth(0.0, 1.0), third_and_fourth(1.0, -1.0)] {
-            close(third, 0.0, 1e-6 * scale);
-            close(fourth, 0.0, 1e-4 * scale);
-        }
+    fn is_equal(&self, other: &dyn Any) -> bool {
+        other.downcast_ref() == Some(self)
     }
 }

@@ -1,14 +1,12 @@
 //! The value of a key, or a part of it, with its place for messages: converted to numbers, for
 //! every form that a key can have.
-//!
-//! Vectors, and places along a rod, as values of keys.
 
-use crate::scenario::format::entries::{Entries, EntryPath};
-use crate::scenario::format::source::{
-    ScenarioError, ScenarioResult, intended_number, number, shorten,
-};
-use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema};
-use crate::scenario::{Profile, Schedule};
+use crate::scenario::format::entries::{Entries, WrittenEntry};
+use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten_excerpt};
+use crate::scenario::format::path::EntryPath;
+use crate::scenario::format::source::{intended_number, number_of_value};
+use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
+use crate::scenario::profile::{Profile, Schedule};
 use std::fmt::Display;
 use std::str::FromStr;
 use toml::Value;
@@ -17,20 +15,21 @@ use toml::Value;
 /// stiffnesses must not overflow.
 pub(in crate::scenario) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
+// Sentences and phrases of messages that several forms of values share.
+
 const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
      shear_2 and shear_3 only, not in a profile";
-
 const LIST_OF_NUMBERS: &str = "a list of numbers";
-
-pub(in crate::scenario) const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
-
-pub(in crate::scenario) const ONE_PER_KNOT: &str = "one per entry of at";
-
+const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+const ONE_PER_KNOT: &str = "one per entry of at";
 const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
-
 const PROFILE_FORM: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
-
 const FACTOR_SCHEDULE_FORM: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
+const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
+     { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const LOAD_SCHEDULE_FORM: &str =
+    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
 /// The value of a key, or a part of it.
 #[derive(Clone, Copy)]
@@ -38,6 +37,12 @@ pub(in crate::scenario) struct EntryValue<'e> {
     entries: &'e Entries,
     part: EntryPath,
     pub value: &'e Value,
+}
+
+/// The knots of a profile: fractions of the length from 0 to 1, and the numbers there.
+pub(in crate::scenario) struct Knots {
+    pub at: Vec<f64>,
+    pub value: Vec<f64>,
 }
 
 impl Entries {
@@ -55,13 +60,13 @@ impl Entries {
         self.value_in_row(key, 0)
     }
 
-    /// The same in one of its tables, if there may be several.
+    /// The value of a key as given in one of its tables, if there may be several, or its default.
     pub(in crate::scenario) fn value_in_row(
         &self,
         key: Key,
         row: usize,
     ) -> ScenarioResult<EntryValue<'_>> {
-        match self.get(key, row) {
+        match self.given_or_default(key, row) {
             Some(value) => Ok(EntryValue {
                 entries: self,
                 part: EntryPath::whole_entry(key, row),
@@ -72,7 +77,7 @@ impl Entries {
     }
 
     /// An error about a key that has no place.
-    pub(in crate::scenario) fn key_error(&self, key: Key, problem: String) -> ScenarioError {
+    fn key_error(&self, key: Key, problem: String) -> ScenarioError {
         ScenarioError {
             key: Some(key),
             ..ScenarioError::in_file(&self.source.file, None, problem)
@@ -82,7 +87,7 @@ impl Entries {
     /// The error about a key that is required and left out.
     fn missing_key_error(&self, key: Key, row: usize) -> ScenarioError {
         let has = |table: &str| self.source.tables.contains(&table);
-        let (table, name) = key.table_and_name();
+        let TablePath { table, name } = key.table_path();
         let example = match key.missing_key_rule() {
             MissingKeyRule::Required(example) => example,
             _ => "...",
@@ -95,7 +100,7 @@ impl Entries {
             _ => format!("add the table [{table}], and below it {entry}"),
         };
         // Stiffnesses are required unless sections are given.
-        let needed = |other: &Key| match other.table_and_name().0 {
+        let needed = |other: &Key| match other.table() {
             _ if has("blade") && other.follows_from_blade() => false,
             "" | "leaf" => true,
             "stiffness" => !has("section") && !has("blade"),
@@ -118,12 +123,13 @@ impl Entries {
 }
 
 impl<'e> EntryValue<'e> {
-    pub(in crate::scenario) fn key(&self) -> Key {
+    /// The key that the value belongs to.
+    pub fn key(&self) -> Key {
         self.part.key
     }
 
-    /// One of the lists of a table, if this is a table that has it.
-    pub(in crate::scenario) fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
+    /// A list of a profile or a schedule, if this value is one and has the list.
+    pub fn list(&self, list: &'static str) -> Option<EntryValue<'e>> {
         let value = self.value.get(list)?;
         let list = Some(list);
         let part = EntryPath { list, ..self.part };
@@ -134,8 +140,8 @@ impl<'e> EntryValue<'e> {
         })
     }
 
-    /// An entry of a list; the value itself if it is not a list or too short.
-    pub(in crate::scenario) fn entry(&self, index: usize) -> EntryValue<'e> {
+    /// An entry of a list; the value itself if the value is no list, or a shorter one.
+    pub fn entry(&self, index: usize) -> EntryValue<'e> {
         let Some(value) = self.value.get(index) else {
             return *self;
         };
@@ -152,7 +158,7 @@ impl<'e> EntryValue<'e> {
 
     /// The two lists, `at` and `other`, of a table that may have no others. `form`
     /// describes such a table.
-    pub(in crate::scenario) fn pair(
+    fn knots_and_values(
         &self,
         other: &'static str,
         form: &str,
@@ -161,7 +167,7 @@ impl<'e> EntryValue<'e> {
             return Err(self.value_error(format_args!("must be a table: {form}")));
         };
         if let Some(key) = table.keys().find(|key| *key != "at" && *key != other) {
-            let key = shorten(key);
+            let key = shorten_excerpt(key);
             return Err(self.value_error(format_args!("unknown key {key}: {form}")));
         }
         let list = |name| {
@@ -172,23 +178,20 @@ impl<'e> EntryValue<'e> {
     }
 
     /// The value as it is written, shortened.
-    pub(in crate::scenario) fn displayed_value(&self) -> String {
-        self.entries.entry_location(self.part, self.value).1
+    fn displayed_value(&self) -> String {
+        self.entries.written_entry(self.part, self.value).text
     }
 
     /// Refuses this value unless a condition `holds`.
-    pub(in crate::scenario) fn refuse_unless(
-        &self,
-        holds: bool,
-        problem: impl Display,
-    ) -> ScenarioResult<()> {
+    pub fn refuse_unless(&self, holds: bool, problem: impl Display) -> ScenarioResult<()> {
         match holds {
             true => Ok(()),
             false => Err(self.value_error(problem)),
         }
     }
 
-    pub(in crate::scenario) fn value_error(&self, problem: impl Display) -> ScenarioError {
+    /// The error about this value.
+    pub fn value_error(&self, problem: impl Display) -> ScenarioError {
         let list = self.part.list.map(|list| format!(", {list}"));
         let components = matches!(
             self.key().form(),
@@ -206,31 +209,31 @@ impl<'e> EntryValue<'e> {
         };
         let path = EntryPath::whole_entry(self.key(), self.part.row);
         let part = list.unwrap_or_default() + &entry;
-        let (place, found) = self.entries.entry_location(self.part, self.value);
+        let WrittenEntry { place, text } = self.entries.written_entry(self.part, self.value);
         ScenarioError {
-            place,
             key: Some(self.key()),
-            problem: format!("{path}{part} = {found}: {problem}"),
-            others: Vec::new(),
+            ..ScenarioError::at_place(place, format!("{path}{part} = {text}: {problem}"))
         }
     }
 
-    pub(in crate::scenario) fn text(&self) -> ScenarioResult<&'e str> {
+    /// A text.
+    pub fn text(&self) -> ScenarioResult<&'e str> {
         (self.value.as_str()).ok_or_else(|| self.value_error("must be text in quotes"))
     }
 
     /// One of the words that `allowed` names.
-    pub(in crate::scenario) fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
+    pub fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
         let word = self.value.as_str().and_then(|word| word.parse().ok());
         word.ok_or_else(|| self.value_error(allowed))
     }
 
-    pub(in crate::scenario) fn switch(&self) -> ScenarioResult<bool> {
+    /// `true` or `false`.
+    pub fn switch(&self) -> ScenarioResult<bool> {
         (self.value.as_bool()).ok_or_else(|| self.value_error("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
-    pub(in crate::scenario) fn whole_number(&self, most: usize) -> ScenarioResult<usize> {
+    pub fn whole_number(&self, most: usize) -> ScenarioResult<usize> {
         let whole = self.value.as_integer();
         let whole = whole.and_then(|whole| usize::try_from(whole).ok());
         let whole = whole.filter(|whole| (1..=most).contains(whole));
@@ -247,12 +250,13 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A number in the range of its key.
-    pub(in crate::scenario) fn number(&self) -> ScenarioResult<f64> {
+    pub fn number(&self) -> ScenarioResult<f64> {
         self.number_in(self.key().form().range())
     }
 
-    pub(in crate::scenario) fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
-        let value = number(self.value);
+    /// A number in a range.
+    pub fn number_in(&self, range: NumberRange) -> ScenarioResult<f64> {
+        let value = number_of_value(self.value);
         let value = value.ok_or_else(|| match self.intended_number() {
             Some(meant) => self.value_error(format_args!("must be a number: {meant}")),
             None => self.value_error("must be a number"),
@@ -280,8 +284,8 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
-    pub(in crate::scenario) fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
-        if number(self.value).is_some() || self.intended_number().is_some() {
+    pub fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
+        if number_of_value(self.value).is_some() || self.intended_number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {
@@ -300,15 +304,15 @@ impl<'e> EntryValue<'e> {
     }
 
     /// A profile for each of `rods` rods.
-    pub(in crate::scenario) fn quantity(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
+    pub fn profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
         if !self.value.is_table() {
             let numbers = self.number_for_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
-        let [at, value] = self.pair("value", PROFILE_FORM)?;
+        let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
-        let mut list = value.array(&needed)?;
+        let mut list = value.list_entries(&needed)?;
         if (list.next()).is_none_or(|first| !first.value.is_array()) {
             return Ok(vec![value.linear_profile(&at)?; rods]);
         }
@@ -316,15 +320,15 @@ impl<'e> EntryValue<'e> {
         lists.map(|list| list.linear_profile(&at)).collect()
     }
 
-    /// Knots and the numbers there, of a profile that is not one per rod.
-    pub(in crate::scenario) fn knots(&self) -> ScenarioResult<(Vec<f64>, Vec<f64>)> {
-        let [at, value] = self.pair("value", PROFILE_FORM)?;
+    /// The knots of a profile along the leaf.
+    pub fn knots(&self) -> ScenarioResult<Knots> {
+        let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = list
             .map(|item| item.number())
             .collect::<ScenarioResult<_>>()?;
-        Ok((at, value))
+        Ok(Knots { at, value })
     }
 
     /// A profile that has these values at the knots `at`.
@@ -342,9 +346,9 @@ impl<'e> EntryValue<'e> {
         Ok(Profile::Linear { at, value })
     }
 
-    /// A factor in time.
-    pub(in crate::scenario) fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
-        let [at, factor] = self.pair("factor", FACTOR_SCHEDULE_FORM)?;
+    /// A factor at given times.
+    pub fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
+        let [at, factor] = self.knots_and_values("factor", FACTOR_SCHEDULE_FORM)?;
         let at = at.increasing_numbers(false)?;
         let value = factor.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = value
@@ -354,10 +358,7 @@ impl<'e> EntryValue<'e> {
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    pub(in crate::scenario) fn increasing_numbers(
-        &self,
-        fractions: bool,
-    ) -> ScenarioResult<Vec<f64>> {
+    fn increasing_numbers(&self, fractions: bool) -> ScenarioResult<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -366,7 +367,7 @@ impl<'e> EntryValue<'e> {
             ),
             false => ("times", 1, "at least one time is needed"),
         };
-        let list = self.array(LIST_OF_NUMBERS)?;
+        let list = self.list_entries(LIST_OF_NUMBERS)?;
         let count = list.len();
         self.refuse_unless(count >= least, too_few)?;
         let mut at: Vec<f64> = Vec::with_capacity(count);
@@ -390,8 +391,8 @@ impl<'e> EntryValue<'e> {
         Ok(at)
     }
 
-    /// The entries of a list; `needed` describes it in the error if it is not one.
-    pub(in crate::scenario) fn array(
+    /// The entries of a list; `needed` describes the list in the error about a value that is none.
+    fn list_entries(
         &self,
         needed: &str,
     ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
@@ -402,15 +403,15 @@ impl<'e> EntryValue<'e> {
         Ok((0..list.len()).map(move |index| whole.entry(index)))
     }
 
-    /// The entries of a list that must have `count` of them, `because` of what; `needed`
-    /// describes the list in the error if it is not one.
-    pub(in crate::scenario) fn list_of_length(
+    /// The entries of a list of length `count`, `because` of what; `needed` describes the list in the
+    /// error about a value that is none.
+    pub fn list_of_length(
         &self,
         count: usize,
         because: &str,
         needed: &str,
     ) -> ScenarioResult<impl ExactSizeIterator<Item = EntryValue<'e>> + use<'e>> {
-        let list = self.array(needed)?;
+        let list = self.list_entries(needed)?;
         let found = list.len();
         self.refuse_unless(
             found == count,
@@ -418,19 +419,9 @@ impl<'e> EntryValue<'e> {
         )?;
         Ok(list)
     }
-}
 
-const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
-     { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
-
-const LOAD_SCHEDULE_FORM: &str =
-    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
-
-const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
-
-impl EntryValue<'_> {
-    /// Three numbers.
-    pub(in crate::scenario) fn vector(&self) -> ScenarioResult<[f64; 3]> {
+    /// A vector x, y, z.
+    pub fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
         let mut vector = [0.0; 3];
         let components = self.list_of_length(3, "one per axis x, y, z", needed)?;
@@ -441,7 +432,7 @@ impl EntryValue<'_> {
     }
 
     /// A vector for each of `rods` rods: one for all, or a list.
-    pub(in crate::scenario) fn vectors(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
+    pub fn vector_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {
             let each = self.list_of_length(rods, ONE_PER_ROD, VECTORS)?;
             return each.map(|item| item.vector()).collect();
@@ -456,15 +447,12 @@ impl EntryValue<'_> {
     }
 
     /// A vector along each of `rods` rods, one profile for each component.
-    pub(in crate::scenario) fn vector_profiles(
-        &self,
-        rods: usize,
-    ) -> ScenarioResult<Vec<[Profile; 3]>> {
+    pub fn vector_profile_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[Profile; 3]>> {
         if !self.value.is_table() {
-            let each = self.vectors(rods)?.into_iter();
+            let each = self.vector_per_rod(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
-        let [at, value] = self.pair("value", VECTOR_PROFILE_FORM)?;
+        let [at, value] = self.knots_and_values("value", VECTOR_PROFILE_FORM)?;
         let at = at.increasing_numbers(true)?;
         let profiles = |list: EntryValue| -> ScenarioResult<[Profile; 3]> {
             let each = list.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
@@ -486,12 +474,12 @@ impl EntryValue<'_> {
         }
     }
 
-    /// A load in time; of some keys, or one that is always the same.
-    pub(in crate::scenario) fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
+    /// A vector at given times; for some keys also one vector for all times.
+    pub fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
-        let [at, value] = self.pair("value", LOAD_SCHEDULE_FORM)?;
+        let [at, value] = self.knots_and_values("value", LOAD_SCHEDULE_FORM)?;
         let at = at.increasing_numbers(false)?;
         let value = value.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
         let value = value
@@ -500,8 +488,8 @@ impl EntryValue<'_> {
         Ok(Schedule { at, value })
     }
 
-    /// A fraction of the length behind the base.
-    pub(in crate::scenario) fn fraction(&self) -> ScenarioResult<f64> {
+    /// A place along a rod: a fraction of its length, greater than 0.
+    pub fn fraction(&self) -> ScenarioResult<f64> {
         let at = self.number_in(NumberRange::Finite)?;
         self.refuse_unless(
             at > 0.0 && at <= 1.0,
@@ -511,8 +499,8 @@ impl EntryValue<'_> {
     }
 
     /// A stretch of a rod, `[from, to]`, or one point of it.
-    pub(in crate::scenario) fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
-        if number(self.value).is_some() {
+    pub fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
+        if number_of_value(self.value).is_some() {
             return Ok([self.fraction()?; 2]);
         }
         let needed = "a fraction of the length, or a list [from, to] of two";

@@ -1,20 +1,17 @@
-//! The table of the keys that a scenario may have, one row per key.
+//! The format of scenarios: the table of its keys, one row per key, and what the values of a key look
+//! like.
 //!
-//! A new key needs a row here, a field of the checked scenario, a line in `check` that reads
+//! A new key needs a row here, a field of the checked scenario, a line in `read` that reads
 //! it, and one in `json` that writes it.
-//!
-//! What the values of keys look like.
-//!
-//! What was probably meant by a key that is none of the format.
 
 pub(super) mod entries;
+pub(super) mod error;
 pub(super) mod item;
-pub(super) mod json;
+pub(super) mod path;
 pub(super) mod schema;
 pub(super) mod source;
 pub mod units;
 
-use crate::scenario::format::source::shorten;
 use crate::scenario::format::units::Dimension;
 use MissingKeyRule::*;
 use NumberRange::*;
@@ -245,7 +242,9 @@ impl Key {
     pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
     /// Stiffnesses in stretch and shear.
     pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
+    /// Curvatures at rest, u0: twist, and bends about d2 and d3.
     pub(super) const REST_CURVATURE: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
+    /// Stiffnesses of the coupling along e1, e2 and e3.
     pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
     /// k1, k2 and k3 of the tissue, and its c1.
     pub(super) const TISSUE: [Key; 4] = [
@@ -261,7 +260,7 @@ impl Key {
         &FORMAT[self as usize]
     }
 
-    /// As in `--set`: `table.key`, or `name`.
+    /// Its path in the scenario: `table.key`, or `name`.
     pub fn path(self) -> &'static str {
         self.row().path
     }
@@ -271,48 +270,53 @@ impl Key {
         self.row().description.trim()
     }
 
-    /// The form of its value.
+    /// The form of the key's value.
     pub(crate) fn form(self) -> ValueSchema {
         self.row().form
     }
 
-    /// Exponents of length, force and time in its unit.
+    /// Exponents of length, force and time in the unit of the key's value.
     pub fn dimension(self) -> Dimension {
         self.row().dimension
     }
 
-    /// What applies if it is left out.
-    pub(crate) fn missing_key_rule(self) -> MissingKeyRule {
+    /// What applies if the key is left out.
+    pub(super) fn missing_key_rule(self) -> MissingKeyRule {
         self.row().left_out
     }
 
-    /// Whether its numbers are positive, or not negative.
+    /// Whether the numbers of the key are positive, or not negative.
     pub(crate) fn is_positive(self) -> bool {
         self.form().range() != Finite
     }
 
-    /// Whether the quantities of the leaf are proportional to its numbers.
+    /// Whether the quantities of the leaf are proportional to the numbers of the key.
     pub(crate) fn is_linear(self) -> bool {
-        !matches!(self.table_and_name().0, "section" | "blade" | "photo")
+        !matches!(self.table(), "section" | "blade" | "photo")
     }
 
-    /// Whether a blade determines its value.
+    /// Whether a blade determines the value of the key.
     pub(super) fn follows_from_blade(self) -> bool {
         match self {
             Key::Length | Key::Fan | Key::Base | Key::RestBend3 => true,
             _ if Key::TISSUE.contains(&self) => true,
-            _ => matches!(self.table_and_name().0, "stiffness" | "section"),
+            _ => matches!(self.table(), "stiffness" | "section"),
         }
     }
 
-    /// Its table, empty at the top, and its name within that.
-    pub(super) fn table_and_name(self) -> (&'static str, &'static str) {
-        split(self.path())
+    /// The table of the key, empty at the top, and its name within that.
+    pub(super) fn table_path(self) -> TablePath<'static> {
+        TablePath::split(self.path())
     }
 
-    /// Whether its table may be there several times.
-    pub(crate) fn is_repeated(self) -> bool {
-        Key::REPEATED_TABLES.contains(&self.table_and_name().0)
+    /// The table of the key; empty at the top.
+    pub(super) fn table(self) -> &'static str {
+        self.table_path().table
+    }
+
+    /// Whether there may be several tables with this key.
+    pub(super) fn is_repeated(self) -> bool {
+        is_repeated_table(self.table())
     }
 
     /// All keys of the format, by tables.
@@ -325,16 +329,17 @@ impl Key {
         Key::all().find(|key| key.path() == path)
     }
 
-    /// The key with this table, empty at the top, and this name within it.
-    pub(super) fn from_parts(table: &str, name: &str) -> Option<Key> {
+    /// The key with this table and name.
+    pub(super) fn from_table_path(path: TablePath) -> Option<Key> {
+        let TablePath { table, name } = path;
         let length = name.len() + if table.is_empty() { 0 } else { table.len() + 1 };
         let mut long = FORMAT.iter().filter(|row| row.path.len() == length);
-        let row = long.find(|row| row.key.table_and_name() == (table, name))?;
+        let row = long.find(|row| row.key.table_path() == path)?;
         Some(row.key)
     }
 
-    /// The table of this name, if any.
-    pub(super) fn table(name: &str) -> Option<&'static str> {
+    /// The table of the format with this name, if any.
+    pub(super) fn table_named(name: &str) -> Option<&'static str> {
         let mut paths = Key::all().map(Key::path);
         paths.find_map(|path| {
             let (table, rest) = path.split_at_checked(name.len())?;
@@ -344,7 +349,7 @@ impl Key {
 
     /// The tables of the format, in its order.
     pub(super) fn tables() -> Vec<&'static str> {
-        let mut tables: Vec<_> = Key::all().map(|key| key.table_and_name().0).collect();
+        let mut tables: Vec<_> = Key::all().map(Key::table).collect();
         tables.dedup();
         tables.retain(|table| !table.is_empty());
         tables
@@ -352,18 +357,40 @@ impl Key {
 
     /// The names allowed in `table`, which is empty at the top, also those of tables in it.
     pub(super) fn allowed_in(table: &str) -> Vec<&'static str> {
-        let keys = Key::all()
-            .map(Key::table_and_name)
-            .filter(|parts| parts.0 == table);
-        let tables = Key::tables().into_iter().map(split);
-        let tables = tables.filter(|parts| parts.0 == table);
-        keys.chain(tables).map(|parts| parts.1).collect()
+        let keys = Key::all().map(Key::table_path);
+        let tables = Key::tables().into_iter().map(TablePath::split);
+        let all = keys.chain(tables).filter(|path| path.table == table);
+        all.map(|path| path.name).collect()
     }
 }
 
-/// The table that a path is in, empty at the top, and its name within that.
-pub(super) fn split(path: &str) -> (&str, &str) {
-    path.rsplit_once('.').unwrap_or(("", path))
+/// The name of a key or a table, and the table that it is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TablePath<'p> {
+    /// Empty at the top.
+    pub table: &'p str,
+    pub name: &'p str,
+}
+
+impl TablePath<'_> {
+    /// Splits a path such as `load.gravity` or `load.point.vein` before its last name.
+    pub fn split(path: &str) -> TablePath<'_> {
+        let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
+        TablePath { table, name }
+    }
+}
+
+/// Whether a scenario may have several tables of this name.
+pub(super) fn is_repeated_table(table: &str) -> bool {
+    Key::REPEATED_TABLES.contains(&table)
+}
+
+/// The name of a table as it stands at the head of the table.
+pub(super) fn table_header(table: &str) -> String {
+    match is_repeated_table(table) {
+        true => format!("[[{table}]]"),
+        false => format!("[{table}]"),
+    }
 }
 
 /// The form of a key's value.
@@ -387,7 +414,7 @@ pub(crate) enum ValueSchema {
     Vector,
     /// x, y, z for all rods, or a list with one such vector for each.
     VectorPerRod,
-    /// The same, or a profile of vectors along the rods.
+    /// x, y, z for all rods, a list with one such vector for each, or a profile of vectors along them.
     VectorQuantity,
     /// A place along a rod, or the two ends of a stretch: fractions of the length.
     Stretch,
@@ -397,7 +424,7 @@ pub(crate) enum ValueSchema {
     Fan,
     /// Vectors at given times.
     VectorInTime,
-    /// The same, or one vector for all times.
+    /// Vectors at given times, or one vector for all times.
     VectorOrInTime,
     /// Factors at given times.
     FactorInTime,
@@ -414,8 +441,8 @@ pub(crate) enum NumberRange {
 
 /// What applies if a key is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MissingKeyRule {
-    /// It is required; the message gives this example of a value.
+pub(super) enum MissingKeyRule {
+    /// The key is required; the message gives this example of a value.
     Required(&'static str),
     /// This default value.
     Default(&'static str),
@@ -424,8 +451,8 @@ pub(crate) enum MissingKeyRule {
 }
 
 impl ValueSchema {
-    /// The range of its numbers.
-    pub(super) fn range(self) -> NumberRange {
+    /// The range of the numbers in a value.
+    pub fn range(self) -> NumberRange {
         match self {
             ValueSchema::Number(range)
             | ValueSchema::PerRod(range)
@@ -437,62 +464,6 @@ impl ValueSchema {
     }
 }
 
-/// The key or table that was probably meant by `path`: the same name in
-/// another table, or the nearest spelling.
-pub(crate) fn nearest_key(path: &str) -> Option<&'static str> {
-    let name = path.rsplit('.').next().unwrap_or(path);
-    // The name of a unit is none of a number.
-    let of_numbers = |key: &Key| key.table_and_name().1 == name && !path.starts_with("units.");
-    if let Some(key) = Key::all().find(of_numbers) {
-        return Some(key.path());
-    }
-    // No key is longer than this.
-    let path: String = path.chars().take(80).collect();
-    let most = 1 + path.chars().count().min(40) / 5;
-    let candidates = Key::all().map(Key::path).chain(Key::tables());
-    let near = candidates.map(|candidate| (strsim::levenshtein(&path, candidate), candidate));
-    let (edits, candidate) = near.min()?;
-    (edits <= most).then_some(candidate)
-}
-
-/// The message for an unknown key, with what was probably meant.
-pub(super) fn unknown_key_message(path: &str) -> String {
-    let found = shorten(path);
-    match nearest_key(path) {
-        Some(meant) if meant != path => {
-            return format!("unknown key {found} (did you mean {meant}?)");
-        }
-        _ => (),
-    }
-    let tables = Key::tables();
-    let inside = |table: &str| {
-        let rest = path.strip_prefix(table);
-        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-    };
-    match tables.iter().rfind(|known| inside(known)) {
-        Some(table) => {
-            let allowed = Key::allowed_in(table).join(", ");
-            let (open, close) = table_brackets(table);
-            format!("unknown key {found}: {open}{table}{close} has {allowed}")
-        }
-        None => {
-            let tables = Key::allowed_in("")
-                .into_iter()
-                .filter(|name| *name != "name");
-            let tables = tables.collect::<Vec<_>>().join(", ");
-            format!("unknown key {found}: keys are name and those of {tables}, as in leaf.rods")
-        }
-    }
-}
-
-/// What stands around the name of a table.
-pub(super) fn table_brackets(table: &str) -> (&'static str, &'static str) {
-    match Key::REPEATED_TABLES.contains(&table) {
-        true => ("[[", "]]"),
-        false => ("[", "]"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -501,8 +472,8 @@ mod tests {
     fn every_key_is_found_by_its_path() {
         for key in Key::all() {
             assert_eq!(Key::from_path(key.path()), Some(key));
-            let (table, name) = key.table_and_name();
-            assert_eq!(Key::from_parts(table, name), Some(key));
+            let TablePath { table, name } = key.table_path();
+            assert_eq!(Key::from_table_path(key.table_path()), Some(key));
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
@@ -510,25 +481,5 @@ mod tests {
         assert_eq!(Key::allowed_in("load")[..2], ["gravity", "g"]);
         assert!(Key::allowed_in("load").contains(&"point"));
         assert!(!Key::allowed_in("").contains(&"load.point"));
-    }
-}
-
-#[cfg(test)]
-mod spelling_tests {
-    use super::*;
-
-    #[test]
-    fn misspelt_keys_are_recognized() {
-        for (misspelt, key) in [
-            ("stiffness.bending2", Some("stiffness.bending_2")),
-            ("gravity", Some("load.gravity")),
-            ("dynamics.gravty", Some("dynamics.gravity")),
-            ("leaf.rod", Some("leaf.rods")),
-            ("units.lenght", Some("units.length")),
-            ("units.mass", None),
-            ("monsoon", None),
-        ] {
-            assert_eq!(nearest_key(misspelt), key);
-        }
     }
 }

@@ -1,23 +1,25 @@
 //! The JSON schema of scenarios, generated from the table of keys.
 
-use crate::scenario::format::{Key, MissingKeyRule, NumberRange, ValueSchema, split};
+use crate::scenario::format::{
+    Key, MissingKeyRule, NumberRange, TablePath, ValueSchema, is_repeated_table,
+};
 use serde_json::{Map, Value, json};
 
 /// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
 /// them. Rules between entries are checked only by the program.
 pub fn schema() -> Value {
-    let mut schema = table("");
+    let mut schema = table_schema("");
     schema["$schema"] = json!("http://json-schema.org/draft-07/schema#");
     schema["title"] = json!("a leaf, as leafdyn reads it");
     schema
 }
 
 /// The schema of a table, which has no name at the top, with those in it.
-fn table(name: &str) -> Value {
+fn table_schema(name: &str) -> Value {
     let (mut properties, mut required) = (Map::new(), Vec::new());
-    for key in Key::all().filter(|key| key.table_and_name().0 == name) {
-        let (_, within) = key.table_and_name();
-        properties.insert(within.into(), entry(key));
+    for key in Key::all().filter(|key| key.table() == name) {
+        let within = key.table_path().name;
+        properties.insert(within.into(), entry_schema(key));
         // Alternatives, such as stiffnesses, sections and blades, are not required here.
         let alone = matches!(name, "" | "leaf") && !key.follows_from_blade() || key.is_repeated();
         if alone && matches!(key.missing_key_rule(), MissingKeyRule::Required(_)) {
@@ -25,16 +27,19 @@ fn table(name: &str) -> Value {
         }
     }
     for inner in Key::tables() {
-        let (outer, within) = split(inner);
+        let TablePath {
+            table: outer,
+            name: within,
+        } = TablePath::split(inner);
         if outer != name {
             continue;
         }
-        let one = table(inner);
-        let repeated = Key::REPEATED_TABLES.contains(&inner);
+        let one = table_schema(inner);
+        let repeated = is_repeated_table(inner);
         if !repeated && !one["required"].is_null() {
             required.push(within);
         }
-        properties.insert(within.into(), if repeated { list(one) } else { one });
+        properties.insert(within.into(), if repeated { list_schema(one) } else { one });
     }
     let mut object = json!({
         "type": "object", "properties": properties, "additionalProperties": false,
@@ -46,49 +51,55 @@ fn table(name: &str) -> Value {
 }
 
 /// The schema of a key's value, with its description.
-fn entry(key: Key) -> Value {
+fn entry_schema(key: Key) -> Value {
     let mut entry = match key.form() {
         ValueSchema::Text => json!({ "type": "string" }),
         ValueSchema::Switch => json!({ "type": "boolean" }),
         ValueSchema::Whole => json!({ "type": "integer", "minimum": 1 }),
-        ValueSchema::Number(range) => number(range),
+        ValueSchema::Number(range) => number_schema(range),
         ValueSchema::PerRod(range) | ValueSchema::PerGap(range) => {
-            json!({ "anyOf": [number(range), list(number(range))] })
+            json!({ "anyOf": [number_schema(range), list_schema(number_schema(range))] })
         }
         ValueSchema::Quantity(range) => {
-            let values = list(number(range));
-            let profile = knots(
+            let values = list_schema(number_schema(range));
+            let profile = profile_schema(
                 "value",
-                json!({ "anyOf": [values, list(list(number(range)))] }),
+                json!({ "anyOf": [values, list_schema(list_schema(number_schema(range)))] }),
             );
-            json!({ "anyOf": [number(range), list(number(range)), profile] })
+            json!({ "anyOf": [number_schema(range), list_schema(number_schema(range)), profile] })
         }
         ValueSchema::Outline(range) => {
-            json!({ "anyOf": [number(range), knots("value", list(number(range)))] })
+            json!({ "anyOf": [number_schema(range), profile_schema("value", list_schema(number_schema(range)))] })
         }
-        ValueSchema::Vector => vector(),
-        ValueSchema::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
+        ValueSchema::Vector => vector_schema(),
+        ValueSchema::VectorPerRod => {
+            json!({ "anyOf": [vector_schema(), list_schema(vector_schema())] })
+        }
         ValueSchema::VectorQuantity => {
-            let vectors = list(vector());
-            let profile = knots("value", json!({ "anyOf": [vectors, list(list(vector()))] }));
-            json!({ "anyOf": [vector(), list(vector()), profile] })
+            let vectors = list_schema(vector_schema());
+            let profile = profile_schema(
+                "value",
+                json!({ "anyOf": [vectors, list_schema(list_schema(vector_schema()))] }),
+            );
+            json!({ "anyOf": [vector_schema(), list_schema(vector_schema()), profile] })
         }
         ValueSchema::Stretch => {
-            let ends =
-                json!({ "type": "array", "items": fraction(), "minItems": 2, "maxItems": 2 });
-            json!({ "anyOf": [fraction(), ends] })
+            let ends = json!({ "type": "array", "items": fraction_schema(), "minItems": 2, "maxItems": 2 });
+            json!({ "anyOf": [fraction_schema(), ends] })
         }
         ValueSchema::Pixel => {
-            json!({ "type": "array", "items": number(NumberRange::Finite), "minItems": 2, "maxItems": 2 })
+            json!({ "type": "array", "items": number_schema(NumberRange::Finite), "minItems": 2, "maxItems": 2 })
         }
         ValueSchema::Fan => json!({ "anyOf": [
-            { "enum": ["paper", "symmetric"] }, list(number(NumberRange::Finite)),
+            { "enum": ["paper", "symmetric"] }, list_schema(number_schema(NumberRange::Finite)),
         ] }),
-        ValueSchema::VectorInTime => knots("value", list(vector())),
+        ValueSchema::VectorInTime => profile_schema("value", list_schema(vector_schema())),
         ValueSchema::VectorOrInTime => {
-            json!({ "anyOf": [vector(), knots("value", list(vector()))] })
+            json!({ "anyOf": [vector_schema(), profile_schema("value", list_schema(vector_schema()))] })
         }
-        ValueSchema::FactorInTime => knots("factor", list(number(NumberRange::Finite))),
+        ValueSchema::FactorInTime => {
+            profile_schema("factor", list_schema(number_schema(NumberRange::Finite)))
+        }
     };
     entry["description"] = json!(key.description());
     // Defaults are TOML; those that are also JSON are included.
@@ -101,7 +112,7 @@ fn entry(key: Key) -> Value {
 }
 
 /// A number. JSON has no infinity; editors accept TOML's `inf` as a number.
-fn number(range: NumberRange) -> Value {
+fn number_schema(range: NumberRange) -> Value {
     match range {
         NumberRange::Finite => json!({ "type": "number" }),
         NumberRange::NotNegative => json!({ "type": "number", "minimum": 0 }),
@@ -111,23 +122,23 @@ fn number(range: NumberRange) -> Value {
     }
 }
 
-fn fraction() -> Value {
+fn fraction_schema() -> Value {
     json!({ "type": "number", "minimum": 0, "maximum": 1 })
 }
 
-fn list(of: Value) -> Value {
+fn list_schema(of: Value) -> Value {
     json!({ "type": "array", "items": of })
 }
 
-fn vector() -> Value {
+fn vector_schema() -> Value {
     json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
 }
 
 /// Knots or times, and the values there.
-fn knots(name: &str, values: Value) -> Value {
+fn profile_schema(name: &str, values: Value) -> Value {
     json!({
         "type": "object",
-        "properties": { "at": list(number(NumberRange::Finite)), name: values },
+        "properties": { "at": list_schema(number_schema(NumberRange::Finite)), name: values },
         "required": ["at", name],
         "additionalProperties": false,
     })

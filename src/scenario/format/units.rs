@@ -5,38 +5,38 @@ use crate::numbers::superscript;
 /// Exponents of length, force and time in the unit of a quantity.
 pub type Dimension = [i32; 3];
 
-/// Without a unit: fractions, angles, numbers.
+/// The dimension of fractions, angles and numbers.
 pub const DIMENSIONLESS: Dimension = [0, 0, 0];
 
-/// Of positions and displacements.
+/// The dimension of positions and displacements.
 pub const LENGTH: Dimension = [1, 0, 0];
 
-/// Of forces.
+/// The dimension of forces.
 pub const FORCE: Dimension = [0, 1, 0];
 
-/// Of energies and moments.
+/// The dimension of energies and moments.
 pub const ENERGY: Dimension = [1, 1, 0];
 
-/// Of stresses and moduli.
+/// The dimension of stresses and moduli.
 pub const STRESS: Dimension = [-2, 1, 0];
 
-/// Of forces per length, and of spring constants.
+/// The dimension of forces per length and of spring constants.
 pub const FORCE_PER_LENGTH: Dimension = [-1, 1, 0];
 
-/// Of the stiffness of tissue along, across and out of the surface: force per displacement and
-/// length.
+/// The dimension of the stiffness of tissue along, across and out of the surface: force per
+/// displacement and length.
 pub const FORCE_PER_AREA: Dimension = STRESS;
 
-/// Of bending and torsional stiffnesses.
+/// The dimension of bending and torsional stiffnesses.
 pub const COUPLE_STIFFNESS: Dimension = [2, 1, 0];
 
-/// Of times.
+/// The dimension of times.
 pub const TIME: Dimension = [0, 0, 1];
 
-/// Of frequencies and rates.
+/// The dimension of frequencies and rates.
 pub const RATE: Dimension = [0, 0, -1];
 
-/// Of masses.
+/// The dimension of masses.
 pub const MASS: Dimension = [-1, 1, 2];
 
 /// Names of the units a scenario is written in.

@@ -1,8 +1,7 @@
 //! `trace` over two parameters: the boundary of stability as curves in their plane.
 //!
-//! Computation of a boundary.
-//!
-//! The result of a boundary.
+//! Curves begin at the critical points of a trace along the first parameter, and at those of the paths by
+//! which the cells of a map are reached.
 
 mod map;
 
@@ -11,15 +10,17 @@ use crate::branch::boundary::{
     CodimensionTwoKind, ConfirmedEquilibrium, TwoParameterProblem, TwoParameterState,
     VerifiedBoundaryPoint, coarsened, leaves_beside_boundary, refine_on_path,
 };
-use crate::branch::{
-    BranchEnd, CorrectorFailure, CriticalKind, ParameterRange, boundary, value_at_fraction,
-};
+use crate::branch::{BranchEnd, CriticalKind, ParameterRange, boundary, value_at_fraction};
 use crate::run::{Instant, RefusedOption};
-use crate::scenario::Scenario;
+use crate::scenario::{PlausibilityWarning, Scenario};
 use crate::shape::serialize_tips;
 use crate::study::ParameterKeys;
 use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
-use crate::study::trace::{Trace, TraceError, TraceRequest, trace_with_points};
+use crate::study::remark::BoundaryRemark;
+use crate::study::trace::{
+    LONGEST_BRANCH_STEP, PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest,
+    trace_with_points,
+};
 use crate::study::vary::ParameterSweep;
 use glam::DVec3;
 use serde::ser::Serializer;
@@ -67,9 +68,6 @@ impl BoundaryRequest {
         Ok(())
     }
 }
-
-/// Longest step along a curve if few values are asked for.
-const LONGEST_CURVE_STEP: f64 = 0.1;
 
 /// Longest step along curves that are followed for a map.
 const LONGEST_MAP_CURVE_STEP: f64 = 0.04;
@@ -127,7 +125,7 @@ pub fn trace_stability_boundary(
         seeds_tried: 0,
         progress,
     };
-    for (critical, refined) in &begun.critical_points {
+    for RefinedCriticalPoint { critical, refined } in &begun.critical_points {
         let seed = BoundarySeed {
             critical,
             refined,
@@ -136,7 +134,7 @@ pub fn trace_stability_boundary(
         };
         run.follow_unknown_curve(&seed, &mut boundary);
     }
-    if let (Some(size), Some((point, grid))) = (request.map, begun.first_point) {
+    if let (Some(size), Some(PointOnGrid { point, grid })) = (request.map, begun.first_point) {
         let kinks = plane.first_leaf().kinks();
         let first = ConfirmedEquilibrium {
             grid: coarsened(&grid, point.state.segments(), kinks),
@@ -152,7 +150,7 @@ pub fn trace_stability_boundary(
     }
     add_leaves_beside_curves(plane, &run.known_curves, &mut boundary);
     if plane.limit.reached() && boundary.remark.is_none() {
-        boundary.remark = Some(CorrectorFailure::Stopped.to_string());
+        boundary.remark = Some(BoundaryRemark::Stopped);
     }
     set_completeness(&mut boundary, begun.trace.complete);
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
@@ -185,7 +183,7 @@ fn boundary_without_curves(
         joined: trace.joined,
         tolerance: trace.tolerance,
         complete: false,
-        remark: trace.remark.clone(),
+        remark: trace.remark.clone().map(BoundaryRemark::Trace),
         doubts: trace.doubts.clone(),
         curves: Vec::new(),
         map: None,
@@ -197,7 +195,7 @@ fn boundary_without_curves(
 /// How curves through the critical points of the first trace are followed.
 fn continuation_options(request: &BoundaryRequest, tolerance: f64) -> BoundaryContinuationOptions {
     BoundaryContinuationOptions {
-        longest_step: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST_CURVE_STEP),
+        longest_step: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST_BRANCH_STEP),
         max_points: request.trace.most_points,
         accuracy: BoundaryAccuracy {
             tips: tolerance,
@@ -213,18 +211,16 @@ fn set_completeness(boundary: &mut StabilityBoundary, traced: bool) {
     let curves = &boundary.curves;
     let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(BranchEnd::is_complete);
     if curves.is_empty() && boundary.remark.is_none() {
-        let [vary, across] = &boundary.keys;
-        let at = across.text(boundary.start);
-        let why = format!("along {vary} the index changes nowhere at {across} = {at}");
-        boundary.remark = Some(why);
+        let [vary, across] = boundary.keys.clone();
+        boundary.remark = Some(BoundaryRemark::NoIndexChange {
+            vary,
+            across,
+            start: boundary.start,
+        });
     }
     boundary.complete = whole && traced && boundary.remark.is_none();
     if !traced && boundary.remark.is_none() {
-        boundary.remark = Some(
-            "not all branches along the first number are followed to \
-                 their ends: see a trace of it alone"
-                .into(),
-        );
+        boundary.remark = Some(BoundaryRemark::BranchesIncomplete);
     }
 }
 
@@ -252,7 +248,8 @@ impl BoundaryTracer<'_, '_> {
             return;
         }
         if self.seeds_tried == MOST_CURVES {
-            boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
+            let most = MOST_CURVES;
+            boundary.remark = Some(BoundaryRemark::TooManyCurves { most });
             return;
         }
         self.seeds_tried += 1;
@@ -410,7 +407,7 @@ pub struct StabilityBoundary {
     /// The parameters.
     #[serde(rename = "vary")]
     pub keys: [ParameterKeys; 2],
-    /// Their values at the ends of their ranges.
+    /// Values of the parameters at the ends of their ranges.
     pub ranges: [[f64; 2]; 2],
     /// Whether their logarithms are spaced evenly.
     #[serde(skip)]
@@ -429,16 +426,16 @@ pub struct StabilityBoundary {
     pub complete: bool,
     /// Why there is no curve, or fewer than there may be.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<BoundaryRemark>,
     /// What in the scenario is probably not what was intended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<PlausibilityWarning>,
     /// The curves.
     pub curves: Vec<BoundaryCurve>,
     /// The map under them, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<BoundaryMap>,
-    /// Matrices factorised to follow and verify the curves, without those of softened leaves,
+    /// Matrices factorized to follow and verify the curves, without those of softened leaves,
     /// and to follow the first trace and the paths between the cells of the map.
     pub factorizations: usize,
     /// Total time, in seconds.
@@ -512,9 +509,9 @@ pub struct BoundaryPoint {
 /// Cells of the plane of two parameters, of equal size on the scales of the axes.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct BoundaryMap {
-    /// Values of the first parameter at the centres of the cells.
+    /// Values of the first parameter at the centers of the cells.
     pub first: Vec<f64>,
-    /// Those of the second.
+    /// Values of the second parameter there.
     pub second: Vec<f64>,
     /// Morse index of equilibria continued from cell to cell, beginning with that at
     /// the start of the first parameter's range; row by row of the second; none where branches

@@ -1,17 +1,10 @@
 //! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
-//! measured together against one reference.
+//! measured together against one reference; and cost against the number of veins at one accuracy.
 //!
-//! The contents of a chart: contenders and their accuracy settings.
-//!
-//! The runs of one contender with one setting on a leaf.
-//!
-//! Fair timing: all settings take turns, so that a varying load of the machine affects
-//! them equally.
-//!
-//! The Pareto front of speed and accuracy.
-//!
-//! Cost against the number of veins, at a fixed accuracy.
+//! All settings take turns, so that a varying load of the machine affects them equally.
 
+mod reference;
+mod remark;
 mod result;
 
 use crate::relax::{
@@ -20,11 +13,15 @@ use crate::relax::{
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
 use crate::shooting::ShootingFailureReason;
+use crate::study::chart::reference::FoundReference;
+pub use crate::study::chart::reference::ReferenceSolution;
+pub use crate::study::chart::remark::{ChartRemark, ChartRowRemark};
+use crate::study::chart::result::PeerRows;
 pub use crate::study::chart::result::{
     Chart, ChartOutcome, ChartRow, FastestByAccuracy, PeerMeasurement, PeerProgram,
-    ReferenceSolution,
 };
-use crate::study::judge::{MethodSolution, run_timed};
+use crate::study::judge::{MethodSolution, Timed, run_timed};
+use crate::study::remark::SolutionRemark;
 use crate::{read_and_write, shooting};
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -83,14 +80,16 @@ pub fn chart(
     let mut all: Vec<RepeatedRuns> = options.contenders.iter().flat_map(each).collect();
     let (reference, rows, rounds) = run_on_one_thread(options.seconds, || {
         let rounds = time_runs(&mut all, options.seconds, progress);
-        let found = result::find_reference(scenario, result::reference_stations(&all))?;
-        let (reference, answer) = found.unzip();
-        Ok((reference, result::chart_rows(&all, answer.as_ref()), rounds))
+        let found = reference::find_reference(scenario, result::reference_stations(&all))?;
+        let rows = result::chart_rows(&all, found.as_ref().map(|it| &it.solution));
+        Ok((found.map(|it| it.reference), rows, rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);
-    let (peers, others) =
-        result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
+    let PeerRows {
+        peers,
+        remarks: others,
+    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
     let mut remarks = result::chart_remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {
@@ -171,11 +170,17 @@ impl SolverConfig {
 
     /// The word used on the command line and in files.
     pub fn word(self) -> &'static str {
-        match (self.method, self.one_grid) {
-            (Method::SemiImplicit(_), true) => "semi-implicit-grid",
-            (Method::Explicit { .. }, true) => "explicit-grid",
-            (method, _) => method.word(),
+        match self.one_grid && !self.method.is_shooting() {
+            true if self.method.is_explicit() => "explicit-grid",
+            true => "semi-implicit-grid",
+            false => self.method.word(),
         }
+    }
+
+    /// Its place among [`SolverConfig::ALL`], whatever the options of its method.
+    pub fn number(self) -> Option<usize> {
+        let word = self.word();
+        SolverConfig::ALL.iter().position(|it| it.word() == word)
     }
 
     /// Whether it is the default of [`crate::relax::relax`].
@@ -223,7 +228,6 @@ pub struct RepeatedRuns<'s> {
 }
 
 impl<'s> RepeatedRuns<'s> {
-    /// Before the first run.
     pub fn new(scenario: &'s Scenario, contender: SolverConfig, knob: AccuracySetting) -> Self {
         RepeatedRuns {
             scenario,
@@ -251,12 +255,13 @@ impl<'s> RepeatedRuns<'s> {
     }
 
     /// Runs once; also returns the time from the checked scenario to the result, in seconds.
-    pub fn run_once(&self) -> Result<(MethodSolution, f64), RelaxError> {
+    pub fn run_once(&self) -> Result<Timed<MethodSolution>, RelaxError> {
         let (tolerance, segments) = match self.setting {
             AccuracySetting::Tolerance(tolerance) => (Some(tolerance), None),
             AccuracySetting::Segments(segments) => (None, Some(segments)),
         };
-        if let Method::ShootingFromRest { .. } = self.contender.method {
+        let shooting = self.contender.method.shooting();
+        if shooting.is_some_and(|how| how.from_relaxed_leaf) {
             let accuracy = tolerance.unwrap_or(self.scenario.tolerance);
             return shoot_from_relaxed_leaf(self.scenario, accuracy);
         }
@@ -265,9 +270,7 @@ impl<'s> RepeatedRuns<'s> {
             tolerance,
             ..Options::default()
         };
-        let (answer, seconds) =
-            run_timed(|| MethodSolution::from_relaxation(self.scenario, &options));
-        Ok((answer?, seconds))
+        run_timed(|| MethodSolution::from_relaxation(self.scenario, &options)).transpose()
     }
 }
 
@@ -276,13 +279,13 @@ impl<'s> RepeatedRuns<'s> {
 fn shoot_from_relaxed_leaf(
     scenario: &Scenario,
     accuracy: f64,
-) -> Result<(MethodSolution, f64), RelaxError> {
+) -> Result<Timed<MethodSolution>, RelaxError> {
     shooting::check_models(scenario, true)?;
     let options = Options {
         tolerance: Some(START_TOLERANCE),
         ..Options::default()
     };
-    let (found, seconds) = run_timed(|| {
+    let found = run_timed(|| {
         let rest = MethodSolution::from_relaxation(scenario, &options)?;
         let precision = shooting::RequiredPrecision::EstimatedError(accuracy);
         let asked =
@@ -292,7 +295,8 @@ fn shoot_from_relaxed_leaf(
             .then(|| shooting::solve(scenario, &asked, &mut |_| {}));
         Ok::<_, RelaxError>((rest, shot))
     });
-    let (rest, shot) = found?;
+    let seconds = found.seconds;
+    let (rest, shot) = found.result?;
     let answer = match shot {
         None => rest,
         Some(Ok(solution)) => {
@@ -313,26 +317,37 @@ fn shoot_from_relaxed_leaf(
                 ShootingFailureReason::Singular(_) => Outcome::Singular,
                 _ => Outcome::NotAtRest,
             },
-            remark: Some(failure.reason.to_string()),
+            remark: Some(SolutionRemark::ShootingFailed(failure.reason)),
             error_estimate: None,
             work: rest.work + failure.work.into(),
             ..rest
         },
     };
-    Ok((answer, seconds))
+    Ok(Timed {
+        result: answer,
+        seconds,
+    })
 }
 
-/// Runs that take longer, in seconds, are slow: they are not repeated.
-const SLOW_RUN_SECONDS: f64 = 1.0;
+/// How often a setting is run.
+struct RunTiming {
+    /// Runs that take longer, in seconds, are not repeated.
+    slow_seconds: f64,
+    /// Shorter runs, in seconds, follow one that is not measured: those of the others have
+    /// displaced their code and data from the processor's caches.
+    short_seconds: f64,
+    /// Least number of runs of a setting that is not slow.
+    fewest_runs: usize,
+    /// Largest number of runs.
+    most_runs: usize,
+}
 
-/// Shorter runs, in seconds, follow one that is not measured: those of the others have
-/// displaced their code and data from the processor's caches.
-const SHORT_RUN_SECONDS: f64 = 0.01;
-
-/// Least and largest number of runs of the others.
-const FEWEST_RUNS: usize = 3;
-
-const MOST_RUNS: usize = 101;
+const TIMING: RunTiming = RunTiming {
+    slow_seconds: 1.0,
+    short_seconds: 0.01,
+    fewest_runs: 3,
+    most_runs: 101,
+};
 
 /// Progress of the measurement.
 #[derive(Clone, Copy, Debug)]
@@ -369,7 +384,7 @@ pub struct TimingSpread {
 }
 
 impl TimingSpread {
-    /// Of measurements in ascending order; `None` without any.
+    /// The spread of measurements in ascending order; `None` without any.
     pub fn from_sorted(sorted: &[f64]) -> Option<Self> {
         let last = sorted.len().checked_sub(1)?;
         let at = |part: f64| {
@@ -389,7 +404,7 @@ impl TimingSpread {
     }
 }
 
-/// The same keys without a measurement: all null, and no run.
+/// A spread as JSON; without a measurement the same keys are null, with no run.
 pub fn serialize_spread<S: Serializer>(
     spread: &Option<TimingSpread>,
     serializer: S,
@@ -408,10 +423,10 @@ pub fn serialize_spread<S: Serializer>(
     }
 }
 
-/// Runs all settings once, in order, and those that are not slow [`FEWEST`] times;
+/// Runs all settings once, in order, and those that are not slow a few times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
-/// the budget (or [`SLOW`]), those after it are not run. Returns the number of rounds.
+/// the budget (or is slow), those after it are not run. Returns the number of rounds.
 pub fn time_runs(
     all: &mut [RepeatedRuns],
     budget: f64,
@@ -427,37 +442,37 @@ pub fn time_runs(
         });
         runs.run_once()
     };
-    let longest = budget.max(SLOW_RUN_SECONDS);
+    let longest = budget.max(TIMING.slow_seconds);
     let mut too_slow = Vec::new();
     for runs in all.iter_mut() {
         if too_slow.contains(&runs.contender) {
             continue;
         }
-        runs.first_result = Some(run(runs, 1, FEWEST_RUNS).map(|(answer, time)| {
-            runs.seconds.push(time);
-            if time > longest {
+        runs.first_result = Some(run(runs, 1, TIMING.fewest_runs).map(|found| {
+            runs.seconds.push(found.seconds);
+            if found.seconds > longest {
                 too_slow.push(runs.contender);
             }
-            answer
+            found.result
         }));
     }
     let mut run_again = |runs: &mut RepeatedRuns, round: usize, rounds: usize| {
-        if runs.seconds[0] < SHORT_RUN_SECONDS {
+        if runs.seconds[0] < TIMING.short_seconds {
             let _ = run(runs, round, rounds);
         }
-        // It succeeded before, and does so again.
-        if let Ok((_, time)) = run(runs, round, rounds) {
-            runs.seconds.push(time);
+        // The run succeeded before, and does so again.
+        if let Ok(found) = run(runs, round, rounds) {
+            runs.seconds.push(found.seconds);
         }
     };
     let is_fast = |runs: &RepeatedRuns| {
         runs.seconds
             .first()
-            .is_some_and(|&time| time < SLOW_RUN_SECONDS)
+            .is_some_and(|&time| time < TIMING.slow_seconds)
     };
-    for round in 1..FEWEST_RUNS {
+    for round in 1..TIMING.fewest_runs {
         for runs in all.iter_mut().filter(|runs| is_fast(runs)) {
-            run_again(runs, round + 1, FEWEST_RUNS);
+            run_again(runs, round + 1, TIMING.fewest_runs);
         }
     }
     let share = budget / all.iter().filter(|runs| is_fast(runs)).count().max(1) as f64;
@@ -468,14 +483,18 @@ pub fn time_runs(
     for round in 0..rest {
         for (runs, repeats) in all.iter_mut().zip(&repeats) {
             if is_run_in_round(round, *repeats, rest) {
-                run_again(runs, FEWEST_RUNS + round + 1, FEWEST_RUNS + rest);
+                run_again(
+                    runs,
+                    TIMING.fewest_runs + round + 1,
+                    TIMING.fewest_runs + rest,
+                );
             }
         }
     }
     for runs in all {
         runs.seconds.sort_by(f64::total_cmp);
     }
-    FEWEST_RUNS + rest
+    TIMING.fewest_runs + rest
 }
 
 /// Number of further runs after the first few, within a `share` of the time: none for a slow
@@ -483,13 +502,14 @@ pub fn time_runs(
 fn repeat_count(seconds: &[f64], share: f64) -> usize {
     let shortest = seconds.iter().copied().reduce(f64::min);
     match shortest {
-        Some(time) if seconds.len() >= FEWEST_RUNS => {
-            let all = if time < SHORT_RUN_SECONDS {
+        Some(time) if seconds.len() >= TIMING.fewest_runs => {
+            let all = if time < TIMING.short_seconds {
                 2.0 * time
             } else {
                 time
             };
-            ((share / all) as usize).clamp(FEWEST_RUNS, MOST_RUNS) - FEWEST_RUNS
+            ((share / all) as usize).clamp(TIMING.fewest_runs, TIMING.most_runs)
+                - TIMING.fewest_runs
         }
         _ => 0,
     }
@@ -553,7 +573,7 @@ pub fn scaling(
     let mut leaves: Vec<&Scenario> = leaves.iter().collect();
     leaves.sort_by_key(|leaf| leaf.rods.len());
     leaves.dedup_by_key(|leaf| leaf.rods.len());
-    let (rows, unconfirmed) = run_on_one_thread(options.seconds, || {
+    let MeasuredScaling { rows, unconfirmed } = run_on_one_thread(options.seconds, || {
         measure_scaling(&leaves, tolerance, options, progress)
     })?;
     let first = leaves.first();
@@ -565,7 +585,12 @@ pub fn scaling(
     })
 }
 
-type MeasuredScaling = (Vec<ScalingRow>, Vec<usize>);
+/// Cost against the number of veins, before it is named.
+struct MeasuredScaling {
+    rows: Vec<ScalingRow>,
+    /// Numbers of veins whose reference is not confirmed.
+    unconfirmed: Vec<usize>,
+}
 
 /// A leaf, its reference, and the coarsest grid that is accurate enough for it.
 struct ScalingLeaf<'s> {
@@ -584,10 +609,11 @@ fn measure_scaling(
     let any_grid = contenders.any(|contender| contender.one_grid);
     let mut unconfirmed = Vec::new();
     let leaves = leaves.iter().map(|&scenario| {
-        let (found, reference) = result::find_reference(scenario, Vec::new())?.unzip();
-        if !found.is_some_and(|found| found.confirmed) {
+        let found = reference::find_reference(scenario, Vec::new())?;
+        if !(found.as_ref()).is_some_and(|found| found.reference.confirmed) {
             unconfirmed.push(scenario.rods.len());
         }
+        let reference = found.map(|found: FoundReference| found.solution);
         let grid = match &reference {
             Some(reference) if any_grid => coarsest_accurate_grid(scenario, reference, tolerance),
             _ => None,
@@ -622,13 +648,8 @@ fn measure_scaling(
         let row = result::chart_rows(&[runs], leaf.reference.as_ref());
         rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
-    let order = |contender| {
-        SolverConfig::ALL
-            .iter()
-            .position(|other| *other == contender)
-    };
-    rows.sort_by_key(|found| (order(found.row.contender), found.rods));
-    Ok((rows, unconfirmed))
+    rows.sort_by_key(|found| (found.row.contender.number(), found.rods));
+    Ok(MeasuredScaling { rows, unconfirmed })
 }
 
 /// The coarsest single grid whose error is within the tolerance.
@@ -639,12 +660,12 @@ fn coarsest_accurate_grid(
 ) -> Option<usize> {
     let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
     let grids = SolverConfig {
-        method: Method::default(),
         one_grid: true,
+        ..SolverConfig::ALL[0]
     };
     let accurate = |&segments: &usize| {
         let mut run = RepeatedRuns::new(scenario, grids, AccuracySetting::Segments(segments));
-        run.first_result = Some(run.run_once().map(|(answer, _)| answer));
+        run.first_result = Some(run.run_once().map(|found| found.result));
         let error = run.distance_from_reference(Some(reference));
         error.is_some_and(|error| error <= tolerance)
     };
@@ -654,11 +675,10 @@ fn coarsest_accurate_grid(
 fn row_without_grid(scenario: &Scenario, contender: SolverConfig) -> ScalingRow {
     let finest = CHARTED_SEGMENTS[CHARTED_SEGMENTS.len() - 1];
     let ending = ChartOutcome::Ended(Outcome::ToleranceNotReached);
-    let why = format!("no grid of up to {finest} segments is accurate enough");
     ScalingRow {
         rods: scenario.rods.len(),
         row: ChartRow {
-            remark: Some(why),
+            remark: Some(ChartRowRemark::NoAccurateGrid { finest }),
             ..ChartRow::without_result(contender, AccuracySetting::Segments(finest), ending)
         },
     }
@@ -707,8 +727,14 @@ mod timing_tests {
 
     #[test]
     fn fast_runs_are_repeated_often_and_slow_ones_not() {
-        assert_eq!(repeat_count(&[1e-6; 3], 0.1), MOST_RUNS - FEWEST_RUNS);
-        assert_eq!(repeat_count(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST_RUNS);
+        assert_eq!(
+            repeat_count(&[1e-6; 3], 0.1),
+            TIMING.most_runs - TIMING.fewest_runs
+        );
+        assert_eq!(
+            repeat_count(&[0.3, 0.01, 0.02], 0.1),
+            10 - TIMING.fewest_runs
+        );
         assert_eq!(repeat_count(&[2.0], 0.1), 0);
     }
 

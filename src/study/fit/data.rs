@@ -1,22 +1,16 @@
-//! Measured data, as read from CSV: experiments and traced veins.
+//! Measured data: experiments with settings and results, and points traced on veins, as read from
+//! tables.
 //!
-//! Which columns of a file are which quantities, and how a file is thinned.
-//!
-//! Experiments with the points traced on their veins; those under the same conditions share a
-//! leaf.
-//!
-//! Quantities that can be measured on a leaf.
-//!
-//! What a traced point tells of the place where it is: coordinates in space, or in a photograph.
+//! Experiments under the same conditions share a leaf: they are one [`ExperimentCase`].
 
-use crate::scenario::{Photo, PhotoParameterDerivative};
 use crate::study::ParameterKeys;
 use crate::study::fit::FitError;
+use crate::study::fit::columns::{
+    COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
+    MeasuredColumn, MeasuredQuantity, ObservedCoordinates, TRACED_POINT_COLUMNS,
+};
 use crate::study::fit::table::{DataTable, line_error};
-use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
-use std::num::NonZeroUsize;
-use std::str::FromStr;
 
 /// Origin of a number: a file and a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -108,7 +102,7 @@ pub struct DataFile {
 #[derive(Clone, Debug, Default)]
 pub struct Data {
     /// How files are read.
-    pub reading: DataReadingOptions,
+    pub reading: DataFileOptions,
     /// The files.
     pub files: Vec<DataFile>,
     /// Experiments.
@@ -211,7 +205,7 @@ impl Data {
                 Some(column) => table.number(row, column),
                 None => Ok(None),
             };
-            // Of one vein, every point is on that.
+            // A leaf of one vein needs no column: every point is on that vein.
             let rod = match column("rod") {
                 Some(column) => table.number(row, column)?,
                 None => Some(1.0),
@@ -271,9 +265,9 @@ pub fn read_candidate_experiments(
     file: &str,
     columns: &[MeasuredColumn],
 ) -> Result<Vec<Experiment>, FitError> {
-    let reading = DataReadingOptions {
+    let reading = DataFileOptions {
         columns: columns.to_vec(),
-        ..DataReadingOptions::default()
+        ..DataFileOptions::default()
     };
     read_experiments(&DataTable::parse(table, file, &reading)?, true, 0)
 }
@@ -400,225 +394,6 @@ fn read_experiments(
     Ok(found)
 }
 
-/// The column of the names of experiments.
-pub(super) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
-
-/// Columns of points on veins.
-pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
-    "rod",
-    "x",
-    "y",
-    "z",
-    "pixel_x",
-    "pixel_y",
-    "sigma",
-    "sd",
-    EXPERIMENT_NAME_COLUMN,
-];
-
-/// Whether this is the name of a column that a fit uses.
-pub(super) fn is_known_column(name: &str) -> bool {
-    let quantity = name.strip_prefix("sd_").unwrap_or(name);
-    TRACED_POINT_COLUMNS.contains(&name)
-        || quantity.parse::<MeasuredQuantity>().is_ok()
-        || name.parse::<ParameterKeys>().is_ok()
-}
-
-/// A column of a file by the name that it has there, and what it is here:
-/// `NAME=QUANTITY[:FACTOR][+OFFSET]`. The quantity is the factor times the number in the file,
-/// plus the offset.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeasuredColumn {
-    /// Its name in the file.
-    pub name: String,
-    /// Its name here: a key of the scenario, a result, or another column of the data.
-    pub quantity: String,
-    /// Factor, such as of a unit.
-    pub factor: f64,
-    /// Offset, in the unit of the scenario.
-    pub offset: f64,
-}
-
-/// The two numbers in FACTOR, FACTOR+OFFSET and FACTOR-OFFSET.
-fn parse_factor_and_offset(text: &str) -> Option<(f64, f64)> {
-    let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
-    let sign = text.char_indices().skip(1).find(|(at, character)| {
-        matches!(character, '+' | '-') && !text[..*at].ends_with(['e', 'E'])
-    });
-    let (factor, offset) = text.split_at(sign.map_or(text.len(), |(at, _)| at));
-    let offset = if offset.is_empty() {
-        Some(0.0)
-    } else {
-        finite(offset)
-    };
-    Some((finite(factor).filter(|factor| *factor != 0.0)?, offset?))
-}
-
-impl FromStr for MeasuredColumn {
-    type Err = FitError;
-
-    fn from_str(text: &str) -> Result<Self, FitError> {
-        let refuse = |why: &str| Err(FitError::Data(format!("column {text}: {why}")));
-        // The name may have the characters = and :, and the quantity has none behind its key.
-        let Some((name, rest)) = text.rsplit_once('=') else {
-            return refuse(
-                "write NAME=QUANTITY, the name in the file and what it is, such as Force=load.tip_force[0]",
-            );
-        };
-        let (name, rest) = (name.trim(), rest.trim());
-        if name.is_empty() {
-            return refuse("write the name that it has in the file before =");
-        }
-        let (quantity, [factor, offset]) = match rest.rsplit_once(':') {
-            _ if is_known_column(rest) => (rest, [1.0, 0.0]),
-            None => (rest, [1.0, 0.0]),
-            Some((quantity, numbers)) => match parse_factor_and_offset(numbers.trim()) {
-                Some((factor, offset)) => (quantity.trim(), [factor, offset]),
-                None => {
-                    return refuse(
-                        "behind : stands a factor, which is not 0, and an offset if there is one, such as 1e-3 or 1e-3+0.12",
-                    );
-                }
-            },
-        };
-        if !is_known_column(quantity) {
-            return refuse(&format!(
-                "{quantity} is no quantity: {}",
-                match quantity.parse::<ParameterKeys>() {
-                    Err(refused) if quantity.contains('.') => refused.to_string(),
-                    _ => format!(
-                        "keys of the scenario, results ({}), their standard deviations (sd_tip_x), and {} are",
-                        MeasuredQuantity::ALL,
-                        TRACED_POINT_COLUMNS.join(", ")
-                    ),
-                }
-            ));
-        }
-        if quantity == EXPERIMENT_NAME_COLUMN && [factor, offset] != [1.0, 0.0] {
-            return refuse("a name has no factor and no offset: leave them out");
-        }
-        Ok(MeasuredColumn {
-            name: name.into(),
-            quantity: quantity.into(),
-            factor,
-            offset,
-        })
-    }
-}
-
-/// How the number in a column compares with a given one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ComparisonOperator {
-    /// `<`
-    Less,
-    /// `<=`
-    AtMost,
-    /// `>`
-    Greater,
-    /// `>=`
-    AtLeast,
-    /// `=`
-    Equal,
-}
-
-/// Longer signs come before those that they begin with.
-const COMPARISON_SIGNS: [(&str, ComparisonOperator); 5] = [
-    ("<=", ComparisonOperator::AtMost),
-    (">=", ComparisonOperator::AtLeast),
-    ("<", ComparisonOperator::Less),
-    (">", ComparisonOperator::Greater),
-    ("=", ComparisonOperator::Equal),
-];
-
-/// A condition on the rows of a table: `COLUMN>VALUE`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RowCondition {
-    /// The column by its name here: a key, a result, or another column of the data.
-    pub column: String,
-    /// How its number compares with the value.
-    pub comparison: ComparisonOperator,
-    /// The value, in the units of the scenario.
-    pub value: f64,
-}
-
-impl RowCondition {
-    /// Whether a row with this number is read.
-    pub(super) fn is_met_by(&self, number: f64) -> bool {
-        match self.comparison {
-            ComparisonOperator::Less => number < self.value,
-            ComparisonOperator::AtMost => number <= self.value,
-            ComparisonOperator::Greater => number > self.value,
-            ComparisonOperator::AtLeast => number >= self.value,
-            ComparisonOperator::Equal => number == self.value,
-        }
-    }
-}
-
-/// Conditions on rows, all of which are met: `COLUMN>VALUE`, joined by `and`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RowFilter {
-    /// The conditions.
-    pub conditions: Vec<RowCondition>,
-}
-
-impl FromStr for RowFilter {
-    type Err = FitError;
-
-    fn from_str(text: &str) -> Result<Self, FitError> {
-        let refuse = |why: String| FitError::Data(format!("rows {text}: {why}"));
-        let condition = |text: &str| {
-            let found = COMPARISON_SIGNS.iter().filter_map(|(sign, comparison)| {
-                let at = text.find(sign)?;
-                Some((at, *sign, *comparison))
-            });
-            // The first sign; of two at one place the longer one, which comes first.
-            let (at, sign, comparison) = found.min_by_key(|(at, ..)| *at).ok_or_else(|| {
-                refuse("write COLUMN>VALUE, or <, >=, <=, =, as in load.tip_force[0]>0.5".into())
-            })?;
-            let column = text[..at].trim();
-            let value = text[at + sign.len()..].trim();
-            let number = value.parse().ok().filter(|number: &f64| number.is_finite());
-            let value = number.ok_or_else(|| refuse(format!("{value} is not a finite number")))?;
-            if !is_known_column(column) || column == EXPERIMENT_NAME_COLUMN {
-                return Err(refuse(format!(
-                    "{column} is no column of numbers: keys of the scenario, results ({}) and columns of points \
-                     on veins are",
-                    MeasuredQuantity::ALL
-                )));
-            }
-            Ok(RowCondition {
-                column: column.into(),
-                comparison,
-                value,
-            })
-        };
-        let conditions = text.split(" and ").map(condition);
-        let conditions = conditions.collect::<Result<_, _>>()?;
-        Ok(RowFilter { conditions })
-    }
-}
-
-/// How files of data are read.
-#[derive(Clone, Debug)]
-pub struct DataReadingOptions {
-    /// Columns that have other names in the files.
-    pub columns: Vec<MeasuredColumn>,
-    /// The first row is read, and then each that is so many further.
-    pub every: NonZeroUsize,
-    /// Conditions that rows meet, in tables with their columns.
-    pub rows: Vec<RowFilter>,
-}
-
-impl Default for DataReadingOptions {
-    fn default() -> Self {
-        DataReadingOptions {
-            columns: Vec::new(),
-            every: NonZeroUsize::MIN,
-            rows: Vec::new(),
-        }
-    }
-}
-
 /// An experiment with the points traced on its veins.
 pub(super) struct ObservedExperiment {
     /// Its position in the data.
@@ -701,7 +476,6 @@ pub(super) fn experiment_cases(data: Data) -> Result<Vec<ExperimentCase>, FitErr
     Ok(cases)
 }
 
-/// The experiments with data.
 fn observed_experiments(data: Data) -> Result<Vec<ObservedExperiment>, FitError> {
     let observed = |experiment: Experiment| ObservedExperiment {
         number: 0,
@@ -761,144 +535,4 @@ fn check_same_settings(one: &Experiment, other: &Experiment) -> Result<(), FitEr
          name of its own",
         other.name
     )))
-}
-
-/// A quantity that can be measured on a leaf.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MeasuredQuantity {
-    /// A coordinate of the shared tip, or of the only rod's: 0, 1, 2.
-    Tip(usize),
-    /// A component of the reaction at a held tip: 0, 1, 2.
-    Reaction(usize),
-    /// A component of the force on a grip, which is counted from 0: 0, 1, 2.
-    Grip(usize, usize),
-    /// The frequency of a mode in cycles per time; modes are numbered from 1.
-    Frequency(usize),
-}
-
-impl MeasuredQuantity {
-    /// The quantities as words that can be followed by a plural.
-    pub(super) const ALL: &str = "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, grip_1_x, ..., frequency_1, \
-         frequency_2, ...";
-
-    pub(super) fn dimension(self) -> DatumDimension {
-        match self {
-            MeasuredQuantity::Tip(_) => DatumDimension::Length,
-            MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..) => DatumDimension::Force,
-            MeasuredQuantity::Frequency(_) => DatumDimension::Frequency,
-        }
-    }
-}
-
-/// Kinds of data, which can only be weighted relative to each other by their deviations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum DatumDimension {
-    Length,
-    /// Of photographs.
-    Pixel,
-    Force,
-    Frequency,
-}
-
-const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
-
-impl FromStr for MeasuredQuantity {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        let axis = |axis: &str| AXIS_NAMES.iter().position(|name| *name == axis).ok_or(());
-        match text.split_once('_') {
-            Some(("tip", at)) => Ok(MeasuredQuantity::Tip(axis(at)?)),
-            Some(("reaction", at)) => Ok(MeasuredQuantity::Reaction(axis(at)?)),
-            Some(("grip", rest)) => {
-                let (number, at) = rest.split_once('_').ok_or(())?;
-                let number: usize = number.parse().map_err(|_| ())?;
-                Ok(MeasuredQuantity::Grip(
-                    number.checked_sub(1).ok_or(())?,
-                    axis(at)?,
-                ))
-            }
-            Some(("frequency", mode)) => match mode.parse() {
-                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(MeasuredQuantity::Frequency(mode)),
-                _ => Err(()),
-            },
-            _ => Err(()),
-        }
-    }
-}
-
-impl std::fmt::Display for MeasuredQuantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            MeasuredQuantity::Tip(axis) => write!(f, "tip_{}", AXIS_NAMES[*axis]),
-            MeasuredQuantity::Reaction(axis) => write!(f, "reaction_{}", AXIS_NAMES[*axis]),
-            MeasuredQuantity::Grip(grip, axis) => {
-                write!(f, "grip_{}_{}", grip + 1, AXIS_NAMES[*axis])
-            }
-            MeasuredQuantity::Frequency(mode) => write!(f, "frequency_{mode}"),
-        }
-    }
-}
-
-/// The coordinates that a point may have, by the names of their columns.
-pub(super) const COORDINATE_COLUMNS: [&str; 5] = ["x", "y", "z", "pixel_x", "pixel_y"];
-
-/// The first of those in a photograph.
-pub(super) const FIRST_PHOTO_COORDINATE: usize = 3;
-
-/// The coordinates of a traced point, as far as they were seen.
-pub(super) type ObservedCoordinates = [Option<f64>; COORDINATE_COLUMNS.len()];
-
-/// How coordinates follow from positions: each is a . x + b.
-pub(super) struct ObservationModel<'p> {
-    photo: Option<&'p Photo>,
-    linear_forms: [(DVec3, f64); COORDINATE_COLUMNS.len()],
-}
-
-impl<'p> ObservationModel<'p> {
-    pub fn new(photo: Option<&'p Photo>) -> Self {
-        let nowhere = [(DVec3::ZERO, f64::NAN); 2];
-        let [x, y] = photo.map_or(nowhere, Photo::projection);
-        let rows = [(DVec3::X, 0.0), (DVec3::Y, 0.0), (DVec3::Z, 0.0), x, y];
-        ObservationModel {
-            photo,
-            linear_forms: rows,
-        }
-    }
-
-    /// A coordinate of a point.
-    pub fn project_point(&self, coordinate: usize, point: DVec3) -> f64 {
-        let (row, offset) = self.linear_forms[coordinate];
-        row.dot(point) + offset
-    }
-
-    /// The change of a coordinate as the point moves.
-    pub fn project_displacement(&self, coordinate: usize, change: DVec3) -> f64 {
-        self.linear_forms[coordinate].0.dot(change)
-    }
-
-    /// The change of a coordinate of a point as its photograph changes.
-    pub fn photo_derivative(
-        &self,
-        coordinate: usize,
-        point: DVec3,
-        by: &PhotoParameterDerivative,
-    ) -> f64 {
-        match (self.photo, coordinate.checked_sub(FIRST_PHOTO_COORDINATE)) {
-            (Some(photo), Some(axis)) => photo.rate(point, by)[axis],
-            _ => 0.0,
-        }
-    }
-
-    /// Where a traced point is in space, as far as that is known.
-    pub fn position_in_space(&self, seen: &ObservedCoordinates) -> [Option<f64>; 3] {
-        match (
-            self.photo,
-            seen[FIRST_PHOTO_COORDINATE],
-            seen[FIRST_PHOTO_COORDINATE + 1],
-        ) {
-            (Some(photo), Some(x), Some(y)) => photo.point_at_pixel([x, y]),
-            _ => [seen[0], seen[1], seen[2]],
-        }
-    }
 }

@@ -1,22 +1,20 @@
-//! Intervals of the free numbers: from the curvature at the minimum if the sum of
-//! squares is quadratic, else from its profile.
+//! Intervals of the free numbers: from the curvature at the minimum if the sum of squares is quadratic,
+//! else from its profile, the least sum for each value of one number.
 //!
-//! Ends of the intervals of numbers for which the sum of squares is not quadratic: from
-//! a few points around the minimum, with derivatives at few of them.
-//!
-//! Ends of intervals by whole fits: the number is held at one distance from the minimum after
-//! another, and all others are fitted again.
-//!
-//! Residuals near a minimum, and the least sum of squares for a given displacement of one
-//! number.
+//! The ends of a profile are first sought from a few points around the minimum, with derivatives at few of
+//! them; if that fails, by whole fits: the number is held at one distance from the minimum after another,
+//! and all others are fitted again.
 
-use crate::relax::{ContinuationFailure, GridPolicy};
-use crate::study::fit::least_squares::{GaussNewtonIteration, GaussNewtonOutcome};
-use crate::study::fit::minima::MOST_RELAXATION_STEPS;
-use crate::study::fit::model::{CaseSolution, FitPoint};
-use crate::study::fit::statistics::{FitStatistics, UNDETERMINED_UNCERTAINTY};
+use crate::study::fit::least_squares::{
+    GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
+use crate::study::fit::model::{FitPoint, MOST_RELAXATION_STEPS};
+use crate::study::fit::statistics::{
+    BETTER_MINIMUM_EXCESS, ConstrainedMinimum, DifferentiatedPoint, EvaluatedPoint, FitStatistics,
+    GaussNewtonModel, MinimumNeighbourhood, UNDETERMINED_UNCERTAINTY, normalized_excess,
+};
 use crate::study::fit::{FitParameter, FitStep};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// The free numbers with their intervals. The shape of the sum of squares away from
 /// the minimum is taken from `shape`, which may be a minimum on coarser grids.
@@ -41,7 +39,7 @@ pub(super) fn parameters_with_intervals(
                     budget: None,
                 })
             };
-            parameter_with_interval(stats, (shape, near.as_ref()), k, &mut profiling)
+            parameter_with_interval(stats, shape, near.as_ref(), k, &mut profiling)
         })
         .collect()
 }
@@ -71,7 +69,8 @@ fn parameter_without_interval(stats: &FitStatistics, k: usize) -> FitParameter {
 
 fn parameter_with_interval(
     stats: &FitStatistics,
-    (shape, near): (&FitStatistics, Option<&MinimumNeighbourhood>),
+    shape: &FitStatistics,
+    near: Option<&MinimumNeighbourhood>,
     k: usize,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<FitParameter, FitPoint> {
@@ -82,15 +81,16 @@ fn parameter_with_interval(
         return Ok(parameter);
     }
     let (low, high) = (parameter.low, parameter.high);
-    let own = stats.standard_error(k).0;
+    let own = stats.uncertainty(k).deviation;
     parameter.standard_error = Some(own * free.value_derivative(theta));
     let half = stats.coverage_factor * own;
     let mut sides = [ProfileEndpoint::End(half); 2];
-    let (deviation, along) = shape.standard_error(k);
-    let first = shape.coverage_factor * deviation;
+    let near_minimum = shape.uncertainty(k);
+    let along = &near_minimum.correlated_changes;
+    let first = shape.coverage_factor * near_minimum.deviation;
     let few = match near {
         Some(near) => interval_endpoints(near, k, first, half),
-        None if half > UNDETERMINED_UNCERTAINTY || !is_quadratic_at_ends(shape, &along, first) => {
+        None if half > UNDETERMINED_UNCERTAINTY || !is_quadratic_at_ends(shape, along, first) => {
             Some([Err(half), Err(half)])
         }
         None => None,
@@ -167,28 +167,34 @@ fn is_quadratic_at_ends(stats: &FitStatistics, along: &DVector<f64>, half: f64) 
 /// beyond it the interval is taken from the profile of the sum.
 pub(super) const QUADRATIC_DEVIATION_LIMIT: f64 = 0.15;
 
-/// Largest number of points in the search for an end before the full profile is computed, the
-/// relative reduction still possible by a correction there, and the accuracy of the end.
-const MOST_ENDPOINT_POINTS: usize = 14;
+/// The search for an end of an interval from a few points.
+struct EndpointSearchLimits {
+    /// Largest number of points before the full profile is computed.
+    most_points: usize,
+    /// The sum is the least one if a correction can still reduce it by less than this part.
+    settled_reduction: f64,
+    /// Relative accuracy of the distance of the end.
+    accuracy: f64,
+    /// A correction that leaves more than this part of the expected reduction has failed.
+    failed_correction: f64,
+    /// The part of a correction that went too far, taken next.
+    shortening: f64,
+    /// Largest number of points at which leaves are lost.
+    most_lost_leaves: usize,
+    /// A sum with a smaller relative error needs no further evaluation, as a part of the deviation
+    /// from a quadratic that is allowed.
+    clear_sum_error: f64,
+}
 
-const SETTLED_REDUCTION: f64 = 0.1;
-
-const ENDPOINT_ACCURACY: f64 = 0.03;
-
-/// A correction that leaves more than this part of the expected reduction has failed, and
-/// the part of it that is taken next if it went too far.
-const FAILED_CORRECTION_RATIO: f64 = 0.5;
-
-const CORRECTION_SHORTENING: f64 = 0.5;
-
-/// Largest number of lost leaves in the search.
-const MOST_LOST_LEAVES: usize = 3;
-
-/// A sum with a smaller relative error than this needs no further evaluation.
-const CLEAR_SUM_ERROR: f64 = 0.3;
-
-/// Excess below the minimum, in variances, that indicates a better minimum.
-pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
+const ENDPOINT_SEARCH: EndpointSearchLimits = EndpointSearchLimits {
+    most_points: 14,
+    settled_reduction: 0.1,
+    accuracy: 0.03,
+    failed_correction: 0.5,
+    shortening: 0.5,
+    most_lost_leaves: 3,
+    clear_sum_error: 0.3,
+};
 
 /// Where a profile ends on one side of the minimum.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -200,9 +206,6 @@ pub(super) enum ProfileEndpoint {
     /// Beyond this distance, up to which it does not, the other numbers could not be fitted.
     Lost(f64),
 }
-
-/// Residuals at a point near a minimum.
-type EvaluatedPoint = (DVector<f64>, FitPoint);
 
 /// The ends of an interval below and above, from a few points around the minimum; as errors,
 /// approximate distances that are not confirmed. `None` if they are those of the quadratic
@@ -226,12 +229,12 @@ pub(super) fn interval_endpoints(
         };
         // By reflection, to second order.
         let linear = &stats.jacobian * change;
-        let down = &up.0 - &linear - &linear;
-        let sides = [&up.0, &down]
+        let down = &up.residuals - &linear - &linear;
+        let sides = [&up.residuals, &down]
             .map(|residuals| near.constrained_minimum(&slopes, k, residuals, f64::INFINITY));
         let clear = |least: &Option<ConstrainedMinimum>| {
             (least.as_ref()).is_some_and(|least| {
-                off(least.excess) < CLEAR_SUM_ERROR * QUADRATIC_DEVIATION_LIMIT
+                off(least.excess) < ENDPOINT_SEARCH.clear_sum_error * QUADRATIC_DEVIATION_LIMIT
             })
         };
         if sides.iter().all(clear) {
@@ -252,7 +255,10 @@ pub(super) fn interval_endpoints(
             most,
             distance: first.min(most),
             curvature: DVector::zeros(along.len()),
-            previous_point: (0.0, 0.0),
+            previous: ProfileRoot {
+                distance: 0.0,
+                root: 0.0,
+            },
             derivatives_elsewhere: None,
             longest: f64::INFINITY,
             last: ProfileCorrection {
@@ -284,12 +290,18 @@ struct EndpointSearch<'s, 'j, 'm, 'a> {
     /// Present estimate of the distance of the end.
     distance: f64,
     curvature: DVector<f64>,
-    /// Distance and root of the sum at the previous point.
-    previous_point: (f64, f64),
+    previous: ProfileRoot,
     /// Where derivatives are known, if not only at the minimum.
-    derivatives_elsewhere: Option<(FitPoint, GaussNewtonModel)>,
+    derivatives_elsewhere: Option<DifferentiatedPoint>,
     longest: f64,
     last: ProfileCorrection,
+}
+
+/// The sum of squares at a distance from the minimum.
+struct ProfileRoot {
+    distance: f64,
+    /// The root of its excess, normalized to one at an end of the interval.
+    root: f64,
 }
 
 /// A correction of the other numbers towards the least sum.
@@ -300,7 +312,6 @@ struct ProfileCorrection {
     gain: f64,
 }
 
-/// The search fails.
 struct EndpointSearchFailure;
 
 /// The result at a point: the end if this is it, or none, if another point follows.
@@ -316,13 +327,13 @@ impl EndpointSearch<'_, '_, '_, '_> {
             return Ok(ProfileEndpoint::Open);
         }
         let mut lost = 0;
-        for step in 0..MOST_ENDPOINT_POINTS {
+        for step in 0..ENDPOINT_SEARCH.most_points {
             let Some(found) = known.take().or_else(|| self.leaves_at_estimate()) else {
                 lost += 1;
-                if lost > MOST_LOST_LEAVES {
+                if lost > ENDPOINT_SEARCH.most_lost_leaves {
                     break;
                 }
-                self.distance = 0.5 * (self.previous_point.0 + self.distance);
+                self.distance = 0.5 * (self.previous.distance + self.distance);
                 continue;
             };
             match self.evaluate(step == 0, found) {
@@ -339,7 +350,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         let change =
             self.along * (self.sign * self.distance) + &self.curvature * self.distance.powi(2);
         let from = match &self.derivatives_elsewhere {
-            Some((point, _)) => point,
+            Some(elsewhere) => &elsewhere.point,
             None => self.neighbourhood.stats.point,
         };
         let found = self
@@ -353,7 +364,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         residuals: &DVector<f64>,
     ) -> Result<ConstrainedMinimum, EndpointSearchFailure> {
         let slopes = match &self.derivatives_elsewhere {
-            Some((_, slopes)) => slopes,
+            Some(elsewhere) => &elsewhere.model,
             None => self.at_minimum,
         };
         let least = self
@@ -364,17 +375,18 @@ impl EndpointSearch<'_, '_, '_, '_> {
 
     /// Whether the sum is the least one, and that of an end.
     fn is_converged(&self, least: &ConstrainedMinimum) -> bool {
-        let corrected =
-            least.excess_without_correction - least.excess < SETTLED_REDUCTION * least.excess;
-        corrected && (self.normalized_root(least) - 1.0).abs() < ENDPOINT_ACCURACY
+        let corrected = least.excess_without_correction - least.excess
+            < ENDPOINT_SEARCH.settled_reduction * least.excess;
+        corrected && (self.normalized_root(least) - 1.0).abs() < ENDPOINT_SEARCH.accuracy
     }
 
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     fn normalized_root(&self, least: &ConstrainedMinimum) -> f64 {
         least.excess.max(0.0).sqrt() / self.neighbourhood.stats.coverage_factor
     }
 
-    fn evaluate(&mut self, first: bool, (residuals, point): EvaluatedPoint) -> EndpointSearchStep {
+    fn evaluate(&mut self, first: bool, found: EvaluatedPoint) -> EndpointSearchStep {
+        let EvaluatedPoint { residuals, point } = found;
         let wanted = self.neighbourhood.stats.coverage_factor.powi(2);
         let mut least = self.constrained_minimum(&residuals)?;
         if least.excess_without_correction < -BETTER_MINIMUM_EXCESS {
@@ -387,10 +399,10 @@ impl EndpointSearch<'_, '_, '_, '_> {
             return Ok(Some(ProfileEndpoint::End(self.distance)));
         }
         let gain = least.excess_without_correction - least.excess;
-        let stagnates =
-            self.derivatives_elsewhere.is_some() && gain > FAILED_CORRECTION_RATIO * self.last.gain;
+        let stagnates = self.derivatives_elsewhere.is_some()
+            && gain > ENDPOINT_SEARCH.failed_correction * self.last.gain;
         if stagnates || self.is_converged(&least) {
-            // With the derivatives there it may be reduced further.
+            // With the derivatives there the sum may be reduced further.
             self.derivatives_elsewhere = Some(
                 self.neighbourhood
                     .gauss_newton_model_at(point)
@@ -404,7 +416,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         if stagnates {
             // The last correction went too far, or not far enough.
             self.longest = match least.excess_without_correction > self.last.from {
-                true => CORRECTION_SHORTENING * self.last.length,
+                true => ENDPOINT_SEARCH.shortening * self.last.length,
                 false => 2.0 * self.longest,
             };
             least = self.constrained_minimum(&residuals)?;
@@ -421,7 +433,7 @@ impl EndpointSearch<'_, '_, '_, '_> {
         self.curvature += &least.correction / self.distance.powi(2);
         // The root of the sum is nearly linear.
         let root = self.normalized_root(least);
-        let secant = (root - self.previous_point.1) / (self.distance - self.previous_point.0);
+        let secant = (root - self.previous.root) / (self.distance - self.previous.distance);
         let wanted = self.neighbourhood.stats.coverage_factor.powi(2);
         let next = match &self.derivatives_elsewhere {
             None if secant > 0.0 => self.distance + (1.0 - root) / secant,
@@ -430,7 +442,10 @@ impl EndpointSearch<'_, '_, '_, '_> {
         if !next.is_finite() {
             return Err(EndpointSearchFailure);
         }
-        self.previous_point = (self.distance, root);
+        self.previous = ProfileRoot {
+            distance: self.distance,
+            root,
+        };
         self.distance = next
             .clamp(0.5 * self.distance, 2.0 * self.distance)
             .min(self.most);
@@ -438,24 +453,34 @@ impl EndpointSearch<'_, '_, '_, '_> {
     }
 }
 
-/// Steps to an end of a profile, iterations at each, accuracy of the least sum there, in
-/// variances, and accuracy of the end.
-const MOST_PROFILE_STEPS: usize = 16;
+/// The search for an end of an interval by whole fits.
+struct ProfileLimits {
+    /// Largest number of distances at which the number is held.
+    most_steps: usize,
+    /// Largest number of steps of the fit at each distance.
+    most_iterations: usize,
+    /// Accuracy of the least sum of squares there, in variances.
+    sum_accuracy: f64,
+    /// Relative accuracy of the distance of the end.
+    accuracy: f64,
+    /// Largest number of distances at which the other numbers cannot be fitted.
+    most_lost_distances: usize,
+    /// Number of smaller steps by which leaves are followed to such a distance.
+    substeps_after_loss: usize,
+    /// Where fits begin again for numbers that ran away: so far on the way from their initial
+    /// values.
+    restart_fractions: [f64; 3],
+}
 
-const MOST_PROFILE_ITERATIONS: usize = 25;
-
-const CONSTRAINED_MINIMUM_ACCURACY: f64 = 1e-2;
-
-const PROFILE_ENDPOINT_ACCURACY: f64 = 0.01;
-
-/// Largest number of distances at which the other numbers cannot be fitted, in the search for an
-/// end of a profile, and number of the smaller steps by which leaves are followed there.
-const MOST_LOST_DISTANCES: usize = 6;
-
-const SUBSTEPS_AFTER_LOSS: usize = 4;
-
-/// Where fits begin again for numbers that ran away: so far on the way from their initial values.
-const RESTART_FRACTIONS: [f64; 3] = [1.0 / 3.0, 0.0, 2.0 / 3.0];
+const PROFILE: ProfileLimits = ProfileLimits {
+    most_steps: 16,
+    most_iterations: 25,
+    sum_accuracy: 1e-2,
+    accuracy: 0.01,
+    most_lost_distances: 6,
+    substeps_after_loss: 4,
+    restart_fractions: [1.0 / 3.0, 0.0, 2.0 / 3.0],
+};
 
 /// The profile of the sum of squares along a number.
 pub(super) struct LikelihoodProfile<'s, 'm, 'a> {
@@ -468,21 +493,12 @@ pub(super) struct LikelihoodProfile<'s, 'm, 'a> {
     pub runaways: &'s [usize],
 }
 
-/// A point of a profile.
 struct ProfilePoint {
     distance: f64,
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     root: f64,
     /// None at the minimum.
     point: Option<FitPoint>,
-}
-
-/// Excess of the sum of squares over the minimum, in squared spreads.
-pub(super) fn normalized_excess(stats: &FitStatistics, point: &FitPoint) -> f64 {
-    let residuals = stats.weighting.residuals(point);
-    let bound = stats.weighting.huber_bound(&stats.residuals);
-    let sum = |residuals: &DVector<f64>| stats.weighting.huber_sum(residuals, bound);
-    (sum(&residuals) - sum(&stats.residuals)) / stats.residual_deviation.powi(2)
 }
 
 impl LikelihoodProfile<'_, '_, '_> {
@@ -512,28 +528,28 @@ impl LikelihoodProfile<'_, '_, '_> {
         // The nearest distance at which all fits failed.
         let mut lost = f64::INFINITY;
         let mut failures = 0;
-        for _ in 0..MOST_PROFILE_STEPS {
+        for _ in 0..PROFILE.most_steps {
             if self.stats.model.budget.is_used_up() {
                 return Ok(ProfileEndpoint::Lost(inside.distance));
             }
             let least = self.constrained_minimum(sign * reach, &inside, outside.as_ref(), progress);
             let Some(mut least) = least else {
                 failures += 1;
-                if failures > MOST_LOST_DISTANCES {
+                if failures > PROFILE.most_lost_distances {
                     break;
                 }
                 lost = reach;
                 reach = 0.5 * (inside.distance + reach);
                 continue;
             };
-            if self.normalized_root(&least) > 1.0 - PROFILE_ENDPOINT_ACCURACY {
+            if self.normalized_root(&least) > 1.0 - PROFILE.accuracy {
                 least = self.restart_runaways(&least, progress).unwrap_or(least);
             }
             if normalized_excess(self.stats, &least) < -BETTER_MINIMUM_EXCESS {
                 return Err(least);
             }
             let root = self.normalized_root(&least);
-            if (root - 1.0).abs() < PROFILE_ENDPOINT_ACCURACY {
+            if (root - 1.0).abs() < PROFILE.accuracy {
                 return Ok(ProfileEndpoint::End(reach));
             }
             let known = ProfilePoint {
@@ -560,14 +576,14 @@ impl LikelihoodProfile<'_, '_, '_> {
             };
         }
         Ok(match outside {
-            Some(outside) if failures <= MOST_LOST_DISTANCES => {
+            Some(outside) if failures <= PROFILE.most_lost_distances => {
                 ProfileEndpoint::End(outside.distance)
             }
             _ => ProfileEndpoint::Lost(inside.distance),
         })
     }
 
-    /// The root of the sum, normalised to one at an end.
+    /// The root of the sum, normalized to one at an end.
     fn normalized_root(&self, least: &FitPoint) -> f64 {
         normalized_excess(self.stats, least).max(0.0).sqrt() / self.stats.coverage_factor
     }
@@ -629,10 +645,10 @@ impl LikelihoodProfile<'_, '_, '_> {
             &|| relaxed(&initial()),
         ];
         ways.into_iter().find_map(|way| {
-            let (least, end) = self.minimize_over_others(way()?, progress);
+            let least = self.minimize_over_others(way()?, progress);
+            let converged = least.outcome == GaussNewtonOutcome::Converged;
             // Without a minimum there, the least sum is still no larger.
-            (end == GaussNewtonOutcome::Converged || self.normalized_root(&least) < 1.0)
-                .then_some(least)
+            (converged || self.normalized_root(&least.point) < 1.0).then_some(least.point)
         })
     }
 
@@ -640,8 +656,8 @@ impl LikelihoodProfile<'_, '_, '_> {
     fn continue_in_substeps(&self, from: &FitPoint, step: f64) -> Option<FitPoint> {
         let model = self.stats.model;
         let mut there: Option<FitPoint> = None;
-        for part in 1..=SUBSTEPS_AFTER_LOSS {
-            let part = part as f64 / SUBSTEPS_AFTER_LOSS as f64;
+        for part in 1..=PROFILE.substeps_after_loss {
+            let part = part as f64 / PROFILE.substeps_after_loss as f64;
             let theta = model.bounded_update(&from.theta, part * step, self.along);
             let mut next = model
                 .continue_leaves(there.as_ref().unwrap_or(from), &theta)
@@ -652,7 +668,6 @@ impl LikelihoodProfile<'_, '_, '_> {
         there
     }
 
-    /// The initial values.
     fn initial_values(&self) -> Vec<f64> {
         let coordinates = self.stats.model.coordinates.iter();
         coordinates.map(|free| free.initial).collect()
@@ -663,14 +678,13 @@ impl LikelihoodProfile<'_, '_, '_> {
         &self,
         start: FitPoint,
         progress: &mut dyn FnMut(usize, f64),
-    ) -> (FitPoint, GaussNewtonOutcome) {
+    ) -> GaussNewtonResult {
         let mut iteration =
             GaussNewtonIteration::new(self.stats.model, self.stats.weighting, progress);
         iteration.held[self.k] = true;
-        iteration.most_steps = MOST_PROFILE_ITERATIONS;
-        iteration.gain_tolerance = CONSTRAINED_MINIMUM_ACCURACY;
-        let (least, end, _) = iteration.run(start);
-        (least, end)
+        iteration.most_steps = PROFILE.most_iterations;
+        iteration.gain_tolerance = PROFILE.sum_accuracy;
+        iteration.run(start)
     }
 
     /// A lower sum with the same value of the number, if numbers that ran away are fitted again
@@ -686,7 +700,7 @@ impl LikelihoodProfile<'_, '_, '_> {
         let (stats, model) = (self.stats, self.stats.model);
         let lowest = normalized_excess(stats, least);
         let mut before: Option<FitPoint> = None;
-        for part in RESTART_FRACTIONS {
+        for part in PROFILE.restart_fractions {
             let mut theta = least.theta.clone();
             for &j in self.runaways {
                 theta[j] =
@@ -707,159 +721,11 @@ impl LikelihoodProfile<'_, '_, '_> {
             let start = model.continue_leaves(&there, &theta);
             before = Some(there);
             let Ok(start) = start else { continue };
-            let (found, _) = self.minimize_over_others(start, progress);
-            if normalized_excess(stats, &found) < lowest - CONSTRAINED_MINIMUM_ACCURACY {
+            let found = self.minimize_over_others(start, progress).point;
+            if normalized_excess(stats, &found) < lowest - PROFILE.sum_accuracy {
                 return Some(found);
             }
         }
         None
-    }
-}
-
-/// The neighbourhood of a minimum.
-pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
-    pub stats: &'j FitStatistics<'m, 'a>,
-    /// Numbers at a bound, which stay fixed.
-    fixed: Vec<bool>,
-}
-
-/// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
-/// regularised, so that combinations to which the data are insensitive do not change.
-pub(super) struct GaussNewtonModel {
-    jacobian: DMatrix<f64>,
-    curvature: DMatrix<f64>,
-}
-
-/// The least sum of squares with one number fixed away from the minimum.
-pub(super) struct ConstrainedMinimum {
-    /// Its excess over the minimum, in squared spreads.
-    pub excess: f64,
-    /// The same if the other numbers do not change.
-    pub excess_without_correction: f64,
-    /// The change of the other numbers.
-    pub correction: DVector<f64>,
-    /// Half of its first derivative, and half of its second derivative.
-    half_slope: f64,
-    half_curvature: f64,
-}
-
-impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
-    /// `None` if residuals have different weights, or derivatives are not known.
-    pub fn new(stats: &'j FitStatistics<'m, 'a>) -> Option<Self> {
-        let differentiated = |case: &CaseSolution| case.responses.is_some();
-        if stats.weighting.is_robust || !stats.point.case_solutions.iter().all(differentiated) {
-            return None;
-        }
-        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
-        let fixed = coordinates.map(|(free, theta)| free.active_bound(*theta).is_some());
-        Some(MinimumNeighbourhood {
-            stats,
-            fixed: fixed.collect(),
-        })
-    }
-
-    pub fn gauss_newton_model(&self) -> GaussNewtonModel {
-        self.gauss_newton_from_jacobian(self.stats.jacobian.clone())
-    }
-
-    /// Derivatives at another point, which stores them.
-    pub fn gauss_newton_model_at(
-        &self,
-        mut there: FitPoint,
-    ) -> Result<(FitPoint, GaussNewtonModel), ContinuationFailure> {
-        self.stats.model.differentiate_data(&mut there)?;
-        let slopes = self.gauss_newton_from_jacobian(self.stats.weighting.jacobian(&there));
-        Ok((there, slopes))
-    }
-
-    fn gauss_newton_from_jacobian(&self, mut jacobian: DMatrix<f64>) -> GaussNewtonModel {
-        let stats = self.stats;
-        for k in (0..self.fixed.len()).filter(|&k| self.fixed[k]) {
-            jacobian.column_mut(k).fill(0.0);
-        }
-        let count = stats.singular_values.len();
-        let least = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
-        let curvature = jacobian.tr_mul(&jacobian) / stats.residual_deviation.powi(2)
-            + DMatrix::identity(count, count) * least;
-        GaussNewtonModel {
-            jacobian,
-            curvature,
-        }
-    }
-
-    /// The values after a change from the minimum, clamped to the bounds.
-    pub fn bounded_update(&self, change: &DVector<f64>) -> Vec<f64> {
-        let theta = &self.stats.point.theta;
-        let mut moved = self.stats.model.bounded_update(theta, 1.0, change);
-        for k in (0..theta.len()).filter(|&k| self.fixed[k]) {
-            moved[k] = theta[k];
-        }
-        moved
-    }
-
-    /// The residuals for other values, and their point, followed from a point with
-    /// derivatives.
-    pub fn residuals(
-        &self,
-        from: &FitPoint,
-        theta: &[f64],
-    ) -> Result<(DVector<f64>, FitPoint), ContinuationFailure> {
-        let stats = self.stats;
-        let there = stats
-            .model
-            .continue_leaves_on_grids(from, theta, GridPolicy::These)?;
-        Ok((stats.weighting.residuals(&there), there))
-    }
-
-    /// The least sum of squares over all numbers but the `k`th, linearised where the residuals
-    /// are these, with a step no longer than `longest`.
-    pub fn constrained_minimum(
-        &self,
-        slopes: &GaussNewtonModel,
-        k: usize,
-        residuals: &DVector<f64>,
-        longest: f64,
-    ) -> Option<ConstrainedMinimum> {
-        let stats = self.stats;
-        let mut curvature = slopes.curvature.clone();
-        let mut coupled = -curvature.column(k);
-        coupled[k] = 1.0;
-        curvature.row_mut(k).fill(0.0);
-        curvature.column_mut(k).fill(0.0);
-        curvature[(k, k)] = 1.0;
-        let variance = stats.residual_deviation.powi(2);
-        let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
-        slope[k] = 0.0;
-        let inverse = curvature.clone().cholesky()?;
-        let along = inverse.solve(&coupled);
-        let mut correction = -inverse.solve(&slope);
-        let corrected = residuals + &slopes.jacobian * &correction;
-        let change = &slopes.jacobian * &along;
-        let mut damping = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
-        while correction.norm() > longest {
-            damping *= 2.0;
-            let count = curvature.nrows();
-            let damped = &curvature + DMatrix::identity(count, count) * damping;
-            correction = -damped.cholesky()?.solve(&slope);
-        }
-        let least = stats.residuals.norm_squared();
-        let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
-        Some(ConstrainedMinimum {
-            excess: above(&corrected),
-            excess_without_correction: above(residuals),
-            half_slope: corrected.dot(&change) / variance,
-            half_curvature: change.norm_squared() / variance,
-            correction,
-        })
-    }
-}
-
-impl ConstrainedMinimum {
-    /// The change of the number at which the least sum exceeds the minimum by `above`, with
-    /// linearised residuals: the farther of two solutions, or the minimum of the excess if there
-    /// are none.
-    pub fn step_to_excess(&self, above: f64, sign: f64) -> f64 {
-        let root = self.half_slope.powi(2) - self.half_curvature * (self.excess - above);
-        (sign * root.max(0.0).sqrt() - self.half_slope) / self.half_curvature
     }
 }

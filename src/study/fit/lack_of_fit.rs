@@ -1,39 +1,46 @@
 //! Whether residuals are systematic: smooth along a column of the data, or along a vein, in place of
-//! scattered, as where a machine has slack or the shape at rest is another.
+//! scattered, as where a machine has slack or the shape at rest is another; and whether the data
+//! contradict the model.
 //!
 //! Residuals are tested for lack of fit against the first cosines along each series of data, less
 //! what the free numbers could explain of them: the sum of squares along these over that of all other
 //! residuals has Fisher's distribution if errors are independent and normal (Neill and Johnson 1984, Testing
 //! for lack of fit in regression, a review). All series together have one level.
-//!
-//! Whether the data contradict the model at a minimum.
 
 use crate::scenario::longest;
-use crate::study::fit::data::{DatumDimension, MeasuredQuantity};
-use crate::study::fit::model::{DatumQuantity, ScalarDatum};
+use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
+use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
 use crate::study::fit::statistics::FitStatistics;
 use crate::study::fit::{FitParameter, FreeParameterTarget, SystematicResiduals};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// The level of the test: so often residuals of a true model are called systematic.
-const SIGNIFICANCE_LEVEL: f64 = 5e-3;
+/// Levels of the test for lack of fit, and its cosines.
+struct LackOfFitTest {
+    /// So often residuals of a true model are called systematic.
+    level: f64,
+    /// Where deviations are given, the p-value below which residuals are smooth beside the others.
+    smooth_p_value: f64,
+    /// Below this p-value the rest of the residuals is too large for the standard deviations that
+    /// are given, and takes their place.
+    large_p_value: f64,
+    /// The least standard deviation of data, in assumed ones: below it errors of the equilibria
+    /// decide.
+    least_deviation: f64,
+    /// The part of a cosine that free numbers and the cosines before it must leave unexplained.
+    least_independent_part: f64,
+    /// Largest number of cosines of all series.
+    most_cosines: usize,
+}
 
-/// Where deviations are given, the p-value below which residuals are smooth beside the others.
-const SMOOTH_RESIDUALS_P_VALUE: f64 = 0.05;
-
-/// Below this p-value the rest of the residuals is too large for the standard deviations that are given, and
-/// takes their place.
-const LARGE_RESIDUALS_P_VALUE: f64 = 0.01;
-
-/// The least standard deviation of data, in assumed ones: below it errors of the equilibria decide.
-const LEAST_RELATIVE_DEVIATION: f64 = 1e-2;
-
-/// Of a cosine at least this part is not explained by free numbers and the cosines before it.
-const LEAST_INDEPENDENT_FRACTION: f64 = 0.1;
-
-/// Largest number of cosines of all series.
-const MOST_COSINES: usize = 48;
+const LACK_OF_FIT: LackOfFitTest = LackOfFitTest {
+    level: 5e-3,
+    smooth_p_value: 0.05,
+    large_p_value: 0.01,
+    least_deviation: 1e-2,
+    least_independent_part: 0.1,
+    most_cosines: 48,
+};
 
 /// The number of cosines of a series of so many data.
 fn cosine_count(data: usize) -> usize {
@@ -56,11 +63,11 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
         .map(|k| (&stats.jacobian * stats.singular_directions.column(k)) / stats.singular_values[k])
         .collect();
     let explained = basis.len();
-    let most = MOST_COSINES.min(stats.degrees_of_freedom / 2);
+    let most = LACK_OF_FIT.most_cosines.min(stats.degrees_of_freedom / 2);
     // By ascending frequency, so that a limit leaves out the highest.
     let mut energies = vec![0.0; series.len()];
     for frequency in 0..cosine_count(usize::MAX) {
-        for (energy, (_, places)) in energies.iter_mut().zip(&series) {
+        for (energy, ResidualSeries { places, .. }) in energies.iter_mut().zip(&series) {
             if frequency >= cosine_count(places.len()) || basis.len() - explained >= most {
                 continue;
             }
@@ -78,7 +85,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
                 }
             }
             let left = wave.norm();
-            if left > LEAST_INDEPENDENT_FRACTION {
+            if left > LACK_OF_FIT.least_independent_part {
                 wave /= left;
                 *energy += wave.dot(&residuals).powi(2);
                 basis.push(wave);
@@ -96,23 +103,23 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
     let smooth: f64 = energies.iter().sum();
     let scattered = (residuals.norm_squared() - smooth).max(0.0) / rest as f64;
     let is_as_given = stats.has_known_deviations
-        && f_distribution_tail(scattered, rest, None) > LARGE_RESIDUALS_P_VALUE;
+        && f_distribution_tail(scattered, rest, None) > LACK_OF_FIT.large_p_value;
     // Deviations that are given too small make all residuals too large, and none of them smooth.
     let among_residuals = f_distribution_tail(smooth / count as f64 / scattered, count, Some(rest));
     let p_value = match is_as_given {
-        true if among_residuals > SMOOTH_RESIDUALS_P_VALUE => return None,
+        true if among_residuals > LACK_OF_FIT.smooth_p_value => return None,
         true => f_distribution_tail(smooth / count as f64, count, None),
         false => {
             let least = if stats.has_known_deviations {
                 1.0
             } else {
-                LEAST_RELATIVE_DEVIATION.powi(2)
+                LACK_OF_FIT.least_deviation.powi(2)
             };
             let ratio = smooth / count as f64 / scattered.max(least);
             f_distribution_tail(ratio, count, Some(rest))
         }
     };
-    if p_value >= SIGNIFICANCE_LEVEL {
+    if p_value >= LACK_OF_FIT.level {
         return None;
     }
     let mut along: Vec<String> = Vec::new();
@@ -120,7 +127,7 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
         .iter()
         .fold(0.0_f64, |most, energy| most.max(*energy));
     let named = energies.iter().zip(&series);
-    for (_, (name, _)) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
+    for (_, ResidualSeries { name, .. }) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
         if !along.contains(name) {
             along.push(name.clone());
         }
@@ -133,9 +140,16 @@ pub(super) fn systematic_residuals(stats: &FitStatistics) -> Option<SystematicRe
     })
 }
 
-/// The data in series, by their places among all, each with a name: results in the order of the experiments
-/// and in that of their predictions, points of a vein from its base to its tip.
-fn data_series(stats: &FitStatistics) -> Vec<(String, Vec<usize>)> {
+/// A series of data along which residuals may be smooth.
+struct ResidualSeries {
+    name: String,
+    /// Places among all data, in the order of the series.
+    places: Vec<usize>,
+}
+
+/// The data in series: results in the order of the experiments and in that of their predictions, points
+/// of a vein from its base to its tip.
+fn data_series(stats: &FitStatistics) -> Vec<ResidualSeries> {
     let components: Vec<_> = stats.point.components().collect();
     let mut all: BTreeMap<(String, usize, usize), Vec<usize>> = BTreeMap::new();
     for (place, component) in components.iter().enumerate() {
@@ -158,16 +172,25 @@ fn data_series(stats: &FitStatistics) -> Vec<(String, Vec<usize>)> {
                 DatumQuantity::Result(_) => 0.0,
             };
             places.sort_by(|a, b| sigma(a).total_cmp(&sigma(b)));
-            found.push((format!("{column} of vein {rod}"), places));
+            found.push(ResidualSeries {
+                name: format!("{column} of vein {rod}"),
+                places,
+            });
             continue;
         }
         places.sort_by_key(|place| components[*place].experiment);
         let mut by_size = places.clone();
         by_size.sort_by(|a, b| components[*a].model.total_cmp(&components[*b].model));
         let same = by_size == places || by_size.iter().rev().eq(&places);
-        found.push((column.clone(), places));
+        found.push(ResidualSeries {
+            name: column.clone(),
+            places,
+        });
         if !same {
-            found.push((column, by_size));
+            found.push(ResidualSeries {
+                name: column,
+                places: by_size,
+            });
         }
     }
     found
@@ -232,7 +255,7 @@ fn f_distribution_tail(ratio: f64, freedom: usize, of: Option<usize>) -> f64 {
     incomplete_beta(x, 1.0 - x, 0.5 * other, 0.5 * one)
 }
 
-/// The regularised incomplete beta function at `x`, of which `y` is the complement.
+/// The regularized incomplete beta function at `x`, of which `y` is the complement.
 fn incomplete_beta(x: f64, y: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 || y <= 0.0 {
         return if x <= 0.0 { 0.0 } else { 1.0 };

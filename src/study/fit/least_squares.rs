@@ -1,149 +1,63 @@
-//! Least squares: Gauss-Newton with a trust region and
-//! bounds, along equilibria that are followed continuously, without jumps.
+//! Least squares: the Gauss-Newton method with a trust region and bounds, along equilibria that are
+//! followed continuously, without jumps.
 //!
 //! Convergence is tested with the longest admissible step, not with the one within the present
 //! trust region: that may be small because of another direction, and then gains little even if
 //! the point is not a minimum in a weakly determined direction.
-//!
-//! The search for a minimum near a start.
 
 use crate::relax::{ContinuationFailure, GridPolicy};
-use crate::study::fit::data::Experiment;
-use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
-use crate::study::fit::minima::{relative_misfit, sum_of_squares};
-use crate::study::fit::model::{FitModel, FitPoint};
+use crate::study::fit::LONGEST_COORDINATE_STEP;
+use crate::study::fit::model::{FitModel, FitPoint, WeightedDerivatives, Weighting};
 use crate::study::fit::statistics::{
-    FitStatistics, NULL_SINGULAR_VALUE, singular_value_decomposition,
-};
-use crate::study::fit::{
-    Fit, FitError, FitStep, FitWork, LONGEST_COORDINATE_STEP, found, intervals, lack_of_fit,
+    NULL_SINGULAR_VALUE, SingularDirections, singular_value_decomposition,
 };
 use nalgebra::{DMatrix, DVector};
 
-/// Largest number of steps of an iteration.
-const MOST_GAUSS_NEWTON_STEPS: usize = 100;
+/// Steps of a Gauss-Newton iteration, and where it ends. Lengths of steps are in logarithms or
+/// units of the free numbers, gains are reductions of the sum of squares in variances of one datum.
+struct GaussNewtonLimits {
+    /// Largest number of steps.
+    most_steps: usize,
+    /// The initial radius of the trust region.
+    initial_radius: f64,
+    /// A smaller trust region ends the iteration.
+    least_radius: f64,
+    /// A shorter step ends the iteration.
+    shortest_step: f64,
+    /// A point ends the iteration from which the longest step is expected to gain no more.
+    converged_gain: f64,
+    /// Smaller gains may be errors of the equilibria: two in succession end the iteration, and so
+    /// does a loss.
+    uncertain_gain: f64,
+    /// The end is no minimum if the longest step was expected to gain more.
+    open_gain: f64,
+    /// The part of the way to the sum of another minimum that the longest step must be expected to
+    /// lead.
+    hopeless_part: f64,
+    /// The part of the way back to a known minimum that the longest step may lead.
+    returning_part: f64,
+    /// Bisections for the damping that shortens a step to the trust region.
+    damping_bisections: usize,
+    /// Least variance of residuals in units of the assumed one: equilibria are not more accurate.
+    least_variance: f64,
+}
 
-/// The initial radius of the trust region, in logarithms or units, and the least one.
-const INITIAL_TRUST_RADIUS: f64 = 0.7;
-
-const LEAST_TRUST_RADIUS: f64 = 1e-12;
-
-/// A smaller step ends the iteration; and a point from which the longest step is
-/// expected to gain no more than this part of one datum's variance.
-const CONVERGED_STEP: f64 = 1e-9;
-
-const CONVERGED_GAIN: f64 = 1e-7;
-
-/// Gains below this part of the variance may be errors of the equilibria: two in
-/// succession end the iteration, and so does a loss.
-const SUM_OF_SQUARES_ACCURACY: f64 = 1e-2;
-
-/// A minimum is rejected if the longest step was expected to gain more than this part.
-const REMAINING_GAIN_LIMIT: f64 = 0.1;
-
-/// The part of the way to a sum that the longest step must be expected to lead, and that of the
-/// way back to a known minimum that it may lead.
-const HOPELESS_STEP_THRESHOLD: f64 = 0.5;
-
-const RETURN_TO_KNOWN_MINIMUM: f64 = 0.5;
-
-/// Bisections for the damping that shortens a step.
-const DAMPING_BISECTIONS: usize = 40;
-
-/// Least variance of residuals in units of the assumed deviation: equilibria are not more
-/// accurate.
-const LEAST_VARIANCE: f64 = 1e-6;
-
-/// Tuning constant of Huber's weights: 95 % efficient for normal errors.
-const HUBER_TUNING_CONSTANT: f64 = 1.345;
-
-/// The standard deviation assumed if none is known, in lengths of the
-/// leaf, until it is estimated from the residuals.
-pub(super) const ASSUMED_DEVIATION_PER_LENGTH: f64 = 1e-3;
+const GAUSS_NEWTON: GaussNewtonLimits = GaussNewtonLimits {
+    most_steps: 100,
+    initial_radius: 0.7,
+    least_radius: 1e-12,
+    shortest_step: 1e-9,
+    converged_gain: 1e-7,
+    uncertain_gain: 1e-2,
+    open_gain: 0.1,
+    hopeless_part: 0.5,
+    returning_part: 0.5,
+    damping_bisections: 40,
+    least_variance: 1e-6,
+};
 
 /// As [`NULL_SINGULAR_VALUE`], for the less accurate derivatives of the search.
 const NULL_SINGULAR_VALUE_SEARCH: f64 = 3e-7;
-
-/// Weights of residuals.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Weighting {
-    /// Replaces unknown standard deviations.
-    pub assumed_deviation: f64,
-    /// Whether large residuals have smaller weights.
-    pub is_robust: bool,
-}
-
-impl Weighting {
-    /// Residuals divided by their standard deviations.
-    pub fn residuals(&self, point: &FitPoint) -> DVector<f64> {
-        let components = point.components();
-        let residual =
-            components.map(|c| (c.model - c.observed) / c.sd.unwrap_or(self.assumed_deviation));
-        DVector::from_vec(residual.collect())
-    }
-
-    /// Their derivatives; zero if they are not known.
-    pub fn jacobian(&self, point: &FitPoint) -> DMatrix<f64> {
-        let components = point.components();
-        let sd: Vec<f64> = components
-            .map(|c| c.sd.unwrap_or(self.assumed_deviation))
-            .collect();
-        let rows = point.case_solutions.iter().flat_map(|case| {
-            let components = 0..case.scalar_data.len();
-            components.map(|i| case.gradients.get(i))
-        });
-        let rows: Vec<Option<&Vec<f64>>> = rows.collect();
-        let gradient = |i: usize, k: usize| rows[i].map_or(0.0, |row| row[k]);
-        DMatrix::from_fn(sd.len(), point.theta.len(), |i, k| gradient(i, k) / sd[i])
-    }
-
-    /// Square roots of the weights of residuals, and derivatives times these.
-    pub fn apply_weights(
-        &self,
-        point: &FitPoint,
-        residuals: &DVector<f64>,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (roots, mut jacobian) = (self.weight_roots(residuals), self.jacobian(point));
-        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
-            row *= *root;
-        }
-        (roots, jacobian)
-    }
-
-    /// Square roots of the weights of residuals: less than one beyond Huber's
-    /// bound, in units of the spread of all.
-    pub fn weight_roots(&self, residuals: &DVector<f64>) -> DVector<f64> {
-        if !self.is_robust {
-            return DVector::from_element(residuals.len(), 1.0);
-        }
-        let bound = HUBER_TUNING_CONSTANT * median_deviation(residuals);
-        residuals.map(|r| match r.abs() > bound {
-            true => (bound / r.abs()).sqrt(),
-            false => 1.0,
-        })
-    }
-
-    /// The sum of their squares, linear beyond Huber's bound.
-    pub fn huber_sum(&self, residuals: &DVector<f64>, bound: f64) -> f64 {
-        let term = |r: &f64| match self.is_robust && r.abs() > bound {
-            true => bound * (2.0 * r.abs() - bound),
-            false => r * r,
-        };
-        residuals.iter().map(term).sum()
-    }
-
-    pub fn huber_bound(&self, residuals: &DVector<f64>) -> f64 {
-        HUBER_TUNING_CONSTANT * median_deviation(residuals)
-    }
-}
-
-/// The standard deviation of normal variables, from the median of their magnitudes.
-fn median_deviation(residuals: &DVector<f64>) -> f64 {
-    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
-    (1.4826 * median).max(1e-12)
-}
 
 /// How an iteration ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,18 +83,25 @@ impl ExcludedMinimum<'_> {
     /// Whether a step hardly leads to such a minimum: the sum that is expected after it is too large
     /// still, or it leads back to the known minimum.
     fn is_step_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
-        let returns =
-            coordinate_change(self.theta, theta).norm() < RETURN_TO_KNOWN_MINIMUM * self.distance;
+        let returns = coordinate_change(self.theta, theta).norm()
+            < GAUSS_NEWTON.returning_part * self.distance;
         returns
             || expected - self.largest_sum
-                > (1.0 - HOPELESS_STEP_THRESHOLD) * (sum - self.largest_sum).max(0.0)
+                > (1.0 - GAUSS_NEWTON.hopeless_part) * (sum - self.largest_sum).max(0.0)
     }
+}
+
+/// Where an iteration ended.
+pub(super) struct GaussNewtonResult {
+    pub point: FitPoint,
+    pub outcome: GaussNewtonOutcome,
+    /// How often the leaves were followed.
+    pub evaluations: usize,
 }
 
 pub(super) struct GaussNewtonIteration<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
-    /// Coordinates that are held fixed.
     pub held: Vec<bool>,
     pub most_steps: usize,
     /// Gain that the longest step may still promise at the end, as a part of a datum's variance.
@@ -206,8 +127,8 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
             model,
             weighting,
             held: vec![false; model.coordinates.len()],
-            most_steps: MOST_GAUSS_NEWTON_STEPS,
-            gain_tolerance: CONVERGED_GAIN,
+            most_steps: GAUSS_NEWTON.most_steps,
+            gain_tolerance: GAUSS_NEWTON.converged_gain,
             reuses_derivatives: false,
             excluded_minimum: None,
             jumps: Vec::new(),
@@ -216,66 +137,76 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
     }
 
     /// From a point to a minimum near it, with derivatives.
-    pub fn run(&mut self, mut point: FitPoint) -> (FitPoint, GaussNewtonOutcome, usize) {
-        if let Err(lost) = self.model.differentiate_data(&mut point) {
-            return (point, GaussNewtonOutcome::Stuck(Some(lost)), 0);
-        }
-        let mut radius = INITIAL_TRUST_RADIUS;
+    pub fn run(&mut self, mut point: FitPoint) -> GaussNewtonResult {
         let mut evaluations = 0;
+        let outcome = self.iterate(&mut point, &mut evaluations);
+        GaussNewtonResult {
+            point,
+            outcome,
+            evaluations,
+        }
+    }
+
+    fn iterate(&mut self, point: &mut FitPoint, evaluations: &mut usize) -> GaussNewtonOutcome {
+        if let Err(lost) = self.model.differentiate_data(point) {
+            return GaussNewtonOutcome::Stuck(Some(lost));
+        }
+        let mut radius = GAUSS_NEWTON.initial_radius;
         let mut small = 0;
         for step in 0..self.most_steps {
-            let residuals = self.weighting.residuals(&point);
+            let residuals = self.weighting.residuals(point);
             let bound = self.weighting.huber_bound(&residuals);
             let sum = self.weighting.huber_sum(&residuals, bound);
             (self.progress)(step, sum);
-            let linear = self.linearize_residuals(&point, &residuals);
-            let variance = linear.datum_variance(&point, sum);
+            let linear = self.linearize_residuals(point, &residuals);
+            let variance = linear.datum_variance(point, sum);
             let longest = self.bounded_update(
                 &point.theta,
                 &linear.trust_region_step(LONGEST_COORDINATE_STEP),
             );
             let open = linear.expected_reduction(&coordinate_change(&point.theta, &longest));
             if open < self.gain_tolerance * variance {
-                return (point, GaussNewtonOutcome::Converged, evaluations);
+                return GaussNewtonOutcome::Converged;
             }
             let besides = self.excluded_minimum.as_ref();
             if besides.is_some_and(|it| it.is_step_hopeless(sum - open, sum, &longest)) {
-                return (point, GaussNewtonOutcome::Stuck(None), evaluations);
+                return GaussNewtonOutcome::Stuck(None);
             }
             self.jumps.clear();
-            let nearly = open < SUM_OF_SQUARES_ACCURACY * variance;
+            let nearly = open < GAUSS_NEWTON.uncertain_gain * variance;
             let mut lost = None;
             loop {
                 let theta = self.bounded_update(&point.theta, &linear.trust_region_step(radius));
                 let change = coordinate_change(&point.theta, &theta);
                 let (size, predicted) = (change.norm(), linear.expected_reduction(&change));
                 let end = |lost: Option<ContinuationFailure>| match open
-                    > REMAINING_GAIN_LIMIT * variance
+                    > GAUSS_NEWTON.open_gain * variance
                 {
                     true => GaussNewtonOutcome::Stuck(lost),
                     false => GaussNewtonOutcome::Converged,
                 };
                 let number = size.is_finite() && predicted.is_finite();
-                let worth = size >= CONVERGED_STEP
-                    && predicted >= CONVERGED_GAIN * variance
-                    && radius >= LEAST_TRUST_RADIUS;
+                let worth = size >= GAUSS_NEWTON.shortest_step
+                    && predicted >= GAUSS_NEWTON.converged_gain * variance
+                    && radius >= GAUSS_NEWTON.least_radius;
                 if !number || !worth {
-                    return (point, end(lost), evaluations);
+                    return end(lost);
                 }
                 if self.model.budget.is_used_up() {
-                    return (point, GaussNewtonOutcome::BudgetExhausted, evaluations);
+                    return GaussNewtonOutcome::BudgetExhausted;
                 }
-                evaluations += 1;
-                match self.model.continue_leaves(&point, &theta) {
+                *evaluations += 1;
+                match self.model.continue_leaves(point, &theta) {
                     Ok(mut trial) => {
                         let found = self.weighting.residuals(&trial);
                         let gained = sum - self.weighting.huber_sum(&found, bound);
                         if self.reuses_derivatives
                             && gained > 0.0
-                            && self.is_minimum(&point, &theta, &found)
+                            && self.is_minimum(point, &theta, &found)
                         {
-                            trial.take_gradients(&mut point);
-                            return (trial, GaussNewtonOutcome::Converged, evaluations);
+                            trial.take_gradients(point);
+                            *point = trial;
+                            return GaussNewtonOutcome::Converged;
                         }
                         if gained > 0.0 && self.model.differentiate_data(&mut trial).is_ok() {
                             let ratio = gained / predicted;
@@ -284,15 +215,15 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                             } else if ratio > 0.75 {
                                 radius = radius.max(2.0 * size).min(LONGEST_COORDINATE_STEP);
                             }
-                            point = trial;
+                            *point = trial;
                             small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
-                                return (point, GaussNewtonOutcome::Converged, evaluations);
+                                return GaussNewtonOutcome::Converged;
                             }
                             break;
                         }
                         if nearly {
-                            return (point, GaussNewtonOutcome::Converged, evaluations);
+                            return GaussNewtonOutcome::Converged;
                         }
                         lost = None;
                     }
@@ -306,22 +237,25 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 radius = 0.25 * size;
             }
         }
-        (point, GaussNewtonOutcome::StepLimit, evaluations)
+        GaussNewtonOutcome::StepLimit
     }
 
-    /// The linearised residuals in the coordinates that may move.
+    /// The linearized residuals in the coordinates that may move.
     fn linearize_residuals(
         &self,
         point: &FitPoint,
         residuals: &DVector<f64>,
     ) -> LinearizedResiduals {
-        let (roots, mut jacobian) = self.weighting.apply_weights(point, residuals);
+        let WeightedDerivatives {
+            roots,
+            mut jacobian,
+        } = self.weighting.weighted_derivatives(point, residuals);
         let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
         let active = self.movable_coordinates(point, &gradient);
         for k in (0..active.len()).filter(|&k| !active[k]) {
             jacobian.column_mut(k).fill(0.0);
         }
-        let (values, directions) = singular_value_decomposition(&jacobian);
+        let SingularDirections { values, directions } = singular_value_decomposition(&jacobian);
         let slopes = directions.tr_mul(&gradient);
         let null = match self.model.grids {
             GridPolicy::AsNeeded => NULL_SINGULAR_VALUE,
@@ -372,7 +306,7 @@ fn coordinate_change(from: &[f64], to: &[f64]) -> DVector<f64> {
     DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
 }
 
-/// Weighted residuals, linearised, along their singular directions.
+/// Weighted residuals, linearized, along their singular directions.
 struct LinearizedResiduals {
     /// Singular values, ascending, and their directions as columns.
     singular_values: Vec<f64>,
@@ -395,11 +329,12 @@ impl LinearizedResiduals {
         }
         match known {
             true => 1.0,
-            false => (sum / count.saturating_sub(sensitive).max(1) as f64).max(LEAST_VARIANCE),
+            false => (sum / count.saturating_sub(sensitive).max(1) as f64)
+                .max(GAUSS_NEWTON.least_variance),
         }
     }
 
-    /// The step within a radius that minimises the sum of squares.
+    /// The step within a radius that minimizes the sum of squares.
     fn trust_region_step(&self, radius: f64) -> DVector<f64> {
         let along = |damping: f64| {
             let part = |k: usize, slope: f64| match k < self.insensitive_count {
@@ -413,7 +348,7 @@ impl LinearizedResiduals {
         if parts.norm() > radius {
             // The length decreases with the damping.
             let (mut low, mut high) = (0.0, self.slopes.norm() / radius);
-            for _ in 0..DAMPING_BISECTIONS {
+            for _ in 0..GAUSS_NEWTON.damping_bisections {
                 let middle = match low > 0.0 {
                     true => f64::sqrt(low * high),
                     false => 1e-4 * high,
@@ -438,184 +373,4 @@ impl LinearizedResiduals {
             })
             .sum()
     }
-}
-
-/// Largest number of minima abandoned for better ones.
-const MOST_MINIMA_ABANDONED: usize = 4;
-
-/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
-const MOST_EQUILIBRIUM_JUMPS: usize = 3;
-
-/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
-/// that of the search to it: a larger one is due to coarse grids.
-const CONSISTENT_DEVIATION_RATIO: f64 = 1.05;
-
-/// Remark if a leaf did not stay on its branch.
-const EQUILIBRIUM_JUMP_REMARK: &str = "on the way a leaf jumped to another equilibrium, that to which it \
-    relaxes from the start: compare with a fit that starts from the values found";
-
-/// A minimum, or where the search for it ended.
-pub(super) struct FitMinimum {
-    pub fit: Fit,
-    pub theta: Vec<f64>,
-    /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
-    pub sum: f64,
-    pub variance: f64,
-    pub significant_excess: f64,
-    pub converged: bool,
-    /// Root mean square of the residuals, relative to the size of the data.
-    pub misfit: f64,
-    /// Whether the sum still falls where a number without given bounds is as far from its initial
-    /// value as it may be.
-    pub beyond_window: bool,
-}
-
-impl FitMinimum {
-    /// Whether this is the better answer. A minimum is not left for values that are none.
-    pub fn is_preferred_to(&self, other: &FitMinimum) -> bool {
-        match self.converged == other.converged {
-            true => self.sum < other.sum,
-            false => self.converged,
-        }
-    }
-
-    /// This minimum as one besides which another is searched from these values.
-    pub fn exclude_from(&self, theta: &[f64]) -> ExcludedMinimum<'_> {
-        let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
-        ExcludedMinimum {
-            theta: &self.theta,
-            largest_sum: self.sum + self.significant_excess,
-            distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
-        }
-    }
-}
-
-/// The search for a minimum near a start.
-pub(super) struct LocalFitSearch<'m, 'a> {
-    pub model: &'m FitModel<'a>,
-    pub weighting: Weighting,
-    /// Whether the standard deviations of the data are known.
-    pub has_known_deviations: bool,
-    pub candidates: &'m [Experiment],
-    /// Largest number of steps to a minimum.
-    pub most_steps: usize,
-}
-
-impl<'m, 'a> LocalFitSearch<'m, 'a> {
-    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
-    /// there.
-    pub fn run(
-        &self,
-        first: &FitPoint,
-        progress: &mut dyn FnMut(&FitStep),
-    ) -> Result<FitMinimum, FitError> {
-        let (model, weighting) = (self.model, self.weighting);
-        let (mut coarse, mut point) = model.coarse_model(first, weighting)?;
-        let mut work = FitWork::default();
-        let mut attempts = 0;
-        let mut jumps = 0;
-        let mut found = loop {
-            // The search on coarse grids; the last steps use all.
-            let mut searching = |step, sum| {
-                let known = None;
-                progress(&FitStep {
-                    step,
-                    sum,
-                    known,
-                    budget: None,
-                });
-            };
-            let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
-            search.most_steps = search.most_steps.min(self.most_steps);
-            let (near, searched, more) = search.run(point);
-            work.evaluations += more;
-            attempts += 1;
-            let there = model.continue_leaves(&near, &near.theta);
-            let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
-            let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
-            last.reuses_derivatives = true;
-            last.most_steps = last.most_steps.min(self.most_steps);
-            let (mut least, end, more) = last.run(there);
-            work.evaluations += 1 + more;
-            work.accurate += 1 + more;
-            let is_lost =
-                end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
-            if is_lost
-                && jumps < MOST_EQUILIBRIUM_JUMPS
-                && let Some(there) = model.relax_beyond_jump(&last.jumps, &least, weighting)
-            {
-                jumps += 1;
-                attempts -= 1;
-                (coarse, point) = model.coarse_model(&there, weighting)?;
-                continue;
-            }
-            let of_search =
-                FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
-            let spread = self.statistics(&least).residual_deviation;
-            let same = searched == GaussNewtonOutcome::Converged
-                && of_search.residual_deviation < CONSISTENT_DEVIATION_RATIO * spread;
-            if !same && end == GaussNewtonOutcome::Converged {
-                // Its neighbourhood is computed with its own leaves.
-                let differentiated = model.differentiate_data(&mut least);
-                differentiated.map_err(|lost| model.no_equilibrium_error(&near.theta, 0, &lost))?;
-            }
-            let stats = self.statistics(&least);
-            let shape = if same { &of_search } else { &stats };
-            let contradicted = lack_of_fit::data_contradict_model(&stats);
-            let parameters = match end {
-                GaussNewtonOutcome::Converged if !contradicted => {
-                    intervals::parameters_with_intervals(&stats, shape, progress)
-                }
-                _ => Ok(intervals::parameters_without_intervals(&stats)),
-            };
-            let (end, parameters) = match parameters {
-                Ok(parameters) => (end, parameters),
-                Err(better) if attempts < MOST_MINIMA_ABANDONED => {
-                    point = better;
-                    continue;
-                }
-                Err(_) => (
-                    GaussNewtonOutcome::StepLimit,
-                    intervals::parameters_without_intervals(&stats),
-                ),
-            };
-            break FitMinimum {
-                fit: found::assemble_fit(&stats, &end, parameters, work, self.candidates),
-                sum: sum_of_squares(weighting, stats.point),
-                variance: stats.residual_deviation.powi(2),
-                significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
-                converged: end == GaussNewtonOutcome::Converged,
-                misfit: relative_misfit(model, stats.point),
-                beyond_window: falls_beyond_window(&stats),
-                theta: stats.point.theta.clone(),
-            };
-        };
-        if jumps > 0 {
-            found.fit.remarks.push(EQUILIBRIUM_JUMP_REMARK.into());
-        }
-        Ok(found)
-    }
-
-    fn statistics<'p>(&'p self, point: &'p FitPoint) -> FitStatistics<'p, 'a> {
-        FitStatistics::new(self.model, self.weighting, self.has_known_deviations, point)
-    }
-}
-
-/// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
-/// than chance.
-fn falls_beyond_window(stats: &FitStatistics) -> bool {
-    let weighed = stats.weighting.weight_roots(&stats.residuals);
-    let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
-    let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
-    coordinates.enumerate().any(|(k, (free, theta))| {
-        let [low, high] = free.bounds;
-        let slope = slopes[k];
-        let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
-        let bend = stats.jacobian.column(k).norm_squared();
-        let step = (slope.abs() / bend).min(LONGEST_COORDINATE_STEP);
-        let gain = step * (2.0 * slope.abs() - bend * step);
-        !free.has_given_bounds
-            && outwards
-            && gain > BETTER_MINIMUM_EXCESS * stats.residual_deviation.powi(2)
-    })
 }

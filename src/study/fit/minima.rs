@@ -1,19 +1,18 @@
 //! Which minimum is the answer: where the search begins, where it begins again if it ends without a
 //! good one, and other minima that fit the data as well.
 //!
-//! Other values from which a search may begin: in decades around given ones, near them, and those
-//! that exchange or mirror what the data may not distinguish.
+//! Searches begin in decades around given values, near them, and at values that exchange or mirror what
+//! the data may not distinguish.
 
 use crate::run::Instant;
-use crate::scenario::longest;
-use crate::study::fit::data::{DatumDimension, Experiment, MeasuredQuantity};
-use crate::study::fit::intervals::BETTER_MINIMUM_EXCESS;
+use crate::study::fit::data::Experiment;
 use crate::study::fit::least_squares::{
-    ExcludedMinimum, FitMinimum, GaussNewtonIteration, GaussNewtonOutcome, LocalFitSearch,
-    Weighting,
+    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
-use crate::study::fit::model::{DatumQuantity, FitModel, FitPoint};
-use crate::study::fit::statistics::UNDETERMINED_UNCERTAINTY;
+use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
+use crate::study::fit::remark::FitRemark;
+use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
 use crate::study::fit::{
     Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
 };
@@ -21,31 +20,39 @@ use rayon::prelude::*;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Root mean square of the residuals, relative to the size of the data, beyond which initial values
-/// say nothing of the minimum: they are searched in decades first.
-const POOR_INITIAL_MISFIT: f64 = 0.25;
+/// When a fit begins elsewhere, and how often. Misfits are root mean squares of the residuals
+/// relative to the size of the data.
+struct GlobalSearchLimits {
+    /// Initial values with a larger misfit say nothing of the minimum: they are searched in decades
+    /// first.
+    poor_initial_misfit: f64,
+    /// At a minimum with a larger misfit the data would be less accurate than measurements are.
+    poor_minimum_misfit: f64,
+    /// Largest number of searches from other values.
+    most_searches: usize,
+    /// Largest number of values from which each of them begins.
+    most_starts: usize,
+    /// Largest number of steps to another minimum.
+    most_steps_to_alternative: usize,
+    /// Relative difference of values that are the same.
+    same_values: f64,
+}
 
-/// The same of a minimum, beyond which the data would be less accurate than measurements are.
-const POOR_MINIMUM_MISFIT: f64 = 0.05;
+const GLOBAL_SEARCH: GlobalSearchLimits = GlobalSearchLimits {
+    poor_initial_misfit: 0.25,
+    poor_minimum_misfit: 0.05,
+    most_searches: 3,
+    most_starts: 4,
+    most_steps_to_alternative: 30,
+    same_values: 1e-3,
+};
 
-/// Largest number of searches from other values, and of values from which each begins.
-const MOST_SEARCHES: usize = 3;
-
-const MOST_STARTS_PER_SEARCH: usize = 4;
-
-/// Largest number of steps to another minimum.
-const MOST_STEPS_TO_ALTERNATIVE: usize = 30;
-
-/// Relative difference of values that are the same.
-const SAME_VALUES_TOLERANCE: f64 = 1e-3;
-
-/// Where a search begins.
 pub(super) struct FitStart {
     pub point: FitPoint,
     /// The values of the scenario, if it does not begin there although all leaves come to rest.
     initial: Option<FitPoint>,
     /// Why it does not begin at the values of the scenario, or what was tried.
-    remark: Option<String>,
+    remark: Option<FitRemark>,
     /// How often the leaves were relaxed to find it.
     evaluations: usize,
 }
@@ -65,7 +72,7 @@ impl FitStart {
         let found = loose.relax_leaves(&start);
         told(clock.elapsed().as_secs_f64());
         let (initial, refused) = match found {
-            Ok(point) if relative_misfit(model, &point) <= POOR_INITIAL_MISFIT => {
+            Ok(point) if model.relative_misfit(&point) <= GLOBAL_SEARCH.poor_initial_misfit => {
                 return Ok(FitStart {
                     point,
                     initial: None,
@@ -80,16 +87,17 @@ impl FitStart {
         let mut taken = 0;
         if let Some(point) = &initial {
             // One search from there costs less than a look at other decades.
-            let (found, evaluations) = find_coarse_minimum(
+            let found = find_coarse_minimum(
                 model,
                 weighting,
                 &point.theta,
-                (None, MOST_STEPS_TO_ALTERNATIVE),
+                None,
+                GLOBAL_SEARCH.most_steps_to_alternative,
             );
-            taken = evaluations;
-            let there = found.and_then(|found| loose.relax_leaves(&found.theta).ok());
-            if let Some(there) =
-                there.filter(|there| relative_misfit(model, there) <= POOR_MINIMUM_MISFIT)
+            taken = found.evaluations;
+            let there = (found.minimum).and_then(|found| loose.relax_leaves(&found.theta).ok());
+            if let Some(there) = there
+                .filter(|there| model.relative_misfit(there) <= GLOBAL_SEARCH.poor_minimum_misfit)
             {
                 return Ok(FitStart {
                     point: there,
@@ -101,7 +109,7 @@ impl FitStart {
         }
         let scout = Multistart::new(model, weighting);
         let least = match &initial {
-            Some(point) => sum_of_squares(weighting, point),
+            Some(point) => weighting.sum_of_squares(point),
             None => f64::INFINITY,
         };
         let mut starts = match initial {
@@ -113,65 +121,84 @@ impl FitStart {
         }
         let better = starts.iter().filter(|found| found.sum < least);
         let better = better
-            .take(MOST_STARTS_PER_SEARCH)
+            .take(GLOBAL_SEARCH.most_starts)
             .find_map(|found| loose.relax_leaves(&found.theta).ok());
         let evaluations = taken + scout.evaluations();
         match (better, initial, refused) {
             (Some(point), initial, refused) => {
                 let values = model.values_in_words(&point.theta);
-                let why = refused.unwrap_or_else(|| {
-                    "with the numbers of the scenario the leaf is far from the data".into()
-                });
-                let remark = Some(format!("{why}; the search began with {values}"));
                 Ok(FitStart {
                     point,
                     initial,
-                    remark,
+                    remark: Some(FitRemark::BeganElsewhere {
+                        refusal: refused,
+                        values,
+                    }),
                     evaluations,
                 })
             }
-            (None, Some(point), _) => {
-                let remark = Some(
-                    "with the numbers of the scenario the leaf is far from the data, and no other \
-                     decade of them is nearer"
-                        .into(),
-                );
-                Ok(FitStart {
-                    point,
-                    initial: None,
-                    remark,
-                    evaluations,
-                })
-            }
+            (None, Some(point), _) => Ok(FitStart {
+                point,
+                initial: None,
+                remark: Some(FitRemark::NoDecadeNearer),
+                evaluations,
+            }),
             (None, None, refused) => Err(FitError::NoEquilibrium(refused.unwrap_or_default())),
         }
     }
 }
 
-/// The minimum near some values, on coarse grids, and how often the leaves were relaxed.
+/// The minimum near some values, on coarse grids.
+struct CoarseMinimum {
+    /// None if the search does not converge.
+    minimum: Option<EvaluatedStart>,
+    /// How often the leaves were relaxed.
+    evaluations: usize,
+}
+
+impl CoarseMinimum {
+    /// No minimum: the leaves do not come to rest at these values.
+    const NO_LEAVES: CoarseMinimum = CoarseMinimum {
+        minimum: None,
+        evaluations: 1,
+    };
+}
+
 fn find_coarse_minimum(
     model: &FitModel,
     weighting: Weighting,
     theta: &[f64],
-    (besides, most_steps): (Option<ExcludedMinimum>, usize),
-) -> (Option<EvaluatedStart>, usize) {
+    besides: Option<ExcludedMinimum>,
+    most_steps: usize,
+) -> CoarseMinimum {
     let first = model.with_loose_tolerance(weighting.assumed_deviation);
     let Ok(first) = first.relax_leaves_within_steps(theta, MOST_RELAXATION_STEPS) else {
-        return (None, 1);
+        return CoarseMinimum::NO_LEAVES;
     };
-    let Ok((coarse, point)) = model.coarse_model(&first, weighting) else {
-        return (None, 1);
+    let Ok(CoarseModel {
+        model: coarse,
+        point,
+    }) = model.coarse_model(&first, weighting)
+    else {
+        return CoarseMinimum::NO_LEAVES;
     };
     let mut quietly = |_, _| {};
     let mut iteration = GaussNewtonIteration::new(&coarse, weighting, &mut quietly);
     iteration.most_steps = most_steps;
     iteration.excluded_minimum = besides;
-    let (point, end, more) = iteration.run(point);
-    let found = (end == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
-        sum: sum_of_squares(weighting, &point),
+    let GaussNewtonResult {
+        point,
+        outcome,
+        evaluations,
+    } = iteration.run(point);
+    let minimum = (outcome == GaussNewtonOutcome::Converged).then(|| EvaluatedStart {
+        sum: weighting.sum_of_squares(&point),
         theta: point.theta,
     });
-    (found, 1 + more)
+    CoarseMinimum {
+        minimum,
+        evaluations: 1 + evaluations,
+    }
 }
 
 /// Other minima, and what was tried to find them.
@@ -181,7 +208,6 @@ struct AlternativeMinima {
     tried: Vec<String>,
 }
 
-/// Searches for the best minimum.
 pub(super) struct GlobalFitSearch<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -220,7 +246,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
             }
             (first, None) => first?,
         };
-        for _ in 0..MOST_SEARCHES {
+        for _ in 0..GLOBAL_SEARCH.most_searches {
             let further = (best.beyond_window && !budget.is_used_up())
                 .then(|| self.search_from_values(&best, &best.theta, progress));
             let further = further.flatten();
@@ -230,7 +256,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
             }
         }
         let mut others = AlternativeMinima::default();
-        for _ in 0..MOST_SEARCHES {
+        for _ in 0..GLOBAL_SEARCH.most_searches {
             if budget.is_used_up() {
                 break;
             }
@@ -258,20 +284,15 @@ impl<'a> GlobalFitSearch<'_, 'a> {
             let significant = best.significant_excess;
             let as_well = |other: &&EvaluatedStart| other.sum <= best.sum + significant;
             for other in others.minima.iter().filter(as_well) {
-                self.add_alternative(&mut fit, (other, best.sum));
+                self.add_alternative(&mut fit, other, best.sum);
             }
         }
         fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
         if budget.is_used_up() {
-            fit.remarks.insert(
-                0,
-                format!(
-                    "the budget of {} evaluations was used up: this is the best that was found so far; allow more, \
-                     free fewer numbers, or begin nearer",
-                    budget.limit()
-                ),
-            );
+            let evaluations = budget.limit();
+            fit.remarks
+                .insert(0, FitRemark::BudgetUsedUp { evaluations });
         }
         fit.work.evaluations = began.evaluations + self.evaluations.get();
         Ok(fit)
@@ -351,7 +372,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<FitMinimum, FitError> {
         let starts = Multistart::new(self.model, self.weighting).starts_nearby(&from.theta);
-        let mut points = starts.iter().take(MOST_STARTS_PER_SEARCH);
+        let mut points = starts.iter().take(GLOBAL_SEARCH.most_starts);
         let found = points.find_map(|start| {
             let point = self
                 .model_with_loose_tolerance()
@@ -365,7 +386,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
     /// Whether there may well be a better minimum elsewhere.
     fn suspects_better_minimum(&self, best: &FitMinimum) -> bool {
         let contradicted = best.fit.outcome == FitOutcome::Contradicted;
-        let coarse = !self.has_known_deviations && best.misfit > POOR_MINIMUM_MISFIT;
+        let coarse = !self.has_known_deviations && best.misfit > GLOBAL_SEARCH.poor_minimum_misfit;
         !best.converged || best.beyond_window || contradicted || coarse
     }
 
@@ -384,7 +405,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         let initial = self.model.coordinates.iter().map(|free| free.initial);
         let mut starts = scout.ranked_starts(vec![initial.collect()]);
         starts.extend(scout.starts_nearby(&best.theta));
-        if best.beyond_window || best.misfit > POOR_MINIMUM_MISFIT {
+        if best.beyond_window || best.misfit > GLOBAL_SEARCH.poor_minimum_misfit {
             tried.push("other decades".into());
             starts.extend(scout.starts_in_decades(&best.theta, best.sum));
         }
@@ -392,14 +413,14 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         self.count_evaluations(scout.evaluations());
         let mut minima = Vec::new();
         let most = self.search_evaluation_limit(best);
-        for start in starts.into_iter().take(MOST_STARTS_PER_SEARCH) {
+        for start in starts.into_iter().take(GLOBAL_SEARCH.most_starts) {
             // Values that are better already need not lead away from the minimum.
             let beside = best.converged && !self.is_better(best, start.sum);
             let besides = beside.then(|| best.exclude_from(&start.theta));
             let Some(most_steps) = self.remaining_evaluations(most) else {
                 break;
             };
-            let most_steps = most_steps.min(MOST_STEPS_TO_ALTERNATIVE);
+            let most_steps = most_steps.min(GLOBAL_SEARCH.most_steps_to_alternative);
             minima.extend(self.find_coarse_minimum(&start.theta, besides, most_steps));
         }
         AlternativeMinima { minima, tried }
@@ -409,14 +430,14 @@ impl<'a> GlobalFitSearch<'_, 'a> {
     fn minima_from_symmetric_values(&self, best: &FitMinimum) -> AlternativeMinima {
         let mut others = AlternativeMinima::default();
         let most = self.search_evaluation_limit(best);
-        for (theta, what) in symmetric_values(self.model, &best.theta) {
+        for SymmetricValues { theta, description } in symmetric_values(self.model, &best.theta) {
             let Some(most_steps) = self.remaining_evaluations(most) else {
                 break;
             };
             let found =
                 self.find_coarse_minimum(&theta, Some(best.exclude_from(&theta)), most_steps);
             others.minima.extend(found);
-            others.tried.push(what);
+            others.tried.push(description);
         }
         others
     }
@@ -428,15 +449,14 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         besides: Option<ExcludedMinimum>,
         most_steps: usize,
     ) -> Option<EvaluatedStart> {
-        let (found, evaluations) =
-            find_coarse_minimum(self.model, self.weighting, theta, (besides, most_steps));
-        self.count_evaluations(evaluations);
-        found
+        let found = find_coarse_minimum(self.model, self.weighting, theta, besides, most_steps);
+        self.count_evaluations(found.evaluations);
+        found.minimum
     }
 
     /// Adds another minimum to a fit, if a number that is determined has a value there beyond its
     /// interval: then it is not.
-    fn add_alternative(&self, fit: &mut Fit, (other, least): (&EvaluatedStart, f64)) {
+    fn add_alternative(&self, fit: &mut Fit, other: &EvaluatedStart, least: f64) {
         let values = self.model.named_values(&other.theta);
         let beyond = |parameter: &FitParameter, value: f64| {
             let (low, high) = (parameter.low, parameter.high);
@@ -446,7 +466,9 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         };
         let known = fit.alternatives.iter().any(|known| {
             let mut both = values.iter();
-            both.all(|(key, value)| (known.values[key] / value - 1.0).abs() < SAME_VALUES_TOLERANCE)
+            both.all(|(key, value)| {
+                (known.values[key] / value - 1.0).abs() < GLOBAL_SEARCH.same_values
+            })
         });
         let differs: Vec<bool> = (fit.parameters.iter().zip(&values))
             .map(|(parameter, (_, value))| beyond(parameter, *value))
@@ -468,31 +490,37 @@ impl<'a> GlobalFitSearch<'_, 'a> {
     }
 }
 
-/// Largest number of decades searched to each side, of those in succession that are no better before
-/// one is and after it, and the reduction of the sum of squares that counts as better.
-const MOST_DECADES_SEARCHED: usize = 8;
+/// Values at which the leaves are compared before a search begins there.
+struct MultistartSettings {
+    /// Largest number of decades to each side.
+    most_decades: usize,
+    /// Largest number of decades in succession that are no better, before one is and after it.
+    fruitless_decades: [usize; 2],
+    /// Ratio of sums of squares that counts as better.
+    improved_sum: f64,
+    /// Ratio of sums of squares in larger numbers at which smaller ones are not searched: leaves of
+    /// small stiffness take long.
+    sufficient_sum: f64,
+    /// Largest number of free numbers that are searched one by one.
+    most_varied_singly: usize,
+    /// Factors of positive numbers near given values.
+    nearby_factors: [f64; 4],
+    /// Changes of other numbers near given values, in their units.
+    nearby_offsets: [f64; 4],
+    /// Tolerance of leaves that are only compared.
+    tolerance: f64,
+}
 
-const FRUITLESS_DECADES_LIMIT: [usize; 2] = [4, 2];
-
-const IMPROVED_SUM_RATIO: f64 = 0.999;
-
-/// Reduction of the sum of squares in larger numbers at which smaller ones are not searched: leaves
-/// of small stiffness take long.
-const SUFFICIENT_SUM_RATIO: f64 = 0.5;
-
-/// Largest number of numbers that are searched one by one.
-const MOST_PARAMETERS_VARIED_SINGLY: usize = 6;
-
-/// Factors of values near given ones, and changes of numbers that are not positive, in their units.
-const NEARBY_VALUE_FACTORS: [f64; 4] = [1.05, 1.0 / 1.3, 0.5, 2.0];
-
-const NEARBY_VALUE_OFFSETS: [f64; 4] = [-0.2, 0.2, -1.0, 1.0];
-
-/// Accuracy of leaves that are only compared, in lengths of the leaf, and the largest number of
-/// steps in which they come to rest: soft leaves far from the data may take thousands.
-const COMPARISON_TOLERANCE: f64 = 1e-3;
-
-pub(super) const MOST_RELAXATION_STEPS: usize = 400;
+const MULTISTART: MultistartSettings = MultistartSettings {
+    most_decades: 8,
+    fruitless_decades: [4, 2],
+    improved_sum: 0.999,
+    sufficient_sum: 0.5,
+    most_varied_singly: 6,
+    nearby_factors: [1.05, 1.0 / 1.3, 0.5, 2.0],
+    nearby_offsets: [-0.2, 0.2, -1.0, 1.0],
+    tolerance: 1e-3,
+};
 
 /// Values of the coordinates and the sum of squares there.
 #[derive(Clone, Debug)]
@@ -512,7 +540,7 @@ pub(super) struct Multistart<'a> {
 impl<'a> Multistart<'a> {
     pub fn new(model: &FitModel<'a>, weighting: Weighting) -> Self {
         let mut model = model.clone();
-        model.options.tolerance = Some(COMPARISON_TOLERANCE.max(model.equilibrium_tolerance()));
+        model.options.tolerance = Some(MULTISTART.tolerance.max(model.equilibrium_tolerance()));
         Multistart {
             model,
             weighting,
@@ -535,11 +563,11 @@ impl<'a> Multistart<'a> {
             .model
             .relax_leaves_within_steps(&theta, MOST_RELAXATION_STEPS)
             .ok()?;
-        let sum = sum_of_squares(self.weighting, &point);
+        let sum = self.weighting.sum_of_squares(&point);
         sum.is_finite().then_some(EvaluatedStart { theta, sum })
     }
 
-    /// Those of these values at which all leaves come to rest, by ascending sums of squares.
+    /// The values, of all given ones, at which all leaves come to rest, by ascending sums of squares.
     pub fn ranked_starts(&self, all: Vec<Vec<f64>>) -> Vec<EvaluatedStart> {
         let found = all.into_par_iter().map(|theta| self.evaluate_start(theta));
         let mut found: Vec<EvaluatedStart> =
@@ -555,13 +583,16 @@ impl<'a> Multistart<'a> {
         let positive: Vec<usize> = (0..free.len())
             .filter(|&k| free[k].is_searched_in_decades())
             .collect();
-        let mut found = self.scan_decades_both_ways((from, least), &positive);
-        if positive.len() > 1 && positive.len() <= MOST_PARAMETERS_VARIED_SINGLY {
+        let given = EvaluatedStart {
+            theta: from.to_vec(),
+            sum: least,
+        };
+        let mut found = self.scan_decades_both_ways(&given, &positive);
+        if positive.len() > 1 && positive.len() <= MULTISTART.most_varied_singly {
             for &k in &positive {
                 let best = found.iter().min_by(|a, b| a.sum.total_cmp(&b.sum));
                 let best = best.filter(|best| best.sum < least);
-                let from = best.map_or((from, least), |best| (&best.theta, best.sum));
-                let more = self.scan_decades_both_ways(from, &[k]);
+                let more = self.scan_decades_both_ways(best.unwrap_or(&given), &[k]);
                 found.extend(more);
             }
         }
@@ -569,13 +600,17 @@ impl<'a> Multistart<'a> {
         found
     }
 
-    fn scan_decades_both_ways(&self, from: (&[f64], f64), moving: &[usize]) -> Vec<EvaluatedStart> {
+    fn scan_decades_both_ways(
+        &self,
+        from: &EvaluatedStart,
+        moving: &[usize],
+    ) -> Vec<EvaluatedStart> {
         if moving.is_empty() {
             return Vec::new();
         }
         let mut found = self.scan_decades_one_way(from, moving, UNDETERMINED_UNCERTAINTY);
-        let better = |start: &EvaluatedStart| start.sum < SUFFICIENT_SUM_RATIO * from.1;
-        if from.1.is_infinite() || !found.iter().any(better) {
+        let better = |start: &EvaluatedStart| start.sum < MULTISTART.sufficient_sum * from.sum;
+        if from.sum.is_infinite() || !found.iter().any(better) {
             found.extend(self.scan_decades_one_way(from, moving, -UNDETERMINED_UNCERTAINTY));
         }
         found
@@ -584,25 +619,25 @@ impl<'a> Multistart<'a> {
     /// Decade after decade, until no more are better.
     fn scan_decades_one_way(
         &self,
-        (from, least): (&[f64], f64),
+        from: &EvaluatedStart,
         moving: &[usize],
         decade: f64,
     ) -> Vec<EvaluatedStart> {
         let mut found: Vec<EvaluatedStart> = Vec::new();
-        let (mut best, mut no_better) = (least, 0);
-        for step in 1..=MOST_DECADES_SEARCHED {
-            let mut theta = from.to_vec();
+        let (mut best, mut no_better) = (from.sum, 0);
+        for step in 1..=MULTISTART.most_decades {
+            let mut theta = from.theta.clone();
             for &k in moving {
                 theta[k] += step as f64 * decade;
             }
             no_better += 1;
             if let Some(start) = self.evaluate_start(theta) {
-                if start.sum < IMPROVED_SUM_RATIO * best {
+                if start.sum < MULTISTART.improved_sum * best {
                     (best, no_better) = (start.sum, 0);
                 }
                 found.push(start);
             }
-            if no_better == FRUITLESS_DECADES_LIMIT[usize::from(best < least)] {
+            if no_better == MULTISTART.fruitless_decades[usize::from(best < from.sum)] {
                 break;
             }
         }
@@ -635,18 +670,18 @@ impl<'a> Multistart<'a> {
             });
             changed.collect()
         };
-        NEARBY_VALUE_FACTORS.map(times).into()
+        MULTISTART.nearby_factors.map(times).into()
     }
 
     fn varied_singly(&self, from: &[f64]) -> Vec<Vec<f64>> {
         let free = self.model.coordinates;
         let mut all = Vec::new();
         for k in (0..free.len())
-            .filter(|_| free.len() > 1 && free.len() <= MOST_PARAMETERS_VARIED_SINGLY)
+            .filter(|_| free.len() > 1 && free.len() <= MULTISTART.most_varied_singly)
         {
             let changes = match free[k].is_logarithmic {
-                true => NEARBY_VALUE_FACTORS.map(f64::ln),
-                false => NEARBY_VALUE_OFFSETS,
+                true => MULTISTART.nearby_factors.map(f64::ln),
+                false => MULTISTART.nearby_offsets,
             };
             for change in changes {
                 let mut theta = from.to_vec();
@@ -658,9 +693,14 @@ impl<'a> Multistart<'a> {
     }
 }
 
-/// Values that may fit as well as given ones, and what they are: of exchanged directions of a section,
-/// of reversed lists of veins, and of the other sign.
-pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, String)> {
+/// Values that may fit as well as given ones.
+struct SymmetricValues {
+    theta: Vec<f64>,
+    description: String,
+}
+
+/// Values of exchanged directions of a section, of reversed lists of veins, and of the other sign.
+fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<SymmetricValues> {
     let keys = model.coordinates.iter().map(|free| free.number.to_string());
     let keys: Vec<String> = keys.collect();
     let place = |key: &str| keys.iter().position(|other| other == key);
@@ -679,14 +719,14 @@ pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, S
         place(&format!("{name}[{}]", rods.checked_sub(index + 1)?))
     };
     let mut all = vec![
-        (
-            permuted(&exchange),
-            "the axes of the section exchanged".to_string(),
-        ),
-        (
-            permuted(&reverse),
-            "the veins in reversed order".to_string(),
-        ),
+        SymmetricValues {
+            theta: permuted(&exchange),
+            description: "the axes of the section exchanged".into(),
+        },
+        SymmetricValues {
+            theta: permuted(&reverse),
+            description: "the veins in reversed order".into(),
+        },
     ];
     let can_be_mirrored = |k: &usize| {
         let free = &model.coordinates[*k];
@@ -696,17 +736,18 @@ pub(super) fn symmetric_values(model: &FitModel, of: &[f64]) -> Vec<(Vec<f64>, S
     let signed: Vec<usize> = signed.collect();
     for &k in signed
         .iter()
-        .filter(|_| signed.len() <= MOST_PARAMETERS_VARIED_SINGLY)
+        .filter(|_| signed.len() <= MULTISTART.most_varied_singly)
     {
         let mut theta = of.to_vec();
         theta[k] = -theta[k];
-        all.push((theta, format!("{} with the other sign", keys[k])));
+        let description = format!("{} with the other sign", keys[k]);
+        all.push(SymmetricValues { theta, description });
     }
-    let mut images: Vec<(Vec<f64>, String)> = Vec::new();
-    for (theta, what) in all {
-        let known = images.iter().any(|(known, _)| *known == theta);
-        if theta != of && !known && is_within_given_bounds(model, &theta) {
-            images.push((theta, what));
+    let mut images: Vec<SymmetricValues> = Vec::new();
+    for values in all {
+        let known = images.iter().any(|known| known.theta == values.theta);
+        if values.theta != of && !known && is_within_given_bounds(model, &values.theta) {
+            images.push(values);
         }
     }
     images
@@ -719,46 +760,4 @@ fn is_within_given_bounds(model: &FitModel, theta: &[f64]) -> bool {
         let [low, high] = free.bounds;
         !free.has_given_bounds || (low..=high).contains(theta)
     })
-}
-
-/// The sum of squares at a point.
-pub(super) fn sum_of_squares(weighting: Weighting, point: &FitPoint) -> f64 {
-    let residuals = weighting.residuals(point);
-    weighting.huber_sum(&residuals, weighting.huber_bound(&residuals))
-}
-
-/// The root mean square of the residuals, of coordinates in lengths of the leaf, of other data
-/// relative to the largest of their kind.
-pub(super) fn relative_misfit(model: &FitModel, point: &FitPoint) -> f64 {
-    let longest = longest(&model.base.scenario().rods);
-    let pixel = model.initial_pixel_length();
-    let largest = |kind: DatumDimension| {
-        let alike = point
-            .components()
-            .filter(move |c| c.quantity.dimension() == kind);
-        alike.fold(0.0_f64, |most, c| most.max(c.observed.abs()))
-    };
-    let (force, frequency) = (
-        largest(DatumDimension::Force),
-        largest(DatumDimension::Frequency),
-    );
-    let (mut squares, mut count) = (0.0, 0.0_f64);
-    for component in point.components() {
-        let size = match component.quantity {
-            DatumQuantity::Vein { .. }
-                if component.quantity.dimension() == DatumDimension::Pixel =>
-            {
-                longest / pixel
-            }
-            DatumQuantity::Vein { .. } | DatumQuantity::Result(MeasuredQuantity::Tip(_)) => longest,
-            DatumQuantity::Result(MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..)) => {
-                force
-            }
-            DatumQuantity::Result(MeasuredQuantity::Frequency(_)) => frequency,
-        };
-        let part = (component.model - component.observed) / size.max(f64::MIN_POSITIVE);
-        squares += part.powi(2);
-        count += 1.0;
-    }
-    (squares / count.max(1.0)).sqrt()
 }

@@ -2,36 +2,39 @@
 //! traced veins, and what the data determine about each number and what they do not.
 //!
 //! The leaves of all experiments are followed from equilibrium to equilibrium, with
-//! derivatives from their linearised equations, so that a fit does not jump between
+//! derivatives from their linearized equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
-//!
-//! The result of a fit.
-//!
-//! The free numbers of a fit.
 
+mod columns;
 mod data;
-mod found;
+mod derivatives;
 mod intervals;
 mod lack_of_fit;
 mod least_squares;
+mod local_fit;
 mod minima;
 mod model;
-mod responses;
+mod prediction;
+mod remark;
 mod statistics;
 mod table;
 
 use crate::newton::SolverCounts;
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use crate::run::{Instant, Limit};
-use crate::scenario::format::units::LENGTH;
+use crate::scenario::units::LENGTH;
 
-pub use crate::study::fit::data::{
-    ComparisonOperator, Data, DataFile, DataOrigin, DataReadingOptions, Experiment, MeasuredColumn,
-    MeasuredQuantity, MeasuredValue, RowCondition, RowFilter, TracedVeinPoint,
+pub use crate::study::fit::columns::{
+    ComparisonOperator, DataFileOptions, MeasuredColumn, MeasuredQuantity, RowCondition, RowFilter,
 };
-use crate::study::fit::least_squares::{ASSUMED_DEVIATION_PER_LENGTH, Weighting};
+pub use crate::study::fit::data::{
+    Data, DataFile, DataOrigin, Experiment, MeasuredValue, TracedVeinPoint,
+};
 use crate::study::fit::minima::{FitStart, GlobalFitSearch};
-use crate::study::fit::model::{EvaluationBudget, FitModel};
+use crate::study::fit::model::{
+    ASSUMED_DEVIATION_PER_LENGTH, EvaluationBudget, FitModel, Weighting,
+};
+pub use crate::study::fit::remark::{FitCandidateRemark, FitRemark};
 use crate::study::{BaseScenario, ParameterKeys, VariableTarget, VaryError};
 use crate::words;
 use serde::Serialize;
@@ -121,8 +124,8 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         ..Options::default()
     };
     let most = request.most_evaluations.unwrap_or(DEFAULT_EVALUATION_LIMIT);
-    let data = (request.data.clone(), EvaluationBudget::new(most));
-    let model = FitModel::new(base, &coordinates, &options, data)?;
+    let (data, budget) = (request.data.clone(), EvaluationBudget::new(most));
+    let model = FitModel::new(base, &coordinates, &options, data, budget)?;
     let weighting = Weighting {
         assumed_deviation: ASSUMED_DEVIATION_PER_LENGTH * model.data_length_unit(),
         is_robust: request.robust,
@@ -133,7 +136,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             step: 0,
             sum: f64::INFINITY,
             known: None,
-            budget: Some(FitBudget {
+            budget: Some(FitCostLimit {
                 evaluations: most,
                 leaves,
                 seconds: seconds * most as f64,
@@ -162,17 +165,11 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     Ok(found)
 }
 
-/// How many lines among the rows of data were left out.
-fn comment_lines_remark(files: &[DataFile]) -> Option<String> {
+/// The files of which lines among the rows were left out, if there are any.
+fn comment_lines_remark(files: &[DataFile]) -> Option<FitRemark> {
     let left_out = files.iter().filter(|file| file.comments_among_rows > 0);
-    let left_out = left_out.map(|file| format!("{} of {}", file.comments_among_rows, file.file));
-    let left_out: Vec<String> = left_out.collect();
-    (!left_out.is_empty()).then(|| {
-        format!(
-            "lines among the rows that begin with # were left out as comments: {}",
-            left_out.join(", ")
-        )
-    })
+    let left_out: Vec<DataFile> = left_out.cloned().collect();
+    (!left_out.is_empty()).then_some(FitRemark::CommentLines { files: left_out })
 }
 
 /// The coordinates of the free numbers, checked to be distinct.
@@ -294,7 +291,7 @@ pub struct SystematicResiduals {
 
 /// An experiment with data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FitExperiment {
+pub struct ExperimentConditions {
     /// Its name.
     pub experiment: String,
     /// What was set, by keys.
@@ -340,7 +337,7 @@ pub struct FitCandidate {
     pub shrinks: f64,
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<FitCandidateRemark>,
 }
 
 /// Other values of the free numbers that fit the data as well.
@@ -362,12 +359,12 @@ pub struct FitStep {
     /// Once the minimum is found: the number of known intervals, and that of all numbers.
     pub known: Option<(usize, usize)>,
     /// Before the first step: what the fit takes at most.
-    pub budget: Option<FitBudget>,
+    pub budget: Option<FitCostLimit>,
 }
 
 /// What a fit takes at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitBudget {
+pub struct FitCostLimit {
     /// Number of times that the leaves of all experiments are relaxed or followed.
     pub evaluations: usize,
     /// Number of these leaves.
@@ -397,7 +394,7 @@ pub struct Fit {
     /// How it ended.
     pub outcome: FitOutcome,
     /// Why it did not converge; other remarks.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<FitRemark>,
     /// The free numbers.
     pub parameters: Vec<FitParameter>,
     /// Correlations of their coordinates (logarithms of positive numbers); null if
@@ -431,7 +428,7 @@ pub struct Fit {
     #[serde(skip)]
     pub files: Vec<DataFile>,
     /// The experiments in the order of the data.
-    pub experiments: Vec<FitExperiment>,
+    pub experiments: Vec<ExperimentConditions>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.
@@ -480,9 +477,9 @@ const LARGEST_DISTANCE_FROM_INITIAL: f64 = 6.907_755_278_982_137;
 /// A column of the data whose zero may be unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OffsetColumn {
-    /// Of what was set in experiments.
+    /// A number that was set in experiments.
     Setting(ParameterKeys),
-    /// Of what was measured in experiments.
+    /// A result that was measured in experiments.
     Result(MeasuredQuantity),
 }
 

@@ -1,28 +1,23 @@
-//! Predictions of a scenario's leaf for the data, and their derivatives with respect to the free
-//! numbers.
+//! The leaves of all experiments as a function of the free numbers: relaxed from their usual starts,
+//! or followed from those at other values.
 //!
-//! A leaf at rest under the conditions of its experiments, its predictions for the data, and
-//! their derivatives.
+//! A search uses leaves that are only as accurate as its data, on a few coarse grids; the last steps
+//! use all grids. [`Weighting`] makes residuals of predictions and data.
 
-use crate::leaf::{LeafParameterDerivative, LinearResponse, Weighted, displacement_part};
-use crate::modes;
-use crate::motion::Physics;
+use crate::leaf::Weighted;
 use crate::newton::SolverCounts;
-use crate::relax::accuracy::transfer::weights;
 use crate::relax::{
-    ContinuationFailure, GridLevel, GridPolicy, NeighbouringEquilibria, NestedEquilibrium, Options,
-    Parameter, unit_forces,
+    ContinuationFailure, GridPolicy, LARGEST_TOLERANCE, NestedEquilibrium, Options,
 };
-use crate::scenario::{Photo, PhotoParameterDerivative, Scenario};
+use crate::scenario::{Scenario, longest};
+use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
 use crate::study::fit::data::{
-    COORDINATE_COLUMNS, Data, DataOrigin, DatumDimension, ExperimentCase, FIRST_PHOTO_COORDINATE,
-    MeasuredQuantity, MeasuredValue, ObservationModel, ObservedExperiment, TracedVeinPoint,
+    Data, DataOrigin, ExperimentCase, MeasuredValue, TracedVeinPoint, experiment_cases,
 };
-use crate::study::fit::found::round_to_three_digits;
-use crate::study::fit::responses::{ParameterResponses, VeinInterpolant};
-use crate::study::fit::{FitCoordinate, FitError, FreeParameterTarget, OffsetColumn, data};
+use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
+use crate::study::fit::{FitCoordinate, FitError, FreeParameterTarget};
 use crate::study::{BaseScenario, ParameterKeys};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -32,6 +27,16 @@ pub(super) type ScenarioDerivative = Vec<Weighted<Scenario>>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT_PREDICTION_ERROR: f64 = 0.05;
+
+/// Iteration error of positions on coarse grids, in standard deviations.
+const COARSE_ITERATION_ERROR: f64 = 10.0 * INSIGNIFICANT_PREDICTION_ERROR;
+
+/// Largest number of coarse grids of a leaf.
+const MOST_COARSE_GRIDS: usize = 2;
+
+/// Largest number of steps in which leaves that are only compared come to rest: soft leaves far from
+/// the data may take thousands.
+pub(super) const MOST_RELAXATION_STEPS: usize = 400;
 
 /// The largest tolerance of leaves from which a search starts.
 const LARGEST_SEARCH_TOLERANCE: f64 = 1e-4;
@@ -59,7 +64,7 @@ impl EvaluationBudget {
     }
 }
 
-/// Data common to all points of a fit.
+/// The leaves of all experiments as a function of the free numbers.
 #[derive(Clone)]
 pub(super) struct FitModel<'a> {
     pub base: &'a BaseScenario,
@@ -75,7 +80,6 @@ pub(super) struct FitModel<'a> {
     pub budget: Arc<EvaluationBudget>,
 }
 
-/// The leaves of all experiments.
 pub(super) struct FitPoint {
     pub theta: Vec<f64>,
     pub case_solutions: Vec<CaseSolution>,
@@ -123,15 +127,22 @@ fn is_scenario_linear(coordinates: &[FitCoordinate]) -> bool {
     })
 }
 
+/// A model on a few coarse grids, and its leaves there.
+pub(super) struct CoarseModel<'a> {
+    pub model: FitModel<'a>,
+    pub point: FitPoint,
+}
+
 impl<'a> FitModel<'a> {
     pub fn new(
         base: &'a BaseScenario,
         coordinates: &'a [FitCoordinate],
         options: &Options,
-        (data, budget): (Data, EvaluationBudget),
+        data: Data,
+        budget: EvaluationBudget,
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
-        let cases = data::experiment_cases(data)?;
+        let cases = experiment_cases(data)?;
         for case in &cases {
             let of_a_tip = |m: &&MeasuredValue| m.quantity.dimension() == DatumDimension::Length;
             if let Some(measured) = case.measured_values().find(of_a_tip)
@@ -224,7 +235,7 @@ impl<'a> FitModel<'a> {
         settings.chain(entries).collect()
     }
 
-    /// Where the number that a coordinate changes stands among [`Model::values`]; none if it changes
+    /// Where the number that a coordinate changes stands among [`FitModel::scenario_values`]; none if it changes
     /// nothing in this experiment's leaf.
     pub(super) fn scenario_value_index(&self, case: &ExperimentCase, k: usize) -> Option<usize> {
         match &self.coordinates[k].number {
@@ -259,7 +270,6 @@ impl<'a> FitModel<'a> {
         Ok(found)
     }
 
-    /// The scenario of an experiment.
     pub(super) fn case_scenario(
         &self,
         case: &ExperimentCase,
@@ -285,7 +295,7 @@ impl<'a> FitModel<'a> {
         self.assemble_point(theta, find)
     }
 
-    /// The same in no more than so many steps of each leaf.
+    /// The leaves relaxed from their usual starts, each in no more than so many steps.
     pub fn relax_leaves_within_steps(
         &self,
         theta: &[f64],
@@ -344,7 +354,7 @@ impl<'a> FitModel<'a> {
             .collect()
     }
 
-    /// These in words.
+    /// The numbers and their values in words, for messages.
     pub fn values_in_words(&self, theta: &[f64]) -> String {
         let numbers = self.named_values(theta);
         let each = numbers
@@ -362,7 +372,7 @@ impl<'a> FitModel<'a> {
         self.continue_leaves_on_grids(from, theta, self.grids)
     }
 
-    /// The same on these grids.
+    /// The leaves at other values, followed on these grids.
     pub fn continue_leaves_on_grids(
         &self,
         from: &FitPoint,
@@ -462,6 +472,52 @@ impl<'a> FitModel<'a> {
         }
     }
 
+    /// The same model on a few coarse grids, and its leaves there, started from those of
+    /// this one.
+    pub fn coarse_model(
+        &self,
+        accurate: &FitPoint,
+        weighting: Weighting,
+    ) -> Result<CoarseModel<'a>, FitError> {
+        let length = self.base.scenario().scale().length;
+        let sd = |component: &ScalarDatum| component.sd.unwrap_or(weighting.assumed_deviation);
+        let in_lengths = |component: &ScalarDatum| match component.quantity.dimension() {
+            DatumDimension::Pixel => sd(component) * self.initial_pixel_length(),
+            _ => sd(component),
+        };
+        let all = accurate.components().map(in_lengths);
+        let least = all.fold(f64::INFINITY, f64::min);
+        let tolerance = (COARSE_ITERATION_ERROR * least / length).min(LARGEST_TOLERANCE);
+        let model = FitModel {
+            options: Options {
+                tolerance: Some(tolerance.max(self.equilibrium_tolerance())),
+                ..self.options.clone()
+            },
+            grids: GridPolicy::These,
+            ..self.clone()
+        };
+        let coarse = |case: usize| -> Result<CaseSolution, FitError> {
+            let lost = |lost| self.no_equilibrium_error(&accurate.theta, case, &lost);
+            let known = &accurate.case_solutions[case];
+            for count in 1..=MOST_COARSE_GRIDS {
+                let Some(at) = known.equilibrium.on_coarsest_grids(count) else {
+                    break;
+                };
+                let found = self.solved_case(case, &accurate.theta, at).map_err(lost)?;
+                let mut both = found.scalar_data.iter().zip(&known.scalar_data);
+                if both.all(|(a, b)| {
+                    (a.model - b.model).abs() < INSIGNIFICANT_PREDICTION_ERROR * sd(b)
+                }) {
+                    return Ok(found);
+                }
+            }
+            self.solved_case(case, &accurate.theta, known.equilibrium.without_estimates())
+                .map_err(lost)
+        };
+        let point = self.assemble_point(&accurate.theta, coarse)?;
+        Ok(CoarseModel { model, point })
+    }
+
     pub fn equilibrium_tolerance(&self) -> f64 {
         let scenario = self.base.scenario();
         self.options.tolerance.unwrap_or(scenario.tolerance)
@@ -534,429 +590,147 @@ impl<'a> FitModel<'a> {
             .map(|case| case.equilibrium.work);
         works.fold(SolverCounts::default(), |sum, work| sum + work)
     }
-}
 
-/// Largest number of unknowns of a grid on which modes are computed, except the first.
-const MOST_UNKNOWNS_FOR_MODES: usize = 4_000;
-
-/// One scalar datum.
-#[derive(Clone, Debug)]
-pub(super) struct ScalarDatum {
-    /// The number of its experiment.
-    pub experiment: usize,
-    pub quantity: DatumQuantity,
-    pub observed: f64,
-    pub model: f64,
-    /// Its standard deviation, if known.
-    pub sd: Option<f64>,
-    /// Whether it does not count as a datum: the distance of a point from a curve contains no
-    /// information on the position along it.
-    pub is_uninformative: bool,
-    pub origin: Option<DataOrigin>,
-}
-
-impl ScalarDatum {
-    /// Whether a coordinate is the offset of its column.
-    pub fn has_offset(&self, free: &FitCoordinate) -> bool {
-        match (&free.number, self.quantity) {
-            (
-                FreeParameterTarget::Offset(OffsetColumn::Result(of)),
-                DatumQuantity::Result(what),
-            ) => *of == what,
-            _ => false,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum DatumQuantity {
-    Result(MeasuredQuantity),
-    /// One of [`COORDINATES`] of a point on a rod, at this fraction of its length.
-    Vein {
-        rod: usize,
-        coordinate: usize,
-        sigma: f64,
-    },
-}
-
-impl DatumQuantity {
-    pub fn dimension(self) -> DatumDimension {
-        match self {
-            DatumQuantity::Result(quantity) => quantity.dimension(),
-            DatumQuantity::Vein { coordinate, .. } if coordinate >= FIRST_PHOTO_COORDINATE => {
-                DatumDimension::Pixel
-            }
-            DatumQuantity::Vein { .. } => DatumDimension::Length,
-        }
-    }
-
-    /// The name of its column in the data.
-    pub fn column(self) -> String {
-        match self {
-            DatumQuantity::Result(quantity) => quantity.to_string(),
-            DatumQuantity::Vein { coordinate, .. } => COORDINATE_COLUMNS[coordinate].into(),
-        }
-    }
-
-    /// The name of the column of its standard deviation.
-    pub fn deviation_column(self) -> String {
-        match self {
-            DatumQuantity::Result(quantity) => format!("sd_{quantity}"),
-            DatumQuantity::Vein { .. } => "sd".into(),
-        }
-    }
-}
-
-/// A leaf at rest at some values of the free numbers.
-pub(super) struct CaseSolution {
-    pub equilibrium: NestedEquilibrium,
-    /// Modes on the first grids.
-    pub modes: Vec<Vec<modes::Eigenpair>>,
-    pub scalar_data: Vec<ScalarDatum>,
-    /// Its response to the numbers, once computed.
-    pub responses: Option<ParameterResponses>,
-    /// The gradients of the components; empty until computed.
-    pub gradients: Vec<Vec<f64>>,
-}
-
-impl CaseSolution {
-    /// Predictions of a leaf at rest for the data under these conditions.
-    pub fn new(
-        of: &ExperimentCase,
-        at: NestedEquilibrium,
-    ) -> Result<CaseSolution, ContinuationFailure> {
-        let frequencies = of
-            .measured_values()
-            .filter_map(|measured| match measured.quantity {
-                MeasuredQuantity::Frequency(mode) => Some(mode),
-                _ => None,
-            });
-        let count = frequencies.max().unwrap_or(0);
-        let mut modes = Vec::new();
-        for level in at.levels.iter().filter(|_| count > 0) {
-            let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-            if modes.is_empty() || unknowns < MOST_UNKNOWNS_FOR_MODES {
-                let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
-                let lost =
-                    || ContinuationFailure::NotAtRest("its frequencies cannot be found".into());
-                let pairs = pairs
-                    .filter(|pairs| pairs.len() == count)
-                    .ok_or_else(lost)?;
-                modes.push(pairs);
-            }
-        }
-        let mut found = CaseSolution {
-            equilibrium: at,
-            modes,
-            scalar_data: Vec::new(),
-            responses: None,
-            gradients: Vec::new(),
+    /// The root mean square of the residuals, of coordinates in lengths of the leaf, of other data
+    /// relative to the largest of their kind.
+    pub fn relative_misfit(&self, point: &FitPoint) -> f64 {
+        let longest = longest(&self.base.scenario().rods);
+        let pixel = self.initial_pixel_length();
+        let largest = |kind: DatumDimension| {
+            let alike = point
+                .components()
+                .filter(move |c| c.quantity.dimension() == kind);
+            alike.fold(0.0_f64, |most, c| most.max(c.observed.abs()))
         };
-        let mut veins = Vec::new();
-        let observed = of.experiments.iter();
-        let components = observed.flat_map(|of| found.experiment_data(of, &mut veins));
-        found.scalar_data = components.collect();
-        Ok(found)
-    }
-
-    /// The components of an experiment.
-    fn experiment_data<'v>(
-        &'v self,
-        of: &ObservedExperiment,
-        veins: &mut Vec<Option<VeinInterpolant<'v>>>,
-    ) -> Vec<ScalarDatum> {
-        let mut components = Vec::new();
-        let view = self.photo_projection();
-        for measured in &of.experiment.measured {
-            components.push(ScalarDatum {
-                experiment: of.number,
-                quantity: DatumQuantity::Result(measured.quantity),
-                observed: measured.value.unwrap_or(f64::NAN),
-                model: self.predicted_result(measured.quantity),
-                sd: measured.sd,
-                is_uninformative: false,
-                origin: of.experiment.origin.clone(),
-            });
-        }
-        for traced in &of.traced {
-            veins.resize_with(veins.len().max(traced.rod + 1), || None);
-            let vein = veins[traced.rod].get_or_insert_with(|| {
-                VeinInterpolant::from_equilibrium(&self.equilibrium, traced.rod)
-            });
-            let beside = traced.sigma.is_none();
-            let (sigma, model) = match traced.sigma {
-                Some(sigma) => (sigma, vein.point_and_tangent(sigma).0),
-                None => vein.nearest_point(&traced.coordinates, &view),
+        let (force, frequency) = (
+            largest(DatumDimension::Force),
+            largest(DatumDimension::Frequency),
+        );
+        let (mut squares, mut count) = (0.0, 0.0_f64);
+        for component in point.components() {
+            let size = match component.quantity {
+                DatumQuantity::Vein { .. }
+                    if component.quantity.dimension() == DatumDimension::Pixel =>
+                {
+                    longest / pixel
+                }
+                DatumQuantity::Vein { .. } | DatumQuantity::Result(MeasuredQuantity::Tip(_)) => {
+                    longest
+                }
+                DatumQuantity::Result(
+                    MeasuredQuantity::Reaction(_) | MeasuredQuantity::Grip(..),
+                ) => force,
+                DatumQuantity::Result(MeasuredQuantity::Frequency(_)) => frequency,
             };
-            let seen = traced.coordinates.iter().enumerate();
-            let seen = seen.filter_map(|(k, value)| value.map(|value| (k, value)));
-            for (number, (coordinate, observed)) in seen.enumerate() {
-                components.push(ScalarDatum {
-                    experiment: of.number,
-                    quantity: DatumQuantity::Vein {
-                        rod: traced.rod,
-                        coordinate,
-                        sigma,
-                    },
-                    observed,
-                    model: view.project_point(coordinate, model),
-                    sd: traced.sd,
-                    is_uninformative: beside && number == 0,
-                    origin: Some(traced.origin.clone()),
-                });
-            }
+            let part = (component.model - component.observed) / size.max(f64::MIN_POSITIVE);
+            squares += part.powi(2);
+            count += 1.0;
         }
-        components
+        (squares / count.max(1.0)).sqrt()
+    }
+}
+
+/// Tuning constant of Huber's weights: 95 % efficient for normal errors.
+const HUBER_TUNING_CONSTANT: f64 = 1.345;
+
+/// The standard deviation assumed if none is known, in lengths of the
+/// leaf, until it is estimated from the residuals.
+pub(super) const ASSUMED_DEVIATION_PER_LENGTH: f64 = 1e-3;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighting {
+    /// Replaces unknown standard deviations.
+    pub assumed_deviation: f64,
+    /// Whether large residuals have smaller weights.
+    pub is_robust: bool,
+}
+
+pub(super) struct WeightedDerivatives {
+    /// Square roots of the weights of residuals.
+    pub roots: DVector<f64>,
+    /// Derivatives of the residuals times these, a row for each datum.
+    pub jacobian: DMatrix<f64>,
+}
+
+impl Weighting {
+    /// Residuals divided by their standard deviations.
+    pub fn residuals(&self, point: &FitPoint) -> DVector<f64> {
+        let components = point.components();
+        let residual =
+            components.map(|c| (c.model - c.observed) / c.sd.unwrap_or(self.assumed_deviation));
+        DVector::from_vec(residual.collect())
     }
 
-    /// The axes along which its tip was measured, if there are no other data, and the equations of
-    /// the leaf are symmetric: adjoint solutions for each axis then give the derivatives with
-    /// respect to all numbers. `None` if solving for each number takes no more work.
-    pub fn measured_tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
-        let leaf = &self.equilibrium.levels[0].leaf;
-        let symmetric = !leaf.leaf.has_placed_supports() && !leaf.has_moments();
-        let tip = |component: &ScalarDatum| match component.quantity {
-            DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => Some(axis),
-            _ => None,
-        };
-        let mut axes: Vec<usize> = self.scalar_data.iter().map(tip).collect::<Option<_>>()?;
-        axes.sort_unstable();
-        axes.dedup();
-        // One more is for the next step.
-        (symmetric && axes.len() + 1 < numbers).then_some(axes)
-    }
-
-    /// The gradients of the components from these solutions.
-    pub fn tip_gradients(
-        &self,
-        responses: &ParameterResponses,
-        axes: &[usize],
-        slopes: &[f64],
-    ) -> Result<Vec<Vec<f64>>, ContinuationFailure> {
-        let mut sums = [(); 3].map(|()| vec![0.0; slopes.len()]);
-        for (k, level) in self.equilibrium.levels.iter().enumerate() {
-            let weight = self.equilibrium.weights[k] * self.leaf_length();
-            if weight == 0.0 {
-                continue;
-            }
-            let all = unit_forces(&level.leaf, 1);
-            let units: Vec<_> = axes.iter().map(|&axis| all[axis].clone()).collect();
-            let rates = responses.adjoint_derivatives((k, level), &units)?;
-            for (axis, rates) in axes.iter().zip(rates) {
-                let sums = sums[*axis].iter_mut().zip(rates).zip(slopes);
-                sums.for_each(|((sum, rate), slope)| *sum += weight * rate * slope);
-            }
-        }
-        let row = |component: &ScalarDatum| match component.quantity {
-            DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => sums[axis].clone(),
-            _ => Vec::new(),
-        };
-        Ok(self.scalar_data.iter().map(row).collect())
-    }
-
-    /// Its response to steps of the numbers on these grids, each of which must be one of its
-    /// own; empty if there are no steps.
-    pub fn response_to_steps(
-        &self,
-        levels: &[GridLevel],
-        steps: &[f64],
-    ) -> Result<Vec<LinearResponse>, ContinuationFailure> {
-        let none = |level: &GridLevel| LinearResponse::zeros(&level.leaf);
-        match &self.responses {
-            Some(responses) if steps.iter().any(|step| *step != 0.0) => {
-                responses.response_to_steps(levels, steps)
-            }
-            _ => Ok(levels.iter().map(none).collect()),
-        }
-    }
-
-    /// How points on its veins are seen.
-    pub fn photo_projection(&self) -> ObservationModel<'_> {
-        ObservationModel::new(self.photograph())
-    }
-
-    fn photograph(&self) -> Option<&Photo> {
-        let leaf = &self.equilibrium.levels[0].leaf.leaf;
-        leaf.scenario().photo.as_ref()
-    }
-
-    fn leaf_length(&self) -> f64 {
-        self.equilibrium.levels[0].leaf.leaf.scale.length
-    }
-
-    fn force_unit(&self) -> f64 {
-        self.equilibrium.levels[0].leaf.leaf.scale.force()
-    }
-
-    /// The unit of such data in which numbers of the leaf are about one.
-    pub fn data_unit(&self, kind: DatumDimension) -> f64 {
-        match kind {
-            DatumDimension::Length => self.leaf_length(),
-            DatumDimension::Pixel => {
-                self.leaf_length() / self.photograph().map_or(1.0, |photo| photo.scale)
-            }
-            DatumDimension::Force => self.force_unit(),
-            DatumDimension::Frequency => {
-                let physics = Physics::new(&self.equilibrium.levels[0].leaf.leaf);
-                1.0 / (std::f64::consts::TAU * physics.time_unit)
-            }
-        }
-    }
-
-    pub fn predicted_result(&self, quantity: MeasuredQuantity) -> f64 {
-        match quantity {
-            MeasuredQuantity::Tip(axis) => {
-                let tip = self
-                    .equilibrium
-                    .extrapolated_value(|_, level| level.state.tip(0));
-                tip[axis] * self.leaf_length()
-            }
-            MeasuredQuantity::Reaction(axis) => {
-                let force = self
-                    .equilibrium
-                    .extrapolated_value(|_, level| level.leaf.reaction(&level.state).force);
-                force[axis] * self.force_unit()
-            }
-            MeasuredQuantity::Grip(grip, axis) => {
-                let force =
-                    |_, level: &GridLevel| level.leaf.grip_reactions(&level.state)[grip].force;
-                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
-            }
-            MeasuredQuantity::Frequency(mode) => {
-                self.extrapolated_eigenvalue(mode).max(0.0).sqrt()
-                    * self.data_unit(DatumDimension::Frequency)
-            }
-        }
-    }
-
-    /// An eigenvalue, extrapolated over the grids with modes.
-    fn extrapolated_eigenvalue(&self, mode: usize) -> f64 {
-        self.extrapolate_over_grids(|level| self.modes[level][mode - 1].eigenvalue)
-    }
-
-    fn extrapolate_over_grids(&self, value: impl Fn(usize) -> f64) -> f64 {
-        let segments = self
-            .equilibrium
-            .levels
-            .iter()
-            .map(|level| level.leaf.segments());
-        let segments: Vec<usize> = segments.take(self.modes.len()).collect();
-        let weights = weights(&segments, f64::INFINITY);
-        weights
-            .iter()
-            .enumerate()
-            .map(|(k, weight)| weight * value(k))
-            .sum()
-    }
-
-    /// The derivative of a result with respect to a number of the scenario.
-    pub fn result_derivative(
-        &self,
-        quantity: MeasuredQuantity,
-        (number, rate, responses): (&Parameter, &LeafParameterDerivative, &[LinearResponse]),
-    ) -> f64 {
-        match quantity {
-            MeasuredQuantity::Tip(axis) => {
-                let tip = |k: usize, level: &GridLevel| {
-                    displacement_part(&responses[k].node_increment(
-                        &level.leaf,
-                        0,
-                        level.leaf.segments(),
-                    ))
-                };
-                self.equilibrium.extrapolated_value(tip)[axis] * self.leaf_length()
-            }
-            MeasuredQuantity::Reaction(axis) => {
-                let force =
-                    |k: usize, level: &GridLevel| level.leaf.reaction_rate(rate, &responses[k]);
-                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
-            }
-            MeasuredQuantity::Grip(grip, axis) => {
-                let force = |k: usize, level: &GridLevel| {
-                    let GridLevel { leaf, state } = level;
-                    leaf.grip_force_rates(state, rate, &responses[k])[grip]
-                };
-                self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
-            }
-            MeasuredQuantity::Frequency(mode) => {
-                let scenarios = number.neighbouring_scenarios().unwrap_or_default();
-                let of = |k: usize| {
-                    let near = NeighbouringEquilibria::new(
-                        &self.equilibrium.levels[k],
-                        &scenarios,
-                        (rate, &responses[k]),
-                    );
-                    near.eigenvalue_rate(&self.modes[k][mode - 1])
-                };
-                // omega^2 = (2 pi f)^2.
-                let frequency = self.predicted_result(quantity);
-                self.extrapolate_over_grids(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
-            }
-        }
-    }
-
-    /// The derivatives of the coordinates of a point on a vein by numbers that change the leaf and its
-    /// photograph; for the nearest point to an unmarked one, only the components normal to the vein.
-    pub fn vein_point_gradients(
-        &self,
-        (responses, photos): (&ParameterResponses, &[PhotoParameterDerivative]),
-        (rod, sigma): (usize, f64),
-        point: &[&ScalarDatum],
-        slopes: &[f64],
-    ) -> Vec<Vec<f64>> {
-        let (view, stencils) = (self.photo_projection(), self.equilibrium.stencils(sigma));
-        let coordinates = point.iter().map(|component| match component.quantity {
-            DatumQuantity::Vein { coordinate, .. } => coordinate,
-            DatumQuantity::Result(_) => 0,
-        });
-        let coordinates: Vec<usize> = coordinates.collect();
-        let of_vein = |derivative: usize| {
-            self.equilibrium.extrapolated_value(|k, level| {
-                let base = level.state.base(rod);
-                stencils[k][derivative].value(|i| level.state.x[base + i])
-            })
-        };
-        let mut along = vec![0.0; coordinates.len()];
-        if point.iter().any(|component| component.is_uninformative) {
-            let slope = of_vein(1);
-            let seen = coordinates
-                .iter()
-                .map(|k| view.project_displacement(*k, slope));
-            along = normalize_or_zero(seen.collect());
-        }
-        let place = of_vein(0) * self.leaf_length();
-        let change =
-            |(responses, photo): (&Vec<LinearResponse>, &PhotoParameterDerivative)| -> Vec<f64> {
-                let change = self.equilibrium.extrapolated_value(|k, level| {
-                    stencils[k][0].value(|i| {
-                        displacement_part(&responses[k].node_increment(&level.leaf, rod, i))
-                    })
-                }) * self.leaf_length();
-                let seen = |k: &usize| {
-                    view.project_displacement(*k, change) + view.photo_derivative(*k, place, photo)
-                };
-                let seen: Vec<f64> = coordinates.iter().map(seen).collect();
-                let part: f64 = seen.iter().zip(&along).map(|(a, b)| a * b).sum();
-                let both = seen.iter().zip(&along);
-                both.map(|(seen, along)| seen - part * along).collect()
-            };
-        let changes: Vec<Vec<f64>> = responses
-            .per_parameter
-            .iter()
-            .zip(photos)
-            .map(change)
+    /// Derivatives of the residuals, a row for each datum; zero if they are not known.
+    pub fn jacobian(&self, point: &FitPoint) -> DMatrix<f64> {
+        let components = point.components();
+        let sd: Vec<f64> = components
+            .map(|c| c.sd.unwrap_or(self.assumed_deviation))
             .collect();
-        let row = |place: usize| {
-            let all = changes.iter().zip(slopes);
-            all.map(|(change, slope)| change[place] * slope).collect()
+        let rows = point.case_solutions.iter().flat_map(|case| {
+            let components = 0..case.scalar_data.len();
+            components.map(|i| case.gradients.get(i))
+        });
+        let rows: Vec<Option<&Vec<f64>>> = rows.collect();
+        let gradient = |i: usize, k: usize| rows[i].map_or(0.0, |row| row[k]);
+        DMatrix::from_fn(sd.len(), point.theta.len(), |i, k| gradient(i, k) / sd[i])
+    }
+
+    /// The weights of these residuals, and the derivatives times their roots.
+    pub fn weighted_derivatives(
+        &self,
+        point: &FitPoint,
+        residuals: &DVector<f64>,
+    ) -> WeightedDerivatives {
+        let (roots, mut jacobian) = (self.weight_roots(residuals), self.jacobian(point));
+        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
+            row *= *root;
+        }
+        WeightedDerivatives { roots, jacobian }
+    }
+
+    /// Square roots of the weights of residuals: less than one beyond Huber's
+    /// bound, in units of the spread of all.
+    pub fn weight_roots(&self, residuals: &DVector<f64>) -> DVector<f64> {
+        if !self.is_robust {
+            return DVector::from_element(residuals.len(), 1.0);
+        }
+        let bound = HUBER_TUNING_CONSTANT * median_deviation(residuals);
+        residuals.map(|r| match r.abs() > bound {
+            true => (bound / r.abs()).sqrt(),
+            false => 1.0,
+        })
+    }
+
+    /// The sum of their squares, linear beyond Huber's bound.
+    pub fn huber_sum(&self, residuals: &DVector<f64>, bound: f64) -> f64 {
+        let term = |r: &f64| match self.is_robust && r.abs() > bound {
+            true => bound * (2.0 * r.abs() - bound),
+            false => r * r,
         };
-        (0..coordinates.len()).map(row).collect()
+        residuals.iter().map(term).sum()
+    }
+
+    pub fn huber_bound(&self, residuals: &DVector<f64>) -> f64 {
+        HUBER_TUNING_CONSTANT * median_deviation(residuals)
+    }
+
+    /// The sum of squares at a point.
+    pub fn sum_of_squares(&self, point: &FitPoint) -> f64 {
+        let residuals = self.residuals(point);
+        self.huber_sum(&residuals, self.huber_bound(&residuals))
     }
 }
 
-/// A vector of length one, or zero.
-fn normalize_or_zero(vector: Vec<f64>) -> Vec<f64> {
-    let length = vector.iter().map(|it| it * it).sum::<f64>().sqrt();
-    let by = if length > 0.0 { 1.0 / length } else { 0.0 };
-    vector.into_iter().map(|it| it * by).collect()
+/// The standard deviation of normal variables, from the median of their magnitudes.
+fn median_deviation(residuals: &DVector<f64>) -> f64 {
+    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    (1.4826 * median).max(1e-12)
+}
+
+/// Three significant digits.
+pub(super) fn round_to_three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }

@@ -1,12 +1,18 @@
-//! Statistics of a minimum: deviations, correlations, bands.
+//! Statistics of a minimum: deviations, correlations, bands, and which candidate experiment would be most
+//! informative.
 //!
-//! Singular directions of derivatives, and quantiles of Student's distribution.
-//!
-//! Which candidate experiment would be most informative.
+//! All follow from the singular values of the weighted derivatives: combinations of the free numbers with
+//! the smallest ones are those to which the data are insensitive. [`MinimumNeighbourhood`] has the
+//! residuals near a minimum, and the least sum of squares for a given displacement of one number.
 
-use crate::study::fit::data::{Data, DatumDimension, Experiment};
-use crate::study::fit::least_squares::Weighting;
-use crate::study::fit::model::{DatumQuantity, EvaluationBudget, FitModel, FitPoint, ScalarDatum};
+use crate::relax::{ContinuationFailure, GridPolicy};
+use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::data::{Data, Experiment};
+use crate::study::fit::model::{
+    EvaluationBudget, FitModel, FitPoint, WeightedDerivatives, Weighting,
+};
+use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
+use crate::study::fit::remark::FitCandidateRemark;
 use crate::study::fit::{FitCandidate, FitError};
 use nalgebra::{DMatrix, DVector};
 
@@ -14,11 +20,13 @@ use nalgebra::{DMatrix, DVector};
 /// factor of ten.
 pub(super) const UNDETERMINED_UNCERTAINTY: f64 = std::f64::consts::LN_10;
 
+/// Excess below the minimum, in variances, that indicates a better minimum.
+pub(super) const BETTER_MINIMUM_EXCESS: f64 = 0.1;
+
 /// A number with a larger component than this in combinations to which the data are insensitive
 /// is not determined.
 const INSENSITIVE_COMPONENT: f64 = 1e-3;
 
-/// The minimum and its statistics.
 pub(super) struct FitStatistics<'m, 'a> {
     pub model: &'m FitModel<'a>,
     pub weighting: Weighting,
@@ -41,6 +49,12 @@ pub(super) struct FitStatistics<'m, 'a> {
     pub coverage_factor: f64,
 }
 
+pub(super) struct CoordinateUncertainty {
+    pub deviation: f64,
+    /// Changes of all coordinates correlated with a change of this one by one.
+    pub correlated_changes: DVector<f64>,
+}
+
 impl<'m, 'a> FitStatistics<'m, 'a> {
     pub fn new(
         model: &'m FitModel<'a>,
@@ -49,8 +63,9 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         point: &'m FitPoint,
     ) -> Self {
         let residuals = weighting.residuals(point);
-        let (roots, jacobian) = weighting.apply_weights(point, &residuals);
-        let (values, directions) = singular_value_decomposition(&jacobian);
+        let WeightedDerivatives { roots, jacobian } =
+            weighting.weighted_derivatives(point, &residuals);
+        let SingularDirections { values, directions } = singular_value_decomposition(&jacobian);
         let largest = values.last().copied().unwrap_or(0.0);
         let insensitive = values
             .iter()
@@ -85,8 +100,7 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
     }
 
-    /// Standard deviation of a coordinate, and the correlated changes of the others.
-    pub fn standard_error(&self, k: usize) -> (f64, DVector<f64>) {
+    pub fn uncertainty(&self, k: usize) -> CoordinateUncertainty {
         let sensitive = self.insensitive_count..self.singular_values.len();
         let mut along = DVector::zeros(self.singular_values.len());
         for direction in sensitive {
@@ -96,8 +110,14 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
         }
         let variance = along[k];
         match variance > 0.0 {
-            true => (variance.sqrt(), along / variance),
-            false => (0.0, along),
+            true => CoordinateUncertainty {
+                deviation: variance.sqrt(),
+                correlated_changes: along / variance,
+            },
+            false => CoordinateUncertainty {
+                deviation: 0.0,
+                correlated_changes: along,
+            },
         }
     }
 
@@ -142,7 +162,7 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
 
     /// Whether the data determine a coordinate to no better than a factor of ten.
     pub fn is_weakly_determined(&self, k: usize) -> bool {
-        self.coverage_factor * self.standard_error(k).0 > UNDETERMINED_UNCERTAINTY
+        self.coverage_factor * self.uncertainty(k).deviation > UNDETERMINED_UNCERTAINTY
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
@@ -164,13 +184,14 @@ impl<'m, 'a> FitStatistics<'m, 'a> {
     /// Correlations of the coordinates to which the data are sensitive.
     pub fn correlations(&self) -> Vec<Vec<Option<f64>>> {
         let count = self.singular_values.len();
-        let deviations: Vec<_> = (0..count).map(|k| self.standard_error(k)).collect();
+        let uncertainties: Vec<_> = (0..count).map(|k| self.uncertainty(k)).collect();
         let entry = |a: usize, b: usize| {
-            let ((own, along), (other, _)) = (&deviations[a], &deviations[b]);
+            let [own, other] = [a, b].map(|k| uncertainties[k].deviation);
             let known =
-                self.is_sensitive_to(a) && self.is_sensitive_to(b) && *own > 0.0 && *other > 0.0;
-            // along is the covariance with a over its variance.
-            known.then(|| (along[b] * own / other).clamp(-1.0, 1.0))
+                self.is_sensitive_to(a) && self.is_sensitive_to(b) && own > 0.0 && other > 0.0;
+            // The correlated change is the covariance with `a` over the variance of `a`.
+            let change = uncertainties[a].correlated_changes[b];
+            known.then(|| (change * own / other).clamp(-1.0, 1.0))
         };
         let row = |a: usize| (0..count).map(|b| entry(a, b)).collect();
         (0..count).map(row).collect()
@@ -207,8 +228,15 @@ const NEGLIGIBLE_COMPONENT: f64 = 1e-3;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 pub(super) const NORMAL_QUANTILE_95: f64 = 1.959_963_984_540_054;
 
-/// Singular values, ascending, and their right singular vectors as columns.
-pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+/// Singular values and right singular vectors of derivatives of the data.
+pub(super) struct SingularDirections {
+    /// Singular values, ascending.
+    pub values: Vec<f64>,
+    /// Right singular vectors, as columns.
+    pub directions: DMatrix<f64>,
+}
+
+pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> SingularDirections {
     let count = jacobian.ncols();
     if jacobian.nrows() > 2 * count {
         // For many rows: those of the triangular factor, which are the same.
@@ -223,7 +251,7 @@ pub(super) fn singular_value_decomposition(jacobian: &DMatrix<f64>) -> (Vec<f64>
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
     let values = order.iter().map(|&k| svd.singular_values[k]).collect();
     let directions = DMatrix::from_fn(count, count, |r, c| rows[(order[c], r)]);
-    (values, directions)
+    SingularDirections { values, directions }
 }
 
 /// A basis of a space of directions with as many zero components as possible:
@@ -277,6 +305,179 @@ pub(super) fn student_quantile_95(freedom: usize) -> f64 {
             / (92160.0 * n.powi(4))
 }
 
+/// Excess of the sum of squares over the minimum, in squared spreads.
+pub(super) fn normalized_excess(stats: &FitStatistics, point: &FitPoint) -> f64 {
+    let residuals = stats.weighting.residuals(point);
+    let bound = stats.weighting.huber_bound(&stats.residuals);
+    let sum = |residuals: &DVector<f64>| stats.weighting.huber_sum(residuals, bound);
+    (sum(&residuals) - sum(&stats.residuals)) / stats.residual_deviation.powi(2)
+}
+
+/// A point near a minimum, with its residuals.
+pub(super) struct EvaluatedPoint {
+    pub residuals: DVector<f64>,
+    pub point: FitPoint,
+}
+
+pub(super) struct MinimumNeighbourhood<'j, 'm, 'a> {
+    pub stats: &'j FitStatistics<'m, 'a>,
+    /// Numbers at a bound, which stay fixed.
+    fixed: Vec<bool>,
+}
+
+/// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
+/// regularized, so that combinations to which the data are insensitive do not change.
+pub(super) struct GaussNewtonModel {
+    jacobian: DMatrix<f64>,
+    curvature: DMatrix<f64>,
+}
+
+/// A point with derivatives.
+pub(super) struct DifferentiatedPoint {
+    pub point: FitPoint,
+    pub model: GaussNewtonModel,
+}
+
+/// The least sum of squares with one number fixed away from the minimum.
+pub(super) struct ConstrainedMinimum {
+    /// Its excess over the minimum, in squared spreads.
+    pub excess: f64,
+    /// Its excess if the other numbers do not change.
+    pub excess_without_correction: f64,
+    /// The change of the other numbers.
+    pub correction: DVector<f64>,
+    /// Half of its first derivative, and half of its second derivative.
+    half_slope: f64,
+    half_curvature: f64,
+}
+
+impl<'j, 'm, 'a> MinimumNeighbourhood<'j, 'm, 'a> {
+    /// `None` if residuals have different weights, or derivatives are not known.
+    pub fn new(stats: &'j FitStatistics<'m, 'a>) -> Option<Self> {
+        let differentiated = |case: &CaseSolution| case.responses.is_some();
+        if stats.weighting.is_robust || !stats.point.case_solutions.iter().all(differentiated) {
+            return None;
+        }
+        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+        let fixed = coordinates.map(|(free, theta)| free.active_bound(*theta).is_some());
+        Some(MinimumNeighbourhood {
+            stats,
+            fixed: fixed.collect(),
+        })
+    }
+
+    pub fn gauss_newton_model(&self) -> GaussNewtonModel {
+        self.gauss_newton_from_jacobian(self.stats.jacobian.clone())
+    }
+
+    /// Derivatives at another point, which stores them.
+    pub fn gauss_newton_model_at(
+        &self,
+        mut there: FitPoint,
+    ) -> Result<DifferentiatedPoint, ContinuationFailure> {
+        self.stats.model.differentiate_data(&mut there)?;
+        let jacobian = self.stats.weighting.jacobian(&there);
+        Ok(DifferentiatedPoint {
+            model: self.gauss_newton_from_jacobian(jacobian),
+            point: there,
+        })
+    }
+
+    fn gauss_newton_from_jacobian(&self, mut jacobian: DMatrix<f64>) -> GaussNewtonModel {
+        let stats = self.stats;
+        for k in (0..self.fixed.len()).filter(|&k| self.fixed[k]) {
+            jacobian.column_mut(k).fill(0.0);
+        }
+        let count = stats.singular_values.len();
+        let least = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
+        let curvature = jacobian.tr_mul(&jacobian) / stats.residual_deviation.powi(2)
+            + DMatrix::identity(count, count) * least;
+        GaussNewtonModel {
+            jacobian,
+            curvature,
+        }
+    }
+
+    /// The values after a change from the minimum, clamped to the bounds.
+    pub fn bounded_update(&self, change: &DVector<f64>) -> Vec<f64> {
+        let theta = &self.stats.point.theta;
+        let mut moved = self.stats.model.bounded_update(theta, 1.0, change);
+        for k in (0..theta.len()).filter(|&k| self.fixed[k]) {
+            moved[k] = theta[k];
+        }
+        moved
+    }
+
+    /// The residuals for other values, and their point, followed from a point with
+    /// derivatives.
+    pub fn residuals(
+        &self,
+        from: &FitPoint,
+        theta: &[f64],
+    ) -> Result<EvaluatedPoint, ContinuationFailure> {
+        let stats = self.stats;
+        let there = stats
+            .model
+            .continue_leaves_on_grids(from, theta, GridPolicy::These)?;
+        Ok(EvaluatedPoint {
+            residuals: stats.weighting.residuals(&there),
+            point: there,
+        })
+    }
+
+    /// The least sum of squares over all numbers but the `k`th, linearized where the residuals
+    /// are these, with a step no longer than `longest`.
+    pub fn constrained_minimum(
+        &self,
+        slopes: &GaussNewtonModel,
+        k: usize,
+        residuals: &DVector<f64>,
+        longest: f64,
+    ) -> Option<ConstrainedMinimum> {
+        let stats = self.stats;
+        let mut curvature = slopes.curvature.clone();
+        let mut coupled = -curvature.column(k);
+        coupled[k] = 1.0;
+        curvature.row_mut(k).fill(0.0);
+        curvature.column_mut(k).fill(0.0);
+        curvature[(k, k)] = 1.0;
+        let variance = stats.residual_deviation.powi(2);
+        let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
+        slope[k] = 0.0;
+        let inverse = curvature.clone().cholesky()?;
+        let along = inverse.solve(&coupled);
+        let mut correction = -inverse.solve(&slope);
+        let corrected = residuals + &slopes.jacobian * &correction;
+        let change = &slopes.jacobian * &along;
+        let mut damping = (stats.coverage_factor / UNDETERMINED_UNCERTAINTY).powi(2);
+        while correction.norm() > longest {
+            damping *= 2.0;
+            let count = curvature.nrows();
+            let damped = &curvature + DMatrix::identity(count, count) * damping;
+            correction = -damped.cholesky()?.solve(&slope);
+        }
+        let least = stats.residuals.norm_squared();
+        let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
+        Some(ConstrainedMinimum {
+            excess: above(&corrected),
+            excess_without_correction: above(residuals),
+            half_slope: corrected.dot(&change) / variance,
+            half_curvature: change.norm_squared() / variance,
+            correction,
+        })
+    }
+}
+
+impl ConstrainedMinimum {
+    /// The change of the number at which the least sum exceeds the minimum by `above`, with
+    /// linearized residuals: the farther of two solutions, or the minimum of the excess if there
+    /// are none.
+    pub fn step_to_excess(&self, above: f64, sign: f64) -> f64 {
+        let root = self.half_slope.powi(2) - self.half_curvature * (self.excess - above);
+        (sign * root.max(0.0).sqrt() - self.half_slope) / self.half_curvature
+    }
+}
+
 /// Prior of a coordinate: 95 % within a factor of ten up and down.
 const PRIOR_DEVIATION: f64 = std::f64::consts::LN_10 / NORMAL_QUANTILE_95;
 
@@ -297,8 +498,8 @@ pub(super) fn rank_candidate_experiments(
         };
         let of = stats.model;
         // One leaf for each, whatever the search took.
-        let data = (data, EvaluationBudget::new(usize::MAX));
-        let model = FitModel::new(of.base, of.coordinates, &of.options, data)?;
+        let budget = EvaluationBudget::new(usize::MAX);
+        let model = FitModel::new(of.base, of.coordinates, &of.options, data, budget)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),
             bits: 0.0,
@@ -325,12 +526,15 @@ pub(super) fn rank_candidate_experiments(
     Ok(found)
 }
 
-fn information_added(stats: &FitStatistics, model: &FitModel) -> Result<DMatrix<f64>, String> {
+fn information_added(
+    stats: &FitStatistics,
+    model: &FitModel,
+) -> Result<DMatrix<f64>, FitCandidateRemark> {
+    let refused = |why: FitError| FitCandidateRemark::Refused(why.to_string());
     let found = model.relax_leaves(&stats.point.theta);
-    let mut point = found.map_err(|refused| refused.to_string())?;
-    (model.check_weights(&point)).map_err(|refused| refused.to_string())?;
-    (model.differentiate_data(&mut point))
-        .map_err(|_| "its equilibrium is singular".to_string())?;
+    let mut point = found.map_err(refused)?;
+    (model.check_weights(&point)).map_err(refused)?;
+    (model.differentiate_data(&mut point)).map_err(|_| FitCandidateRemark::Singular)?;
     let sd = |component: &ScalarDatum| match component.quantity {
         DatumQuantity::Result(quantity) => component
             .sd
@@ -338,7 +542,7 @@ fn information_added(stats: &FitStatistics, model: &FitModel) -> Result<DMatrix<
         DatumQuantity::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();
-    let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;
+    let sd = sd.ok_or(FitCandidateRemark::NoDeviation)?;
     let rows: Vec<&Vec<f64>> = point.gradients().collect();
     let jacobian = DMatrix::from_fn(rows.len(), stats.singular_values.len(), |i, k| {
         rows[i][k] / sd[i]
@@ -380,7 +584,7 @@ mod tests {
 
     #[test]
     fn rows_fewer_than_columns_leave_directions_unfelt() {
-        let (values, directions) =
+        let SingularDirections { values, directions } =
             singular_value_decomposition(&DMatrix::from_row_slice(1, 2, &[3.0, 4.0]));
         assert!(values[0] < 1e-12 && (values[1] - 5.0).abs() < 1e-12);
         let insensitive = directions.column(0);

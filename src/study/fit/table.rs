@@ -1,20 +1,14 @@
 //! Tables of numbers, as instruments, spreadsheets and people write them.
 //!
-//! The lines of a table, divided into cells, and which of them is the header.
-//!
-//! Decimal points and decimal commas.
-//!
-//! The text of a table from its bytes.
-//!
-//! The row of units below a header.
+//! Encoding, separator of cells, header, decimal mark and a row of units are recognized from the text
+//! itself; where it can be read in two ways, the file is refused with what to change.
 
 use crate::scenario::MOST_BYTES;
 use crate::study::fit::FitError;
-use crate::study::fit::data::{
-    DataReadingOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
+use crate::study::fit::columns::{
+    DataFileOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
 };
 
-/// A parsed table.
 pub(super) struct DataTable<'t> {
     pub file: &'t str,
     /// Line of the header, counted from 1.
@@ -27,7 +21,6 @@ pub(super) struct DataTable<'t> {
     pub comments: [usize; 2],
     /// What the file was taken for, where that is not the usual CSV.
     pub taken: Vec<String>,
-    /// What was left out.
     pub left_out: Vec<String>,
     sources: Vec<ColumnSource>,
     rows: Vec<TableLine>,
@@ -78,11 +71,7 @@ fn column_names(header: &TableLine, groups: Option<&TableLine>) -> Vec<String> {
 }
 
 impl<'t> DataTable<'t> {
-    pub fn parse(
-        bytes: &[u8],
-        file: &'t str,
-        reading: &DataReadingOptions,
-    ) -> Result<Self, FitError> {
+    pub fn parse(bytes: &[u8], file: &'t str, reading: &DataFileOptions) -> Result<Self, FitError> {
         let decoded = decode(bytes, file)?;
         let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
         let known = |name: &str| is_known_column(name) || mapped(name).is_some();
@@ -260,7 +249,7 @@ impl<'t> DataTable<'t> {
     }
 
     /// Chooses the columns that are used, and returns words for others.
-    fn select_columns(&mut self, reading: &DataReadingOptions) -> Result<Vec<String>, FitError> {
+    fn select_columns(&mut self, reading: &DataFileOptions) -> Result<Vec<String>, FitError> {
         let (mut unnamed, mut unused) = (None, Vec::new());
         let maps_of = |name: &str| {
             let maps = reading.columns.iter();
@@ -371,7 +360,6 @@ impl<'t> DataTable<'t> {
         Ok(())
     }
 
-    /// Number of rows.
     pub fn row_count(&self) -> usize {
         self.rows.len()
     }
@@ -381,7 +369,6 @@ impl<'t> DataTable<'t> {
         self.rows[row].number
     }
 
-    /// Where a column is.
     pub fn column_index(&self, name: &str) -> Option<usize> {
         self.header.iter().position(|known| known == name)
     }
@@ -468,7 +455,6 @@ impl TableLine {
 /// Lines, one of which is the header.
 pub struct TableLines {
     pub lines: Vec<TableLine>,
-    /// Index of the header.
     pub header: usize,
     /// What divides cells, in words.
     pub separator: &'static str,
@@ -510,11 +496,14 @@ fn split_cells(text: &str, separator: u8, up_to: usize) -> Vec<TableLine> {
     lines
 }
 
-/// The line with most columns that are known, and how many these are.
-fn header_with_known_columns(
-    lines: &[TableLine],
-    known: &dyn Fn(&str) -> bool,
-) -> Option<(usize, usize)> {
+/// A line that may be the header.
+struct HeaderCandidate {
+    line: usize,
+    known_columns: usize,
+}
+
+/// The line with most columns that are known, or else the one that looks most like a header.
+fn header_candidate(lines: &[TableLine], known: &dyn Fn(&str) -> bool) -> HeaderCandidate {
     let count = |line: &TableLine| line.cells().filter(|name| known(name)).count();
     let counts = lines
         .iter()
@@ -522,7 +511,12 @@ fn header_with_known_columns(
         .filter(|(_, line)| line.may_be_header());
     let counts = counts.map(|(at, line)| (at, count(line)));
     let counts = counts.filter(|(_, count)| *count > 0);
-    counts.rev().max_by_key(|(_, count)| *count)
+    let (line, known_columns) = (counts.rev().max_by_key(|(_, count)| *count))
+        .unwrap_or_else(|| (guess_header_line(lines), 0));
+    HeaderCandidate {
+        line,
+        known_columns,
+    }
 }
 
 /// Of the lines of words above a number the one with most of them; without such lines, the first.
@@ -550,8 +544,10 @@ impl TableLines {
             let Some(first) = lines.iter().find(|line| !line.is_blank()) else {
                 continue;
             };
-            let (at, count) =
-                header_with_known_columns(&lines, known).unwrap_or((guess_header_line(&lines), 0));
+            let HeaderCandidate {
+                line: at,
+                known_columns: count,
+            } = header_candidate(&lines, known);
             let width = lines[at].len();
             let fits = lines[at..].iter().all(|line| line.len() == width);
             // Where no name is known, the most cells.

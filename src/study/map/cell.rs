@@ -1,11 +1,10 @@
-//! One cell: the reference, and each method's answer with its verdict.
+//! One cell of a map: the reference, and each method's answer with its verdict; and the jumps of the leaf
+//! between neighboring cells.
 //!
-//! Explicit motion with one time step, stable or not: the answer of a plain simulation
-//! of the damped leaf.
+//! Explicit motion has one time step, stable or not: its answer is that of a plain simulation of the damped
+//! leaf.
 //!
-//! Jumps: neighbouring cells in which the leaf rests in different equilibria.
-//!
-//! Pairs of cells whose answers are farther apart than those of the neighbouring pairs are
+//! Pairs of cells whose answers are farther apart than those of the neighboring pairs are
 //! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
 //! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
@@ -14,19 +13,23 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::motion::{Explicit, Physics, Stopped, TimeIntegrator};
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Method, Options, Outcome, RelaxError, SolverCounts, index_near, initial_state, rod_shapes,
+    Method, Options, Outcome, RelaxError, SemiImplicit, SolverCounts, index_near, initial_state,
+    rod_shapes,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::Undulation;
 use crate::shooting::{ShootingFailureReason, ShootingStart};
+use crate::simulate::DEFAULT_MOTION_SEGMENTS;
 use crate::study::judge::{
-    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, eigenvalue_grid,
+    LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, Timed, eigenvalue_grid,
     morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
+use crate::study::map::remark::{MapMotionFailure, MapRemark};
 use crate::study::map::{
-    CellSolution, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
+    CellSolution, CellVerdict, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
 };
+use crate::study::remark::SolutionRemark;
 use crate::study::vary::{SolverSettings, VariedScenario};
 use crate::{relax, shooting};
 use glam::DVec3;
@@ -57,7 +60,7 @@ pub struct MapCell<'a> {
     /// Time limit for all cells.
     total_limit: &'a Limit,
     /// The default method's answer and its seconds: the start of shooting from rest.
-    relaxed_answer: (CellSolution, f64),
+    relaxed_answer: Timed<CellSolution>,
     reference: Option<MethodSolution>,
     confidence: ReferenceConfidence,
 }
@@ -76,7 +79,12 @@ impl<'a> MapCell<'a> {
         let rods = scenario.rods.len();
         let relaxed = refuse_slow_grid(LEAST_SEGMENTS_PER_ROD, rods, limit).unwrap_or_else(|| {
             run_within_limit(limit, all, |limit| {
-                relax_with_error_estimate(scenario, Method::default(), tolerance, limit)
+                relax_with_error_estimate(
+                    scenario,
+                    SemiImplicit::default().into(),
+                    tolerance,
+                    limit,
+                )
             })
         });
         let mut cell = MapCell {
@@ -90,19 +98,23 @@ impl<'a> MapCell<'a> {
             confidence: ReferenceConfidence::None,
         };
         let sharp = (REFERENCE_TOLERANCE_RATIO * tolerance).max(LEAST_REFERENCE_TOLERANCE);
-        let (shot, _) = run_within_limit(limit, all, |limit| {
+        let shot = run_within_limit(limit, all, |limit| {
             cell.shoot_from_relaxed_leaf(sharp, limit)
-        });
-        if let Ok(relaxed) = &cell.relaxed_answer.0 {
-            let (confidence, reference) = choose_reference(relaxed, shot.ok());
-            (cell.confidence, cell.reference) = (confidence, Some(reference));
+        })
+        .result;
+        if let Ok(relaxed) = &cell.relaxed_answer.result {
+            let chosen = choose_reference(relaxed, shot.ok());
+            (cell.confidence, cell.reference) = (chosen.confidence, Some(chosen.solution));
         }
         cell
     }
 
     /// Solves by a method and judges the answer.
     pub fn solve_by_method(&self, cell: usize, method: MapMethod) -> MapRow {
-        let (found, seconds) = self.timed_solution(method);
+        let Timed {
+            result: found,
+            seconds,
+        } = self.timed_solution(method);
         let blank = MapRow {
             seconds,
             cell,
@@ -112,10 +124,10 @@ impl<'a> MapCell<'a> {
         };
         let answer = match found {
             Ok(answer) => answer,
-            Err((outcome, detail)) => {
+            Err(CellVerdict { outcome, remark }) => {
                 return MapRow {
                     outcome,
-                    detail: join_lines(&detail),
+                    remark,
                     ..blank
                 };
             }
@@ -123,12 +135,12 @@ impl<'a> MapCell<'a> {
         let length = longest(&self.scenario.rods);
         let reference = self.reference.as_ref();
         let distance = reference.and_then(|it| it.largest_distance(&answer));
-        let (outcome, detail) = self.judge_solution(&answer, distance);
+        let CellVerdict { outcome, remark } = self.judge_solution(&answer, distance);
         let margin = answer.undulation.margin();
         let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
         MapRow {
             outcome,
-            detail: join_lines(&detail),
+            remark,
             index: answer.index,
             tip_x: tip.map(|node| node.position.x),
             tip_y: tip.map(|node| node.position.y),
@@ -143,10 +155,11 @@ impl<'a> MapCell<'a> {
         }
     }
 
-    fn timed_solution(&self, method: MapMethod) -> (CellSolution, f64) {
+    fn timed_solution(&self, method: MapMethod) -> Timed<CellSolution> {
         let segments = self.solver_settings.segments;
         let (scenario, tolerance) = (self.scenario, self.tolerance);
-        if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
+        let is_relaxed = |method: Method| method.semi_implicit().is_some() && segments.is_none();
+        if matches!(method, MapMethod::ToRest(method) if is_relaxed(method)) {
             return self.relaxed_answer.clone();
         }
         let on_grid = match method {
@@ -163,16 +176,15 @@ impl<'a> MapCell<'a> {
             MapMethod::ExplicitMotion => {
                 solve_by_explicit_motion(scenario, self.solver_settings, tolerance, limit)
             }
-            MapMethod::ToRest(method) => match method {
-                Method::SingleShooting => {
-                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, Some(1), limit)
-                }
-                Method::Shooting { intervals } => {
-                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, intervals, limit)
-                }
-                Method::ShootingFromRest { .. } => self.shoot_from_relaxed_leaf(tolerance, limit),
-                Method::SemiImplicit(_) | Method::Explicit { .. } => {
+            MapMethod::ToRest(method) => match method.shooting() {
+                None => {
                     relax_with_error_estimate(scenario, method.on_grid(segments), tolerance, limit)
+                }
+                Some(how) if how.from_relaxed_leaf => {
+                    self.shoot_from_relaxed_leaf(tolerance, limit)
+                }
+                Some(how) => {
+                    self.solve_by_shooting(ShootingStart::Arcs, tolerance, how.intervals, limit)
                 }
             },
         })
@@ -185,7 +197,7 @@ impl<'a> MapCell<'a> {
         intervals: Option<usize>,
         limit: &Limit,
     ) -> CellSolution {
-        let segments = match &self.relaxed_answer.0 {
+        let segments = match &self.relaxed_answer.result {
             Ok(relaxed) => relaxed.stations.len() - 1,
             Err(_) => LEAST_EIGENVALUE_SEGMENTS,
         };
@@ -211,77 +223,72 @@ impl<'a> MapCell<'a> {
                 ShootingFailureReason::OutOfTime => MapOutcome::OutOfTime,
                 _ => MapOutcome::NotConverged,
             };
-            let way = match failure.lambda {
-                part if part < 1.0 => format!(" (at {part:.4} of the way from arcs)"),
-                _ => String::new(),
+            let remark = MapRemark::ShootingFailed {
+                reason: failure.reason,
+                part: failure.lambda,
             };
-            (outcome, format!("{}{way}", failure.reason))
+            CellVerdict::new(outcome, remark)
         })?;
-        let intervals = match solution.intervals.len() - 1 {
-            1 => "1 interval".into(),
-            count => format!("{count} intervals"),
+        let remark = SolutionRemark::Shot {
+            intervals: solution.intervals.len() - 1,
+            growth: solution.growth,
+            neutral: solution.neutral.clone(),
         };
-        let neutral = solution.neutral.as_ref();
-        let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
-        let growth = solution.growth;
-        let note = format!("over {intervals}, growth 10^{growth:.1}{neutral}");
         let answer = MethodSolution::from_shooting(self.scenario, solution, accuracy);
         if !answer.outcome.is_success() {
-            let known = format!(
-                "the solution is only known within {:.1e}",
-                answer.error_bound()
-            );
-            return Err((MapOutcome::NotConverged, known));
+            let error = answer.error_bound();
+            let known = MapRemark::Inaccurate { error };
+            return Err(CellVerdict::new(MapOutcome::NotConverged, known));
         }
         Ok(MethodSolution {
             index: morse_index_near(
                 self.scenario,
                 grid,
-                (&answer.stations, &answer.rods),
+                &answer.stations,
+                &answer.rods,
                 answer.error_bound(),
             ),
-            remark: Some(note),
+            remark: Some(remark),
             ..answer
         })
     }
 
     fn shoot_from_relaxed_leaf(&self, accuracy: f64, limit: &Limit) -> CellSolution {
-        match &self.relaxed_answer.0 {
+        match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
-            Err((outcome, why)) => {
-                let why = format!("the leaf to start from is not at rest: {why}");
-                Err((*outcome, why))
+            Err(CellVerdict { outcome, remark }) => {
+                let why = remark.clone().map(Box::new);
+                Err(CellVerdict::new(*outcome, MapRemark::NoStart { why }))
             }
         }
     }
 
     /// The verdict on an answer at this distance from the reference.
-    fn judge_solution(
-        &self,
-        answer: &MethodSolution,
-        distance: Option<f64>,
-    ) -> (MapOutcome, String) {
-        let note = answer.remark.as_deref().unwrap_or_default();
+    fn judge_solution(&self, answer: &MethodSolution, distance: Option<f64>) -> CellVerdict {
+        let remark = answer.remark.clone();
         if let Some(index @ 1..) = answer.index {
-            return (MapOutcome::Saddle, format!("index {index}; {note}"));
+            let saddle = MapRemark::Saddle { index, remark };
+            return CellVerdict::new(MapOutcome::Saddle, saddle);
         }
         let (Some(reference), Some(distance)) = (&self.reference, distance) else {
-            let text = format!("stable, with nothing to compare with; {note}");
-            return (MapOutcome::Right, text);
+            return CellVerdict::new(MapOutcome::Right, MapRemark::Uncompared { remark });
         };
         if answer.agrees_within_errors(reference, distance) {
-            return (MapOutcome::Right, note.into());
+            return CellVerdict {
+                outcome: MapOutcome::Right,
+                remark: remark.map(MapRemark::Solution),
+            };
         }
-        let lower = match answer.energy - reference.energy {
-            lower if lower < 0.0 => format!("energy lower by {:.1e}", -lower),
-            higher => format!("energy higher by {higher:.1e}"),
+        let elsewhere = MapRemark::Elsewhere {
+            distance: distance / longest(&self.scenario.rods),
+            energy: answer.energy - reference.energy,
+            remark,
         };
-        let apart = distance / longest(&self.scenario.rods);
-        let text = format!("{apart:.1e} lengths from the reference, {lower}; {note}");
-        match self.is_other_equilibrium(answer, reference, distance) {
-            true => (MapOutcome::OtherEquilibrium, text),
-            false => (MapOutcome::Inaccurate, text),
-        }
+        let outcome = match self.is_other_equilibrium(answer, reference, distance) {
+            true => MapOutcome::OtherEquilibrium,
+            false => MapOutcome::Inaccurate,
+        };
+        CellVerdict::new(outcome, elsewhere)
     }
 
     /// Whether the equilibrium near an answer is another than the reference.
@@ -291,10 +298,10 @@ impl<'a> MapCell<'a> {
         reference: &MethodSolution,
         distance: f64,
     ) -> bool {
-        let (near, _) = run_within_limit(self.limit, self.total_limit, |limit| {
+        let near = run_within_limit(self.limit, self.total_limit, |limit| {
             self.solve_by_shooting(answer.shooting_start(), self.tolerance, None, limit)
         });
-        match near {
+        match near.result {
             Ok(near) if near.largest_distance(answer) < Some(distance) => {
                 near.largest_distance(reference) > Some(0.5 * distance)
             }
@@ -304,11 +311,14 @@ impl<'a> MapCell<'a> {
 }
 
 /// The outcome on a grid that takes longer than the limit in any case.
-fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<(CellSolution, f64)> {
-    let (nodes, limit) = (segments.saturating_mul(rods), limit.as_secs_f64());
-    let late = nodes as f64 * LEAST_SECONDS_PER_NODE > limit;
-    let why = || format!("{nodes} nodes take longer than {limit} s");
-    late.then(|| (Err((MapOutcome::OutOfTime, why())), 0.0))
+fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<Timed<CellSolution>> {
+    let (nodes, seconds) = (segments.saturating_mul(rods), limit.as_secs_f64());
+    let late = nodes as f64 * LEAST_SECONDS_PER_NODE > seconds;
+    let why = MapRemark::TooManyNodes { nodes, seconds };
+    late.then_some(Timed {
+        result: Err(CellVerdict::new(MapOutcome::OutOfTime, why)),
+        seconds: 0.0,
+    })
 }
 
 /// Runs a method with a time limit; also returns the seconds it took.
@@ -317,20 +327,18 @@ fn run_within_limit(
     limit: Duration,
     all: &Limit,
     run: impl FnOnce(&Limit) -> CellSolution,
-) -> (CellSolution, f64) {
+) -> Timed<CellSolution> {
     let until = Limit {
         deadline: Some(Instant::now() + limit),
         ..all.clone()
     };
-    let (found, seconds) = run_timed(|| run(&until));
-    let limit = limit.as_secs_f64();
-    match seconds > limit {
-        true => {
-            let late = format!("no answer within {limit} s");
-            (Err((MapOutcome::OutOfTime, late)), seconds)
-        }
-        false => (found, seconds),
+    let mut found = run_timed(|| run(&until));
+    let allowed = limit.as_secs_f64();
+    if found.seconds > allowed {
+        let late = MapRemark::OutOfTime { seconds: allowed };
+        found.result = Err(CellVerdict::new(MapOutcome::OutOfTime, late));
     }
+    found
 }
 
 /// Relaxes, perhaps on one grid. That has no error estimate of its own: a finer grid gives one.
@@ -347,7 +355,10 @@ pub fn relax_with_error_estimate(
         ..Options::default()
     };
     let leaf = relax::relax(scenario, &options, &mut |_| {});
-    let leaf = leaf.map_err(|refused| (MapOutcome::Refused, refused.to_string()))?;
+    let leaf = leaf.map_err(|refused| {
+        let refused = MapRemark::Refused(refused.to_string());
+        CellVerdict::new(MapOutcome::Refused, refused)
+    })?;
     let saddle = leaf.stability.saddle;
     let saddle = saddle.map(|saddle| saddle.negative_eigenvalues);
     let mut answer = MethodSolution::from(leaf);
@@ -356,49 +367,56 @@ pub fn relax_with_error_estimate(
             Outcome::Diverged => MapOutcome::Diverged,
             _ => MapOutcome::NotConverged,
         };
-        return Err((outcome, answer.remark.unwrap_or_default()));
+        return Err(CellVerdict {
+            outcome,
+            remark: answer.remark.map(MapRemark::Solution),
+        });
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();
         let error = segments.and_then(|n| single_grid_error(scenario, n, tolerance, limit));
         let Some(error) = error else {
-            let why = "the error of the grid cannot be told: a finer one finds no rest";
-            return Err((MapOutcome::NotConverged, why.into()));
+            return Err(CellVerdict::new(
+                MapOutcome::NotConverged,
+                MapRemark::UnknownError,
+            ));
         };
         answer.error_estimate = Some(error + tolerance);
     }
     if let Some(index) = saddle {
-        answer.remark = Some(format!("left a saddle of index {index}"));
+        answer.remark = Some(SolutionRemark::LeftSaddle { index });
     }
     Ok(answer)
+}
+
+/// The solution against which the answers in a cell are judged.
+struct CellReference {
+    confidence: ReferenceConfidence,
+    solution: MethodSolution,
 }
 
 /// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
 /// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
 /// if not, only if that is stable.
-fn choose_reference(
-    relaxed: &MethodSolution,
-    shot: Option<MethodSolution>,
-) -> (ReferenceConfidence, MethodSolution) {
+fn choose_reference(relaxed: &MethodSolution, shot: Option<MethodSolution>) -> CellReference {
+    let unconfirmed = |solution: MethodSolution| CellReference {
+        confidence: ReferenceConfidence::Unconfirmed,
+        solution,
+    };
     let Some(shot) = shot else {
-        return (ReferenceConfidence::Unconfirmed, relaxed.clone());
+        return unconfirmed(relaxed.clone());
     };
     let distance = relaxed.largest_distance(&shot);
     let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&shot, distance));
     match (same && shot.index == relaxed.index, shot.index) {
-        (true, _) => (ReferenceConfidence::Confirmed, shot),
-        (false, Some(0)) => (ReferenceConfidence::Unconfirmed, shot),
-        (false, _) => (ReferenceConfidence::Unconfirmed, relaxed.clone()),
+        (true, _) => CellReference {
+            confidence: ReferenceConfidence::Confirmed,
+            solution: shot,
+        },
+        (false, Some(0)) => unconfirmed(shot),
+        (false, _) => unconfirmed(relaxed.clone()),
     }
 }
-
-/// Puts a text on one line, as tables require.
-pub fn join_lines(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// Default number of segments per rod: as in a simulation.
-const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
 /// Largest number of stations at which answers are compared.
 const MOST_COMPARED_STATIONS: usize = 4096;
@@ -414,30 +432,39 @@ pub fn solve_by_explicit_motion(
     tolerance: f64,
     limit: &Limit,
 ) -> CellSolution {
-    let refused = |why: String| Err((MapOutcome::Refused, why));
+    let refused = |why: MapRemark| Err(CellVerdict::new(MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
-        return refused("explicit motion needs method.step".into());
+        return refused(MapRemark::NoTimeStep);
     };
     let leaf = Leaf::new(scenario);
     let grid = match motion_grid(&leaf, knobs) {
         Ok(grid) => grid,
-        Err(error) => return refused(error.to_string()),
+        Err(error) => return refused(MapRemark::Refused(error.to_string())),
     };
     let physics = Physics::new(&leaf);
     if !physics.clamped() {
-        return refused("a free leaf has no place to rest in".into());
+        return refused(MapRemark::FreeLeaf);
     }
     let discrete = DiscreteLeaf::new(&leaf, grid.clone());
     let state = initial_state(&discrete);
     let h = step / physics.time_unit;
     let Ok(mut motion) = Explicit::new(discrete, physics.clone(), &state, Some(h)) else {
-        return refused("no time step is stable for rigid rods (a stiffness is inf)".into());
+        return refused(MapRemark::RigidRods);
     };
     let stable = motion.stable_step();
-    let (most, why) = (stable.step * physics.time_unit, stable.limit);
-    let note = format!("step {step:.3e}, stable up to {most:.3e} because of {why}");
-    let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
-    let (duration, _) = physics.duration_and_interval();
+    let stepped = SolutionRemark::Stepped {
+        step,
+        stable: stable.step * physics.time_unit,
+        limit: stable.limit,
+    };
+    let failed = |outcome, motion: MapMotionFailure| {
+        let step = stepped.clone();
+        Err(CellVerdict::new(
+            outcome,
+            MapRemark::MotionFailed { motion, step },
+        ))
+    };
+    let duration = physics.times().duration;
     while motion.time() < duration {
         let until = motion.time() + STEPS_PER_TIME_CHECK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
@@ -446,22 +473,24 @@ pub fn solve_by_explicit_motion(
             | Stopped::Diverged { time, .. }
             | Stopped::StepTooShort { time, .. }
             | Stopped::Interrupted { time }) = stopped;
-            let at = format!("at t = {:.3e}", time * physics.time_unit);
+            let time = time * physics.time_unit;
             return match stopped {
-                Stopped::Unresolved { turn, .. } => {
-                    let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
-                    failed(MapOutcome::NotConverged, format!("{at} {bent}"))
-                }
-                Stopped::HalfTurn { half_turn, .. } => failed(
+                Stopped::Unresolved { turn, .. } => failed(
                     MapOutcome::NotConverged,
-                    format!("{at} {}", half_turn.sentence()),
+                    MapMotionFailure::Unresolved { time, turn },
                 ),
-                _ => failed(MapOutcome::Diverged, format!("numerical instability {at}")),
+                Stopped::HalfTurn {
+                    half_turn: place, ..
+                } => failed(
+                    MapOutcome::NotConverged,
+                    MapMotionFailure::HalfTurn { time, place },
+                ),
+                _ => failed(MapOutcome::Diverged, MapMotionFailure::Unstable { time }),
             };
         }
         if limit.reached() {
             // Past the limit it counts as out of time, whatever is returned here.
-            return failed(MapOutcome::OutOfTime, "still moving".into());
+            return failed(MapOutcome::OutOfTime, MapMotionFailure::OutOfTime);
         }
     }
     let end = motion.snapshot();
@@ -471,7 +500,7 @@ pub fn solve_by_explicit_motion(
         .map(|v| [v.linear, v.angular].map(DVec3::length));
     let fastest = largest(speeds.flatten());
     if fastest > tolerance {
-        let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
+        let moves = MapMotionFailure::StillMoving { speed: fastest };
         return failed(MapOutcome::NotConverged, moves);
     }
     let rods = rod_shapes(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
@@ -482,14 +511,14 @@ pub fn solve_by_explicit_motion(
         SAME_LEAF_DISTANCE * leaf.scale.length,
     );
     if index.is_none() && !leaf.loads.has_moments() {
-        return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
+        return failed(MapOutcome::NotConverged, MapMotionFailure::NotAtRest);
     }
     let length = leaf.scale.length;
     let error = single_grid_error(scenario, grid.segments(), tolerance, limit);
     let estimate = error.unwrap_or(SAME_LEAF_DISTANCE * length) + tolerance * length;
     Ok(MethodSolution {
         outcome: Outcome::Converged,
-        remark: Some(note),
+        remark: Some(stepped),
         undulation: Undulation::at_stations(scenario, grid.sigma(), &rods, Some(estimate)),
         stations: grid.sigma().to_vec(),
         rods,
@@ -533,20 +562,27 @@ pub fn reference_stations(scenario: &Scenario, knobs: SolverSettings) -> Vec<f64
     }
 }
 
-/// Leaves closer than this, in lengths, count as the same.
-const SAME_ROW_DISTANCE: f64 = 0.01;
+/// The search for jumps between neighbouring cells.
+struct JumpSearch {
+    /// Leaves closer than this, in lengths, count as the same.
+    same_leaf: f64,
+    /// A pair is examined if its tips, or its twists, are farther apart than those of a
+    /// neighbouring pair by this factor.
+    suspicious_ratio: f64,
+    /// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
+    /// part of their distance.
+    continuous_part: f64,
+    /// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
+    /// distance from it, here a sixty-fourth.
+    bisections: usize,
+}
 
-/// A pair is examined if its tips, or its twists, are farther apart than those of
-/// a neighbouring pair by this factor.
-const SUSPICIOUS_DISTANCE_RATIO: f64 = 1.5;
-
-/// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
-/// part of their distance.
-const CONTINUITY_RATIO: f64 = 0.1;
-
-/// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
-/// distance from it, here a sixty-fourth.
-const JUMP_BISECTIONS: usize = 12;
+const JUMP_SEARCH: JumpSearch = JumpSearch {
+    same_leaf: 0.01,
+    suspicious_ratio: 1.5,
+    continuous_part: 0.1,
+    bisections: 12,
+};
 
 /// Two neighbouring cells between which the leaf jumps to another equilibrium.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -555,7 +591,7 @@ pub struct MapJump {
     pub key: String,
     /// The varied values of one cell.
     pub from: Vec<String>,
-    /// Those of the other.
+    /// The varied values of the other cell.
     pub to: Vec<String>,
     /// The two values of the key between which it jumps.
     pub between: [f64; 2],
@@ -644,8 +680,8 @@ fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &Neighbouring
     (0..2).any(|k| {
         let others = [before, after].into_iter().flatten().map(|it| it[k]);
         let least = others.fold(f64::INFINITY, f64::min);
-        own[k] > SAME_ROW_DISTANCE * units[k]
-            && (!least.is_finite() || own[k] > SUSPICIOUS_DISTANCE_RATIO * least)
+        own[k] > JUMP_SEARCH.same_leaf * units[k]
+            && (!least.is_finite() || own[k] > JUMP_SEARCH.suspicious_ratio * least)
     })
 }
 
@@ -666,13 +702,15 @@ fn locate_jump(request: &MapRequest, pair: &NeighbouringCells) -> Option<MapJump
     let length = longest(&request.base.scenario().rods);
     let [mut low, mut high] = [(0.0, at(0.0)?), (1.0, at(1.0)?)];
     let mut distance = low.1.largest_distance(&high.1)?;
-    for half in 0..JUMP_BISECTIONS {
-        if distance < SAME_ROW_DISTANCE * length {
+    for half in 0..JUMP_SEARCH.bisections {
+        if distance < JUMP_SEARCH.same_leaf * length {
             return None;
         }
         let part = 0.5 * (low.0 + high.0);
         let middle = at(part)?;
-        if half == 0 && distance_from_mean(&low.1, &middle, &high.1)? < CONTINUITY_RATIO * distance
+        if half == 0
+            && distance_from_mean(&low.1, &middle, &high.1)?
+                < JUMP_SEARCH.continuous_part * distance
         {
             return None;
         }
@@ -685,7 +723,7 @@ fn locate_jump(request: &MapRequest, pair: &NeighbouringCells) -> Option<MapJump
             false => (low, distance) = ((part, middle), above),
         }
     }
-    (distance >= SAME_ROW_DISTANCE * length).then(|| MapJump {
+    (distance >= JUMP_SEARCH.same_leaf * length).then(|| MapJump {
         key: axis.keys.to_string(),
         from: request.texts(pair.cells[0]),
         to: request.texts(pair.cells[1]),
@@ -707,7 +745,7 @@ fn relax_between_cells(
         deadline: Some(Instant::now() + Duration::from_secs_f64(request.cell_seconds)),
         ..request.limit.clone()
     };
-    let method = Method::default().on_grid(varied.solver_settings.segments);
+    let method = SemiImplicit::on_grid(varied.solver_settings.segments).into();
     let tolerance = request.tolerance.unwrap_or(varied.scenario.tolerance);
     relax_with_error_estimate(&varied.scenario, method, tolerance, &limit).ok()
 }

@@ -5,19 +5,17 @@
 //! leaf, and the solution of the boundary-value problem that starts from it,
 //! both at a hundredth of the tolerance. If they agree within their estimates the
 //! reference is confirmed. All answers are measured against it.
-//!
-//! Requests for maps, and their validation.
-//!
-//! The result of one method in one cell: a closed set of words, and numbers.
 
 mod cell;
+mod remark;
 
 use crate::memory::TooMuch;
 use crate::relax::{Method, RelaxError, check_tolerance, without_wind};
 use crate::run::{Limit, RefusedOption};
 use crate::study::judge::MethodSolution;
+use crate::study::map::cell::MapCell;
 pub use crate::study::map::cell::MapJump;
-use crate::study::map::cell::{MapCell, join_lines};
+pub use crate::study::map::remark::{MapMotionFailure, MapRemark};
 use crate::study::vary::{BaseScenario, ParameterKeys, ParameterSweep, SolverSetting, VaryError};
 use crate::{memory, read_and_write, words};
 use serde::{Serialize, Serializer};
@@ -122,7 +120,7 @@ pub fn map(
     let done = Mutex::new(done);
     let work = || {
         while let Some(&cell) = next() {
-            let rows = request.solve(cell, &request.methods);
+            let rows = request.solve_cell(cell, &request.methods);
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             if !(*done)(rows) {
                 *left.lock().unwrap_or_else(PoisonError::into_inner) = [].iter();
@@ -295,7 +293,7 @@ impl MapRequest {
             .collect()
     }
 
-    /// The same as texts, as in tables.
+    /// The varied values of a cell as texts, as in tables.
     pub fn texts(&self, cell: usize) -> Vec<String> {
         let values = self.values(cell).into_iter();
         values.map(|(keys, value)| keys.text(value)).collect()
@@ -307,14 +305,20 @@ impl MapRequest {
         cell::longest_stable_step(&self.base.scenario_with_values(&self.values(cell)).ok()?)
     }
 
-    /// Solves one cell by these methods.
+    /// Renamed to [`MapRequest::solve_cell`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
     pub fn solve(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
+        self.solve_cell(cell, methods)
+    }
+
+    /// Solves one cell by these methods.
+    pub fn solve_cell(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
         let varied = match self.base.scenario_with_values(&self.values(cell)) {
             Ok(varied) => varied,
             Err(refused) => {
-                let detail = join_lines(&refused.to_string());
+                let remark = Some(MapRemark::Refused(refused.to_string()));
                 let refused = |&method: &MapMethod| MapRow {
-                    detail: detail.clone(),
+                    remark: remark.clone(),
                     cell,
                     method,
                     ..MapRow::default()
@@ -448,9 +452,25 @@ words! {
     }
 }
 
-/// An answer at rest within the tolerance, or an outcome and a sentence that say why there
+/// An answer at rest within the tolerance, or an outcome and a remark that say why there
 /// is none.
-pub type CellSolution = Result<MethodSolution, (MapOutcome, String)>;
+pub type CellSolution = Result<MethodSolution, CellVerdict>;
+
+/// The outcome of a method in a cell, and what is to be said of it.
+#[derive(Clone, Debug)]
+pub struct CellVerdict {
+    outcome: MapOutcome,
+    remark: Option<MapRemark>,
+}
+
+impl CellVerdict {
+    fn new(outcome: MapOutcome, remark: MapRemark) -> Self {
+        CellVerdict {
+            outcome,
+            remark: Some(remark),
+        }
+    }
+}
 
 words! {
     /// Reliability of the reference.
@@ -491,8 +511,9 @@ pub struct MapRow {
     pub method: MapMethod,
     /// The outcome.
     pub outcome: MapOutcome,
-    /// Further information, on one line.
-    pub detail: String,
+    /// Further information.
+    #[serde(rename = "detail", serialize_with = "serialize_on_one_line")]
+    pub remark: Option<MapRemark>,
     /// Negative eigenvalues of the equilibrium found.
     pub index: Option<usize>,
     /// The shared tip, or the first rod's.
@@ -516,7 +537,7 @@ pub struct MapRow {
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_waves: Option<f64>,
-    /// Their amplitude.
+    /// Amplitude of the waves along the margins.
     #[serde(serialize_with = "serialize_exact_number")]
     pub margin_amplitude: Option<f64>,
     /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
@@ -529,7 +550,19 @@ pub struct MapRow {
     pub reference: ReferenceConfidence,
 }
 
-/// As in Rust's notation, from which every bit can be read.
+impl MapRow {
+    /// Further information on one line, as tables require.
+    pub fn detail(&self) -> String {
+        on_one_line(self.remark.as_ref())
+    }
+}
+
+fn on_one_line(remark: Option<&MapRemark>) -> String {
+    let text = remark.map(ToString::to_string).unwrap_or_default();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Numbers as Rust writes them, from which every bit can be read.
 fn serialize_exact_number<S: Serializer>(
     value: &Option<f64>,
     serializer: S,
@@ -539,6 +572,13 @@ fn serialize_exact_number<S: Serializer>(
         Some(value) => serializer.collect_str(&format_args!("{:?}", value + 0.0)),
         None => serializer.serialize_none(),
     }
+}
+
+fn serialize_on_one_line<S: Serializer>(
+    remark: &Option<MapRemark>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&on_one_line(remark.as_ref()))
 }
 
 fn serialize_microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {

@@ -16,32 +16,41 @@ const SOFTEST_MODE_COUNT: usize = 3;
 
 pub(super) const MODE_SADDLE_SEARCHES: usize = 2 * SOFTEST_MODE_COUNT;
 
-/// Largest number of grids for the extrapolated energy of a pass, nodes of the finest,
-/// and the relative error at which it is accurate enough.
-const MOST_BARRIER_GRIDS: usize = 7;
+/// The search for the lowest pass.
+struct BarrierSearch {
+    /// Largest number of grids for the extrapolated energy of a pass.
+    most_grids: usize,
+    /// Largest number of nodes of the finest of these grids.
+    most_nodes: usize,
+    /// The relative error at which this energy is accurate enough.
+    accuracy: f64,
+    /// Within this distance, in lengths, the leaf has returned to its equilibrium.
+    return_distance: f64,
+    /// Within this part of the distance to the pass it has returned, too.
+    return_part: f64,
+    /// How often the grid of the search is refined: near a fold a coarse one may have no pass, or
+    /// another one.
+    most_refinements: usize,
+    /// Largest number of nodes of the grid of the search.
+    most_search_nodes: usize,
+    /// Passes whose heights differ by less than this, relatively, are examined once.
+    same_height: f64,
+    /// Rounding error of the difference of two energies, relative to these: for a column 0.5 %
+    /// beyond its Euler load it was 3.1e-13.
+    rounding: f64,
+}
 
-const MOST_BARRIER_NODES: usize = 20_000;
-
-const BARRIER_ENERGY_ACCURACY: f64 = 1e-7;
-
-/// The leaf has returned to its equilibrium within this distance, in lengths and as a part of
-/// the distance to the pass.
-const RETURN_DISTANCE: f64 = 1e-3;
-
-const RETURN_DISTANCE_RATIO: f64 = 0.1;
-
-/// Near a fold a coarse grid may have no pass, or another one: so often the grid is refined
-/// for the search, up to so many nodes.
-const MOST_GRID_HALVINGS: usize = 3;
-
-const MOST_SEARCH_NODES: usize = 800;
-
-/// Passes whose heights differ by less than this, relatively, are examined once.
-const SAME_HEIGHT_DIFFERENCE: f64 = 1e-6;
-
-/// Rounding error of the difference of two energies, relative to these: for a column 0.5 % beyond
-/// its Euler load it was 3.1e-13.
-const ENERGY_DIFFERENCE_ROUNDING: f64 = 5e-13;
+const BARRIER: BarrierSearch = BarrierSearch {
+    most_grids: 7,
+    most_nodes: 20_000,
+    accuracy: 1e-7,
+    return_distance: 1e-3,
+    return_part: 0.1,
+    most_refinements: 3,
+    most_search_nodes: 800,
+    same_height: 1e-6,
+    rounding: 5e-13,
+};
 
 /// A saddle on the grid on which it was found, with the stable leaf there.
 struct MountainPass {
@@ -52,35 +61,49 @@ struct MountainPass {
     height: f64,
 }
 
-/// The lowest pass found from these start points and along the softest modes; also
-/// the number of start points.
+/// The lowest pass, if there is one, and from how many points it was sought.
+pub(super) struct LowestBarrier {
+    pub barrier: Option<Barrier>,
+    pub searches: usize,
+}
+
+/// The lowest pass found from these start points and along the softest modes.
 pub(super) fn lowest_energy_barrier(
     stable: &StableLeaf,
     mut starts: Vec<SaddleSearchStart>,
     weight: f64,
-) -> (Option<Barrier>, usize) {
+) -> LowestBarrier {
     starts.extend(starts_along_modes(stable).unwrap_or_default());
     let all = &stable.searches.total_count;
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
     let pushes = counted.saturating_sub(MODE_SADDLE_SEARCHES);
     all.store(pushes + starts.len(), std::sync::atomic::Ordering::Relaxed);
     let count = starts.len();
-    for _ in 0..MOST_GRID_HALVINGS {
+    for _ in 0..BARRIER.most_refinements {
         let found = lowest_pass_from_starts(stable, &starts, weight);
         if found.is_some() || stable.limit.reached() {
-            return (found, count);
+            return LowestBarrier {
+                barrier: found,
+                searches: count,
+            };
         }
         let finer: Option<_> = starts
             .iter()
             .map(|it| start_on_halved_grid(stable, it))
             .collect();
-        match finer {
-            Some(finer) => starts = finer,
-            None => return (None, count),
-        }
+        let Some(finer) = finer else {
+            return LowestBarrier {
+                barrier: None,
+                searches: count,
+            };
+        };
+        starts = finer;
         all.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
     }
-    (lowest_pass_from_starts(stable, &starts, weight), count)
+    LowestBarrier {
+        barrier: lowest_pass_from_starts(stable, &starts, weight),
+        searches: count,
+    }
 }
 
 /// The lowest pass found from these start points on their grids.
@@ -97,7 +120,7 @@ fn lowest_pass_from_starts(
         })
         .collect();
     passes.sort_by(|a, b| a.height.total_cmp(&b.height));
-    passes.dedup_by(|a, b| (a.height - b.height).abs() < SAME_HEIGHT_DIFFERENCE * b.height);
+    passes.dedup_by(|a, b| (a.height - b.height).abs() < BARRIER.same_height * b.height);
     let (pass, neighbour) = passes.iter().find_map(|pass| {
         let neighbour = equilibrium_beyond_pass(stable, pass)?;
         Some((pass, neighbour))
@@ -112,14 +135,14 @@ fn start_on_halved_grid(
 ) -> Option<SaddleSearchStart> {
     let mut equations = BranchEquations::new(stable.family, start.grid.clone());
     let leaf = equations.leaves.leaf_at([0.0]).ok()?;
-    (2 * leaf.rods() * leaf.segments() <= MOST_SEARCH_NODES).then(|| SaddleSearchStart {
+    (2 * leaf.rods() * leaf.segments() <= BARRIER.most_search_nodes).then(|| SaddleSearchStart {
         grid: start.grid.refined(),
         state: prolong(leaf, &start.state),
         direction: prolong_field(&start.direction, leaf.first_node()),
     })
 }
 
-/// Both directions along the softest modes of the leaf.
+/// Start points at the leaf in both directions along its softest modes.
 fn starts_along_modes(stable: &StableLeaf) -> Option<Vec<SaddleSearchStart>> {
     let mut equations = BranchEquations::new(stable.family, stable.grid.clone());
     let point = equations.correct(&stable.state, 0.0, None).ok()?;
@@ -158,7 +181,7 @@ fn equilibrium_beyond_pass(stable: &StableLeaf, pass: &MountainPass) -> Option<S
     let distance = pass.saddle.state.largest_displacement_to(&pass.leaf.state);
     let same = |state: &State| {
         state.largest_displacement_to(&pass.leaf.state)
-            < RETURN_DISTANCE.min(RETURN_DISTANCE_RATIO * distance)
+            < BARRIER.return_distance.min(BARRIER.return_part * distance)
     };
     let mut equations = BranchEquations::new(stable.family, pass.grid.clone());
     let towards = increments_between(&pass.saddle.state, &pass.leaf.state, equations.first_node());
@@ -189,7 +212,7 @@ fn barrier_in_scenario_units(
     let mut equations = BranchEquations::new(stable.family, pass.grid.clone());
     let neighbour = equations.correct(neighbour, 0.0, None).ok()?;
     let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
-    let rounding = ENERGY_DIFFERENCE_ROUNDING
+    let rounding = BARRIER.rounding
         * equations
             .leaves
             .leaf_at([0.0])
@@ -201,12 +224,12 @@ fn barrier_in_scenario_units(
         pass.grid.segments(),
         energies_above_leaf(&mut equations, &three, pass.height)?,
     );
-    for _ in 1..MOST_BARRIER_GRIDS {
+    for _ in 1..BARRIER.most_grids {
         let (rods, segments) = (three[0].state.rods(), 2 * equations.grid().segments());
         let known = table
             .best()
-            .is_some_and(|best| best.error < BARRIER_ENERGY_ACCURACY);
-        if known || rods * segments > MOST_BARRIER_NODES || stable.limit.reached() {
+            .is_some_and(|best| best.error < BARRIER.accuracy);
+        if known || rods * segments > BARRIER.most_nodes || stable.limit.reached() {
             break;
         }
         let finer: Result<Vec<_>, _> = (three.iter())

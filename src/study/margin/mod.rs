@@ -1,6 +1,8 @@
-//! `relax --margin`: how far a stable leaf is from losing its stability.
+//! How far a stable leaf is from losing its stability.
 //!
-//! The force at the tip at which a leaf loses its stability.
+//! A force on the tip is increased along each axis, both ways, and the leaf followed until it becomes
+//! unstable; saddles are sought from there and along the softest modes, and the lowest is the barrier to
+//! another equilibrium.
 
 mod barrier;
 
@@ -11,11 +13,11 @@ use crate::branch::{
 };
 use crate::leaf::{Grid, NodalField, State, are_mirror_symmetric, is_mirrored};
 use crate::memory;
-use crate::numbers::format_error_bound;
 use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
-    AxisDirection, CriticalTipForce, Equilibrium, GridLevel, InstabilityKind, Margin, Neighbour,
-    Options, PostcriticalBehavior, Progress, RelaxError, relax_on_grids, without_wind,
+    AxisDirection, CriticalTipForce, CriticalTipForceRemark, Equilibrium, GridLevel,
+    InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, Progress,
+    RelaxError, RelaxedLeaf, relax_on_grids, without_wind,
 };
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
@@ -25,18 +27,47 @@ use std::f64::consts::PI;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The largest push: this many A/L^2, the load under which the veins buckle as columns pinned at
-/// both ends (Euler), and so many weights; but no more than this part of
-/// their axial stiffness.
-const LARGEST_BENDING_LOAD_FACTOR: f64 = PI * PI;
+/// The largest push: the sum of the first two loads, but no more than the third.
+struct LargestPush {
+    /// In A/L^2: the load under which the veins buckle as columns pinned at both ends (Euler).
+    bending: f64,
+    /// In weights of the leaf.
+    weight: f64,
+    /// A part of the axial stiffness of the veins.
+    axial_strain: f64,
+}
 
-const LARGEST_WEIGHT_FACTOR: f64 = 10.0;
+const LARGEST_PUSH: LargestPush = LargestPush {
+    bending: PI * PI,
+    weight: 10.0,
+    axial_strain: 0.2,
+};
 
-const LARGEST_AXIAL_LOAD_FACTOR: f64 = 0.2;
+/// How the branch of a push is followed until the leaf has lost its stability.
+struct PushBranch {
+    /// Accuracy of points on it (of the tips, relative to the leaf); a critical one has its own
+    /// error.
+    accuracy: f64,
+    /// Longest step, as a part of the largest push.
+    longest_step: f64,
+    /// Largest number of points.
+    most_points: usize,
+    /// Points after the loss of stability that are needed to confirm it.
+    confirming_points: usize,
+    /// Grids of a critical point: for a leaf of few nodes, and for others.
+    critical_grids: [usize; 2],
+    /// Largest number of nodes of a leaf of few nodes.
+    few_nodes: usize,
+}
 
-/// Accuracy of points on the branch (of the tips, relative to the leaf); a
-/// critical one has its own error.
-const BRANCH_ACCURACY: f64 = 1e-4;
+const PUSH_BRANCH: PushBranch = PushBranch {
+    accuracy: 1e-4,
+    longest_step: 0.1,
+    most_points: 400,
+    confirming_points: 2,
+    critical_grids: [4, 3],
+    few_nodes: 500,
+};
 
 /// Why a margin cannot be found.
 #[derive(Debug, thiserror::Error)]
@@ -77,17 +108,6 @@ const EIGENVALUE_AGREEMENT: f64 = 0.25;
 /// Nodes of the finest grid in that search.
 const MOST_CONTINUATION_NODES: usize = 5_000;
 
-/// Why there is no margin if no grid satisfies it.
-const UNRESOLVED_EIGENVALUE_REASON: &str =
-    "its softest eigenvalue cannot be told from zero on any grid tried";
-
-/// Remark on pushes that are not tried.
-const ZERO_ENERGY_ROTATION_REMARK: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
-     pushes along it are tried";
-
-/// Remark where none is tried.
-const TIP_HELD_REMARK: &str = "the tip is held: a force on it moves nothing";
-
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
 pub fn relax_with_margin(
@@ -102,13 +122,16 @@ pub fn relax_with_margin(
         return Err(MarginError::Moment);
     }
     without_wind(scenario, "the margin")?;
-    let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
+    let RelaxedLeaf {
+        result: mut leaf,
+        on_grids: found,
+    } = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
         (true, Some(true)) => stability_margin(scenario, &leaf, &found.levels, options, progress)?,
-        (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
-        _ => Margin::none("only a leaf at rest whose stability is known has a margin"),
+        (true, Some(false)) => Margin::none(MarginRemark::Unstable),
+        _ => Margin::none(MarginRemark::StabilityUnknown),
     });
     Ok(leaf)
 }
@@ -169,9 +192,9 @@ fn stability_margin(
     let clock = Instant::now();
     let make = |_: [f64; 1]| Ok(scenario.clone());
     let Ok(family) = LeafFamily::new(&make, [0.0, 1.0], false) else {
-        return Ok(Margin::none(UNRESOLVED_EIGENVALUE_REASON));
+        return Ok(Margin::none(MarginRemark::UnresolvedEigenvalue));
     };
-    let (grid, state) = match continuation_grid(&family, levels) {
+    let LeafOnGrid { grid, point, .. } = match continuation_grid(&family, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
@@ -185,8 +208,8 @@ fn stability_margin(
         family: &family,
         rest,
         grid,
-        state,
-        accuracy: tolerance.max(BRANCH_ACCURACY),
+        state: point.state,
+        accuracy: tolerance.max(PUSH_BRANCH.accuracy),
         largest_force: largest_tip_force(scenario, weight),
         limit: &options.limit,
         searches: SearchProgress {
@@ -204,22 +227,23 @@ fn stability_margin(
         })
         .collect();
     let (mut pushes, mut starts) = (Vec::new(), Vec::new());
-    for (push, found) in pushed {
-        starts.extend(found);
-        pushes.push(push);
+    for push in pushed {
+        starts.extend(push.starts);
+        pushes.push(push.force);
     }
     add_mirrored_forces(&mut pushes, rods);
     pushes.sort_by(|a, b| {
         let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
         a.total_cmp(&b)
     });
-    let (barrier, climbs) = barrier::lowest_energy_barrier(&stable, starts, weight);
+    let barrier::LowestBarrier { barrier, searches } =
+        barrier::lowest_energy_barrier(&stable, starts, weight);
     let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
-        true => Some("the time allowed was over before all was tried".into()),
-        false if held => Some(TIP_HELD_REMARK.into()),
+        true => Some(MarginRemark::OutOfTime),
+        false if held => Some(MarginRemark::TipHeld),
         false => {
-            (rest.stability.neutral_directions > 0).then(|| ZERO_ENERGY_ROTATION_REMARK.into())
+            (rest.stability.neutral_directions > 0).then_some(MarginRemark::ZeroEnergyRotation)
         }
     };
     Ok(Margin {
@@ -228,7 +252,7 @@ fn stability_margin(
         largest_push: (!held).then_some(stable.largest_force),
         pushes,
         barrier,
-        climbs,
+        climbs: searches,
         remark,
         wall_seconds: clock.elapsed().as_secs_f64(),
     })
@@ -277,7 +301,7 @@ fn is_softest_eigenvalue_resolved(grids: &[LeafOnGrid]) -> bool {
 fn continuation_grid(
     family: &LeafFamily,
     levels: &[GridLevel],
-) -> Result<(Grid, State), &'static str> {
+) -> Result<LeafOnGrid, MarginRemark> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
@@ -289,31 +313,34 @@ fn continuation_grid(
         Ok::<_, CorrectorFailure>((equations, point))
     };
     let (mut equations, mut point) =
-        on_level(&levels[0]).map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
+        on_level(&levels[0]).map_err(|_| MarginRemark::UnresolvedEigenvalue)?;
     nested.next();
     let mut grids: Vec<LeafOnGrid> = Vec::new();
     loop {
         grids.push(
             LeafOnGrid::from_point(&mut equations, &point)
-                .map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?,
+                .map_err(|_| MarginRemark::UnresolvedEigenvalue)?,
         );
-        for grids in [2, 3].map(|count| grids.len().checked_sub(count).map(|k| &grids[k..])) {
-            if let Some(grids) = grids.filter(|grids| is_softest_eigenvalue_resolved(grids)) {
-                return Ok((grids[0].grid.clone(), grids[0].point.state.clone()));
+        for first in [2, 3]
+            .into_iter()
+            .filter_map(|count| grids.len().checked_sub(count))
+        {
+            if is_softest_eigenvalue_resolved(&grids[first..]) {
+                return Ok(grids.swap_remove(first));
             }
         }
         if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_CONTINUATION_NODES
         {
             return Err(match point.index {
-                0 => UNRESOLVED_EIGENVALUE_REASON,
-                _ => "the leaf is unstable on grids finer than those of its relaxation",
+                0 => MarginRemark::UnresolvedEigenvalue,
+                _ => MarginRemark::UnstableOnFinerGrids,
             });
         }
         let finer = match nested.next() {
             Some(level) => on_level(level),
             None => on_finer(&mut equations, &point),
         };
-        (equations, point) = finer.map_err(|_| UNRESOLVED_EIGENVALUE_REASON)?;
+        (equations, point) = finer.map_err(|_| MarginRemark::UnresolvedEigenvalue)?;
     }
 }
 
@@ -329,9 +356,9 @@ fn largest_tip_force(scenario: &Scenario, weight: f64) -> f64 {
     } else {
         1
     } as f64;
-    let stiff = LARGEST_BENDING_LOAD_FACTOR * together * scenario.scale().force();
-    (stiff + LARGEST_WEIGHT_FACTOR * weight)
-        .min(LARGEST_AXIAL_LOAD_FACTOR * axial * together / scenario.rods.len() as f64)
+    let stiff = LARGEST_PUSH.bending * together * scenario.scale().force();
+    (stiff + LARGEST_PUSH.weight * weight)
+        .min(LARGEST_PUSH.axial_strain * axial * together / scenario.rods.len() as f64)
 }
 
 /// Veins at rest are each other's mirror images within this part of the leaf's length, and within
@@ -394,32 +421,32 @@ fn add_mirrored_forces(pushes: &mut Vec<CriticalTipForce>, rods: usize) {
     pushes.extend(images);
 }
 
-/// Longest step along the branch, and largest number of points.
-const LONGEST_BRANCH_STEP: f64 = 0.1;
+/// Rounding error of a critical force.
+struct ForceRounding {
+    /// Relative to the force itself.
+    relative: f64,
+    /// Of a nearly rigid leaf, relative to the total force on its tip: in eight runs of a buckled
+    /// column it was at most 9e-10.
+    nearly_rigid: f64,
+}
 
-const MOST_BRANCH_POINTS: usize = 400;
+const FORCE_ROUNDING_ERROR: ForceRounding = ForceRounding {
+    relative: 1e-14,
+    nearly_rigid: 3e-9,
+};
 
-/// Points after the loss of stability that are needed to confirm it.
-const CONFIRMING_POINTS: usize = 2;
+/// The force at which a leaf loses its stability, with start points for saddle searches there.
+struct PushedLeaf {
+    force: CriticalTipForce,
+    starts: Vec<SaddleSearchStart>,
+}
 
-/// Grids of a critical point: for a leaf of few nodes, and for others.
-const CRITICAL_GRIDS: [usize; 2] = [4, 3];
-
-const FEW_NODES_LIMIT: usize = 500;
-
-/// Rounding error of a force, relative to itself, and for a nearly rigid leaf relative to the
-/// total force on its tip: in eight runs of a buckled column it was at most 9e-10.
-const FORCE_ROUNDING: f64 = 1e-14;
-
-const RIGID_LEAF_ROUNDING: f64 = 3e-9;
-
-/// Pushes a leaf in one direction until it loses its stability, or to the largest push;
-/// also returns start points for saddle searches there.
+/// Pushes a leaf in one direction until it loses its stability, or to the largest push.
 fn find_critical_tip_force(
     stable: &StableLeaf,
     direction: AxisDirection,
     weight: f64,
-) -> (CriticalTipForce, Vec<SaddleSearchStart>) {
+) -> PushedLeaf {
     let make = |[force]: [f64; 1]| -> Result<Scenario, String> {
         let mut scenario = stable.scenario.clone();
         scenario.tip_force[direction.axis] += direction.sign() * force;
@@ -429,27 +456,30 @@ fn find_critical_tip_force(
         direction,
         ..CriticalTipForce::default()
     };
-    let failed = |why: String| CriticalTipForce {
-        more_than: Some(0.0),
-        remark: Some(why),
-        ..unknown.clone()
+    let failed = |why: CriticalTipForceRemark| PushedLeaf {
+        force: CriticalTipForce {
+            more_than: Some(0.0),
+            remark: Some(why),
+            ..unknown.clone()
+        },
+        starts: Vec::new(),
     };
     let family = match LeafFamily::new(&make, [0.0, stable.largest_force], false) {
         Ok(family) => family,
-        Err(out) => return (failed(out.to_string()), Vec::new()),
+        Err(out) => return failed(branch_lost(&out)),
     };
     let mut grids = NestedBranchEquations::new(&family, stable.grid.clone());
     let followed = match continue_to_stability_loss(stable, direction, &mut grids) {
         Ok(followed) => followed,
-        Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
+        Err(stuck) => return failed(branch_lost(&stuck)),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
     let lost = |critical: &CriticalPoint| critical.indices[0] == 0 && critical.indices[1] > 0;
     let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
-        return (
-            force_without_stability_loss(stable, &followed, unknown),
-            Vec::new(),
-        );
+        return PushedLeaf {
+            force: force_without_stability_loss(stable, &followed, unknown),
+            starts: Vec::new(),
+        };
     };
     let force = refined.fraction * stable.largest_force;
     let then = postcritical_behavior(stable, &mut grids, critical);
@@ -457,11 +487,13 @@ fn find_critical_tip_force(
     let error =
         refined.fraction_error * stable.largest_force + force_rounding_error(stable, force, weight);
     if 2.0 * error >= force {
-        let below = format_error_bound(force + error);
-        let unknown = failed(format!("its loss, below {below}, cannot be told from zero"));
-        return (unknown, starts);
+        let below = force + error;
+        return PushedLeaf {
+            starts,
+            ..failed(CriticalTipForceRemark::NearZero { below })
+        };
     }
-    let push = CriticalTipForce {
+    let force = CriticalTipForce {
         kind: match critical.kind {
             CriticalKind::Fold => InstabilityKind::Fold,
             CriticalKind::Branching => InstabilityKind::BranchPoint,
@@ -470,11 +502,11 @@ fn find_critical_tip_force(
         error: Some(error),
         per_weight: (weight > 0.0).then(|| force / weight),
         then: Some(then),
-        neighbour: equilibrium_beyond_fold(stable, &mut grids, (critical, refined), &starts),
+        neighbour: equilibrium_beyond_fold(stable, &mut grids, critical, refined, &starts),
         tips: family.tips(&refined.tips),
         ..unknown
     };
-    (push, starts)
+    PushedLeaf { force, starts }
 }
 
 fn force_rounding_error(stable: &StableLeaf, force: f64, weight: f64) -> f64 {
@@ -483,9 +515,9 @@ fn force_rounding_error(stable: &StableLeaf, force: f64, weight: f64) -> f64 {
     let stiffest = stiffness.fold(0.0, |most: f64, it| most.max(it.max_abs()));
     let rigid = stiffest > NEARLY_RIGID * stable.scenario.scale().force();
     let borne = force + weight + DVec3::from_array(stable.scenario.tip_force).length();
-    FORCE_ROUNDING * force
+    FORCE_ROUNDING_ERROR.relative * force
         + if rigid {
-            RIGID_LEAF_ROUNDING * borne
+            FORCE_ROUNDING_ERROR.nearly_rigid * borne
         } else {
             0.0
         }
@@ -500,14 +532,14 @@ fn continue_to_stability_loss(
     let mut first = (grids.on_grid_of(&stable.state)).correct(&stable.state, 0.0, None)?;
     first.tangent = first.tangent.towards_larger_parameter();
     let enough = |points: &[EquilibriumPoint]| {
-        let behind = points.len().checked_sub(CONFIRMING_POINTS);
+        let behind = points.len().checked_sub(PUSH_BRANCH.confirming_points);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
     };
     let nodes = stable.state.rods() * stable.grid.segments();
     let walk = ContinuationOptions {
-        longest_step: LONGEST_BRANCH_STEP,
-        max_points: MOST_BRANCH_POINTS,
-        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES_LIMIT)],
+        longest_step: PUSH_BRANCH.longest_step,
+        max_points: PUSH_BRANCH.most_points,
+        critical_grids: PUSH_BRANCH.critical_grids[usize::from(nodes > PUSH_BRANCH.few_nodes)],
         stop_criterion: Some(&enough),
     };
     let mut report = |_, fraction: f64| {
@@ -535,19 +567,23 @@ fn force_without_stability_loss(
         more_than: Some(furthest * stable.largest_force),
         remark: match &followed.end {
             BranchEnd::RangeEndReached => None,
-            _ if stable.limit.reached() => Some("the time allowed was over".into()),
-            BranchEnd::StepFailed(stuck) => Some(stuck.to_string()),
-            BranchEnd::PointUnverified(doubt) => Some(doubt.to_string()),
+            _ if stable.limit.reached() => Some(CriticalTipForceRemark::OutOfTime),
+            BranchEnd::StepFailed(stuck) => Some(branch_lost(stuck)),
+            BranchEnd::PointUnverified(doubt) => Some(branch_lost(doubt)),
             BranchEnd::LoopClosed
             | BranchEnd::RangeStartReached
             | BranchEnd::KnownBoundaryMet
             | BranchEnd::PointLimitReached
             | BranchEnd::StopCriterionMet
             | BranchEnd::StabilityLost
-            | BranchEnd::RunLimitReached => Some("the branch could not be followed further".into()),
+            | BranchEnd::RunLimitReached => Some(CriticalTipForceRemark::NotFollowed),
         },
         ..unknown
     }
+}
+
+fn branch_lost(why: &impl ToString) -> CriticalTipForceRemark {
+    CriticalTipForceRemark::BranchLost(why.to_string())
 }
 
 /// What the leaf does at a critical point: if a stable branch crosses, it continues
@@ -571,7 +607,8 @@ fn postcritical_behavior(
 fn equilibrium_beyond_fold(
     stable: &StableLeaf,
     grids: &mut NestedBranchEquations,
-    (critical, fold): (&CriticalPoint, &ExtrapolatedPoint),
+    critical: &CriticalPoint,
+    fold: &ExtrapolatedPoint,
     starts: &[SaddleSearchStart],
 ) -> Option<Neighbour> {
     let start = starts

@@ -1,10 +1,8 @@
 //! `trace`: an equilibrium followed through a parameter of its scenario.
 //!
-//! Computation of a trace.
-//!
-//! Force against displacement, as a tensile test measures it.
-//!
-//! What the figure of a trace shows.
+//! Branches that cross at critical points are followed as well, breadth first, if that is requested.
+//! Where the parameter is a force on the tip, or a coordinate of a held one, the trace tells the stiffness
+//! that a tensile test would measure ([`ForceDisplacementLine`]).
 
 mod result;
 
@@ -22,9 +20,10 @@ use crate::relax::{
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{EntryPath, Key, Scenario, plausibility_warnings};
 use crate::shape::Undulation;
+use crate::study::remark::{BranchRemark, TraceRemark};
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
 use crate::study::vary::{BaseScenario, ParameterSweep};
-use crate::study::{UnknownWord, VariableTarget, VaryError};
+use crate::study::{AXIS_NAMES, UnknownWord, VariableTarget, VaryError};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::collections::VecDeque;
@@ -153,8 +152,9 @@ impl TraceRequest {
 
 const DEAD_MOMENT_REFUSAL: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";
 
-/// Longest step along a branch if few values are asked for.
-const LONGEST_BRANCH_STEP: f64 = 0.1;
+/// Longest step along a branch, or along a curve of a boundary, if few values are asked for, as a part
+/// of the range.
+pub(super) const LONGEST_BRANCH_STEP: f64 = 0.1;
 
 /// Points closer than this (fractions of the range, lengths) are the same.
 const SAME_POINT_DISTANCE: f64 = 1e-5;
@@ -171,8 +171,8 @@ pub fn trace(
     Ok(trace_with_points(request, progress)?.trace)
 }
 
-/// The same from a leaf at rest, which the scenario has at this `value` of its number: through that
-/// leaf towards both ends of the range, as two branches, of which the first goes to larger fractions.
+/// Follows the equilibrium through a given leaf at rest, which the scenario has at this value of its
+/// number, towards both ends of the range, as two branches, of which the first goes to larger fractions.
 ///
 /// # Errors
 /// Requests that cannot be met; failures during the run are part of the result.
@@ -184,15 +184,27 @@ pub fn trace_through(
     Ok(trace_with_points_from(request, Some(leaf), progress)?.trace)
 }
 
+/// A point of a branch, and a grid that refines its own.
+pub struct PointOnGrid {
+    pub point: EquilibriumPoint,
+    pub grid: Grid,
+}
+
+/// A critical point on the grid on which it was found, and extrapolated over grids.
+pub struct RefinedCriticalPoint {
+    pub critical: CriticalPoint,
+    pub refined: ExtrapolatedPoint,
+}
+
 /// A trace, with its first point and its critical points.
 pub struct TraceWithPoints {
     pub trace: Trace,
-    /// The first point, and a grid that refines its own; none if there is no first point.
-    pub first_point: Option<(EquilibriumPoint, Grid)>,
-    pub critical_points: Vec<(CriticalPoint, ExtrapolatedPoint)>,
+    /// None if there is no first equilibrium.
+    pub first_point: Option<PointOnGrid>,
+    pub critical_points: Vec<RefinedCriticalPoint>,
 }
 
-/// The same as [`trace`], with those points.
+/// As [`trace`], with the first point and the critical points.
 pub fn trace_with_points(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
@@ -200,7 +212,7 @@ pub fn trace_with_points(
     trace_with_points_from(request, None, progress)
 }
 
-/// Both: from a relaxation at the start of the range, or both ways from a given leaf.
+/// The trace from a relaxation at the start of the range, or both ways from a given leaf.
 fn trace_with_points_from(
     request: &TraceRequest,
     given: Option<(&Equilibrium, f64)>,
@@ -230,13 +242,21 @@ fn trace_with_points_from(
         .base
         .scenario_with_values(&[(keys, ends[1])])?
         .scenario;
-    let leaning = total_load(&last) - total_load(&scenario);
-    let (rest, options) = match given {
-        Some((leaf, _)) => {
-            let options = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
-            (leaf.clone(), options)
+    let bias_direction = total_load(&last) - total_load(&scenario);
+    let options = Options {
+        limit: request.limit.clone(),
+        tolerance: Some(tolerance),
+        bias_direction,
+        method: SemiImplicit {
+            keep_unstable: request.keep_unstable,
+            ..SemiImplicit::default()
         }
-        None => first_equilibrium(request, &scenario, (tolerance, leaning))?,
+        .into(),
+        ..Options::default()
+    };
+    let rest = match given {
+        Some((leaf, _)) => leaf.clone(),
+        None => first_equilibrium(&scenario, &options, request.keep_unstable)?,
     };
     let fraction = ParameterRange {
         ends,
@@ -269,9 +289,18 @@ fn trace_with_points_from(
         wall_seconds: 0.0,
     };
     let began = match rest.stability.negative_eigenvalues {
-        Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted)
-            .map_err(|stuck| stuck.to_string()),
-        None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
+        Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted).map_err(|why| {
+            TraceRemark::NoFirstPoint {
+                keys: keys.clone(),
+                value,
+                why,
+            }
+        }),
+        None => Err(TraceRemark::NoEquilibrium {
+            keys: keys.clone(),
+            value,
+            remark: rest.remark,
+        }),
     };
     let (mut first, mut critical) = (None, Vec::new());
     match began {
@@ -289,11 +318,7 @@ fn trace_with_points_from(
             run.trace_all_branches(point, given.is_some(), &mut trace);
             (first, critical) = (run.first, run.critical);
         }
-        Err(why) => {
-            let at = keys.text(value);
-            let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
-            trace.remark = Some(remark);
-        }
+        Err(remark) => trace.remark = Some(remark),
     }
     let branches = &trace.branches;
     trace.complete =
@@ -314,39 +339,23 @@ fn total_load(scenario: &Scenario) -> DVec3 {
     scenario.total_load() + DVec3::from_array(scenario.tip_force)
 }
 
-/// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how
-/// it was found. Where it may turn to either side it turns to that to which the range pushes.
+/// The equilibrium at the start of the range, from Newton's method if it may be unstable. Where it
+/// may turn to either side it turns to that to which the range pushes.
 fn first_equilibrium(
-    request: &TraceRequest,
     scenario: &Scenario,
-    (tolerance, leaning): (f64, DVec3),
-) -> Result<(Equilibrium, Options), RelaxError> {
-    let wanted = relaxation_options(request, (tolerance, leaning), request.keep_unstable);
-    let mut rest = relax(scenario, &wanted, &mut |_| {})?;
-    if request.keep_unstable && !rest.outcome.is_at_rest() {
-        // Newton's method leads nowhere from this start.
-        let stable = relaxation_options(request, (tolerance, leaning), false);
-        rest = relax(scenario, &stable, &mut |_| {})?;
-    }
-    Ok((rest, wanted))
-}
-
-fn relaxation_options(
-    request: &TraceRequest,
-    (tolerance, leaning): (f64, DVec3),
+    options: &Options,
     keep_unstable: bool,
-) -> Options {
-    Options {
-        limit: request.limit.clone(),
-        tolerance: Some(tolerance),
-        bias_direction: leaning,
-        method: SemiImplicit {
-            keep_unstable,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..Options::default()
+) -> Result<Equilibrium, RelaxError> {
+    let rest = relax(scenario, options, &mut |_| {})?;
+    if !keep_unstable || rest.outcome.is_at_rest() {
+        return Ok(rest);
     }
+    // Newton's method leads nowhere from this start.
+    let stable = Options {
+        method: SemiImplicit::default().into(),
+        ..options.clone()
+    };
+    relax(scenario, &stable, &mut |_| {})
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
@@ -378,23 +387,31 @@ fn force_displacement_line(
         return None;
     };
     let points = branch.points.iter().map(|point| match point.tips[..] {
-        [tip] => Some((point.force_on_tip(*axis), tip)),
+        [tip] => Some(LoadedTip {
+            force: point.force_on_tip(*axis),
+            tip,
+        }),
         _ => None,
     });
-    let points: Option<Vec<(f64, DVec3)>> = points.collect();
+    let points: Option<Vec<LoadedTip>> = points.collect();
     ForceDisplacementLine::fit(*axis, &points?)
 }
 
-/// Data common to all branches.
+struct BranchEntrance {
+    point: EquilibriumPoint,
+    /// The indices of the branch and the point from which it was entered; none for the first.
+    from: Option<[usize; 2]>,
+}
+
 struct BranchTracer<'r, 'p> {
     family: &'r LeafFamily<'r>,
     request: &'r TraceRequest,
     /// The grids on which branches are followed.
     grids: NestedBranchEquations<'r>,
     tolerance: f64,
-    /// As in [`Traced`], so far.
-    first: Option<(EquilibriumPoint, Grid)>,
-    critical: Vec<(CriticalPoint, ExtrapolatedPoint)>,
+    /// The first point of the first branch, and the critical points so far.
+    first: Option<PointOnGrid>,
+    critical: Vec<RefinedCriticalPoint>,
     /// Whether the run was stopped before branches that cross were sought.
     stopped_before_crossings: bool,
     progress: &'p mut dyn FnMut(usize, usize, f64),
@@ -431,17 +448,18 @@ impl BranchTracer<'_, '_> {
         let mut entrances: VecDeque<_> = [first]
             .into_iter()
             .chain(back)
-            .map(|it| (it, None))
+            .map(|point| BranchEntrance { point, from: None })
             .collect();
-        while let Some((first, from)) = entrances.pop_front() {
+        while let Some(BranchEntrance { point, from }) = entrances.pop_front() {
             let number = trace.branches.len();
             if number == MOST_BRANCHES {
-                trace.remark = Some(format!("there are more than {MOST_BRANCHES} branches"));
+                let most = MOST_BRANCHES;
+                trace.remark = Some(TraceRemark::TooManyBranches { most });
                 break;
             }
             let (family, progress) = (self.family, &mut *self.progress);
             let mut report = |points, at| progress(number, points, family.value(at));
-            let mut followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
+            let mut followed = (self.grids).follow(point, &how, self.tolerance, &mut report);
             if followed.end == BranchEnd::StopCriterionMet {
                 truncate_at_destabilization(&mut followed);
             }
@@ -452,20 +470,21 @@ impl BranchTracer<'_, '_> {
                 .branches
                 .push(self.branch_in_scenario_units(&followed, from));
             let begun = followed.branch.points.first().zip(followed.points.first());
-            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
+            let begun = begun.map(|(point, refined)| PointOnGrid {
+                point: point.clone(),
+                grid: refined.grid.clone(),
+            });
             self.first = self.first.take().or(begun);
             let missing = self.record_crossings(&followed, number, &mut entrances);
-            trace.branches[number].add_remarks(missing);
+            trace.branches[number].remarks.extend(missing);
             let left = followed.end == BranchEnd::RunLimitReached
                 || !entrances.is_empty()
                 || self.stopped_before_crossings;
             if left && self.family.limit.reached() {
                 trace.remark = Some(
                     match self.stopped_before_crossings || !entrances.is_empty() {
-                        true => {
-                            "the run was stopped: branches that cross are not all followed".into()
-                        }
-                        false => "the run was stopped".into(),
+                        true => TraceRemark::StoppedBeforeCrossings,
+                        false => TraceRemark::Stopped,
                     },
                 );
                 break;
@@ -481,15 +500,18 @@ impl BranchTracer<'_, '_> {
         &mut self,
         followed: &VerifiedBranch,
         number: usize,
-        entrances: &mut VecDeque<(EquilibriumPoint, Option<[usize; 2]>)>,
-    ) -> Vec<String> {
+        entrances: &mut VecDeque<BranchEntrance>,
+    ) -> Vec<BranchRemark> {
         let mut missing = Vec::new();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
             let mut crossings =
-                (self.critical.iter()).filter(|(it, _)| it.kind == CriticalKind::Branching);
-            let known = crossings.any(|(_, other)| is_same_point(other, refined));
-            self.critical.push((critical.clone(), refined.clone()));
+                (self.critical.iter()).filter(|it| it.critical.kind == CriticalKind::Branching);
+            let known = crossings.any(|other| is_same_point(&other.refined, refined));
+            self.critical.push(RefinedCriticalPoint {
+                critical: critical.clone(),
+                refined: refined.clone(),
+            });
             if critical.kind != CriticalKind::Branching || known || !self.request.switch {
                 continue;
             }
@@ -504,14 +526,12 @@ impl BranchTracer<'_, '_> {
                 let value = self.family.value(refined.fraction);
                 // As many digits as tell one crossing from the next.
                 let value = format!("{value:.8e}").parse().unwrap_or(value);
-                missing.push(format!(
-                    "the branches that cross at {} are not followed: none was found within the range",
-                    self.request.vary.keys.text(value)
-                ));
+                let value = self.request.vary.keys.text(value);
+                missing.push(BranchRemark::CrossingNotFollowed { value });
             }
             self.stopped_before_crossings |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
-            entrances.extend(new.into_iter().map(|point| (point, from)));
+            entrances.extend(new.into_iter().map(|point| BranchEntrance { point, from }));
         }
         missing
     }
@@ -542,28 +562,23 @@ impl BranchTracer<'_, '_> {
             from,
             points,
             end: followed.end.clone(),
-            remark: self.branch_remark(followed),
+            remarks: self.branch_remarks(followed),
         }
     }
 
     /// Why a branch ended, and where it met no branch that must cross it.
-    fn branch_remark(&self, followed: &VerifiedBranch) -> Option<String> {
+    fn branch_remarks(&self, followed: &VerifiedBranch) -> Vec<BranchRemark> {
         let near = |after: &usize| {
             let near = &followed.points[*after];
             let keys = &self.request.vary.keys;
             let value = keys.text(self.family.value(near.fraction));
-            format!(
-                "it turns back beyond {value} where another branch must cross it, which was not found"
-            )
+            BranchRemark::CrossingNotFound { value }
         };
-        let mut remarks: Vec<String> = followed
-            .branch
-            .unmatched_vertices
-            .iter()
+        let vertices = followed.branch.unmatched_vertices.iter();
+        vertices
             .map(near)
-            .collect();
-        remarks.extend(followed.end.failure_remark());
-        (!remarks.is_empty()).then(|| remarks.join("; "))
+            .chain(followed.end.failure_remark())
+            .collect()
     }
 
     /// Waves and twist of the leaf at a point, on its finest grid.
@@ -658,13 +673,19 @@ pub struct ForceDisplacementLine {
     pub length: f64,
 }
 
+/// A tip under a force along an axis.
+struct LoadedTip {
+    force: f64,
+    tip: DVec3,
+}
+
 impl ForceDisplacementLine {
-    /// From forces along an axis and the tips under them; `None` with fewer than three, if the
-    /// tip moves by no more than rounding, or if the forces are not [`LINEAR`].
-    pub(super) fn fit(axis: usize, points: &[(f64, DVec3)]) -> Option<ForceDisplacementLine> {
-        let (_, tip) = *points.first()?;
+    /// `None` with fewer than three points, if the tip moves by no more than rounding, or if the
+    /// forces are not linear.
+    fn fit(axis: usize, points: &[LoadedTip]) -> Option<ForceDisplacementLine> {
+        let tip = points.first()?.tip;
         let points: Vec<(f64, f64)> = (points.iter())
-            .map(|(force, moved)| (moved[axis] - tip[axis], *force))
+            .map(|point| (point.tip[axis] - tip[axis], point.force))
             .collect();
         let count = points.len() as f64;
         if points.len() < 3 {
@@ -718,8 +739,6 @@ pub enum TraceShow {
     /// The mean twist of the veins, in radians.
     Twist,
 }
-
-const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl Display for TraceShow {
     fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
@@ -775,7 +794,11 @@ mod tests {
 
     fn law(tip: impl Fn(f64) -> f64) -> Option<ForceDisplacementLine> {
         let forces = (0..=10).map(|k| 0.1 * f64::from(k));
-        let points: Vec<_> = forces.map(|f| (f, DVec3::new(tip(f), 0.0, 0.0))).collect();
+        let point = |force: f64| LoadedTip {
+            force,
+            tip: DVec3::new(tip(force), 0.0, 0.0),
+        };
+        let points: Vec<_> = forces.map(point).collect();
         ForceDisplacementLine::fit(0, &points)
     }
 
@@ -788,8 +811,11 @@ mod tests {
 
     #[test]
     fn of_a_tip_that_does_not_move_there_is_none() {
-        let rounding = |k: i32| DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0);
-        let points: Vec<_> = (0..=10).map(|k| (f64::from(k), rounding(k))).collect();
+        let point = |k: i32| LoadedTip {
+            force: f64::from(k),
+            tip: DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0),
+        };
+        let points: Vec<_> = (0..=10).map(point).collect();
         assert_eq!(ForceDisplacementLine::fit(0, &points), None);
     }
 

@@ -1,9 +1,11 @@
 //! The result of a trace.
 
 use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
-use crate::scenario::Units;
+use crate::run::join_remarks;
+use crate::scenario::{PlausibilityWarning, Units};
 use crate::shape::{Undulation, serialize_tips};
 use crate::study::ParameterKeys;
+use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::{ForceDisplacementLine, TraceShow, TraceUntil};
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
@@ -52,15 +54,15 @@ pub struct Trace {
     pub complete: bool,
     /// Why there is no branch, or fewer than there are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
+    pub remark: Option<TraceRemark>,
     /// What in the scenario is probably not what was intended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub doubts: Vec<PlausibilityWarning>,
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if what varied is a tip force or the position of held tips.
     pub law: Option<ForceDisplacementLine>,
-    /// Number of matrices factorised by the continuation.
+    /// Number of matrices factorized by the continuation.
     pub factorizations: usize,
     /// Total time, in seconds.
     pub wall_seconds: f64,
@@ -76,8 +78,8 @@ pub struct TraceBranch {
     pub points: Vec<TracePoint>,
     /// How it ended.
     pub end: BranchEnd,
-    /// A sentence with the reason, if necessary.
-    pub remark: Option<String>,
+    /// Why it is incomplete, and which branches that cross it are missing.
+    pub remarks: Vec<BranchRemark>,
 }
 
 /// A point of a branch, in the scenario's units.
@@ -202,7 +204,7 @@ impl BranchEnd {
     }
 
     /// Why an incomplete branch stopped, and what may help.
-    pub(super) fn failure_remark(&self) -> Option<String> {
+    pub(super) fn failure_remark(&self) -> Option<BranchRemark> {
         match self {
             // Of a stopped run the trace says so.
             BranchEnd::RangeEndReached
@@ -212,16 +214,13 @@ impl BranchEnd {
             | BranchEnd::StabilityLost
             | BranchEnd::RunLimitReached => None,
             BranchEnd::PointLimitReached | BranchEnd::StopCriterionMet => {
-                Some("there are more points: allow more".into())
+                Some(BranchRemark::MorePoints)
             }
-            BranchEnd::StepFailed(stuck) => Some(stuck.to_string()),
-            BranchEnd::PointUnverified(VerificationFailure::Inaccurate) => Some(format!(
-                "{}: ask for a larger one",
-                VerificationFailure::Inaccurate
-            )),
-            BranchEnd::PointUnverified(doubt) => {
-                Some(format!("what comes next is not verified: {doubt}"))
+            BranchEnd::StepFailed(stuck) => Some(BranchRemark::StepFailed(stuck.clone())),
+            BranchEnd::PointUnverified(VerificationFailure::Inaccurate) => {
+                Some(BranchRemark::ToleranceNotReached)
             }
+            BranchEnd::PointUnverified(doubt) => Some(BranchRemark::PointUnverified(*doubt)),
         }
     }
 }
@@ -234,15 +233,20 @@ impl Serialize for BranchEnd {
 
 impl TraceBranch {
     /// How often its Morse index grows along it: at a critical point, or between two points.
-    pub fn destabilizations(&self) -> usize {
+    pub fn index_increase_count(&self) -> usize {
         let pairs = self.points.windows(2);
         pairs.filter(|pair| pair[1].index > pair[0].index).count()
     }
 
-    /// Adds sentences to its remark.
-    pub(super) fn add_remarks(&mut self, more: Vec<String>) {
-        let all: Vec<String> = self.remark.take().into_iter().chain(more).collect();
-        self.remark = (!all.is_empty()).then(|| all.join("; "));
+    /// Renamed to [`TraceBranch::index_increase_count`].
+    #[deprecated(note = "renamed: its documentation has the new name")]
+    pub fn destabilizations(&self) -> usize {
+        self.index_increase_count()
+    }
+
+    /// Its remarks in one sentence, if there are any.
+    pub fn remark(&self) -> Option<String> {
+        join_remarks(&self.remarks)
     }
 
     /// Its critical points, with their indices.
@@ -252,7 +256,7 @@ impl TraceBranch {
     }
 }
 
-/// Also with the numbers of its first, last and critical points.
+/// A branch as JSON: with its first, last and critical points, and the number of all.
 impl Serialize for TraceBranch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let critical: Vec<&TracePoint> = self.critical_points().map(|(_, point)| point).collect();
@@ -260,8 +264,8 @@ impl Serialize for TraceBranch {
         object.serialize_field("from", &self.from.map(|from| from.map(|index| index + 1)))?;
         object.serialize_field("points", &self.points.len())?;
         object.serialize_field("end", &self.end)?;
-        match &self.remark {
-            Some(remark) => object.serialize_field("remark", remark)?,
+        match self.remark() {
+            Some(remark) => object.serialize_field("remark", &remark)?,
             None => object.skip_field("remark")?,
         }
         object.serialize_field("first", &self.points.first())?;

@@ -1,18 +1,14 @@
-//! Two axes around a panel: grid, frame, ticks and names, with curves and markers
-//! inside. Every panel of numbers is drawn with them.
+//! Panels with two axes: grid, frame, ticks and names, with curves and markers inside. Every panel of
+//! numbers is drawn with them.
 //!
-//! An axis: maps values to fractions of its length, and places round ticks.
-//!
-//! Round numbers, for ticks and scales.
+//! An axis, linear or logarithmic, maps values to fractions of its length, and has ticks at round numbers as
+//! close as their labels can be read.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{
-    PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE, draw_panel_title,
-};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{
-    Color, Drawing, DrawingPath, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, Stroke, TEXT_COLOR,
-    TextAnchor, rectangle_path, smooth_curve,
+    Color, Drawing, DrawingPath, FONT_SIZE, FRAME_COLOR, GRID_COLOR, NOTE_COLOR, PageRectangle,
+    PathStep, Stroke, TEXT_COLOR, TextAnchor, draw_panel_title, rectangle_path, smooth_curve,
 };
 use crate::report::numbers::{
     digit_times_power_text, format_decimals, power_of_ten_text, superscript, time_power_text,
@@ -20,20 +16,27 @@ use crate::report::numbers::{
 use glam::DVec2;
 use std::ops::{Range, RangeInclusive};
 
-const TICK_LENGTH: f64 = 4.0;
+/// Sizes of what surrounds a frame, in pixels.
+struct AxisMarks {
+    tick: f64,
+    subdivision_tick: f64,
+    /// From the frame to the base line of the name of the horizontal axis.
+    name_below: f64,
+    /// From the frame to the base line of the name of the vertical axis: at least, after its labels, and at
+    /// most.
+    least_name_beside: f64,
+    name_label_gap: f64,
+    largest_name_beside: f64,
+}
 
-const SUBDIVISION_TICK_LENGTH: f64 = 2.0;
-
-/// From the frame to the base line of the name of the horizontal axis.
-const HORIZONTAL_NAME_DISTANCE: f64 = 34.0;
-
-/// From the frame to that of the vertical axis: the least distance, the gap after the
-/// labels, and the largest distance.
-const LEAST_NAME_DISTANCE: f64 = 42.0;
-
-const NAME_LABEL_GAP: f64 = 13.0;
-
-const LARGEST_NAME_DISTANCE: f64 = 53.0;
+const AXIS_MARKS: AxisMarks = AxisMarks {
+    tick: 4.0,
+    subdivision_tick: 2.0,
+    name_below: 34.0,
+    least_name_beside: 42.0,
+    name_label_gap: 13.0,
+    largest_name_beside: 53.0,
+};
 
 pub struct NamedCurve {
     pub name: &'static str,
@@ -81,7 +84,7 @@ impl PanelAxes {
         let end = self.cell.opposite_corner();
         let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
             true => Stroke::new(FRAME_COLOR, 0.8),
-            false => Stroke::new(GRID, 0.7),
+            false => Stroke::new(GRID_COLOR, 0.7),
         };
         for tick in self.across.ticks(size.x, AxisOrientation::Horizontal) {
             let top = corner.with_x(corner.x + tick.fraction * size.x);
@@ -94,7 +97,7 @@ impl PanelAxes {
         self.draw_without_grid(page);
     }
 
-    /// Draws all but the grid.
+    /// Draws frame, ticks and names, without the grid.
     pub fn draw_without_grid(&self, page: &mut Drawing) {
         let PageRectangle { corner, size } = self.cell;
         let (middle, end) = (self.cell.middle(), self.cell.opposite_corner());
@@ -112,52 +115,52 @@ impl PanelAxes {
             };
             for fraction in axis.decade_subdivisions(length) {
                 let foot = foot(fraction);
-                page.draw_line(foot, foot + SUBDIVISION_TICK_LENGTH * out, rim);
+                page.draw_line(foot, foot + AXIS_MARKS.subdivision_tick * out, rim);
             }
             for Tick { fraction, text, .. } in axis.ticks(length, direction) {
                 let foot = foot(fraction);
-                page.draw_line(foot, foot + TICK_LENGTH * out, rim);
+                page.draw_line(foot, foot + AXIS_MARKS.tick * out, rim);
                 match direction {
                     _ if !axis.labelled => (),
                     AxisOrientation::Horizontal => {
-                        let base = foot + DVec2::new(0.0, TICK_LENGTH + 1.2 * TICK_FONT_SIZE);
+                        let base = foot + DVec2::new(0.0, AXIS_MARKS.tick + 1.2 * FONT_SIZE.tick);
                         page.draw_label(
                             base,
                             &text,
-                            TICK_FONT_SIZE,
+                            FONT_SIZE.tick,
                             TextAnchor::Middle,
                             NOTE_COLOR,
                         );
                     }
                     AxisOrientation::Vertical => {
-                        let end = foot - DVec2::new(TICK_LENGTH + 3.0, 0.0);
+                        let end = foot - DVec2::new(AXIS_MARKS.tick + 3.0, 0.0);
                         page.draw_centered_label(
                             end,
                             &text,
-                            TICK_FONT_SIZE,
+                            FONT_SIZE.tick,
                             TextAnchor::End,
                             NOTE_COLOR,
                         );
-                        widest = widest.max(font.text_width(&text, TICK_FONT_SIZE));
+                        widest = widest.max(font.text_width(&text, FONT_SIZE.tick));
                     }
                 }
             }
         }
         if self.across.labelled {
-            let base = DVec2::new(middle.x, end.y + HORIZONTAL_NAME_DISTANCE);
+            let base = DVec2::new(middle.x, end.y + AXIS_MARKS.name_below);
             page.draw_label(
                 base,
                 &self.across.title(),
-                TEXT_FONT_SIZE,
+                FONT_SIZE.text,
                 TextAnchor::Middle,
                 TEXT_COLOR,
             );
         }
         if self.up.labelled {
-            let distance =
-                (widest + NAME_LABEL_GAP).clamp(LEAST_NAME_DISTANCE, LARGEST_NAME_DISTANCE);
+            let distance = (widest + AXIS_MARKS.name_label_gap)
+                .clamp(AXIS_MARKS.least_name_beside, AXIS_MARKS.largest_name_beside);
             let base = DVec2::new(corner.x - distance, middle.y);
-            page.draw_rotated_label(base, &self.up.title(), TEXT_FONT_SIZE, TEXT_COLOR);
+            page.draw_rotated_label(base, &self.up.title(), FONT_SIZE.text, TEXT_COLOR);
         }
     }
 
@@ -194,9 +197,8 @@ impl PanelAxes {
         let mut path: DrawingPath = Vec::new();
         let mut pen = None;
         for pair in places.windows(2) {
-            let inside = pair[0].zip(pair[1]);
-            let Some((from, to)) = inside.and_then(|(from, to)| self.clip_to_frame(from, to))
-            else {
+            let ends = pair[0].zip(pair[1]).map(<[DVec2; 2]>::from);
+            let Some([from, to]) = ends.and_then(|ends| self.clip_to_frame(ends)) else {
                 continue;
             };
             if pen != Some(from) {
@@ -211,7 +213,7 @@ impl PanelAxes {
     }
 
     /// The part of a line that is inside the frame (Liang and Barsky).
-    fn clip_to_frame(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+    fn clip_to_frame(&self, [from, to]: [DVec2; 2]) -> Option<[DVec2; 2]> {
         let step = to - from;
         let (low, high) = (self.cell.corner - from, self.cell.opposite_corner() - from);
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -231,7 +233,7 @@ impl PanelAxes {
             1.0 => to,
             part => from + part * step,
         };
-        (first <= last).then(|| (point(first), point(last)))
+        (first <= last).then(|| [first, last].map(point))
     }
 
     /// Draws a marker at each of these points that is inside the frame.
@@ -274,29 +276,44 @@ fn thin_points(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Padding at both ends: as a fraction of a linear extent, and in decades.
-const LINEAR_PADDING: f64 = 0.06;
+/// Which values an axis covers.
+struct AxisRange {
+    /// Padding at both ends, as a fraction of a linear extent and in decades.
+    linear_padding: f64,
+    logarithmic_padding: f64,
+    /// Decades that are shown below the largest value: smaller ones are rounding.
+    most_decades: f64,
+    /// Larger values are diverged and not drawn.
+    largest_value: f64,
+}
 
-const LOGARITHMIC_PADDING: f64 = 0.12;
-
-/// Most decades of an axis: smaller values are below rounding.
-const MOST_DECADES: f64 = 18.0;
-
-/// Larger values are diverged and not drawn.
-const LARGEST_DRAWN_VALUE: f64 = 1e290;
+const AXIS_RANGE: AxisRange = AxisRange {
+    linear_padding: 0.06,
+    logarithmic_padding: 0.12,
+    most_decades: 18.0,
+    largest_value: 1e290,
+};
 
 /// Powers of ten for which a linear axis writes values without a factor.
 const POWERS_WITHOUT_FACTOR: Range<f64> = -2.0..4.0;
 
-/// Least pixels between ticks, across and up, and between their labels.
-const LINEAR_TICK_SPACING: [f64; 2] = [62.0, 25.0];
+/// Least distances of ticks, in pixels.
+struct TickSpacing {
+    /// Distance of ticks across and up, on linear and logarithmic axes.
+    linear: [f64; 2],
+    logarithmic: [f64; 2],
+    /// Gap between the labels of neighboring ticks.
+    label_gap: f64,
+    /// A wider decade is subdivided.
+    subdivided_decade: f64,
+}
 
-const LOGARITHMIC_TICK_SPACING: [f64; 2] = [38.0, 22.0];
-
-const LABEL_GAP: f64 = 4.0;
-
-/// A decade wider than this many pixels is subdivided.
-const SUBDIVIDED_DECADE_WIDTH: f64 = 60.0;
+const TICK_SPACING: TickSpacing = TickSpacing {
+    linear: [62.0, 25.0],
+    logarithmic: [38.0, 22.0],
+    label_gap: 4.0,
+    subdivided_decade: 60.0,
+};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisOrientation {
@@ -340,10 +357,17 @@ pub struct Tick {
     pub text: String,
 }
 
+/// A value as a tick shows it.
+#[derive(Clone, Debug)]
+pub struct LabelledValue {
+    pub value: f64,
+    pub text: String,
+}
+
 impl Axis {
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
-        let [start, end] =
-            [start, end].map(|value| value.clamp(-LARGEST_DRAWN_VALUE, LARGEST_DRAWN_VALUE));
+        let [start, end] = [start, end]
+            .map(|value| value.clamp(-AXIS_RANGE.largest_value, AXIS_RANGE.largest_value));
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
         // An extent that is only rounding counts as zero.
@@ -366,13 +390,22 @@ impl Axis {
         }
     }
 
+    /// An axis from 0 to 1 without ticks, for rows that are placed by their number.
+    pub fn blank() -> Self {
+        Axis {
+            ticks: TickPlacement::WholeNumbers(Vec::new()),
+            labelled: false,
+            ..Axis::linear("", 0.0, 1.0)
+        }
+    }
+
     /// A linear axis that covers these values, with padding.
     pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) =
-            extent_of_values(values.filter(|value| value.abs() < LARGEST_DRAWN_VALUE))
+            extent_of_values(values.filter(|value| value.abs() < AXIS_RANGE.largest_value))
                 .unwrap_or_default();
         let axis = Axis::linear(name, low, high);
-        let padding = LINEAR_PADDING * (axis.end - axis.start);
+        let padding = AXIS_RANGE.linear_padding * (axis.end - axis.start);
         Axis {
             start: axis.start - padding,
             end: axis.end + padding,
@@ -381,7 +414,7 @@ impl Axis {
         }
     }
 
-    /// The same axis with at least this extent: smaller variations are rounding.
+    /// Widens the axis to at least this extent: smaller variations are rounding.
     pub fn with_least_extent(self, extent: f64) -> Self {
         let lacking = extent - (self.end - self.start);
         if lacking.is_nan() || lacking <= 0.0 {
@@ -400,8 +433,8 @@ impl Axis {
         let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
         let (start, end) = match extent_of_values(drawable.map(f64::log10)) {
             Some((low, high)) => {
-                let low = low.max(high - MOST_DECADES);
-                let padding = (0.5 * (fewest - (high - low))).max(LOGARITHMIC_PADDING);
+                let low = low.max(high - AXIS_RANGE.most_decades);
+                let padding = (0.5 * (fewest - (high - low))).max(AXIS_RANGE.logarithmic_padding);
                 (low - padding, high + padding)
             }
             None => (-fewest, 0.0),
@@ -452,26 +485,26 @@ impl Axis {
     pub fn fraction(&self, value: f64) -> f64 {
         let at = match self.sign {
             Some(sign) => (sign * value).log10(),
-            None if value.abs() < LARGEST_DRAWN_VALUE => value,
+            None if value.abs() < AXIS_RANGE.largest_value => value,
             None => f64::NAN,
         };
         (at - self.start) / (self.end - self.start)
     }
 
-    /// As many ticks as are readable on an axis of this length.
+    /// As many ticks as can be read on an axis of this length in pixels.
     pub fn ticks(&self, length: f64, direction: AxisOrientation) -> Vec<Tick> {
         let default = match self.ticks {
-            TickPlacement::RoundNumbers if self.sign.is_none() => LINEAR_TICK_SPACING,
-            _ => LOGARITHMIC_TICK_SPACING,
+            TickPlacement::RoundNumbers if self.sign.is_none() => TICK_SPACING.linear,
+            _ => TICK_SPACING.logarithmic,
         };
         let font = Font::embedded();
         let size = |tick: &Tick| match direction {
-            AxisOrientation::Horizontal => font.text_width(&tick.text, TICK_FONT_SIZE),
-            AxisOrientation::Vertical => TICK_FONT_SIZE,
+            AxisOrientation::Horizontal => font.text_width(&tick.text, FONT_SIZE.tick),
+            AxisOrientation::Vertical => FONT_SIZE.tick,
         };
         let separate = |pair: &[Tick]| {
             let distance = length * (pair[1].fraction - pair[0].fraction).abs();
-            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > LABEL_GAP
+            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > TICK_SPACING.label_gap
         };
         let mut spacing = self.tick_spacing.unwrap_or(default[direction as usize]);
         loop {
@@ -490,8 +523,11 @@ impl Axis {
         let ticks = match (&self.ticks, self.sign) {
             (TickPlacement::WholeNumbers(values), _) => {
                 let kept = values.iter().step_by(every(values.len()));
-                kept.map(|&value| (value, format_decimals(value, 0)))
-                    .collect()
+                kept.map(|&value| LabelledValue {
+                    value,
+                    text: format_decimals(value, 0),
+                })
+                .collect()
             }
             (_, Some(sign)) => {
                 let count = (high.floor() - low.ceil() + 1.0).max(0.0) as usize;
@@ -501,10 +537,15 @@ impl Axis {
                 let unit = 10f64.powi(self.label_power_of_ten());
                 let step = round_step((high - low) * spacing / unit);
                 let found = multiples_with_text(low / unit, high / unit, step).into_iter();
-                found.map(|(value, text)| (value * unit, text)).collect()
+                found
+                    .map(|LabelledValue { value, text }| LabelledValue {
+                        value: value * unit,
+                        text,
+                    })
+                    .collect()
             }
         };
-        let tick = |(value, text): (f64, String)| Tick {
+        let tick = |LabelledValue { value, text }: LabelledValue| Tick {
             value,
             fraction: self.fraction(value),
             text,
@@ -522,7 +563,7 @@ impl Axis {
         sign: f64,
         every: i32,
         few: bool,
-    ) -> Vec<(f64, String)> {
+    ) -> Vec<LabelledValue> {
         let (digits, every) = match few {
             true => ([1.0, 2.0, 5.0].as_slice(), 1),
             false => ([1.0].as_slice(), every),
@@ -538,15 +579,18 @@ impl Axis {
                     _ if few => digit_times_power_text(sign * digit, power),
                     _ => power_of_ten_text(sign, power),
                 };
-                (sign * digit * 10f64.powi(power), text)
+                LabelledValue {
+                    value: sign * digit * 10f64.powi(power),
+                    text,
+                }
             })
             .collect()
     }
 
     /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
-    pub fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
+    fn decade_subdivisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
-        let divided = length > SUBDIVIDED_DECADE_WIDTH * (high - low)
+        let divided = length > TICK_SPACING.subdivided_decade * (high - low)
             && !matches!(self.ticks, TickPlacement::WholeNumbers(_));
         let Some(sign) = self.sign.filter(|_| divided) else {
             return Vec::new();
@@ -577,14 +621,17 @@ pub fn round_step(smallest: f64) -> f64 {
 }
 
 /// Multiples of `step` from `low` to `high`, each with its text.
-pub fn multiples_with_text(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
+pub fn multiples_with_text(low: f64, high: f64, step: f64) -> Vec<LabelledValue> {
     let slack = 1e-9;
     let first = (low / step - slack).ceil() as i64;
     let last = (high / step + slack).floor() as i64;
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     (first..=last)
         .map(|multiple| multiple as f64 * step)
-        .map(|value| (value, format_decimals(value, decimals)))
+        .map(|value| LabelledValue {
+            value,
+            text: format_decimals(value, decimals),
+        })
         .collect()
 }
 
@@ -772,7 +819,7 @@ mod round_tests {
     fn multiples_reach_both_ends_and_have_equal_decimals() {
         let texts = |low, high, step| -> Vec<String> {
             let found = multiples_with_text(low, high, step).into_iter();
-            found.map(|(_, text)| text).collect()
+            found.map(|it| it.text).collect()
         };
         let even = ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"];
         assert_eq!(texts(-0.4, 0.45, 0.2), even);

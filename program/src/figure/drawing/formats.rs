@@ -1,8 +1,5 @@
-//! SVG files.
-//!
-//! PNG files: the drawing at 192 dots per inch.
-//!
-//! The embedded font: how wide a text is, and its outlines for the PNG.
+//! Drawings as files: SVG, and PNG at 192 dots per inch, painted in parallel bands. The embedded font
+//! tells how wide a text is, and has its outlines for the PNG.
 
 use crate::figure::drawing::{
     Color, Drawing, DrawingElement, DrawingPath, PathStep, Stroke, TextAnchor, TextLabel,
@@ -152,13 +149,13 @@ const CHUNK_BYTES: usize = 1 << 16;
 const DOTS_PER_METRE: u32 = 7559;
 
 /// Rows of a band; bands are painted in parallel.
-const BAND: u32 = 320;
+const BAND_ROWS: u32 = 320;
 
 pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let [width, height] = pixel_size(drawing);
     let shapes = painted_shapes(drawing);
-    let starts = (0..height).step_by(BAND as usize);
-    let bands: Vec<Range<u32>> = starts.map(|at| at..(at + BAND).min(height)).collect();
+    let starts = (0..height).step_by(BAND_ROWS as usize);
+    let bands: Vec<Range<u32>> = starts.map(|at| at..(at + BAND_ROWS).min(height)).collect();
     let together = bands.chunks(rayon::current_num_threads());
     let painted = together.flat_map(|some| -> Vec<Pixmap> {
         let each = some.par_iter().cloned();
@@ -365,7 +362,7 @@ impl Font {
     }
 
     /// The outlines of a text that starts at the origin of its base line.
-    pub fn text_outline(&self, text: &str, size: f64) -> DrawingPath {
+    fn text_outline(&self, text: &str, size: f64) -> DrawingPath {
         let mut outline = GlyphOutlineBuilder {
             scale: self.units_to_size(size),
             line_position: 0.0,

@@ -1,52 +1,53 @@
-//! Labels where they cover neither curves nor each other.
-//!
-//! Page layout: sizes, and cells of panels with their titles.
-//!
-//! Pages: the header, and keys.
-//!
-//! Several leaves in small panels, seen by one camera, to one scale.
+//! The header of a page, keys beside and above panels, and labels of points that cover neither curves
+//! nor each other.
 
-use crate::figure::drawing::axes::{PanelAxes, round_step};
+use crate::figure::drawing::axes::PanelAxes;
 use crate::figure::drawing::formats::Font;
 use crate::figure::drawing::markers::{Marker, draw_support_marker, draw_tip_marker};
-use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, ParallelProjection, SpacePanel, ViewAngles, common_bounding_box,
-};
+use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
-    CURVE_COLORS, Color, Drawing, NOTE_COLOR, Stroke, TEXT_COLOR, TextAnchor, rectangle_path,
-    vein_color,
+    CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
+    TextAnchor, rectangle_path, vein_color,
 };
-use crate::figure::leaf::DrawnVeins;
-use crate::figure::scenario::FigureSetting;
-use crate::report::numbers::format_four_digits;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use leafdyn::scenario::SupportKind;
 
-/// Spacing in pixels of the points on curves that labels keep clear of.
-const SPACING: f64 = 4.0;
+/// Where labels are tried around a point, in pixels.
+struct LabelRules {
+    /// Between the points on curves that labels keep clear of, and how many there are at most.
+    curve_spacing: f64,
+    most_curve_points: usize,
+    /// From the point to the middle of its label, and in how many directions.
+    distances: [f64; 3],
+    directions: usize,
+    /// A clearance with which the search ends.
+    sufficient_clearance: f64,
+    /// Points closer than this share a label.
+    shared_distance: f64,
+}
 
-/// Most of these points.
-const MOST_PLACES: usize = 20_000;
+const LABEL: LabelRules = LabelRules {
+    curve_spacing: 4.0,
+    most_curve_points: 20_000,
+    distances: [11.0, 16.0, 24.0],
+    directions: 16,
+    sufficient_clearance: 5.0,
+    shared_distance: 10.0,
+};
 
-/// From a point to the middle of its label.
-const LABEL_DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
-
-const LABEL_DIRECTIONS: usize = 16;
-
-/// A clearance that is large enough.
-const SUFFICIENT_CLEARANCE: f64 = 5.0;
-
-/// Points closer than this share a label.
-const SHARED_LABEL_DISTANCE: f64 = 10.0;
+/// A text that is to stand next to a point.
+struct RequestedLabel {
+    at: DVec2,
+    text: String,
+}
 
 pub struct LabelPlacement {
     cell: PageRectangle,
-    /// Points on curves.
+    /// Points on curves that labels keep clear of.
     curve_points: Vec<DVec2>,
-    /// Labels drawn so far.
     drawn_labels: Vec<PageRectangle>,
     /// Points that are still to be labelled.
-    requested_labels: Vec<(DVec2, String)>,
+    requested_labels: Vec<RequestedLabel>,
 }
 
 impl LabelPlacement {
@@ -67,8 +68,12 @@ impl LabelPlacement {
             .collect();
         self.curve_points.extend(places.first());
         for pair in places.windows(2) {
-            let parts = (pair[0].distance(pair[1]) / SPACING).ceil().max(1.0);
-            let room = MOST_PLACES.saturating_sub(self.curve_points.len());
+            let parts = (pair[0].distance(pair[1]) / LABEL.curve_spacing)
+                .ceil()
+                .max(1.0);
+            let room = LABEL
+                .most_curve_points
+                .saturating_sub(self.curve_points.len());
             let parts = (parts as usize).min(room);
             let place = |k: usize| pair[0].lerp(pair[1], k as f64 / parts as f64);
             self.curve_points.extend((1..=parts).map(place));
@@ -78,22 +83,24 @@ impl LabelPlacement {
     /// Requests a label next to a point; points close to each other share one.
     pub fn request_label(&mut self, at: DVec2, text: &str) {
         let mut wanted = self.requested_labels.iter_mut();
-        match wanted.find(|(place, _)| place.distance(at) < SHARED_LABEL_DISTANCE) {
-            Some((_, texts)) => *texts += &format!(", {text}"),
-            None => self.requested_labels.push((at, text.into())),
+        match wanted.find(|label| label.at.distance(at) < LABEL.shared_distance) {
+            Some(label) => label.text += &format!(", {text}"),
+            None => self.requested_labels.push(RequestedLabel {
+                at,
+                text: text.into(),
+            }),
         }
     }
 
-    /// Draws all requested labels.
     pub fn draw_requested(&mut self, page: &mut Drawing) {
         self.curve_points
-            .extend(self.requested_labels.iter().map(|(at, _)| *at));
-        for (at, text) in std::mem::take(&mut self.requested_labels) {
+            .extend(self.requested_labels.iter().map(|label| label.at));
+        for RequestedLabel { at, text } in std::mem::take(&mut self.requested_labels) {
             let size = label_size(&text);
-            let places = LABEL_DISTANCES.into_iter().flat_map(|distance| {
-                (0..LABEL_DIRECTIONS).map(move |k| {
+            let places = LABEL.distances.into_iter().flat_map(|distance| {
+                (0..LABEL.directions).map(move |k| {
                     let angle = -0.25 * std::f64::consts::PI
-                        + std::f64::consts::TAU * k as f64 / LABEL_DIRECTIONS as f64;
+                        + std::f64::consts::TAU * k as f64 / LABEL.directions as f64;
                     distance * DVec2::from_angle(angle)
                 })
             });
@@ -102,8 +109,8 @@ impl LabelPlacement {
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
                 PageRectangle::new(at + offset + side - 0.5 * size, size)
             });
-            if let Some((_, cell)) = clearest_label(cells, |cell| self.clearance(cell)) {
-                self.draw_label_at(page, cell, &text, TEXT_COLOR);
+            if let Some(best) = clearest_label(cells, |cell| self.clearance(cell)) {
+                self.draw_label_at(page, best.label, &text, TEXT_COLOR);
             }
         }
     }
@@ -118,14 +125,14 @@ impl LabelPlacement {
         page.draw_centered_label(
             cell.middle(),
             text,
-            TICK_FONT_SIZE,
+            FONT_SIZE.tick,
             TextAnchor::Middle,
             color,
         );
         self.drawn_labels.push(cell);
     }
 
-    /// The distance of a label from curves, at most [`CLEAR`]; negative where it leaves
+    /// The distance of a label from curves, at most `LABEL.sufficient_clearance`; negative where it leaves
     /// the panel or covers another label.
     pub fn clearance(&self, label: &PageRectangle) -> f64 {
         let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
@@ -145,22 +152,28 @@ impl LabelPlacement {
         self.curve_points
             .iter()
             .map(far)
-            .fold(SUFFICIENT_CLEARANCE, f64::min)
+            .fold(LABEL.sufficient_clearance, f64::min)
     }
+}
+
+/// A label, or several that are placed together, with the least of their clearances.
+pub struct ClearLabel<T> {
+    pub label: T,
+    pub clearance: f64,
 }
 
 /// The first of these labels that is clear enough, or the clearest of all.
 pub fn clearest_label<T>(
     labels: impl Iterator<Item = T>,
     clearance: impl Fn(&T) -> f64,
-) -> Option<(f64, T)> {
-    let mut best: Option<(f64, T)> = None;
+) -> Option<ClearLabel<T>> {
+    let mut best: Option<ClearLabel<T>> = None;
     for label in labels {
-        let clear = clearance(&label);
-        if best.as_ref().is_none_or(|(most, _)| clear > *most) {
-            best = Some((clear, label));
+        let clearance = clearance(&label);
+        if best.as_ref().is_none_or(|best| clearance > best.clearance) {
+            best = Some(ClearLabel { label, clearance });
         }
-        if clear >= SUFFICIENT_CLEARANCE {
+        if clearance >= LABEL.sufficient_clearance {
             break;
         }
     }
@@ -169,119 +182,14 @@ pub fn clearest_label<T>(
 
 pub fn label_size(text: &str) -> DVec2 {
     DVec2::new(
-        Font::embedded().text_width(text, TICK_FONT_SIZE),
-        TICK_FONT_SIZE,
+        Font::embedded().text_width(text, FONT_SIZE.tick),
+        FONT_SIZE.tick,
     )
 }
 
-pub const WIDTH: f64 = 900.0;
-
-pub const PAGE_LEFT_MARGIN: f64 = 64.0;
-
-pub const PAGE_RIGHT_MARGIN: f64 = 22.0;
-
-/// Where the title and the notes end and the panels may begin.
-pub const HEADER: f64 = 74.0;
-
-/// Room above a panel, for its title.
-pub const PANEL_TITLE_HEIGHT: f64 = 24.0;
-
-/// Room below a panel, for its axis.
-pub const PANEL_AXIS_HEIGHT: f64 = 48.0;
-
-pub const TITLE_FONT_SIZE: f64 = 19.0;
-
-pub const TEXT_FONT_SIZE: f64 = 12.0;
-
-pub const TICK_FONT_SIZE: f64 = 10.5;
-
-#[derive(Clone, Copy)]
-pub struct PageRectangle {
-    pub corner: DVec2,
-    pub size: DVec2,
-}
-
-impl PageRectangle {
-    pub fn new(corner: DVec2, size: DVec2) -> Self {
-        PageRectangle { corner, size }
-    }
-
-    /// A panel across the page that leaves this width on the right for a key.
-    pub fn left_of_legend(top: f64, height: f64, key: f64) -> Self {
-        PageRectangle::new(
-            DVec2::new(PAGE_LEFT_MARGIN, top),
-            DVec2::new(WIDTH - PAGE_LEFT_MARGIN - PAGE_RIGHT_MARGIN - key, height),
-        )
-    }
-
-    pub fn opposite_corner(&self) -> DVec2 {
-        self.corner + self.size
-    }
-
-    /// Of the four points at this inset from its corners, the one farthest from all points
-    /// `taken`.
-    pub fn emptiest_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
-        let (low, high) = (self.corner + inset, self.opposite_corner() - inset);
-        let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
-        let mut free = [f64::INFINITY; 4];
-        for point in taken {
-            for (free, place) in free.iter_mut().zip(places) {
-                *free = free.min(place.distance_squared(point));
-            }
-        }
-        // The first of equally free ones, up to rounding.
-        let freer = |k: usize, best: usize| free[k] > (1.0 + 1e-9) * free[best];
-        places[(0..4).fold(0, |best, k| if freer(k, best) { k } else { best })]
-    }
-
-    pub fn middle(&self) -> DVec2 {
-        self.corner + 0.5 * self.size
-    }
-
-    /// The ends of the line from left to right through its middle.
-    pub fn midline(&self) -> [DVec2; 2] {
-        let half = DVec2::new(0.5 * self.size.x, 0.0);
-        [self.middle() - half, self.middle() + half]
-    }
-
-    pub fn draw_midline(&self, page: &mut Drawing, stroke: Stroke) {
-        let [from, to] = self.midline();
-        page.draw_line(from, to, stroke);
-    }
-}
-
-/// Draws a panel's title above its frame.
-pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
-    draw_colored_title(page, corner, letter, text, NOTE_COLOR);
-}
-
-/// Draws a panel's title above its frame, with the text in this colour.
-pub fn draw_colored_title(
-    page: &mut Drawing,
-    corner: DVec2,
-    letter: &str,
-    text: &str,
-    color: Color,
-) {
-    let base = corner - DVec2::new(0.0, 8.0);
-    page.draw_label(base, letter, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
-    let base = base + DVec2::new(24.0, 0.0);
-    page.draw_label(base, text, TEXT_FONT_SIZE, TextAnchor::Start, color);
-}
-
-/// Letters of panels: `(a)`, `(b)`, ...
-pub fn panel_letters() -> impl Iterator<Item = String> + Clone {
-    (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
-}
-
-const TITLE_BASE_LINE: f64 = 38.0;
-
-/// Base line of the notes.
-pub const NOTES_BASE_LINE: f64 = 60.0;
-
 /// A page of the default width with a header whose text begins at `left`.
 pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&DrawnVeins>) -> Drawing {
-    let mut drawing = Drawing::new(WIDTH, title);
+    let mut drawing = Drawing::new(PAGE.width, title);
     drawing.draw_group("header", |page| draw_header(page, left, title, notes, leaf));
     drawing
 }
@@ -298,32 +206,38 @@ pub fn draw_header(
     let font = Font::embedded();
     let right = match leaf {
         Some(veins) => draw_vein_legend(page, veins, &font) - 20.0,
-        None => page.width - PAGE_RIGHT_MARGIN,
+        None => page.width - PAGE.right_margin,
     };
-    let title = font.shorten_text(title, TITLE_FONT_SIZE, right - left);
-    let base = DVec2::new(left, TITLE_BASE_LINE);
-    page.draw_label(base, &title, TITLE_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
+    let title = font.shorten_text(title, FONT_SIZE.title, right - left);
+    let base = DVec2::new(left, PAGE.title_base_line);
+    page.draw_label(base, &title, FONT_SIZE.title, TextAnchor::Start, TEXT_COLOR);
     // Spaces that SVG does not collapse.
     let notes = notes.join("\u{a0}\u{a0}·\u{a0}\u{a0}");
-    let base = DVec2::new(left, NOTES_BASE_LINE);
-    page.draw_label(base, &notes, TEXT_FONT_SIZE, TextAnchor::Start, NOTE_COLOR);
+    let base = DVec2::new(left, PAGE.notes_base_line);
+    page.draw_label(base, &notes, FONT_SIZE.text, TextAnchor::Start, NOTE_COLOR);
 }
+
+/// What keys call supports.
+pub const SUPPORT_NAMES: [(SupportKind, &str); 2] = [
+    (SupportKind::Clamped, "clamp"),
+    (SupportKind::Pinned, "pinned"),
+];
 
 /// Draws the key at the right end of the header; returns where it starts.
 fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 {
     const LEGEND_MIDDLE: f64 = 32.0;
     const COLOR_BAR_SIZE: DVec2 = DVec2::new(120.0, 9.0);
     const COLOR_BAR_STEPS: u32 = 60;
-    let mut x = page.width - PAGE_RIGHT_MARGIN;
+    let mut x = page.width - PAGE.right_margin;
     let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
         page.draw_centered_label(
             DVec2::new(*x, LEGEND_MIDDLE),
             text,
-            TEXT_FONT_SIZE,
+            FONT_SIZE.text,
             TextAnchor::End,
             NOTE_COLOR,
         );
-        *x -= font.text_width(text, TEXT_FONT_SIZE) + 6.0;
+        *x -= font.text_width(text, FONT_SIZE.text) + 6.0;
     };
     if veins.count > 1 {
         text_before(page, &mut x, &veins.count.to_string());
@@ -345,11 +259,6 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
         text_before(page, &mut x, "vein 1");
         x -= 16.0;
     }
-    let held = |how: SupportKind| {
-        let mut grips = veins.grips.iter();
-        let ends = veins.base_support == how || veins.tip_support == Some(how);
-        ends || grips.any(|grip| grip.support == how)
-    };
     let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
     let mut entry = |page: &mut Drawing, name: &str, marker: &dyn Fn(&mut Drawing, DVec2)| {
         text_before(page, &mut x, name);
@@ -359,33 +268,44 @@ fn draw_vein_legend(page: &mut Drawing, veins: &DrawnVeins, font: &Font) -> f64 
     if veins.tip_support.is_none() {
         entry(page, tips, &draw_tip_marker);
     }
-    for (how, name) in [
-        (SupportKind::Clamped, "clamp"),
-        (SupportKind::Pinned, "pinned"),
-    ] {
-        if held(how) {
+    for (how, name) in SUPPORT_NAMES {
+        if veins.has_held_ends(how) || veins.has_grips(how) {
             entry(page, name, &|page, at| draw_support_marker(page, at, how));
         }
     }
     x + 16.0
 }
 
-/// Between a sample and its name.
-const GAP: f64 = 7.0;
+/// Sizes of keys, in pixels.
+struct LegendSizes {
+    sample_height: f64,
+    /// Between a sample and its name.
+    name_gap: f64,
+    /// Height of a line of text in a column of entries, and the gap below an entry.
+    line: f64,
+    entry_gap: f64,
+    /// Height of a row of entries, and the gap between its entries.
+    row: f64,
+    row_entry_gap: f64,
+}
 
-const LINE: f64 = 15.0;
-
-/// Between the entries of a column, and of a row.
-const ENTRY_GAP: f64 = 7.0;
-
-const ROW_ENTRY_GAP: f64 = 20.0;
-
-const ROW: f64 = 20.0;
-
-const SAMPLE_HEIGHT: f64 = 12.0;
+const LEGEND: LegendSizes = LegendSizes {
+    sample_height: 12.0,
+    name_gap: 7.0,
+    line: 15.0,
+    entry_gap: 7.0,
+    row: 20.0,
+    row_entry_gap: 20.0,
+};
 
 /// Most of many curves that a key names.
 pub const MOST_CURVES_NAMED: usize = 7;
+
+/// What a key says of a curve.
+pub struct LegendText {
+    pub name: String,
+    pub note: String,
+}
 
 /// The key of a panel: a column of samples with their names.
 pub struct Legend {
@@ -412,17 +332,17 @@ impl Legend {
     ) {
         let font = Font::embedded();
         sample(page, sample_rectangle(self.at, Self::SAMPLE_WIDTH));
-        let left = self.at.x + Self::SAMPLE_WIDTH + GAP;
+        let left = self.at.x + Self::SAMPLE_WIDTH + LEGEND.name_gap;
         let room = page.width - 6.0 - left;
         for (text, color) in [(name, TEXT_COLOR), (note, NOTE_COLOR)] {
-            for line in font.wrap_text(text, TICK_FONT_SIZE, room) {
-                let line = font.shorten_text(&line, TICK_FONT_SIZE, room);
+            for line in font.wrap_text(text, FONT_SIZE.tick, room) {
+                let line = font.shorten_text(&line, FONT_SIZE.tick, room);
                 let at = DVec2::new(left, self.at.y);
-                page.draw_centered_label(at, &line, TICK_FONT_SIZE, TextAnchor::Start, color);
-                self.at.y += LINE;
+                page.draw_centered_label(at, &line, FONT_SIZE.tick, TextAnchor::Start, color);
+                self.at.y += LEGEND.line;
             }
         }
-        self.at.y += ENTRY_GAP;
+        self.at.y += LEGEND.entry_gap;
     }
 
     pub fn add_line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
@@ -435,10 +355,10 @@ impl Legend {
     pub fn add_curves(
         &mut self,
         page: &mut Drawing,
-        curves: impl ExactSizeIterator<Item = (String, String)>,
+        curves: impl ExactSizeIterator<Item = LegendText>,
     ) {
         let more = curves.len().saturating_sub(MOST_CURVES_NAMED);
-        for ((name, note), color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
+        for (LegendText { name, note }, color) in curves.take(MOST_CURVES_NAMED).zip(CURVE_COLORS) {
             self.add_line(page, &name, &note, Stroke::new(color, 1.8));
         }
         if more > 0 {
@@ -481,7 +401,7 @@ impl LegendRows {
     pub fn starting_at(left: f64, base: f64, sample: f64) -> Self {
         LegendRows {
             left,
-            at: DVec2::new(left, base - 0.36 * TEXT_FONT_SIZE),
+            at: DVec2::new(left, base - 0.36 * FONT_SIZE.text),
             sample,
         }
     }
@@ -492,14 +412,15 @@ impl LegendRows {
         name: &str,
         sample: impl FnOnce(&mut Drawing, PageRectangle),
     ) {
-        let width = self.sample + GAP + Font::embedded().text_width(name, TEXT_FONT_SIZE);
-        if self.at.x > self.left && self.at.x + width > page.width - PAGE_RIGHT_MARGIN {
-            self.at = DVec2::new(self.left, self.at.y + ROW);
+        let width =
+            self.sample + LEGEND.name_gap + Font::embedded().text_width(name, FONT_SIZE.text);
+        if self.at.x > self.left && self.at.x + width > page.width - PAGE.right_margin {
+            self.at = DVec2::new(self.left, self.at.y + LEGEND.row);
         }
         sample(page, sample_rectangle(self.at, self.sample));
-        let text = self.at + DVec2::new(self.sample + GAP, 0.0);
-        page.draw_centered_label(text, name, TEXT_FONT_SIZE, TextAnchor::Start, TEXT_COLOR);
-        self.at.x += width + ROW_ENTRY_GAP;
+        let text = self.at + DVec2::new(self.sample + LEGEND.name_gap, 0.0);
+        page.draw_centered_label(text, name, FONT_SIZE.text, TextAnchor::Start, TEXT_COLOR);
+        self.at.x += width + LEGEND.row_entry_gap;
     }
 
     pub fn bottom(&self) -> f64 {
@@ -509,132 +430,9 @@ impl LegendRows {
 
 fn sample_rectangle(at: DVec2, width: f64) -> PageRectangle {
     PageRectangle::new(
-        at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
-        DVec2::new(width, SAMPLE_HEIGHT),
+        at - DVec2::new(0.0, 0.5 * LEGEND.sample_height),
+        DVec2::new(width, LEGEND.sample_height),
     )
-}
-
-const COLUMNS: usize = 4;
-
-/// Margin to the left and right of the panels.
-pub const SIDE_MARGIN: f64 = 22.0;
-
-const PANEL_GAP: f64 = 12.0;
-
-const LOWEST: f64 = 110.0;
-
-const HIGHEST: f64 = 330.0;
-
-const BOTTOM: f64 = 10.0;
-
-/// Least pixels between grid lines.
-const LEAST_GRID_SPACING: f64 = 17.0;
-
-/// Factor of the line width of veins in small panels.
-pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
-
-const SPACE_PANEL_MARGINS: BoxMargins = BoxMargins {
-    left: 14.0,
-    right: 14.0,
-    below: 14.0,
-};
-
-/// Where the panels are, and the box that all of them show.
-pub struct SmallPanels<'s> {
-    bounds: [DVec3; 2],
-    setting: &'s FigureSetting,
-    /// Displayed width of a square of the grid.
-    grid_step: f64,
-    size: DVec2,
-    top: f64,
-    count: usize,
-}
-
-impl<'s> SmallPanels<'s> {
-    /// `count` panels from `top` on that can hold any of these shapes.
-    pub fn fitted_to_shapes<'a>(
-        shapes: impl Iterator<Item = &'a DrawnVeins>,
-        count: usize,
-        setting: &'s FigureSetting,
-        top: f64,
-    ) -> Self {
-        let bounds = common_bounding_box(shapes);
-        let width = (WIDTH - 2.0 * SIDE_MARGIN - (COLUMNS - 1) as f64 * PANEL_GAP) / COLUMNS as f64;
-        let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
-        let height = (width - SPACE_PANEL_MARGINS.left - SPACE_PANEL_MARGINS.right) * extent.y
-            / extent.x
-            + SPACE_PANEL_MARGINS.below;
-        let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
-        let scale = (SPACE_PANEL_MARGINS.inner_size(size) / extent).min_element();
-        SmallPanels {
-            bounds,
-            grid_step: round_step(setting.value_per_length() * LEAST_GRID_SPACING / scale),
-            setting,
-            size,
-            top,
-            count,
-        }
-    }
-
-    /// Formats the width of a square of the grid.
-    pub fn grid_width(&self) -> String {
-        format!(
-            "{} {}",
-            format_four_digits(self.grid_step),
-            self.setting.length_unit()
-        )
-    }
-
-    fn panel_rectangle(&self, index: usize) -> PageRectangle {
-        let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
-        let pitch = self.size + DVec2::new(PANEL_GAP, PANEL_TITLE_HEIGHT + PANEL_GAP);
-        PageRectangle::new(
-            DVec2::new(SIDE_MARGIN, self.top + PANEL_TITLE_HEIGHT) + place * pitch,
-            self.size,
-        )
-    }
-
-    pub fn bottom(&self) -> f64 {
-        let rows = self.count.div_ceil(COLUMNS).max(1);
-        let row = PANEL_TITLE_HEIGHT + self.size.y + PANEL_GAP;
-        (self.top + rows as f64 * row + BOTTOM).ceil()
-    }
-
-    /// Draws a leaf with its letter and title in its panel.
-    pub fn draw_leaf(
-        &self,
-        page: &mut Drawing,
-        index: usize,
-        veins: &DrawnVeins,
-        caption: [&str; 2],
-    ) {
-        let [letter, text] = caption;
-        let scene =
-            self.draw_empty_panel(page, (index, 0.0), OBLIQUE_VIEW, (letter, text, NOTE_COLOR));
-        scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
-    }
-
-    /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
-    /// title in a colour. The first also shows the names of the axes and gravity, and each the wind
-    /// if that changes.
-    pub fn draw_empty_panel(
-        &self,
-        page: &mut Drawing,
-        (index, time): (usize, f64),
-        view: ViewAngles,
-        (letter, text, color): (&str, &str, Color),
-    ) -> SpacePanel<'s> {
-        let cell = self.panel_rectangle(index);
-        draw_colored_title(page, cell.corner, letter, text, color);
-        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
-        let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_PANEL_MARGINS, step);
-        scene.draw_box(page);
-        if index == 0 {
-            scene.draw_axis_names(page, 9.0, false);
-        }
-        scene.draw_direction_arrows(page, index == 0, time);
-        scene
-    }
 }
 
 #[cfg(test)]

@@ -1,17 +1,12 @@
-//! Markers of points in a panel, of the clamp and the tips of a leaf, of points of a second
-//! solution, of grips, and of the directions of gravity and wind.
-//!
-//! Dead forces on a rod as arrows, on its tip, on points and along it.
-//!
-//! Dead moments on a rod as curved arrows about their axes, by the right-hand rule.
+//! Markers of points, supports and tips, and arrows: directions of gravity and wind in a corner of a
+//! panel, dead forces on a rod, and dead moments as curved arrows about their axes by the right-hand
+//! rule.
 
 use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TICK_FONT_SIZE};
 use crate::figure::drawing::{
-    Color, Drawing, NOTE_COLOR, SECOND_SOLUTION_COLOR, Stroke, TEXT_COLOR, TextAnchor, WHITE,
-    circle_path, polygon_path, polyline_path, rectangle_path,
+    Color, Drawing, FONT_SIZE, NOTE_COLOR, PageRectangle, SECOND_SOLUTION_COLOR, Stroke,
+    TEXT_COLOR, TextAnchor, WHITE, circle_path, polygon_path, polyline_path, rectangle_path,
 };
-use crate::figure::leaf::{DrawnVeins, GrippedStretch};
 use crate::figure::scenario::{LoadKind, LoadMark, load_marks};
 use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
@@ -60,7 +55,7 @@ fn draw_cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
 }
 
 /// Marks where the rods are clamped; larger than the tip's marker, which may cover it.
-pub fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
+fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
     let rim = Some(Stroke::new(WHITE, 1.0));
     page.draw_shape(rectangle_path(at - half, 2.0 * half), TEXT_COLOR, rim);
@@ -79,102 +74,58 @@ pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
     }
 }
 
-/// Draws the markers of a leaf: those along its veins, and of its bases and tips.
-pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
-    draw_vein_markers(page, veins, &place);
-    let mut bases: Vec<DVec3> = Vec::new();
-    for base in veins.bases() {
-        if !bases.contains(&base) {
-            draw_support_marker(page, place(base), veins.base_support);
-            bases.push(base);
-        }
-    }
-    if let [(tip, _)] = veins.tips.as_slice() {
-        return match veins.tip_support {
-            Some(held) => draw_support_marker(page, place(*tip), held),
-            None => draw_tip_marker(page, place(*tip)),
-        };
-    }
-    // Many are small.
-    let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
-    for (tip, color) in &veins.tips {
-        let rim = Stroke::new(*color, 0.5 * radius);
-        page.draw_shape(circle_path(place(*tip), radius), WHITE, Some(rim));
-    }
-}
-
-/// Draws the markers along veins: points of a second solution, moments and grips.
-pub fn draw_vein_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
-    let radius = 0.7 + 0.6 * veins.line_width();
-    for &point in &veins.dots {
-        draw_second_solution_dot(page, place(point), radius);
-    }
-    for moment in &veins.moments {
-        moment.draw(page, veins.largest_extent(), &place);
-    }
-    for grip in &veins.grips {
-        draw_grip_markers(page, grip, veins.line_width(), &place);
-    }
-}
-
-/// Marks where a grip holds a vein: a stretch with both of its ends, or a point; pinned or clamped.
-fn draw_grip_markers(
-    page: &mut Drawing,
-    grip: &GrippedStretch,
-    line_width: f64,
-    place: impl Fn(DVec3) -> DVec2,
-) {
-    let points: Vec<DVec2> = grip.points.iter().map(|&point| place(point)).collect();
-    let marker = match grip.support {
-        SupportKind::Clamped => Marker::Square,
-        SupportKind::Pinned => Marker::Triangle,
-    };
-    if let [first, .., last] = points.as_slice() {
-        page.draw_stroke(
-            polyline_path(&points),
-            Stroke::new(TEXT_COLOR, 1.6 + line_width),
-        );
-        marker.draw(page, *first, TEXT_COLOR);
-        marker.draw(page, *last, TEXT_COLOR);
-    } else if let [point] = points.as_slice() {
-        marker.draw(page, *point, TEXT_COLOR);
-    }
-}
-
-/// Marks a point of a second solution, in a colour that no vein has.
+/// Marks a point of a second solution, in a color that no vein has.
 pub fn draw_second_solution_dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.draw_shape(circle_path(at, radius), SECOND_SOLUTION_COLOR, None);
 }
 
-/// Length in pixels of an arrow that lies in the plane of the page.
-const ARROW_LENGTH: f64 = 30.0;
+/// The arrow of a direction in a corner of a panel, in pixels.
+struct CornerArrow {
+    /// Length of the arrow of a direction in the plane of the page.
+    length: f64,
+    /// A projection that is a shorter part of its direction is drawn end-on.
+    end_on: f64,
+    /// From the sides of the panel to the middle of the arrow.
+    inset: DVec2,
+}
 
-/// A shorter arrow is drawn end-on.
-const END_ON_LENGTH: f64 = 0.2;
+const CORNER_ARROW: CornerArrow = CornerArrow {
+    length: 30.0,
+    end_on: 0.2,
+    inset: DVec2::new(28.0, 32.0),
+};
 
-/// From the sides of a panel to the middle of the arrow.
-const ARROW_INSET: DVec2 = DVec2::new(28.0, 32.0);
+/// A direction as a panel shows it.
+#[derive(Clone, Copy)]
+pub struct ProjectedDirection {
+    /// Projection of its unit vector onto the page.
+    pub on_page: DVec2,
+    pub is_toward_viewer: bool,
+}
 
 /// Draws a direction with its name in the corner of a panel that is farthest from the points
-/// `taken`; returns where. `direction` is the projection of its unit vector onto the page, `toward`
-/// whether it points towards the viewer.
+/// `taken`; returns where.
 pub fn draw_direction_arrow(
     page: &mut Drawing,
     cell: PageRectangle,
     taken: &[DVec2],
-    (direction, toward): (DVec2, bool),
+    direction: ProjectedDirection,
     name: &str,
 ) -> DVec2 {
-    let at = cell.emptiest_corner(ARROW_INSET, taken.iter().copied());
+    let at = cell.emptiest_corner(CORNER_ARROW.inset, taken.iter().copied());
     let stroke = Stroke::new(TEXT_COLOR, 1.3);
-    if direction.length() < END_ON_LENGTH {
+    let ProjectedDirection {
+        on_page: direction,
+        is_toward_viewer,
+    } = direction;
+    if direction.length() < CORNER_ARROW.end_on {
         page.draw_stroke(circle_path(at, 6.0), stroke);
-        match toward {
+        match is_toward_viewer {
             true => page.draw_shape(circle_path(at, 1.8), TEXT_COLOR, None),
             false => draw_cross(page, at, 4.2, stroke),
         }
     } else {
-        let (half, along) = (0.5 * ARROW_LENGTH * direction, direction.normalize());
+        let (half, along) = (0.5 * CORNER_ARROW.length * direction, direction.normalize());
         let (end, across) = (at + half, 3.4 * along.perp());
         let neck = end - 8.0 * along;
         page.draw_line(at - half, neck, stroke);
@@ -184,22 +135,29 @@ pub fn draw_direction_arrow(
             None,
         );
     }
-    let below = 0.5 * ARROW_LENGTH * direction.y.abs().max(0.4) + 11.0;
+    let below = 0.5 * CORNER_ARROW.length * direction.y.abs().max(0.4) + 11.0;
     let foot = at + DVec2::new(0.0, below);
-    page.draw_label(foot, name, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
+    page.draw_label(foot, name, FONT_SIZE.tick, TextAnchor::Middle, NOTE_COLOR);
     at
 }
 
-/// Length and half the width of the heads of arrows, in pixels.
-const ARROW_HEAD_SIZE: [f64; 2] = [10.0, 4.2];
+/// Sizes of the arrow of a force, in pixels.
+struct ForceArrowSizes {
+    /// Length and half the width of the head, and of those along a rod.
+    head: [f64; 2],
+    small_head: [f64; 2],
+    /// From the arrow to its label.
+    label_gap: f64,
+    /// A shorter arrow is seen end-on.
+    end_on: f64,
+}
 
-const SMALL_ARROW_HEAD_SIZE: [f64; 2] = [6.0, 2.6];
-
-/// From an arrow to the middle of its label.
-const GAP: f64 = 9.0;
-
-/// An arrow that is shorter on the page is seen end-on.
-const ARROW_END_ON: f64 = 6.0;
+const FORCE_ARROW: ForceArrowSizes = ForceArrowSizes {
+    head: [10.0, 4.2],
+    small_head: [6.0, 2.6],
+    label_gap: 9.0,
+    end_on: 6.0,
+};
 
 /// The arrow of a force on a rod.
 pub struct ForceArrow {
@@ -210,29 +168,35 @@ pub struct ForceArrow {
     label: String,
 }
 
+/// A point of a rod, with the unit tangent there.
+pub struct RodPoint {
+    pub position: DVec3,
+    pub tangent: DVec3,
+}
+
 /// The forces on a single rod whose largest extent is `extent`; `at` gives the point at a fraction of
-/// its length, with the tangent there.
+/// its length.
 pub fn force_arrows(
     scenario: &Scenario,
     extent: f64,
-    at: impl Fn(f64) -> Option<(DVec3, DVec3)>,
+    at: impl Fn(f64) -> Option<RodPoint>,
 ) -> Vec<ForceArrow> {
     let unit = scenario.units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     let marks = load_marks(scenario, None).into_iter();
     let arrow = |mark: LoadMark| {
-        let (place, tangent) = at(mark.at)?;
+        let RodPoint { position, tangent } = at(mark.at)?;
         let along = mark.action == LoadKind::Distributed;
         // One that pushes against the rod ends at the point, any other begins there.
         let pushes = mark.direction.dot(tangent) < -0.5;
         let start = if pushes || along { -1.0 } else { 0.0 };
         let reach = mark.length * extent * mark.direction;
         Some(ForceArrow {
-            ends: [start, start + 1.0].map(|part| place + part * reach),
+            ends: [start, start + 1.0].map(|part| position + part * reach),
             head: if along {
-                SMALL_ARROW_HEAD_SIZE
+                FORCE_ARROW.small_head
             } else {
-                ARROW_HEAD_SIZE
+                FORCE_ARROW.head
             },
             label: match along {
                 true => String::new(),
@@ -250,7 +214,7 @@ impl ForceArrow {
         let [tail, tip] = self.ends.map(place);
         let [length, half] = self.head;
         let along = (tip - tail).normalize_or_zero();
-        if (tip - tail).length() > ARROW_END_ON {
+        if (tip - tail).length() > FORCE_ARROW.end_on {
             let (neck, side) = (tip - length * along, half * along.perp());
             page.draw_line(tail, neck, Stroke::new(TEXT_COLOR, 1.5));
             page.draw_shape(
@@ -261,15 +225,15 @@ impl ForceArrow {
         }
         // Beside the middle of the arrow, or below it where it lies flat.
         let size = DVec2::new(
-            Font::embedded().text_width(&self.label, TICK_FONT_SIZE),
-            TICK_FONT_SIZE,
+            Font::embedded().text_width(&self.label, FONT_SIZE.tick),
+            FONT_SIZE.tick,
         );
         let side = if along.x.abs() < 0.7 {
             DVec2::X
         } else {
             DVec2::Y
         };
-        let reach = GAP + 0.5 * (size * side).element_sum();
+        let reach = FORCE_ARROW.label_gap + 0.5 * (size * side).element_sum();
         let middle = 0.5 * (tail + tip) + reach * side;
         let (low, high) = (
             cell.corner + 0.5 * size + 3.0,
@@ -279,28 +243,35 @@ impl ForceArrow {
         page.draw_centered_label(
             middle,
             &self.label,
-            TICK_FONT_SIZE,
+            FONT_SIZE.tick,
             TextAnchor::Middle,
             NOTE_COLOR,
         );
     }
 }
 
-/// Radius of an arrow, as a part of the leaf's largest extent.
-const ARROW_RADIUS: f64 = 0.06;
+/// The curved arrow of a moment.
+struct MomentArc {
+    /// Radius of the arc, as a part of the leaf's largest extent.
+    radius: f64,
+    /// Along the arrow, and pieces of which it is drawn.
+    angle: f64,
+    pieces: usize,
+    /// Length and half the width of its head, in pixels.
+    head: [f64; 2],
+}
 
-/// Angle along the arrow, and pieces of which it is drawn.
-const ARROW_ANGLE: f64 = 1.5 * PI;
-
-const ARROW_PIECES: usize = 24;
-
-/// Length and half the width of its head, in pixels.
-const ARC_HEAD: [f64; 2] = [8.0, 3.4];
+const MOMENT_ARC: MomentArc = MomentArc {
+    radius: 0.06,
+    angle: 1.5 * PI,
+    pieces: 24,
+    head: [8.0, 3.4],
+};
 
 /// A dead moment on a rod.
 pub struct MomentArrow {
     pub position: DVec3,
-    /// Of length one.
+    /// Unit vector about which the moment turns.
     pub axis: DVec3,
     pub size: f64,
 }
@@ -324,14 +295,14 @@ impl MomentArrow {
         let across = self.axis.any_orthonormal_vector();
         let other = self.axis.cross(across);
         let point = |k: usize| {
-            let (sin, cos) = (ARROW_ANGLE * k as f64 / ARROW_PIECES as f64).sin_cos();
-            place(self.position + ARROW_RADIUS * extent * (cos * across + sin * other))
+            let (sin, cos) = (MOMENT_ARC.angle * k as f64 / MOMENT_ARC.pieces as f64).sin_cos();
+            place(self.position + MOMENT_ARC.radius * extent * (cos * across + sin * other))
         };
-        let points: Vec<DVec2> = (0..=ARROW_PIECES).map(point).collect();
+        let points: Vec<DVec2> = (0..=MOMENT_ARC.pieces).map(point).collect();
         page.draw_stroke(polyline_path(&points), Stroke::new(TEXT_COLOR, 1.3));
-        let end = points[ARROW_PIECES];
-        if let Some(along) = (end - points[ARROW_PIECES - 1]).try_normalize() {
-            let [length, half] = ARC_HEAD;
+        let end = points[MOMENT_ARC.pieces];
+        if let Some(along) = (end - points[MOMENT_ARC.pieces - 1]).try_normalize() {
+            let [length, half] = MOMENT_ARC.head;
             let (tip, side) = (end + 0.5 * length * along, half * along.perp());
             let back = tip - length * along;
             page.draw_shape(

@@ -1,15 +1,12 @@
-//! Elements of a picture: shapes and labels on a page, and their colours. The unit
-//! is 1/96 inch, x points to the right and y down.
-//!
-//! Smooth curves through points on the page.
-//!
-//! Points of curves: which of them can be drawn, and where fractions of the length are.
+//! A page with its elements, shapes and labels, on which every figure is drawn: sizes, panels,
+//! colors, and smooth curves. The unit is 1/96 inch, x points to the right and y down.
 
 pub(super) mod axes;
 pub(crate) mod formats;
 pub(super) mod labels;
 pub(super) mod markers;
 pub(super) mod space;
+pub(crate) mod veins;
 
 use glam::{DVec2, DVec3};
 
@@ -178,7 +175,7 @@ impl Drawing {
         });
     }
 
-    /// Adds a label that is vertically centred at `at`.
+    /// Adds a label that is vertically centered at `at`.
     pub fn draw_centered_label(
         &mut self,
         at: DVec2,
@@ -242,6 +239,145 @@ pub fn circle_path(center: DVec2, radius: f64) -> DrawingPath {
     ]
 }
 
+/// Sizes of a page, in pixels.
+pub struct PageSizes {
+    pub width: f64,
+    pub left_margin: f64,
+    pub right_margin: f64,
+    /// Margins to the left and right of panels without labels.
+    pub side_margin: f64,
+    /// Base lines of the title and of the notes below it.
+    pub title_base_line: f64,
+    pub notes_base_line: f64,
+    /// Height of the header, below which panels may begin.
+    pub header: f64,
+    /// Room above a panel, for its title, and below, for its axis.
+    pub panel_title: f64,
+    pub panel_axis: f64,
+    /// Margin below the last panel.
+    pub bottom_margin: f64,
+}
+
+pub const PAGE: PageSizes = PageSizes {
+    width: 900.0,
+    left_margin: 64.0,
+    right_margin: 22.0,
+    side_margin: 22.0,
+    title_base_line: 38.0,
+    notes_base_line: 60.0,
+    header: 74.0,
+    panel_title: 24.0,
+    panel_axis: 48.0,
+    bottom_margin: 4.0,
+};
+
+/// Sizes of letters, in pixels: of a page's title, of text, and of the labels of ticks and points.
+pub struct FontSizes {
+    pub title: f64,
+    pub text: f64,
+    pub tick: f64,
+}
+
+pub const FONT_SIZE: FontSizes = FontSizes {
+    title: 19.0,
+    text: 12.0,
+    tick: 10.5,
+};
+
+#[derive(Clone, Copy)]
+pub struct PageRectangle {
+    pub corner: DVec2,
+    pub size: DVec2,
+}
+
+impl PageRectangle {
+    pub fn new(corner: DVec2, size: DVec2) -> Self {
+        PageRectangle { corner, size }
+    }
+
+    /// A panel across the page that leaves this width on the right for a key.
+    pub fn left_of_legend(top: f64, height: f64, key: f64) -> Self {
+        PageRectangle::new(
+            DVec2::new(PAGE.left_margin, top),
+            DVec2::new(
+                PAGE.width - PAGE.left_margin - PAGE.right_margin - key,
+                height,
+            ),
+        )
+    }
+
+    pub fn opposite_corner(&self) -> DVec2 {
+        self.corner + self.size
+    }
+
+    /// Of the four points at this inset from its corners, the one farthest from all points
+    /// `taken`.
+    pub fn emptiest_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
+        let (low, high) = (self.corner + inset, self.opposite_corner() - inset);
+        let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
+        let mut free = [f64::INFINITY; 4];
+        for point in taken {
+            for (free, place) in free.iter_mut().zip(places) {
+                *free = free.min(place.distance_squared(point));
+            }
+        }
+        // The first of equally free ones, up to rounding.
+        let freer = |k: usize, best: usize| free[k] > (1.0 + 1e-9) * free[best];
+        places[(0..4).fold(0, |best, k| if freer(k, best) { k } else { best })]
+    }
+
+    pub fn middle(&self) -> DVec2 {
+        self.corner + 0.5 * self.size
+    }
+
+    /// The ends of the line from left to right through its middle.
+    pub fn midline(&self) -> [DVec2; 2] {
+        let half = DVec2::new(0.5 * self.size.x, 0.0);
+        [self.middle() - half, self.middle() + half]
+    }
+
+    pub fn draw_midline(&self, page: &mut Drawing, stroke: Stroke) {
+        let [from, to] = self.midline();
+        page.draw_line(from, to, stroke);
+    }
+}
+
+/// A panel's title: its letter, and a text in a color.
+#[derive(Clone, Copy)]
+pub struct PanelCaption<'t> {
+    pub letter: &'t str,
+    pub text: &'t str,
+    pub color: Color,
+}
+
+impl PanelCaption<'_> {
+    /// Draws the title above the frame whose upper left corner is given.
+    pub fn draw(self, page: &mut Drawing, corner: DVec2) {
+        let base = corner - DVec2::new(0.0, 8.0);
+        let mut label = |at: DVec2, text: &str, color: Color| {
+            page.draw_label(at, text, FONT_SIZE.text, TextAnchor::Start, color);
+        };
+        label(base, self.letter, TEXT_COLOR);
+        label(base + DVec2::new(24.0, 0.0), self.text, self.color);
+    }
+}
+
+/// Draws a panel's title above its frame.
+pub fn draw_panel_title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
+    let color = NOTE_COLOR;
+    PanelCaption {
+        letter,
+        text,
+        color,
+    }
+    .draw(page, corner);
+}
+
+/// Letters of panels: `(a)`, `(b)`, ...
+pub fn panel_letters() -> impl Iterator<Item = String> + Clone {
+    (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Color(pub u8, pub u8, pub u8);
 
@@ -253,17 +389,17 @@ pub const NOTE_COLOR: Color = Color(84, 84, 92);
 
 pub const FRAME_COLOR: Color = Color(120, 120, 128);
 
-pub const GRID: Color = Color(226, 227, 232);
+pub const GRID_COLOR: Color = Color(226, 227, 232);
 
 /// The floor of the panel in space.
-pub const FLOOR: Color = Color(247, 247, 249);
+pub const FLOOR_COLOR: Color = Color(247, 247, 249);
 
-/// Shadows on that floor.
+/// Shadows of veins on the floor of the panel in space.
 pub const SHADOW_COLOR: Color = Color(212, 213, 220);
 
 pub const SECOND_SOLUTION_COLOR: Color = Color(213, 60, 30);
 
-/// Colours that the colour-blind can distinguish, too (after Okabe and Ito).
+/// Colors that the color-blind can distinguish, too (after Okabe and Ito).
 pub const BLUE: Color = Color(0, 114, 178);
 
 pub const SKY: Color = Color(86, 170, 225);
@@ -280,7 +416,7 @@ const BROWN: Color = Color(120, 80, 45);
 
 pub const SLATE: Color = Color(60, 60, 66);
 
-/// Colours of the curves in one panel, in this order.
+/// Colors of the curves in one panel, in this order.
 pub const CURVE_COLORS: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 
 /// Viridis (Smith and van der Walt, matplotlib), equally spaced.
@@ -301,7 +437,7 @@ const VIRIDIS_COLORS: [Color; 11] = [
 /// The bright end of viridis is left out: thin yellow lines vanish on white.
 const BRIGHTEST_VIRIDIS_FRACTION: f64 = 0.88;
 
-/// The colour of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
+/// The color of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
 pub fn vein_color(t: f64) -> Color {
     let place = BRIGHTEST_VIRIDIS_FRACTION * t.clamp(0.0, 1.0) * (VIRIDIS_COLORS.len() - 1) as f64;
     let left = (place as usize).min(VIRIDIS_COLORS.len() - 2);
@@ -313,7 +449,7 @@ pub fn vein_color(t: f64) -> Color {
     Color(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }
 
-/// The colour of one of `count` veins.
+/// The color of one of `count` veins.
 pub fn color_of_vein(index: usize, count: usize) -> Color {
     match count {
         0 | 1 => vein_color(0.3),

@@ -1,31 +1,45 @@
-//! The panel in space: a parallel projection of the leaf in a box, with its shadow
-//! on the floor.
+//! Parallel projections of leaves: flat panels of two axes, and panels in space, alone or many of
+//! one scale on a page, with the box around the leaf and its shadow on the floor.
 
-use crate::figure::drawing::axes::{multiples_with_text, round_step};
-use crate::figure::drawing::formats::Font;
-use crate::figure::drawing::labels::{PageRectangle, TEXT_FONT_SIZE, TICK_FONT_SIZE};
-use crate::figure::drawing::markers::{draw_direction_arrow, draw_leaf_markers};
-use crate::figure::drawing::{
-    Drawing, FLOOR, FRAME_COLOR, GRID, NOTE_COLOR, PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR,
-    TextAnchor, polygon_path, polyline_path,
+use crate::figure::drawing::axes::{
+    Axis, LabelledValue, PanelAxes, multiples_with_text, round_step,
 };
-use crate::figure::leaf::{BezierPiece, DrawnVein, DrawnVeins};
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::markers::{ProjectedDirection, draw_direction_arrow};
+use crate::figure::drawing::veins::{BezierPiece, DrawnVein, DrawnVeins, draw_leaf_markers};
+use crate::figure::drawing::{
+    Drawing, FLOOR_COLOR, FONT_SIZE, FRAME_COLOR, GRID_COLOR, NOTE_COLOR, PAGE, PageRectangle,
+    PanelCaption, PathStep, SHADOW_COLOR, Stroke, TEXT_COLOR, TextAnchor, polygon_path,
+    polyline_path,
+};
 use crate::figure::scenario::{DirectionArrow, FigureSetting};
+use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
 
-/// Directions from which the box is seen: azimuth from the xi axis and elevation above the
-/// floor, in degrees. From above one of its edges, and along the xi axis from a little above.
-pub type ViewAngles = [f64; 2];
+/// The direction from which a box is seen, in degrees: from the xi axis, and above the floor.
+#[derive(Clone, Copy)]
+pub struct ViewAngles {
+    azimuth: f64,
+    elevation: f64,
+}
 
-pub const OBLIQUE_VIEW: ViewAngles = [-55.0, 28.0];
+/// From above one of the edges of the box.
+pub const OBLIQUE_VIEW: ViewAngles = ViewAngles {
+    azimuth: -55.0,
+    elevation: 28.0,
+};
 
-pub const FRONT: ViewAngles = [-8.0, 12.0];
+/// Along the xi axis, from a little above.
+pub const FRONT_VIEW: ViewAngles = ViewAngles {
+    azimuth: -8.0,
+    elevation: 12.0,
+};
 
 /// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_BOX_SIDE: f64 = 0.4;
 
 /// Padding around the leaf, as a fraction of its largest extent.
-const PADDING: f64 = 0.06;
+pub const LEAF_PADDING: f64 = 0.06;
 
 /// Margins around the box, for the labels of its axes.
 #[derive(Clone, Copy)]
@@ -37,25 +51,32 @@ pub struct BoxMargins {
 
 impl BoxMargins {
     /// Pixels that are left to the box, of a cell of this size.
-    pub fn inner_size(self, size: DVec2) -> DVec2 {
+    fn inner_size(self, size: DVec2) -> DVec2 {
         size - DVec2::new(self.left + self.right, self.below)
     }
 }
 
-/// Least distance between the ticks of an axis.
-const TICK_DISTANCE: f64 = 30.0;
+/// Distances of ticks and names along the edges of a box in space, in pixels.
+struct EdgeLabels {
+    /// Least distance between the ticks of an axis.
+    ticks: f64,
+    /// From a name to the right edge of the page, at least.
+    page_edge: f64,
+    /// From the edge to the name of its axis, at least, besides half of the widest label.
+    name: f64,
+    /// From the middle of the edge to the name in a small panel.
+    small_panel_name: f64,
+    /// From the top of a vertical edge to its name.
+    vertical_name: DVec2,
+}
 
-/// Least distance of a name from the right edge of the page.
-const NAME_PAGE_EDGE_DISTANCE: f64 = 6.0;
-
-/// Least distance of the name of an axis from its edge, besides half of its widest label.
-const NAME_LABEL_DISTANCE: f64 = 25.0;
-
-/// From the middle of an edge to the name of its axis in a small panel.
-const SMALL_PANEL_NAME_DISTANCE: f64 = 14.0;
-
-/// From the top of a vertical edge to its name.
-const VERTICAL_NAME_OFFSET: DVec2 = DVec2::new(6.0, -12.0);
+const EDGE_LABELS: EdgeLabels = EdgeLabels {
+    ticks: 30.0,
+    page_edge: 6.0,
+    name: 25.0,
+    small_panel_name: 14.0,
+    vertical_name: DVec2::new(6.0, -12.0),
+};
 
 /// A box around all of these shapes.
 pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> [DVec3; 2] {
@@ -68,7 +89,7 @@ pub fn common_bounding_box<'a>(shapes: impl Iterator<Item = &'a DrawnVeins>) -> 
 /// The box with padding around it, and no side too short.
 pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
-    let padding = DVec3::splat(PADDING * if extent > 1e-9 { extent } else { 1.0 });
+    let padding = DVec3::splat(LEAF_PADDING * if extent > 1e-9 { extent } else { 1.0 });
     let (low, high) = (low - padding, high + padding);
     let middle = 0.5 * (low + high);
     let sides = high - low;
@@ -76,14 +97,14 @@ pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     [middle - half, middle + half]
 }
 
-/// A parallel projection.
+/// A parallel projection of space onto the page.
 pub struct ParallelProjection {
     right: DVec3,
     up: DVec3,
     pub toward: DVec3,
     /// Pixels per length.
     scale: f64,
-    /// The origin on the page.
+    /// Where the origin of space is on the page.
     origin: DVec2,
 }
 
@@ -99,14 +120,15 @@ impl ParallelProjection {
         }
     }
 
-    pub fn from_view(view: ViewAngles) -> Self {
-        let [(sin_a, cos_a), (sin_e, cos_e)] = view.map(|angle| angle.to_radians().sin_cos());
+    fn from_view(view: ViewAngles) -> Self {
+        let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
+        let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let right = DVec3::new(-sin_a, cos_a, 0.0);
         ParallelProjection::new(right, DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e))
     }
 
     /// Shows a point at a place on the page.
-    pub fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
+    fn with_point_at(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
         self.scale = scale;
         self.origin += at - self.project_point(point);
         self
@@ -121,7 +143,7 @@ impl ParallelProjection {
     }
 
     /// Width and height of a box on the page.
-    pub fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
+    fn projected_extent(&self, bounds: [DVec3; 2]) -> DVec2 {
         let corners = || box_corners(bounds).map(|corner| self.project_point(corner));
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
@@ -137,9 +159,11 @@ impl ParallelProjection {
     ) {
         let mut taken: Vec<DVec2> = taken.collect();
         for DirectionArrow { direction, name } in arrows {
-            let shown = self.project_direction(*direction) / self.scale;
-            let toward = self.toward.dot(*direction) > 0.0;
-            let at = draw_direction_arrow(page, cell, &taken, (shown, toward), name);
+            let direction = ProjectedDirection {
+                on_page: self.project_direction(*direction) / self.scale,
+                is_toward_viewer: self.toward.dot(*direction) > 0.0,
+            };
+            let at = draw_direction_arrow(page, cell, &taken, direction, name);
             taken.push(at);
         }
     }
@@ -150,7 +174,7 @@ fn box_corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     (0..8).map(move |k| DVec3::new(side(k, 0), side(k, 1), side(k, 2)))
 }
 
-/// One axis along an edge of the box.
+/// An axis along an edge of the box.
 struct AxisEdge {
     axis: usize,
     from: DVec3,
@@ -160,7 +184,13 @@ struct AxisEdge {
     /// Offsets from a point on the edge along its grid lines: to the corner between the two
     /// walls, and to the end of the second.
     grid_line_offsets: [DVec3; 2],
-    ticks: Vec<(DVec3, String)>,
+    ticks: Vec<EdgeTick>,
+}
+
+/// A tick of an axis in space.
+struct EdgeTick {
+    point: DVec3,
+    text: String,
 }
 
 /// A box in space, and the leaf in it.
@@ -194,7 +224,7 @@ impl<'s> SpacePanel<'s> {
             let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
             let step = step.unwrap_or_else(|| {
                 round_step(
-                    unit * TICK_DISTANCE / camera.project_direction(DVec3::AXES[axis]).length(),
+                    unit * EDGE_LABELS.ticks / camera.project_direction(DVec3::AXES[axis]).length(),
                 )
             });
             let inset = 0.02 * (high - low)[axis];
@@ -207,7 +237,10 @@ impl<'s> SpacePanel<'s> {
                 outward: camera.project_direction(outward).normalize(),
                 grid_line_offsets: walls,
                 ticks: ticks
-                    .map(|(value, text)| (at(value / unit), text))
+                    .map(|LabelledValue { value, text }| EdgeTick {
+                        point: at(value / unit),
+                        text,
+                    })
                     .collect(),
             }
         };
@@ -240,16 +273,16 @@ impl<'s> SpacePanel<'s> {
         let far = DVec3::new(low.x, high.y, low.z);
         let right = near.with_y(high.y);
         let floor = [low, near, right, far].map(|corner| self.project_point(corner));
-        page.draw_shape(polygon_path(&floor), FLOOR, None);
+        page.draw_shape(polygon_path(&floor), FLOOR_COLOR, None);
         for edge in &self.edges {
-            for &(start, _) in &edge.ticks {
+            for &EdgeTick { point: start, .. } in &edge.ticks {
                 let line = [
                     start,
                     start + edge.grid_line_offsets[0],
                     start + edge.grid_line_offsets[1],
                 ];
                 let line = line.map(|point| self.project_point(point));
-                page.draw_stroke(polyline_path(&line), Stroke::new(GRID, 0.7));
+                page.draw_stroke(polyline_path(&line), Stroke::new(GRID_COLOR, 0.7));
             }
         }
         let top = |corner: DVec3| corner.with_z(high.z);
@@ -280,11 +313,11 @@ impl<'s> SpacePanel<'s> {
             ..
         } in &self.edges
         {
-            for (point, text) in ticks {
+            for EdgeTick { point, text } in ticks {
                 let foot = self.project_point(*point);
                 page.draw_line(foot, foot + 4.0 * *out, Stroke::new(FRAME_COLOR, 0.8));
                 let at = foot + label_offset(*out, 17.0);
-                page.draw_centered_label(at, text, TICK_FONT_SIZE, TextAnchor::Middle, NOTE_COLOR);
+                page.draw_centered_label(at, text, FONT_SIZE.tick, TextAnchor::Middle, NOTE_COLOR);
             }
         }
         self.draw_axis_names(page, distance, true);
@@ -298,11 +331,11 @@ impl<'s> SpacePanel<'s> {
 
     /// Draws the names of all axes at a distance from their edges, with units if values
     /// are shown.
-    pub fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
+    fn draw_axis_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.edge_middles()) {
             let widths = edge.ticks.iter();
-            let widths = widths.map(|(_, text)| Font::embedded().text_width(text, TICK_FONT_SIZE));
-            let beyond = NAME_LABEL_DISTANCE + 0.5 * widths.fold(0.0, f64::max);
+            let widths = widths.map(|tick| Font::embedded().text_width(&tick.text, FONT_SIZE.tick));
+            let beyond = EDGE_LABELS.name + 0.5 * widths.fold(0.0, f64::max);
             let distance = if values {
                 distance.max(beyond)
             } else {
@@ -311,15 +344,15 @@ impl<'s> SpacePanel<'s> {
             let at = middle + label_offset(edge.outward, distance);
             let name = self.setting.brief_axis_name(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
-            let size = TEXT_FONT_SIZE + 1.0;
+            let size = FONT_SIZE.text + 1.0;
             let most =
-                page.width - Font::embedded().text_width(&name, size) - NAME_PAGE_EDGE_DISTANCE;
+                page.width - Font::embedded().text_width(&name, size) - EDGE_LABELS.page_edge;
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
                 0 => (at, TextAnchor::End),
                 1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
                 _ => (
-                    self.project_point(edge.to) + VERTICAL_NAME_OFFSET,
+                    self.project_point(edge.to) + EDGE_LABELS.vertical_name,
                     TextAnchor::End,
                 ),
             };
@@ -332,8 +365,9 @@ impl<'s> SpacePanel<'s> {
     pub fn draw_direction_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
         let taken = box_corners([self.low, self.high]).map(|corner| self.project_point(corner));
         let names = self.edges.iter().zip(self.edge_middles());
-        let names = names
-            .flat_map(|(edge, middle)| [middle, middle + SMALL_PANEL_NAME_DISTANCE * edge.outward]);
+        let names = names.flat_map(|(edge, middle)| {
+            [middle, middle + EDGE_LABELS.small_panel_name * edge.outward]
+        });
         let taken = taken.chain(names);
         let arrows = self.setting.direction_arrows(first, time);
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
@@ -370,4 +404,199 @@ impl<'s> SpacePanel<'s> {
 /// to the side.
 fn label_offset(out: DVec2, distance: f64) -> DVec2 {
     distance * out + DVec2::new(5.0 * out.x, 0.0)
+}
+
+/// Least distance between grid lines.
+const PLANE_TICK_DISTANCE: f64 = 36.0;
+
+/// A view along one of the three axes: its title, and the axes that point to the right and up.
+#[derive(Clone, Copy)]
+pub struct PlaneView {
+    pub title: &'static str,
+    pub axes: [usize; 2],
+}
+
+pub const VIEW_FROM_ABOVE: PlaneView = PlaneView {
+    title: "from above",
+    axes: [0, 1],
+};
+
+pub const VIEW_FROM_SIDE: PlaneView = PlaneView {
+    title: "from the side",
+    axes: [0, 2],
+};
+
+pub const VIEW_FROM_FRONT: PlaneView = PlaneView {
+    title: "from the front",
+    axes: [1, 2],
+};
+
+/// Draws a panel of two axes with `scale` pixels per length and this point in its middle; returns how
+/// it shows points.
+pub fn draw_plane_panel(
+    page: &mut Drawing,
+    middle: DVec3,
+    setting: &FigureSetting,
+    cell: PageRectangle,
+    scale: f64,
+    [across, up]: [usize; 2],
+) -> ParallelProjection {
+    let camera = ParallelProjection::new(DVec3::AXES[across], DVec3::AXES[up]);
+    let camera = camera.with_point_at(scale, middle, cell.middle());
+    let shown = setting.value_per_length();
+    let axis = |which: usize, pixels: f64| {
+        let half = 0.5 * pixels / scale;
+        let (low, high) = (middle[which] - half, middle[which] + half);
+        Axis {
+            tick_spacing: Some(PLANE_TICK_DISTANCE),
+            ..Axis::linear(&setting.axis_name(which), shown * low, shown * high)
+        }
+    };
+    let axes = PanelAxes {
+        cell,
+        across: axis(across, cell.size.x),
+        up: axis(up, cell.size.y),
+    };
+    axes.draw(page);
+    camera
+}
+
+/// Sizes of small panels, in pixels.
+struct SmallPanelSizes {
+    columns: usize,
+    gap: f64,
+    /// Least and largest height.
+    lowest: f64,
+    highest: f64,
+    /// Room below the last row.
+    bottom: f64,
+    /// Least distance between grid lines.
+    grid_spacing: f64,
+    margins: BoxMargins,
+}
+
+const SMALL_PANEL: SmallPanelSizes = SmallPanelSizes {
+    columns: 4,
+    gap: 12.0,
+    lowest: 110.0,
+    highest: 330.0,
+    bottom: 10.0,
+    grid_spacing: 17.0,
+    margins: BoxMargins {
+        left: 14.0,
+        right: 14.0,
+        below: 14.0,
+    },
+};
+
+/// Factor of the line width of veins in small panels.
+pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
+
+/// Where the panels are, and the box that all of them show.
+pub struct SmallPanels<'s> {
+    bounds: [DVec3; 2],
+    setting: &'s FigureSetting,
+    /// Displayed width of a square of the grid.
+    grid_step: f64,
+    size: DVec2,
+    top: f64,
+    count: usize,
+}
+
+impl<'s> SmallPanels<'s> {
+    /// `count` panels from `top` on that can hold any of these shapes.
+    pub fn fitted_to_shapes<'a>(
+        shapes: impl Iterator<Item = &'a DrawnVeins>,
+        count: usize,
+        setting: &'s FigureSetting,
+        top: f64,
+    ) -> Self {
+        let bounds = common_bounding_box(shapes);
+        let width = (PAGE.width
+            - 2.0 * PAGE.side_margin
+            - (SMALL_PANEL.columns - 1) as f64 * SMALL_PANEL.gap)
+            / SMALL_PANEL.columns as f64;
+        let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
+        let height = (width - SMALL_PANEL.margins.left - SMALL_PANEL.margins.right) * extent.y
+            / extent.x
+            + SMALL_PANEL.margins.below;
+        let size = DVec2::new(width, height.clamp(SMALL_PANEL.lowest, SMALL_PANEL.highest));
+        let scale = (SMALL_PANEL.margins.inner_size(size) / extent).min_element();
+        SmallPanels {
+            bounds,
+            grid_step: round_step(setting.value_per_length() * SMALL_PANEL.grid_spacing / scale),
+            setting,
+            size,
+            top,
+            count,
+        }
+    }
+
+    /// Formats the width of a square of the grid.
+    pub fn grid_width(&self) -> String {
+        format!(
+            "{} {}",
+            format_four_digits(self.grid_step),
+            self.setting.length_unit()
+        )
+    }
+
+    fn panel_rectangle(&self, index: usize) -> PageRectangle {
+        let place = DVec2::new(
+            (index % SMALL_PANEL.columns) as f64,
+            (index / SMALL_PANEL.columns) as f64,
+        );
+        let pitch = self.size + DVec2::new(SMALL_PANEL.gap, PAGE.panel_title + SMALL_PANEL.gap);
+        PageRectangle::new(
+            DVec2::new(PAGE.side_margin, self.top + PAGE.panel_title) + place * pitch,
+            self.size,
+        )
+    }
+
+    pub fn bottom(&self) -> f64 {
+        let rows = self.count.div_ceil(SMALL_PANEL.columns).max(1);
+        let row = PAGE.panel_title + self.size.y + SMALL_PANEL.gap;
+        (self.top + rows as f64 * row + SMALL_PANEL.bottom).ceil()
+    }
+
+    /// Draws a leaf with its letter and title in its panel.
+    pub fn draw_leaf(
+        &self,
+        page: &mut Drawing,
+        index: usize,
+        veins: &DrawnVeins,
+        caption: [&str; 2],
+    ) {
+        let [letter, text] = caption;
+        let caption = PanelCaption {
+            letter,
+            text,
+            color: NOTE_COLOR,
+        };
+        let scene = self.draw_empty_panel(page, index, 0.0, OBLIQUE_VIEW, caption);
+        scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
+    }
+
+    /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
+    /// title in a color. The first also shows the names of the axes and gravity, and each the wind
+    /// if that changes.
+    pub fn draw_empty_panel(
+        &self,
+        page: &mut Drawing,
+        index: usize,
+        time: f64,
+        view: ViewAngles,
+        caption: PanelCaption,
+    ) -> SpacePanel<'s> {
+        let cell = self.panel_rectangle(index);
+        caption.draw(page, cell.corner);
+        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
+        let scene = SpacePanel::new(bounds, setting, view, cell, SMALL_PANEL.margins, step);
+        scene.draw_box(page);
+        if index == 0 {
+            scene.draw_axis_names(page, 9.0, false);
+        }
+        scene.draw_direction_arrows(page, index == 0, time);
+        scene
+    }
 }

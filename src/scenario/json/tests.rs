@@ -1,4 +1,4 @@
-use crate::scenario::format::json::*;
+use crate::scenario::json::*;
 use leafdyn_testing::pairs;
 
 /// Uses every feature of the format.
@@ -23,10 +23,10 @@ const FULL: &str = r#"
 
 #[test]
 fn a_scenario_read_from_its_json_is_the_same() {
-    let paper = include_str!("../../../../scenarios/paper/fig04.toml");
-    let swing = include_str!("../../../../scenarios/motion/swing.toml");
-    let buckled = include_str!("../../../../scenarios/classic/elastica_buckled.toml");
-    let held = include_str!("../../../../scenarios/classic/twisted_strip.toml");
+    let paper = include_str!("../../../scenarios/paper/fig04.toml");
+    let swing = include_str!("../../../scenarios/motion/swing.toml");
+    let buckled = include_str!("../../../scenarios/classic/elastica_buckled.toml");
+    let held = include_str!("../../../scenarios/classic/twisted_strip.toml");
     let (head, tail) = FULL.split_at(FULL.find("stiffness").unwrap());
     let tail = &tail[tail.find("rest").unwrap()..];
     let taper =

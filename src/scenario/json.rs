@@ -1,48 +1,63 @@
 //! Serializes a checked scenario as JSON of the same form as the TOML, which can be read
-//! in place of it.
+//! in place of the TOML.
 
 #[cfg(test)]
 mod tests;
 
-use crate::scenario::format::split;
-use crate::scenario::outline::SectionOutline;
+use crate::numbers::sorted_distinct;
+use crate::scenario::blade::Spline;
+use crate::scenario::checked::Scenario;
+use crate::scenario::format::{Key, TablePath};
+use crate::scenario::loads::PointLoad;
 use crate::scenario::photo::axis_name;
-use crate::scenario::section::{HollowSection, Property, Section};
-use crate::scenario::{
-    Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, sorted_distinct,
-};
+use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
+use crate::scenario::supports::Grip;
+use crate::scenario::veins::{Rod, Tissue};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// The sections of a scenario, and what else is theirs.
+/// The sections of a scenario where they give the stiffnesses.
 struct SerializedSections<'a> {
     sections: &'a [Arc<Section>],
+    /// Whether they give the densities, too.
     density: bool,
+    /// Whether they give the rotary inertia, too.
     rotary_inertia: bool,
 }
 
-/// All entries with their values, including defaults, but not those that `[section]` or `[blade]` gives: a JSON object from which
-/// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
-/// `"inf"`.
+/// An entry of the format with its value.
+struct SerializedEntry {
+    path: TablePath<'static>,
+    value: Value,
+}
+
+/// A JSON object from which [`Scenario::from_toml`] makes an equal scenario: all entries with their
+/// values, including defaults, but not those that `[section]` or `[blade]` gives. An infinite
+/// stiffness is `"inf"`.
 impl Serialize for Scenario {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let sections = self.sections();
         let entry = |key: Key| match key {
             // All tables of a name stand where the first of its keys does.
-            Key::PointVein | Key::GripVein => {
-                let (table, _) = key.table_and_name();
-                Some((split(table), self.table_rows(key)?))
-            }
+            Key::PointVein | Key::GripVein => Some(SerializedEntry {
+                path: TablePath::split(key.table()),
+                value: self.table_rows(key)?,
+            }),
             _ if key.is_repeated() => None,
-            _ => Some((key.table_and_name(), self.written(key, sections.as_ref())?)),
+            _ => Some(SerializedEntry {
+                path: key.table_path(),
+                value: self.serialized_value(key, sections.as_ref())?,
+            }),
         };
         let entries: Vec<_> = Key::all().filter_map(entry).collect();
         let mut top = serializer.serialize_map(None)?;
-        for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
-            match &entries[0] {
-                (("", name), value) => top.serialize_entry(name, value)?,
-                ((table, _), _) => top.serialize_entry(table, &SerializedTable(entries))?,
+        for entries in entries.chunk_by(|one, other| one.path.table == other.path.table) {
+            let SerializedEntry { path, value } = &entries[0];
+            match path.table {
+                "" => top.serialize_entry(path.name, value)?,
+                table => top.serialize_entry(table, &SerializedTable(entries))?,
             }
         }
         top.end()
@@ -50,11 +65,12 @@ impl Serialize for Scenario {
 }
 
 /// The entries of a table, in the order of the format.
-struct SerializedTable<'e>(&'e [((&'static str, &'static str), Value)]);
+struct SerializedTable<'e>(&'e [SerializedEntry]);
 
 impl Serialize for SerializedTable<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|((_, name), value)| (name, value)))
+        let entries = self.0.iter();
+        serializer.collect_map(entries.map(|entry| (entry.path.name, &entry.value)))
     }
 }
 
@@ -64,14 +80,14 @@ impl Scenario {
         let point = |point: &PointLoad| {
             json!({
                 "vein": point.vein + 1, "at": point.at, "mass": point.mass,
-                "force": list(point.force), "moment": list(point.moment),
+                "force": list_value(point.force), "moment": list_value(point.moment),
             })
         };
         let grip = |grip: &Grip| {
             let [from, to] = grip.at;
             json!({
-                "vein": grip.vein + 1, "held": grip.held, "move": list(grip.displacement),
-                "at": if from == to { json!(from) } else { list(grip.at) },
+                "vein": grip.vein + 1, "held": grip.held, "move": list_value(grip.displacement),
+                "at": if from == to { json!(from) } else { list_value(grip.at) },
             })
         };
         let rows: Vec<Value> = match first {
@@ -82,39 +98,38 @@ impl Scenario {
     }
 
     /// The value of a key; `None` if other keys determine it.
-    fn written(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
+    fn serialized_value(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         if let Some(blade) = &self.blade {
             match (key, blade.curvature()) {
                 _ if key.follows_from_blade() => return None,
                 (Key::RestTwist, Some(_)) => return None,
-                (Key::RestBend2, Some((at, value))) => return Some(along(at, value)),
+                (Key::RestBend2, Some(curvature)) => return Some(spline_value(curvature)),
                 _ => {}
             }
         }
-        match key.table_and_name().0 {
-            "blade" => return self.of_blade(key),
-            "section" => return sections?.written(key),
+        match key.table() {
+            "blade" => return self.blade_value(key),
+            "section" => return sections?.serialized_value(key),
             "stiffness" if sections.is_some() => return None,
-            "tip" => return self.of_tip(key),
-            "photo" => return self.of_photo(key),
-            "tissue" => return self.of_tissue(key),
-            "wind" => return self.of_wind(key),
-            "dynamics" => return self.of_dynamics(key, sections),
+            "tip" => return self.tip_value(key),
+            "photo" => return self.photo_value(key),
+            "tissue" => return self.tissue_value(key),
+            "wind" => return self.wind_value(key),
+            "dynamics" => return self.dynamics_value(key, sections),
             _ if key == Key::Elevation && self.blade.is_some() => {
-                return Some(number(self.blade.as_ref()?.elevation));
+                return Some(number_value(self.blade.as_ref()?.elevation));
             }
             _ => {}
         }
-        type Triple = fn(&Rod) -> &[Profile; 3];
-        let triples: [([Key; 3], Triple); 3] = [
-            (Key::COUPLE, |rod| &rod.couple_stiffness),
-            (Key::FORCE, |rod| &rod.force_stiffness),
-            (Key::REST_CURVATURE, |rod| &rod.rest_curvature),
-        ];
-        for (keys, of) in triples {
-            if let Some(which) = keys.iter().position(|one| *one == key) {
-                return Some(quantity(self.rods.iter().map(|rod| &of(rod)[which])));
-            }
+        let triple = |keys: [Key; 3], of: fn(&Rod) -> &[Profile; 3]| {
+            let axis = keys.iter().position(|one| *one == key)?;
+            Some(quantity_value(self.rods.iter().map(|rod| &of(rod)[axis])))
+        };
+        let of_veins = triple(Key::COUPLE, |rod| &rod.couple_stiffness)
+            .or_else(|| triple(Key::FORCE, |rod| &rod.force_stiffness))
+            .or_else(|| triple(Key::REST_CURVATURE, |rod| &rod.rest_curvature));
+        if of_veins.is_some() {
+            return of_veins;
         }
         Some(match key {
             Key::Name => json!(self.name),
@@ -126,9 +141,9 @@ impl Scenario {
             Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
             Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
             Key::BaseHeld => json!(self.base_held),
-            Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
+            Key::Fan => list_value(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => json!(self.joined),
-            Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
+            Key::RestStretch => quantity_value(self.rods.iter().map(|rod| &rod.rest_stretch)),
             Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
                 // A single rod has no gaps: any number will do.
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
@@ -138,42 +153,41 @@ impl Scenario {
                 let veins = 0..self.rods.len();
                 vector_or_list(veins.map(|vein| self.weight(vein).even))
             }
-            Key::G => list(self.g),
+            Key::G => list_value(self.g),
             Key::Distributed => vector_quantity(self.distributed.as_deref()?),
-            Key::TipForce => list(self.tip_force),
-            Key::TipMoment => list(self.tip_moment),
-            Key::Tolerance => number(self.tolerance),
+            Key::TipForce => list_value(self.tip_force),
+            Key::TipMoment => list_value(self.tip_moment),
+            Key::Tolerance => number_value(self.tolerance),
             _ => return None,
         })
     }
 
-    fn of_tissue(&self, key: Key) -> Option<Value> {
+    fn tissue_value(&self, key: Key) -> Option<Value> {
         let tissue = self.tissue.as_ref()?;
         if key == Key::TissueGrown {
             return Some(json!(self.tissue_grown));
         }
         let which = Key::TISSUE.iter().position(|one| *one == key)?;
-        let of = |gap: &Tissue| gap.profiles()[which].at(0.0);
+        let of = |gap: &Tissue| gap.stiffness_profiles()[which].at(0.0);
         Some(number_or_list(tissue.iter().map(of)))
     }
 
-    fn of_blade(&self, key: Key) -> Option<Value> {
+    fn blade_value(&self, key: Key) -> Option<Value> {
         let blade = self.blade.as_ref()?;
         let materials = blade.materials.iter();
-        let (at, value) = blade.points();
         Some(match key {
-            Key::BladeLength => number(blade.length()),
-            Key::BladeWidth => along(at, value),
-            Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
-            Key::BladeYoung => quantity(materials.map(|of| &of.young)),
+            Key::BladeLength => number_value(blade.length()),
+            Key::BladeWidth => spline_value(blade.width_profile()),
+            Key::BladeThickness => quantity_value(materials.map(|of| &of.thickness)),
+            Key::BladeYoung => quantity_value(materials.map(|of| &of.young)),
             Key::YoungAcross => optional_quantity(materials.map(|of| of.young_across.as_ref()))?,
             Key::ShearModulus => optional_quantity(materials.map(|of| of.shear_modulus.as_ref()))?,
-            Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
+            Key::BladePoisson => quantity_value(materials.map(|of| &of.poisson)),
             Key::BladeMassDensity => {
                 optional_quantity(materials.map(|of| of.mass_density.as_ref()))?
             }
             Key::Edges => json!(blade.edges),
-            _ => number(blade.least_width_fraction()),
+            _ => number_value(blade.least_width_fraction()),
         })
     }
 
@@ -182,69 +196,74 @@ impl Scenario {
         self.blade.as_ref().is_some_and(|blade| blade.has_mass())
     }
 
-    fn of_wind(&self, key: Key) -> Option<Value> {
+    fn wind_value(&self, key: Key) -> Option<Value> {
         let wind = self.wind.as_ref()?;
         Some(match key {
-            Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
-            Key::WindVelocity => schedule_value(&wind.velocity, "value", list),
-            Key::WindDensity => number(wind.density),
-            Key::WindDrag => number(wind.drag),
-            _ => quantity(wind.width.iter()),
+            Key::WindVelocity if wind.velocity.is_constant() => list_value(wind.velocity.at(0.0)),
+            Key::WindVelocity => schedule_value(&wind.velocity, "value", list_value),
+            Key::WindDensity => number_value(wind.density),
+            Key::WindDrag => number_value(wind.drag),
+            _ => quantity_value(wind.width.iter()),
         })
     }
 
     /// A ruler is told as the scale that follows from it.
-    fn of_photo(&self, key: Key) -> Option<Value> {
+    fn photo_value(&self, key: Key) -> Option<Value> {
         let photo = self.photo.as_ref()?;
         match key {
-            Key::PhotoScale => Some(number(photo.scale)),
-            Key::PhotoX => Some(number(photo.origin[0])),
-            Key::PhotoY => Some(number(photo.origin[1])),
-            Key::PhotoRotation => Some(number(photo.rotation)),
+            Key::PhotoScale => Some(number_value(photo.scale)),
+            Key::PhotoX => Some(number_value(photo.origin[0])),
+            Key::PhotoY => Some(number_value(photo.origin[1])),
+            Key::PhotoRotation => Some(number_value(photo.rotation)),
             Key::PhotoRight => Some(json!(axis_name(photo.right))),
             Key::PhotoUp => Some(json!(axis_name(photo.up))),
             _ => None,
         }
     }
 
-    fn of_tip(&self, key: Key) -> Option<Value> {
+    fn tip_value(&self, key: Key) -> Option<Value> {
         let held = self.held_tip.as_ref()?;
         let clamps = held.clamps.as_deref();
         Some(match key {
             Key::TipHeld if clamps.is_some() => json!("clamped"),
             Key::TipHeld => json!("pinned"),
-            Key::TipPosition => list(held.position),
+            Key::TipPosition => list_value(held.position),
             Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
             _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
         })
     }
 
-    fn of_dynamics(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
+    fn dynamics_value(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
             Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
             Key::Density if sections.is_some_and(|it| it.density) => return None,
             Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
-            Key::Density => quantity(dynamics.density.iter()),
+            Key::Density => quantity_value(dynamics.density.iter()),
             // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
-            Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
-            Key::ExternalDamping => number(dynamics.external_damping),
-            Key::InternalDamping => number(dynamics.internal_damping),
-            Key::Duration => number(dynamics.duration),
-            Key::OutputInterval => number(dynamics.output_interval),
+            Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
+            Key::ExternalDamping => number_value(dynamics.external_damping),
+            Key::InternalDamping => number_value(dynamics.internal_damping),
+            Key::Duration => number_value(dynamics.duration),
+            Key::OutputInterval => number_value(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
             Key::Start => json!(dynamics.start),
             Key::GravityInTime => {
-                schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list)?
+                schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list_value)?
             }
             Key::TipForceInTime => {
-                schedule_unless_constant(&dynamics.tip_force, self.tip_force, "value", list)?
+                schedule_unless_constant(&dynamics.tip_force, self.tip_force, "value", list_value)?
             }
-            Key::TipMomentInTime => {
-                schedule_unless_constant(&dynamics.tip_moment, self.tip_moment, "value", list)?
+            Key::TipMomentInTime => schedule_unless_constant(
+                &dynamics.tip_moment,
+                self.tip_moment,
+                "value",
+                list_value,
+            )?,
+            Key::RestInTime => {
+                schedule_unless_constant(&dynamics.rest, 1.0, "factor", number_value)?
             }
-            Key::RestInTime => schedule_unless_constant(&dynamics.rest, 1.0, "factor", number)?,
             _ => return None,
         })
     }
@@ -276,10 +295,10 @@ impl Scenario {
 }
 
 impl SerializedSections<'_> {
-    fn written(&self, key: Key) -> Option<Value> {
+    fn serialized_value(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {
-            quantity(self.sections.iter().map(|section| of(section)))
+            quantity_value(self.sections.iter().map(|section| of(section)))
         };
         Some(match key {
             Key::SectionShape => json!(outline),
@@ -295,7 +314,7 @@ impl SerializedSections<'_> {
                 if is_bore != (key == Key::InnerDiameter) {
                     return None;
                 }
-                quantity(hollow.iter().map(HollowSection::profile))
+                quantity_value(hollow.iter().map(HollowSection::profile))
             }
             Key::Young => of(|section| &section.young),
             Key::Poisson => of(|section| &section.poisson),
@@ -306,15 +325,15 @@ impl SerializedSections<'_> {
 }
 
 /// A number; JSON has no infinity: `"inf"`.
-fn number(number: f64) -> Value {
+fn number_value(number: f64) -> Value {
     match number.is_infinite() {
         true => json!("inf"),
         false => json!(number),
     }
 }
 
-fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
-    numbers.into_iter().map(number).collect()
+fn list_value(numbers: impl IntoIterator<Item = f64>) -> Value {
+    numbers.into_iter().map(number_value).collect()
 }
 
 /// A single number if all are the same.
@@ -322,8 +341,8 @@ fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
     let numbers: Vec<f64> = numbers.collect();
     let first = numbers.first().copied().unwrap_or(0.0);
     match numbers.iter().all(|number| *number == first) {
-        true => number(first),
-        false => list(numbers),
+        true => number_value(first),
+        false => list_value(numbers),
     }
 }
 
@@ -331,8 +350,8 @@ fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
 fn vector_or_list(vectors: impl Iterator<Item = [f64; 3]>) -> Value {
     let vectors: Vec<[f64; 3]> = vectors.collect();
     match vectors.first() {
-        Some(first) if vectors.iter().all(|vector| vector == first) => list(*first),
-        _ => vectors.into_iter().map(list).collect(),
+        Some(first) if vectors.iter().all(|vector| vector == first) => list_value(*first),
+        _ => vectors.into_iter().map(list_value).collect(),
     }
 }
 
@@ -346,7 +365,7 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
     let kinks = rods.iter().flatten().flat_map(Profile::kinks);
     let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
     let values = |rod: &[Profile; 3]| -> Value {
-        let knot = |&sigma: &f64| list(rod.each_ref().map(|profile| profile.at(sigma)));
+        let knot = |&sigma: &f64| list_value(rod.each_ref().map(|profile| profile.at(sigma)));
         at.iter().map(knot).collect()
     };
     let value = match rods.iter().all(|rod| *rod == rods[0]) {
@@ -357,14 +376,14 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
 }
 
 /// A quantity of all rods, in the shortest form.
-fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
+fn quantity_value<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     let profiles: Vec<&Profile> = profiles.collect();
     if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
     let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
-    let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
+    let values = |profile: &Profile| list_value(at.iter().map(|&sigma| profile.at(sigma)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
         false => profiles.iter().map(|profile| values(profile)).collect(),
@@ -372,21 +391,22 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     json!({ "at": at, "value": value })
 }
 
-/// A quantity along a leaf.
-fn along(at: &[f64], value: &[f64]) -> Value {
+/// A quantity along a blade.
+fn spline_value(spline: &Spline) -> Value {
+    let (at, value) = (spline.knots(), spline.values());
     match value.iter().all(|one| *one == value[0]) {
-        true => number(value[0]),
+        true => number_value(value[0]),
         false => json!({ "at": at, "value": value }),
     }
 }
 
-/// A quantity of all rods; `None` if it is left out.
+/// A quantity of all rods; `None` if the quantity is left out.
 fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
     let profiles: Option<Vec<&Profile>> = profiles.collect();
-    Some(quantity(profiles?.into_iter()))
+    Some(quantity_value(profiles?.into_iter()))
 }
 
-/// A quantity in time; `None` if it is always the one at rest.
+/// A quantity in time; `None` if the quantity always has its value at rest.
 fn schedule_unless_constant<T: Copy + PartialEq>(
     schedule: &Schedule<T>,
     at_rest: T,

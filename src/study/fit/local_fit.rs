@@ -1,21 +1,253 @@
-//! The result of a fit: the minimum and its neighbourhood.
+//! The fit from one start: the search for the minimum near it, and what is told of the minimum.
 //!
-//! The results in words.
+//! The search runs on coarse grids and ends on all of them. If the profile of a number leads to a
+//! better minimum, it goes on from there.
 
 use crate::numbers::format_two_digits;
 use crate::relax::ContinuationFailure;
 use crate::scenario::longest;
 use crate::study::ParameterKeys;
-use crate::study::fit::data::{DatumDimension, Experiment, ObservedExperiment};
+use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::data::{Experiment, ObservedExperiment};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
-use crate::study::fit::least_squares::GaussNewtonOutcome;
-use crate::study::fit::model::{DatumQuantity, FitModel};
-use crate::study::fit::statistics::{FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis};
+use crate::study::fit::least_squares::{
+    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+};
+use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
+use crate::study::fit::prediction::DatumQuantity;
+use crate::study::fit::remark::FitRemark;
+use crate::study::fit::statistics::{
+    BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
+};
 use crate::study::fit::{
-    Fit, FitCoordinate, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork,
-    lack_of_fit, statistics,
+    ExperimentConditions, Fit, FitCoordinate, FitError, FitLeaf, FitOutcome, FitParameter,
+    FitResidual, FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
 };
 use std::collections::BTreeMap;
+
+/// How often a local search begins again.
+struct LocalSearchLimits {
+    /// Largest number of minima abandoned for better ones.
+    most_minima_abandoned: usize,
+    /// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
+    most_jumps: usize,
+    /// Number of values, of those at which a leaf would have to jump, at which it is relaxed again.
+    most_jumps_relaxed: usize,
+    /// If the standard deviation of the data is estimated from the residuals, the largest ratio of
+    /// that of the search to it: a larger one is due to coarse grids.
+    consistent_deviation: f64,
+}
+
+const LOCAL_SEARCH: LocalSearchLimits = LocalSearchLimits {
+    most_minima_abandoned: 4,
+    most_jumps: 3,
+    most_jumps_relaxed: 3,
+    consistent_deviation: 1.05,
+};
+
+/// A minimum, or where the search for it ended.
+pub(super) struct FitMinimum {
+    pub fit: Fit,
+    pub theta: Vec<f64>,
+    /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
+    pub sum: f64,
+    pub variance: f64,
+    pub significant_excess: f64,
+    pub converged: bool,
+    /// Root mean square of the residuals, relative to the size of the data.
+    pub misfit: f64,
+    /// Whether the sum still falls where a number without given bounds is as far from its initial
+    /// value as it may be.
+    pub beyond_window: bool,
+}
+
+impl FitMinimum {
+    /// Whether this is the better answer. A minimum is not left for values that are none.
+    pub fn is_preferred_to(&self, other: &FitMinimum) -> bool {
+        match self.converged == other.converged {
+            true => self.sum < other.sum,
+            false => self.converged,
+        }
+    }
+
+    /// This minimum as one besides which another is searched from these values.
+    pub fn exclude_from(&self, theta: &[f64]) -> ExcludedMinimum<'_> {
+        let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
+        ExcludedMinimum {
+            theta: &self.theta,
+            largest_sum: self.sum + self.significant_excess,
+            distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
+        }
+    }
+}
+
+/// The search for a minimum near a start.
+pub(super) struct LocalFitSearch<'m, 'a> {
+    pub model: &'m FitModel<'a>,
+    pub weighting: Weighting,
+    /// Whether the standard deviations of the data are known.
+    pub has_known_deviations: bool,
+    pub candidates: &'m [Experiment],
+    /// Largest number of steps to a minimum.
+    pub most_steps: usize,
+}
+
+impl<'m, 'a> LocalFitSearch<'m, 'a> {
+    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
+    /// there.
+    pub fn run(
+        &self,
+        first: &FitPoint,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<FitMinimum, FitError> {
+        let (model, weighting) = (self.model, self.weighting);
+        let CoarseModel {
+            model: mut coarse,
+            mut point,
+        } = model.coarse_model(first, weighting)?;
+        let mut work = FitWork::default();
+        let mut attempts = 0;
+        let mut jumps = 0;
+        let mut found = loop {
+            // The search on coarse grids; the last steps use all.
+            let mut searching = |step, sum| {
+                let known = None;
+                progress(&FitStep {
+                    step,
+                    sum,
+                    known,
+                    budget: None,
+                });
+            };
+            let mut search = GaussNewtonIteration::new(&coarse, weighting, &mut searching);
+            search.most_steps = search.most_steps.min(self.most_steps);
+            let searched = search.run(point);
+            let near = searched.point;
+            work.evaluations += searched.evaluations;
+            attempts += 1;
+            let there = model.continue_leaves(&near, &near.theta);
+            let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
+            let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
+            last.reuses_derivatives = true;
+            last.most_steps = last.most_steps.min(self.most_steps);
+            let GaussNewtonResult {
+                point: mut least,
+                outcome: end,
+                evaluations,
+            } = last.run(there);
+            work.evaluations += 1 + evaluations;
+            work.accurate += 1 + evaluations;
+            let is_lost =
+                end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
+            if is_lost
+                && jumps < LOCAL_SEARCH.most_jumps
+                && let Some(there) = model.relax_beyond_jump(&last.jumps, &least, weighting)
+            {
+                jumps += 1;
+                attempts -= 1;
+                CoarseModel {
+                    model: coarse,
+                    point,
+                } = model.coarse_model(&there, weighting)?;
+                continue;
+            }
+            let of_search =
+                FitStatistics::new(&coarse, weighting, self.has_known_deviations, &near);
+            let spread = self.statistics(&least).residual_deviation;
+            let same = searched.outcome == GaussNewtonOutcome::Converged
+                && of_search.residual_deviation < LOCAL_SEARCH.consistent_deviation * spread;
+            if !same && end == GaussNewtonOutcome::Converged {
+                // Its neighbourhood is computed with its own leaves.
+                let differentiated = model.differentiate_data(&mut least);
+                differentiated.map_err(|lost| model.no_equilibrium_error(&near.theta, 0, &lost))?;
+            }
+            let stats = self.statistics(&least);
+            let shape = if same { &of_search } else { &stats };
+            let contradicted = lack_of_fit::data_contradict_model(&stats);
+            let parameters = match end {
+                GaussNewtonOutcome::Converged if !contradicted => {
+                    intervals::parameters_with_intervals(&stats, shape, progress)
+                }
+                _ => Ok(intervals::parameters_without_intervals(&stats)),
+            };
+            let (end, parameters) = match parameters {
+                Ok(parameters) => (end, parameters),
+                Err(better) if attempts < LOCAL_SEARCH.most_minima_abandoned => {
+                    point = better;
+                    continue;
+                }
+                Err(_) => (
+                    GaussNewtonOutcome::StepLimit,
+                    intervals::parameters_without_intervals(&stats),
+                ),
+            };
+            break FitMinimum {
+                fit: assemble_fit(&stats, &end, parameters, work, self.candidates),
+                sum: weighting.sum_of_squares(stats.point),
+                variance: stats.residual_deviation.powi(2),
+                significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
+                converged: end == GaussNewtonOutcome::Converged,
+                misfit: model.relative_misfit(stats.point),
+                beyond_window: falls_beyond_window(&stats),
+                theta: stats.point.theta.clone(),
+            };
+        };
+        if jumps > 0 {
+            found.fit.remarks.push(FitRemark::JumpedOnTheWay);
+        }
+        Ok(found)
+    }
+
+    fn statistics<'p>(&'p self, point: &'p FitPoint) -> FitStatistics<'p, 'a> {
+        FitStatistics::new(self.model, self.weighting, self.has_known_deviations, point)
+    }
+}
+
+/// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
+/// than chance.
+fn falls_beyond_window(stats: &FitStatistics) -> bool {
+    let weighed = stats.weighting.weight_roots(&stats.residuals);
+    let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
+    let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+    coordinates.enumerate().any(|(k, (free, theta))| {
+        let [low, high] = free.bounds;
+        let slope = slopes[k];
+        let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
+        let bend = stats.jacobian.column(k).norm_squared();
+        let step = (slope.abs() / bend).min(LONGEST_COORDINATE_STEP);
+        let gain = step * (2.0 * slope.abs() - bend * step);
+        !free.has_given_bounds
+            && outwards
+            && gain > BETTER_MINIMUM_EXCESS * stats.residual_deviation.powi(2)
+    })
+}
+
+impl FitModel<'_> {
+    /// The leaves relaxed from their usual starts, beyond the values at which one of
+    /// `before` would have to jump; or there, if another equilibrium exists. `None`
+    /// if that does not reduce the residuals.
+    pub fn relax_beyond_jump(
+        &self,
+        jumps: &[Vec<f64>],
+        before: &FitPoint,
+        weighting: Weighting,
+    ) -> Option<FitPoint> {
+        let residuals = weighting.residuals(before);
+        let bound = weighting.huber_bound(&residuals);
+        let sum = weighting.huber_sum(&residuals, bound);
+        // The farthest are the steps that the data ask for; close to where a leaf buckles none is followed.
+        let far = jumps.iter().take(LOCAL_SEARCH.most_jumps_relaxed);
+        let near = jumps
+            .iter()
+            .skip(LOCAL_SEARCH.most_jumps_relaxed)
+            .next_back();
+        far.chain(near).chain([&before.theta]).find_map(|theta| {
+            let there = self.relax_leaves(theta).ok()?;
+            let nearer = weighting.huber_sum(&weighting.residuals(&there), bound) < sum;
+            nearer.then_some(there)
+        })
+    }
+}
 
 /// Components of a weakly determined combination smaller than this part of its
 /// largest are left out.
@@ -67,7 +299,7 @@ pub(super) fn assemble_fit(
     let candidates = match statistics::rank_candidate_experiments(stats, wanted) {
         Ok(candidates) => candidates,
         Err(refused) => {
-            remarks.push(format!("candidates: {refused}"));
+            remarks.push(FitRemark::Candidates(refused.to_string()));
             Vec::new()
         }
     };
@@ -116,52 +348,48 @@ pub(super) fn assemble_fit(
     }
 }
 
-fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<String> {
+fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<FitRemark> {
     let mut remarks = Vec::new();
     match end {
         GaussNewtonOutcome::Converged => {}
-        // That is said at the end.
+        // The used-up budget is told once, by the search for the best minimum.
         GaussNewtonOutcome::BudgetExhausted => {}
-        GaussNewtonOutcome::StepLimit => remarks.push(
-            "the step limit came before the minimum: start from values nearer to it".into(),
-        ),
-        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => remarks.push(
-            "the way to smaller residuals ends where a leaf jumps to another equilibrium, and is not \
-             followed there: start from other values, or leave out experiments beyond the jump"
-                .into(),
-        ),
-        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::NotAtRest(why))) => {
-            remarks.push(format!("the way to smaller residuals ends: {why}"));
+        GaussNewtonOutcome::StepLimit => remarks.push(FitRemark::StepLimit),
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium)) => {
+            remarks.push(FitRemark::EndsAtJump);
         }
-        GaussNewtonOutcome::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
+        GaussNewtonOutcome::Stuck(Some(ContinuationFailure::NotAtRest(why))) => {
+            remarks.push(FitRemark::EndsWithoutEquilibrium(why.clone()));
+        }
+        GaussNewtonOutcome::Stuck(None) => remarks.push(FitRemark::NoSmallerResiduals),
     }
     for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
         if let Some(bound) = free.active_bound(*theta) {
-            let (number, bound) = (&free.number, free.inverse_transform(bound));
+            let (number, value) = (free.number.to_string(), free.inverse_transform(bound));
             remarks.push(match free.has_given_bounds {
-                true => format!("{number} is at its bound {bound}"),
-                false => format!("{number} went as far as {bound:.3e}, and was let no farther"),
+                true => FitRemark::AtBound {
+                    number,
+                    bound: value,
+                },
+                false => FitRemark::WentFar { number, value },
             });
         }
     }
     remarks.extend(unit_mismatch_remarks(stats));
     if stats.degrees_of_freedom == 0 {
-        remarks
-            .push("there are as many numbers as data: nothing is left to judge the fit by".into());
+        remarks.push(FitRemark::NoFreedom);
     }
     if stats.has_known_deviations && stats.has_excessive_residuals() {
-        remarks.push(format!(
-            "chi squared is {:.3e} for {} degrees of freedom: the standard deviations are not \
-             those of these data, or the model is not that of this leaf, or this minimum is not the lowest",
-            stats.residuals.norm_squared(),
-            stats.degrees_of_freedom
-        ));
+        remarks.push(FitRemark::ExcessiveResiduals {
+            chi_squared: stats.residuals.norm_squared(),
+            degrees_of_freedom: stats.degrees_of_freedom,
+        });
     }
     remarks
 }
 
 /// Data that are probably in other units than the scenario.
-fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
+fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<FitRemark> {
     let base = stats.model.base;
     let longest = longest(&base.scenario().rods);
     let (mut beyond, mut missed) = (0, 0);
@@ -176,20 +404,14 @@ fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
     let frequencies =
         components.any(|component| component.quantity.dimension() == DatumDimension::Frequency);
     let mut remarks = Vec::new();
-    let are = |count: usize| if count == 1 { "is" } else { "are" };
+    let length = longest;
     if beyond > 0 {
-        remarks.push(format!(
-            "{beyond} of the coordinates {} far from any leaf of this length ({longest}): are the data in the \
-             scenario's unit of length?",
-            are(beyond)
-        ));
+        let count = beyond;
+        remarks.push(FitRemark::FarFromAnyLeaf { count, length });
     }
     if missed > 0 {
-        remarks.push(format!(
-            "{missed} of the coordinates {} more than half of the leaf's length ({longest}) from the fitted leaf: \
-             are lengths and forces in the scenario's units?",
-            are(missed)
-        ));
+        let count = missed;
+        remarks.push(FitRemark::FarFromFittedLeaf { count, length });
     }
     let given = |key: &str| {
         let keys = key.parse::<ParameterKeys>();
@@ -200,11 +422,7 @@ fn unit_mismatch_remarks(stats: &FitStatistics) -> Vec<String> {
             .into_iter()
             .any(given)
     {
-        remarks.push(
-            "frequencies are compared, but the scenario has no dynamics.density: its unit of time is then \
-             sqrt(rho L^4/A), which changes with the bending stiffness A: give the density"
-                .into(),
-        );
+        remarks.push(FitRemark::NoDensity);
     }
     remarks
 }
@@ -241,7 +459,7 @@ fn unidentifiable_combinations(
             let parts: Vec<_> = parts
                 .filter(|(_, part)| part.abs() > NEGLIGIBLE_COEFFICIENT)
                 .collect();
-            // Of a number alone its profile decides.
+            // Whether a single number is determined its profile decides.
             if !matches!(parts[..], [(k, _)] if parameters[k].determined) {
                 let exactly = false;
                 open.push(UnidentifiableCombination {
@@ -273,10 +491,10 @@ fn experiments_in_data_order<'s>(stats: &'s FitStatistics) -> Vec<&'s ObservedEx
     observed
 }
 
-fn fit_experiments(stats: &FitStatistics) -> Vec<FitExperiment> {
+fn fit_experiments(stats: &FitStatistics) -> Vec<ExperimentConditions> {
     let experiment = |observed: &ObservedExperiment| {
         let settings = observed.experiment.settings.iter();
-        FitExperiment {
+        ExperimentConditions {
             experiment: observed.experiment.name.clone(),
             settings: settings
                 .map(|(keys, value)| (keys.to_string(), *value))
@@ -465,7 +683,7 @@ fn combination_sentence(
             format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
-            // Of numbers that are not logarithms the combination is the tangent.
+            // In numbers that are not logarithms the combination is a tangent.
             let change = |(k, part): &(usize, f64)| match free[*k].is_logarithmic {
                 true => format!(
                     "{} in proportion to t^{}",
@@ -508,11 +726,6 @@ fn unknown_endpoint_sentences(parameter: &FitParameter) -> Vec<String> {
 fn is_at_bound(parameter: &FitParameter, free: &FitCoordinate) -> bool {
     let bounds = free.bounds.map(|bound| free.inverse_transform(bound));
     free.has_given_bounds && bounds.contains(&parameter.value)
-}
-
-/// Three significant digits.
-pub(super) fn round_to_three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 fn format_two_decimals(value: f64) -> String {

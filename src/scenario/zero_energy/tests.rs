@@ -1,7 +1,7 @@
 //! Which veins turn without resistance.
 
 use crate::scenario::Entries;
-use crate::scenario::supports::*;
+use crate::scenario::zero_energy::*;
 
 fn turnings(change: &str) -> Vec<ZeroEnergyRotation> {
     turnings_with("", change)

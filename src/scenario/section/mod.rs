@@ -1,4 +1,4 @@
-//! Stiffnesses and masses of a rod from its material and the size of its section.
+//! Stiffnesses and masses of a rod from its material and the size of its section: the table `[section]`.
 //!
 //! With the area S, the second moments I2 and I3 about d2 and d3 and the shear
 //! modulus G = E/(2 (1 + nu)):
@@ -14,24 +14,29 @@
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
 //! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`.
-//!
-//! The table `[section]`: computes stiffnesses and masses from sections.
 
+mod outline;
+
+use crate::numbers::sorted_distinct;
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
+use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::format::source::ScenarioResult;
-use crate::scenario::outline::{Moduli, SectionDimensions, SectionOutline};
-use crate::scenario::{Profile, sorted_distinct};
+use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
+use crate::scenario::section::outline::SectionDimensions;
+pub(super) use crate::scenario::section::outline::SectionOutline;
+pub use crate::scenario::section::outline::{Moduli, Stress};
+use std::any::Any;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Steps between two knots in the search for extremes.
-const SAMPLES: usize = 16;
+/// Steps between two knots at which the extremes of a property are looked for: properties are smooth
+/// between knots.
+const STEPS_BETWEEN_KNOTS: usize = 16;
 
 /// A property that a section determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Property {
+pub(super) enum Property {
     /// A1, A2 and A3, by index.
     Couple(usize),
     /// H1, H2 and H3, by index.
@@ -44,7 +49,6 @@ pub enum Property {
 }
 
 impl Property {
-    /// All of them.
     const ALL: [Property; 8] = {
         use Property::{Couple, Density, Force, RotaryInertia};
         [
@@ -59,8 +63,8 @@ impl Property {
         ]
     };
 
-    /// Its number among all.
-    fn property_index(self) -> usize {
+    /// The index of the property in [`Property::ALL`].
+    fn index(self) -> usize {
         match self {
             Property::Couple(axis) => axis,
             Property::Force(axis) => 3 + axis,
@@ -70,7 +74,7 @@ impl Property {
     }
 }
 
-/// What makes a section hollow, as it is given.
+/// The hole of a section, as it is given.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum HollowSection {
     /// The thickness of the wall.
@@ -80,7 +84,7 @@ pub(super) enum HollowSection {
 }
 
 impl HollowSection {
-    pub(super) fn profile(&self) -> &Profile {
+    pub fn profile(&self) -> &Profile {
         match self {
             HollowSection::Wall(profile) | HollowSection::Bore(profile) => profile,
         }
@@ -89,16 +93,16 @@ impl HollowSection {
 
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Section {
-    pub(super) outline: SectionOutline,
-    pub(super) width: Profile,
-    pub(super) thickness: Profile,
-    pub(super) hollow: Option<HollowSection>,
-    pub(super) young: Profile,
-    pub(super) poisson: Profile,
+pub(super) struct Section {
+    pub outline: SectionOutline,
+    pub width: Profile,
+    pub thickness: Profile,
+    pub hollow: Option<HollowSection>,
+    pub young: Profile,
+    pub poisson: Profile,
     /// Mass per volume; zero where it is not given.
-    pub(super) mass_density: Profile,
-    /// Fractions inside (0, 1) where the slope of one of these may jump.
+    pub mass_density: Profile,
+    /// Fractions inside (0, 1) where the slope of a property may jump.
     kinks: Vec<f64>,
     /// Least and largest value of every property, where they change along the rod: else the
     /// profiles are constant.
@@ -106,7 +110,7 @@ pub struct Section {
 }
 
 impl Section {
-    pub(super) fn new(
+    fn new(
         outline: SectionOutline,
         [width, thickness]: [Profile; 2],
         hollow: Option<HollowSection>,
@@ -129,7 +133,7 @@ impl Section {
         for sigma in section.fractions().filter(|_| varies) {
             for property in Property::ALL {
                 let value = section.property_value(property, sigma);
-                let [least, most] = &mut section.extremes[property.property_index()];
+                let [least, most] = &mut section.extremes[property.index()];
                 (*least, *most) = (least.min(value), most.max(value));
             }
         }
@@ -151,18 +155,13 @@ impl Section {
             .chain(hollow.iter().map(HollowSection::profile))
     }
 
-    /// Whether it is the same along the whole rod.
+    /// Whether the section is the same along the whole rod.
     fn is_constant(&self) -> bool {
         let mut profiles = self.profiles();
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
-    /// Fractions inside (0, 1) where the slope of a property may jump.
-    pub fn kinks(&self) -> &[f64] {
-        &self.kinks
-    }
-
-    /// Its sides at a fraction of the length.
+    /// The sides of the section at a fraction of the length.
     fn dimensions_at(&self, sigma: f64) -> SectionDimensions {
         let (width, thickness) = (self.width.at(sigma), self.thickness.at(sigma));
         SectionDimensions {
@@ -176,20 +175,15 @@ impl Section {
         }
     }
 
-    /// Its larger side, where that is largest.
-    fn largest_side(&self) -> f64 {
-        self.width.max_abs().max(self.thickness.max_abs())
-    }
-
     /// A property at a fraction of the length.
-    pub fn property_value(&self, property: Property, sigma: f64) -> f64 {
+    fn property_value(&self, property: Property, sigma: f64) -> f64 {
         let sides = self.dimensions_at(sigma);
         let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
         let shear = young / (2.0 * (1.0 + poisson));
         let area = sides.area();
         let second = sides.second_moments();
         match property {
-            Property::Couple(0) => shear * sides.torsion(),
+            Property::Couple(0) => shear * sides.torsion_constant(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
             Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
@@ -199,24 +193,15 @@ impl Section {
     }
 
     /// A property along the rod.
-    pub(super) fn profile(self: &Arc<Section>, property: Property) -> Profile {
+    pub fn profile(self: &Arc<Section>, property: Property) -> Profile {
         match self.is_constant() {
             true => Profile::Constant(self.property_value(property, 0.5)),
-            false => Profile::Section {
-                section: self.clone(),
-                property,
-                factor: 1.0,
-            },
+            false => Profile::Derived(DerivedProfile::new(self.clone(), property.index(), 1.0)),
         }
     }
 
-    /// The least and the largest value of a property, of those at the knots and between them.
-    pub(super) fn extremes(&self, property: Property) -> [f64; 2] {
-        self.extremes[property.property_index()]
-    }
-
-    /// Cowper's factors for both shear forces, likewise.
-    pub(super) fn shear_factors(&self) -> impl Iterator<Item = f64> {
+    /// Cowper's factors for both shear forces, at the knots and between them.
+    fn shear_factors(&self) -> impl Iterator<Item = f64> {
         let fractions = self.fractions();
         fractions.flat_map(|sigma| {
             self.dimensions_at(sigma)
@@ -224,12 +209,32 @@ impl Section {
         })
     }
 
+    /// The knots, and places between them.
     fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
-        let edges = [&[0.0], self.kinks(), &[1.0]].concat();
+        let edges = [&[0.0], self.kinks.as_slice(), &[1.0]].concat();
         (0..edges.len() - 1).flat_map(move |panel| {
             let (from, to) = (edges[panel], edges[panel + 1]);
-            (0..=SAMPLES).map(move |k| from + k as f64 / SAMPLES as f64 * (to - from))
+            (0..=STEPS_BETWEEN_KNOTS)
+                .map(move |k| from + k as f64 / STEPS_BETWEEN_KNOTS as f64 * (to - from))
         })
+    }
+}
+
+impl RodProperties for Section {
+    fn value_at(&self, property: usize, sigma: f64) -> f64 {
+        self.property_value(Property::ALL[property], sigma)
+    }
+
+    fn extremes(&self, property: usize) -> [f64; 2] {
+        self.extremes[property]
+    }
+
+    fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    fn is_equal(&self, other: &dyn Any) -> bool {
+        other.downcast_ref() == Some(self)
     }
 }
 
@@ -239,7 +244,7 @@ impl Section {
 pub struct Radii(Vec<Arc<Section>>);
 
 impl Radii {
-    pub(super) fn of(sections: Vec<Arc<Section>>) -> Self {
+    pub(super) fn from_sections(sections: Vec<Arc<Section>>) -> Self {
         Radii(sections)
     }
 
@@ -252,19 +257,18 @@ impl Radii {
     /// the outline of its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some((section.dimensions_at(sigma).enclosed() / PI).sqrt())
+        Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
     }
 
     /// The moduli of the section of a rod at a fraction of its length.
     pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
         Some(self.0.get(rod)?.dimensions_at(sigma).moduli())
     }
-}
 
-impl Radii {
     /// The larger side of the section of a rod, where that is largest.
     pub fn largest_side(&self, rod: usize) -> Option<f64> {
-        self.0.get(rod).map(|section| section.largest_side())
+        let section = self.0.get(rod)?;
+        Some(section.width.max_abs().max(section.thickness.max_abs()))
     }
 
     /// Whether the sections have a mass.
@@ -283,25 +287,25 @@ impl PartialEq for Radii {
     }
 }
 
-/// The entry with the size of the sections, or of the blade.
+/// The entry that gives the size of the sections or of the blade.
 pub(super) fn size_entry(entries: &Entries) -> Option<EntryValue<'_>> {
     let sizes = [Key::Diameter, Key::Thickness, Key::BladeThickness];
     sizes.into_iter().find_map(|key| entries.given_value(key))
 }
 
-/// A property of all rods.
-pub(super) fn profiles(sections: &[Arc<Section>], property: Property) -> Vec<Profile> {
+/// A property of the sections of all rods.
+pub(super) fn section_profiles(sections: &[Arc<Section>], property: Property) -> Vec<Profile> {
     let profile = |section: &Arc<Section>| section.profile(property);
     sections.iter().map(profile).collect()
 }
 
-/// The sections of the rods, which determine the stiffnesses; `None` if there is no such table.
-pub(super) fn sections(
+/// Reads `[section]`: the sections of the rods, which determine the stiffnesses; `None` if there is no
+/// such table.
+pub(super) fn read_sections(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<Arc<Section>>>> {
-    let mut table = Key::all().filter(|key| key.table_and_name().0 == "section");
-    if !table.any(|key| entries.is_given(key)) {
+    if !entries.has_key_of_table("section") {
         return Ok(None);
     }
     for key in Key::COUPLE.into_iter().chain(Key::FORCE) {
@@ -310,14 +314,14 @@ pub(super) fn sections(
             return Err(item.value_error(why));
         }
     }
-    let quantity = |key| entries.value_or_default(key)?.quantity(rods);
-    let (outline, sides) = outline(entries)?;
+    let quantity = |key| entries.value_or_default(key)?.profile_per_rod(rods);
+    let SectionForm { outline, sides } = read_form(entries)?;
     let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
-    let hollow = hollow(entries, outline, [&width, &thickness])?;
+    let hollow = read_hollow(entries, outline, [&width, &thickness])?;
     let young = quantity(Key::Young)?;
-    let poisson = poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+    let poisson = read_poisson(entries.value_or_default(Key::Poisson)?, rods)?;
     let mass_density = match entries.given_value(Key::MassDensity) {
-        Some(item) => item.quantity(rods)?,
+        Some(item) => item.profile_per_rod(rods)?,
         None => vec![Profile::Constant(0.0); rods],
     };
     let all = [&width, &thickness, &young, &poisson, &mass_density];
@@ -337,12 +341,12 @@ pub(super) fn sections(
             )),
         });
     }
-    check(entries, &sections)?;
+    check_shear_factors(entries, &sections)?;
     Ok(Some(sections))
 }
 
 /// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
-fn check(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
+fn check_shear_factors(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     for (rod, section) in sections.iter().enumerate() {
         entries
             .value_or_default(Key::Poisson)?
@@ -357,8 +361,13 @@ fn check(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     Ok(())
 }
 
-/// The outline, and the keys of its two sides.
-fn outline(entries: &Entries) -> ScenarioResult<(SectionOutline, [Key; 2])> {
+/// The outline of a section, and the keys of its two sides, along d2 and along d3.
+struct SectionForm {
+    outline: SectionOutline,
+    sides: [Key; 2],
+}
+
+fn read_form(entries: &Entries) -> ScenarioResult<SectionForm> {
     let item = entries.value_or_default(Key::SectionShape)?;
     let outline = item.word("must be \"circle\", \"ellipse\" or \"rectangle\"")?;
     let (sides, diameter) = ([Key::Width, Key::Thickness], [Key::Diameter; 2]);
@@ -367,7 +376,7 @@ fn outline(entries: &Entries) -> ScenarioResult<(SectionOutline, [Key; 2])> {
         SectionOutline::Ellipse | SectionOutline::Rectangle => (sides, diameter),
     };
     match others.into_iter().find_map(|key| entries.given_value(key)) {
-        None => Ok((outline, sides)),
+        None => Ok(SectionForm { outline, sides }),
         Some(other) => Err(other.value_error(
             "a circle has a diameter; an ellipse and a rectangle have a width (along d2) and a \
              thickness (along d3): leave this out, or change section.shape",
@@ -376,7 +385,7 @@ fn outline(entries: &Entries) -> ScenarioResult<(SectionOutline, [Key; 2])> {
 }
 
 /// The walls or bores of the rods; `None` if their sections are full.
-fn hollow(
+fn read_hollow(
     entries: &Entries,
     outline: SectionOutline,
     [width, thickness]: [&[Profile]; 2],
@@ -394,7 +403,7 @@ fn hollow(
         let twice = "section.wall is given, too: leave one of them out";
         bore.refuse_unless(wall.is_none(), twice)?;
     }
-    let profiles = item.quantity(width.len())?;
+    let profiles = item.profile_per_rod(width.len())?;
     for (rod, profile) in profiles.iter().enumerate() {
         let sides = [&width[rod], &thickness[rod]];
         let knots = [0.0, 1.0].into_iter();
@@ -422,8 +431,9 @@ fn hollow(
     Ok(Some(profiles.into_iter().map(of).collect()))
 }
 
-pub(super) fn poisson(item: EntryValue, rods: usize) -> ScenarioResult<Vec<Profile>> {
-    let poisson = item.quantity(rods)?;
+/// Poisson's ratio along every rod.
+pub(super) fn read_poisson(item: EntryValue, rods: usize) -> ScenarioResult<Vec<Profile>> {
+    let poisson = item.profile_per_rod(rods)?;
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();
         item.entry(rod).refuse_unless(

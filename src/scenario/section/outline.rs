@@ -1,6 +1,10 @@
-//! Areas, moments and factors of full and hollow sections.
+//! A section at one place along a rod: area, moments, torsion constant and shear factors, full or
+//! hollow, and the largest stresses in it.
 //!
 //! Second moments and areas of hollow sections are those of the outline less those of the hole.
+//!
+//! # Torsion of hollow sections
+//!
 //! The torsion constant J of a hollow section lies between two bounds (L. Prandtl's stress function
 //! gives most of all that are constant on both edges of the wall). From below it is that of tubes
 //! within each other (R. Bredt 1896, layer upon layer): with the area A(x) within the line at depth
@@ -14,7 +18,7 @@
 //! y + (b/a)^2 y (1 - y), with its sides a > b and the wall y b/2: it is exact for thin walls and for
 //! full sections, and else within 1 % of finite differences.
 //!
-//! The largest stresses in a section: its moduli, and what a force and a moment make of them.
+//! # Stresses
 //!
 //! With the area S, the second moments I2 and I3 about d2 and d3, and the width w and thickness t:
 //!
@@ -29,8 +33,8 @@
 //! semi-axes a > b at the ends of the short one 2 a^2 b/(a^2 + b^2), of a rectangle in the middle of
 //! the long sides. That of a thin wall is 2 A/s (art. 115, R. Bredt), with the area A within it and its
 //! length s; a thick one lies between both as its torsion constant does: exact for circles, and of
-//! rectangles within 4 % of finite differences. Q/(I b) is D. I. Zhuravskii's (art. 120, note): the first moment of half of the section over
-//! its second moment and the material across, 3/2 of the mean in a rectangle, 4/3 in a round section
+//! rectangles within 4 % of finite differences. Q/(I b) is D. I. Zhuravskii's (art. 120, note): the first moment of half
+//! of the section over its second moment and the material across, 3/2 of the mean in a rectangle, 4/3 in a round section
 //! and 2 in a thin round tube.
 //!
 //! The largest normal and shear stresses, and those of torsion and shear forces, lie at different
@@ -38,8 +42,7 @@
 //! to them for the equivalent one of a circle that is bent, pulled and twisted. Corners within a hollow
 //! rectangle concentrate stress, which is left out.
 
-use crate::scenario::Scenario;
-use crate::scenario::profile::GAUSS_LEGENDRE_RULE;
+use crate::numbers::GAUSS_LEGENDRE_RULE;
 use crate::words;
 use glam::DVec3;
 use serde::Serialize;
@@ -52,7 +55,7 @@ words! {
         Circle = "circle",
         /// An ellipse with its width along d2 and its thickness along d3.
         Ellipse = "ellipse",
-        /// A rectangle with the same sides.
+        /// A rectangle with its width along d2 and its thickness along d3.
         Rectangle = "rectangle",
     }
 }
@@ -67,7 +70,7 @@ pub(super) struct SectionDimensions {
 }
 
 impl SectionDimensions {
-    /// Those of the hole.
+    /// The dimensions of the hole.
     pub fn hole(self) -> Option<SectionDimensions> {
         let inside = |side: f64, wall: f64| (side - 2.0 * wall).max(0.0);
         self.wall.map(|wall| SectionDimensions {
@@ -79,7 +82,7 @@ impl SectionDimensions {
     }
 
     /// The area within the outline, with the hole.
-    pub fn enclosed(self) -> f64 {
+    pub fn enclosed_area(self) -> f64 {
         match self.outline {
             SectionOutline::Circle | SectionOutline::Ellipse => {
                 PI / 4.0 * self.width * self.thickness
@@ -88,8 +91,9 @@ impl SectionDimensions {
         }
     }
 
+    /// The area of the material.
     pub fn area(self) -> f64 {
-        self.enclosed() - self.hole().map_or(0.0, SectionDimensions::enclosed)
+        self.enclosed_area() - self.hole().map_or(0.0, SectionDimensions::enclosed_area)
     }
 
     /// The second moments I2 and I3 of the area, about d2 and d3.
@@ -110,14 +114,16 @@ impl SectionDimensions {
     }
 
     /// The torsion constant J.
-    pub fn torsion(self) -> f64 {
+    pub fn torsion_constant(self) -> f64 {
         let Some(wall) = self.wall else {
-            return self.outline.torsion(self.width, self.thickness);
+            return self.outline.torsion_constant(self.width, self.thickness);
         };
         let panel = |from: f64| -> f64 {
             let layers = GAUSS_LEGENDRE_RULE.iter();
             layers
-                .map(|(x, weight)| weight * self.layer_torsion((from + x / WALL_PANELS) * wall))
+                .map(|point| {
+                    point.weight * self.layer_torsion((from + point.at / WALL_PANELS) * wall)
+                })
                 .sum()
         };
         let panels = (0..WALL_PANELS as usize).map(|k| panel(k as f64 / WALL_PANELS));
@@ -133,13 +139,14 @@ impl SectionDimensions {
     /// The torsion constant of the outline less that of the hole.
     fn torsion_upper_bound(self) -> f64 {
         let of = |sides: SectionDimensions| match sides.width.min(sides.thickness) > 0.0 {
-            true => sides.outline.torsion(sides.width, sides.thickness),
+            true => sides.outline.torsion_constant(sides.width, sides.thickness),
             false => 0.0,
         };
         of(self) - self.hole().map_or(0.0, of)
     }
 
-    /// Where the torsion constant of a rectangle lies between its bounds.
+    /// Where the torsion constant of a hollow rectangle lies between its bounds: 0 at the lower one, 1 at
+    /// the upper one.
     pub fn torsion_interpolation(self, wall: f64) -> f64 {
         let (long, short) = (
             self.width.max(self.thickness),
@@ -149,7 +156,7 @@ impl SectionDimensions {
         part + (short / long).powi(2) * part * (1.0 - part)
     }
 
-    /// A^2/g of the line at this depth in the wall.
+    /// A^2/g (see the torsion of hollow sections above) of the line at this depth in the wall.
     fn layer_torsion(self, depth: f64) -> f64 {
         let (w, t) = (self.width - 2.0 * depth, self.thickness - 2.0 * depth);
         let (area, gradient) = match self.outline {
@@ -183,12 +190,13 @@ impl SectionDimensions {
     }
 }
 
-/// So many panels of five points resolve the layers of every wall to 1e-9.
+/// Panels of a wall's depth, each with the rule of five points: they resolve the layers of every wall
+/// to 1e-9.
 const WALL_PANELS: f64 = 4.0;
 
 /// Cowper's factor of a hollow circle, the square of whose inner diameter is the part `hole` of
-/// that of the outer one. That of a hollow ellipse is that of the full one, reduced as for circles:
-/// an estimate.
+/// the square of the outer one. The factor of a hollow ellipse is estimated from that of the full
+/// ellipse, reduced as for circles.
 fn hollow_circle_shear_factor(hole: f64, nu: f64) -> f64 {
     let both = (1.0 + hole) * (1.0 + hole);
     6.0 * (1.0 + nu) * both / ((7.0 + 6.0 * nu) * both + (20.0 + 12.0 * nu) * hole)
@@ -206,7 +214,7 @@ fn box_shear_factor(along: f64, across: f64, nu: f64) -> f64 {
 impl SectionOutline {
     /// The torsion constant J. Of a rectangle with the long side a and the short
     /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
-    fn torsion(self, width: f64, thickness: f64) -> f64 {
+    fn torsion_constant(self, width: f64, thickness: f64) -> f64 {
         match self {
             SectionOutline::Circle | SectionOutline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
@@ -243,7 +251,7 @@ impl SectionOutline {
 /// What the largest stresses in a section follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moduli {
-    /// S.
+    /// S, the area of the material.
     area: f64,
     /// t/(2 I2) and w/(2 I3).
     bending: [f64; 2],
@@ -258,19 +266,19 @@ pub struct Moduli {
 /// The largest stresses in a section, force per area.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Stress {
-    /// Along the rod, by tension and bending: its size, in tension or compression.
+    /// Size of the stress along the rod, in tension or compression, by tension and bending.
     pub normal: f64,
-    /// By torsion and shear forces.
+    /// Shear stress by torsion and shear forces.
     pub shear: f64,
-    /// As if both were largest in the same point.
+    /// Von Mises' equivalent stress, as if normal and shear stress were largest in the same point.
     pub equivalent: f64,
 }
 
 impl Stress {
-    /// The names of its components.
+    /// The names of the three stresses in results.
     pub const NAMES: [&str; 3] = ["normal_stress", "shear_stress", "equivalent_stress"];
 
-    /// All three.
+    /// The three stresses in the order of [`Stress::NAMES`].
     pub fn to_array(self) -> [f64; 3] {
         [self.normal, self.shear, self.equivalent]
     }
@@ -294,8 +302,8 @@ impl Moduli {
         }
     }
 
-    /// Those of a strip of a plate, which twists with it: J = w t^3/3.
-    fn for_strip(width: f64, thickness: f64) -> Moduli {
+    /// The moduli of a strip of a plate, which twists with the plate: J = w t^3/3.
+    pub(in crate::scenario) fn for_strip(width: f64, thickness: f64) -> Moduli {
         let sides = SectionDimensions {
             outline: SectionOutline::Rectangle,
             width,
@@ -310,7 +318,7 @@ impl Moduli {
 }
 
 impl SectionDimensions {
-    /// Its moduli.
+    /// What the largest stresses in the section follow from.
     pub fn moduli(self) -> Moduli {
         let (w, t) = (self.width, self.thickness);
         let [second, third] = self.second_moments();
@@ -322,7 +330,7 @@ impl SectionDimensions {
         Moduli {
             area: self.area(),
             bending: [0.5 * t / second, 0.5 * w / third],
-            torsion: self.stress_function_slope() / self.torsion(),
+            torsion: self.stress_function_slope() / self.torsion_constant(),
             shear: [
                 turned.first_moment() / (third * turned.central_material_width()),
                 self.first_moment() / (second * self.central_material_width()),
@@ -333,10 +341,10 @@ impl SectionDimensions {
 
     /// The hole, if it has an area.
     fn open_hole(self) -> Option<SectionDimensions> {
-        self.hole().filter(|hole| hole.enclosed() > 0.0)
+        self.hole().filter(|hole| hole.enclosed_area() > 0.0)
     }
 
-    /// The first moment of its upper half about d2.
+    /// The first moment of the upper half of the section about d2.
     fn first_moment(self) -> f64 {
         let factor = match self.outline {
             SectionOutline::Circle | SectionOutline::Ellipse => 1.0 / 12.0,
@@ -371,7 +379,7 @@ impl SectionDimensions {
     }
 }
 
-/// Terms of the series of a rectangle, which falls off as exp(-n pi/2).
+/// Terms of the series for the stress function of a rectangle, which falls off as exp(-n pi/2).
 const RECTANGLE_SERIES_TERMS: i32 = 12;
 
 impl SectionOutline {
@@ -390,24 +398,6 @@ impl SectionOutline {
                 short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
             }
         }
-    }
-}
-
-impl Scenario {
-    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
-    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
-    /// sections.
-    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        if self.blade.is_none() {
-            return self.radii.moduli(rod, sigma);
-        }
-        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
-        let rod = self.rods.get(rod)?;
-        let side = |axis: usize| {
-            let bending = rod.couple_stiffness[axis].at(sigma);
-            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
-        };
-        Some(Moduli::for_strip(side(2), side(1)))
     }
 }
 
@@ -430,7 +420,7 @@ mod tests {
             (10.0, 0.312_332_5),
         ] {
             for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
-                let found = SectionOutline::Rectangle.torsion(width, thickness);
+                let found = SectionOutline::Rectangle.torsion_constant(width, thickness);
                 close(found, constant * sides, 3e-5);
             }
         }
@@ -441,12 +431,16 @@ mod tests {
         };
         for long in [1.0, 1.3, 4.0, 50.0] {
             close(
-                SectionOutline::Rectangle.torsion(long, 1.0),
+                SectionOutline::Rectangle.torsion_constant(long, 1.0),
                 direct(long),
                 1e-13,
             );
         }
-        close(SectionOutline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
+        close(
+            SectionOutline::Rectangle.torsion_constant(1e4, 1.0),
+            1e4 / 3.0,
+            1e-4,
+        );
     }
 
     fn hollow(outline: SectionOutline, width: f64, thickness: f64, wall: f64) -> SectionDimensions {
@@ -467,7 +461,7 @@ mod tests {
             let polar = PI / 32.0 * (1.0 - f64::powi(inner, 4));
             for outline in [SectionOutline::Circle, SectionOutline::Ellipse] {
                 let tube = hollow(outline, 1.0, 1.0, wall);
-                close(tube.torsion(), polar, 1e-13);
+                close(tube.torsion_constant(), polar, 1e-13);
                 close(tube.area(), PI / 4.0 * (1.0 - inner * inner), 1e-13);
                 let [second, third] = tube.second_moments();
                 close(second, polar / 2.0, 1e-13);
@@ -486,7 +480,7 @@ mod tests {
         let (w, t, wall) = (2.0, 1.0, 1e-7);
         let tube = hollow(SectionOutline::Rectangle, w, t, wall);
         close(
-            tube.torsion(),
+            tube.torsion_constant(),
             4.0 * (w * t).powi(2) * wall / (2.0 * (w + t)),
             1e-6,
         );
@@ -501,7 +495,7 @@ mod tests {
     /// Torsion constants from finite differences (rectangles) and bilinear elements (ellipses) for
     /// the stress function on three grids, extrapolated.
     #[test]
-    fn torsion_of_hollow_sections() {
+    fn torsion_constants_of_hollow_sections() {
         use SectionOutline::{Ellipse, Rectangle};
         for (outline, width, thickness, wall, torsion, within) in [
             (Rectangle, 1.0, 1.0, 0.02, 0.018_998, 2e-3),
@@ -516,22 +510,16 @@ mod tests {
             (Ellipse, 20.0, 2.0, 0.2, 12.867_544, 3e-3),
         ] {
             let tube = hollow(outline, width, thickness, wall);
-            close(tube.torsion(), torsion, within);
-            assert!(tube.torsion() < tube.torsion_upper_bound());
+            close(tube.torsion_constant(), torsion, within);
+            assert!(tube.torsion_constant() < tube.torsion_upper_bound());
         }
         // A wall of half the thickness leaves no hole.
         let full = hollow(Rectangle, 1.7, 1.0, 0.5);
-        close(full.torsion(), Rectangle.torsion(1.7, 1.0), 1e-14);
-    }
-}
-
-#[cfg(test)]
-mod moduli_tests {
-    use super::*;
-
-    #[track_caller]
-    fn close(found: f64, wanted: f64, relative: f64) {
-        assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
+        close(
+            full.torsion_constant(),
+            Rectangle.torsion_constant(1.7, 1.0),
+            1e-14,
+        );
     }
 
     fn moduli(outline: SectionOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
@@ -569,7 +557,7 @@ mod moduli_tests {
     /// differences for the stress function on two grids, over J.
     #[test]
     fn torsion_of_hollow_sections() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for wall in [0.01, 0.2, 0.5] {
             let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
             close(
@@ -601,7 +589,7 @@ mod moduli_tests {
     /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
     #[test]
     fn shear_by_forces() {
-        use crate::scenario::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
         for (outline, width, thickness, wall, factor) in [
             (Rectangle, 3.0, 0.7, None, 1.5),
             (Rectangle, 3.0, 0.7, Some(0.35), 1.5),

@@ -1,98 +1,226 @@
-//! Turns a scenario as written into a checked [`Scenario`]: interprets every value.
-//! Limits on combinations of values are in `limits`.
+//! Reads a scenario: a file, its text, its entries, and from these the checked [`Scenario`], every
+//! value interpreted. Limits on combinations of values are in `limits`.
 //!
-//! All mistakes in the entries of a scenario, though reading it ends at the first.
+//! Reading ends at the first mistake; all other mistakes are then looked for, to be told at once.
 
-use crate::scenario::format::entries::{Entries, MOST_RODS};
+use crate::memory;
+use crate::scenario::checked::Scenario;
+use crate::scenario::format::entries::{CollectedEntries, Entries, MOST_RODS};
+use crate::scenario::format::error::{ScenarioError, ScenarioResult, line_number_at};
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::format::source::{ScenarioError, ScenarioResult};
+use crate::scenario::format::source::ScenarioSource;
+use crate::scenario::format::units::Units;
 use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
-use crate::scenario::loads::{DEFAULT_OUTPUTS, check_single_rod_moments, round_inertia, wind};
-use crate::scenario::photo::photo;
-use crate::scenario::section::Property;
-use crate::scenario::veins::{StiffnessSource, joined, tissue, veins};
-use crate::scenario::{
-    Dynamics, MotionStart, Profile, Rod, Scenario, Units, limits, loads, supports,
-};
+use crate::scenario::loads::{check_single_rod_moments, read_dynamics, read_wind};
+use crate::scenario::photo::read_photo;
+use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
+use crate::scenario::{limits, loads, supports};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
-use toml::Value;
+use toml::{Table, Value};
 
-/// Longest name: it must be allowed everywhere as the name of a folder with files.
-const LONGEST_NAME: usize = 100;
+/// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
+pub const MOST_BYTES: u64 = 64 << 20;
 
-/// Longest name of a unit, which figures show at their axes.
-const LONGEST_UNIT: usize = 20;
+impl Scenario {
+    /// Reads and checks the TOML in `text`, or the JSON of a [`Scenario`] or of a
+    /// result with its `input`.
+    ///
+    /// ```
+    /// let scenario = leafdyn::scenario::Scenario::from_toml(
+    ///     r#"
+    ///     name = "cantilever"
+    ///     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    ///     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    ///     load = { tip_force = [0.0, 0.0, -1.0] }
+    ///     "#,
+    /// )?;
+    /// assert_eq!(scenario.rods.len(), 1);
+    /// # Ok::<(), leafdyn::scenario::ScenarioError>(())
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Scenario, ScenarioError> {
+        Scenario::from_toml_with(text, "scenario", &[])
+    }
 
-/// The accuracy that double precision leaves after a solve on a fine grid.
-const TOLERANCE_LEAST: f64 = 1e-12;
+    /// As [`Scenario::from_toml`], with the entries `overrides` replaced
+    /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, anything
+    /// else is taken as text), or parts of them: one entry of a list
+    /// (`load.gravity[2]=-1`, `stiffness.bending_2.value[0]=2`), or every number of
+    /// a key multiplied (`scale:load.gravity=2`). Messages call the text `file`.
+    pub fn from_toml_with(
+        text: &str,
+        file: &str,
+        overrides: &[String],
+    ) -> Result<Scenario, ScenarioError> {
+        let entries = Entries::from_text(text, file)?;
+        entries.replaced(overrides)?.check()
+    }
 
-/// An error of a tenth of the length is no accuracy.
-const TOLERANCE_MOST: f64 = 0.1;
+    /// Reads and checks the file at `path`.
+    pub fn read(path: impl AsRef<Path>) -> Result<Scenario, ScenarioError> {
+        Scenario::read_with(path.as_ref(), &[])
+    }
+
+    /// As [`Scenario::read`], with the entries `overrides` replaced.
+    pub fn read_with(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
+        Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
+    }
+}
+
+/// Reads the text of a scenario's file.
+///
+/// # Errors
+/// If it cannot be read, or is not text.
+pub fn text(path: &Path) -> Result<String, ScenarioError> {
+    decode_utf8(bytes(path)?, &path.display().to_string())
+}
+
+/// Reads a file, of at most one byte more than [`MOST_BYTES`].
+///
+/// # Errors
+/// If it cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    // Opening a folder succeeds on some systems, and reading it fails.
+    File::open(path)
+        .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|reason| match reason.kind() {
+            ErrorKind::IsADirectory => {
+                ScenarioError::in_file(&file, None, "is a folder: give the file itself".into())
+            }
+            _ => {
+                let problem = format!("cannot be read: {reason}: check its path and permissions");
+                ScenarioError::in_file(&file, None, problem)
+            }
+        })?;
+    Ok(bytes)
+}
+
+/// Decodes the text of a scenario's `file` from its first bytes.
+pub fn decode_utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
+    if bytes.len() as u64 > MOST_BYTES {
+        let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
+        return Err(ScenarioError::in_file(file, None, problem));
+    }
+    memory::check_text_memory(&bytes)
+        .map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let byte = bytes[offset];
+        let problem =
+            format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
+        ScenarioError::in_file(file, Some(line_number_at(bytes, offset)), problem)
+    })
+}
+
+/// What names, units, the tolerance and messages may be.
+struct ReadingLimits {
+    /// Bytes of a name, which must be allowed everywhere as the name of a folder with files.
+    longest_name: usize,
+    /// Characters of the name of a unit, which figures show at their axes.
+    longest_unit: usize,
+    /// Range of the tolerance. The least is the accuracy that double precision leaves after a solve on
+    /// a fine grid; an error of a tenth of the length is no accuracy.
+    least_tolerance: f64,
+    largest_tolerance: f64,
+    /// Most mistakes that are told at once.
+    reported_mistakes: usize,
+}
+
+const LIMITS: ReadingLimits = ReadingLimits {
+    longest_name: 100,
+    longest_unit: 20,
+    least_tolerance: 1e-12,
+    largest_tolerance: 0.1,
+    reported_mistakes: 8,
+};
 
 impl Entries {
+    /// The entries in a text, TOML or JSON; messages call it `file`.
+    ///
+    /// # Errors
+    /// If it cannot be parsed, or has an unknown key.
+    pub fn from_text(text: &str, file: &str) -> ScenarioResult<Self> {
+        Entries::collect_from_text(text, file)?.refuse_unknown()
+    }
+
+    /// The entries in a table of the same form, without a text.
+    ///
+    /// # Errors
+    /// If it has an unknown key.
+    pub fn from_table(table: Table) -> ScenarioResult<Self> {
+        Entries::collect_from_table(ScenarioSource::default(), table).refuse_unknown()
+    }
+
     /// The checked scenario.
     ///
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> ScenarioResult<Scenario> {
         let scenario = self.read().map_err(|error| self.error_with_others(error))?;
-        limits::check(self, &scenario)?;
+        limits::check_limits(self, &scenario)?;
         Ok(scenario)
     }
 
-    /// The scenario, entry by entry.
-    pub(super) fn read(&self) -> ScenarioResult<Scenario> {
+    /// Interprets the entries one after the other; ends at the first mistake.
+    fn read(&self) -> ScenarioResult<Scenario> {
         let name = match self.given_value(Key::Name) {
-            Some(item) => name(item)?,
+            Some(item) => read_name(item)?,
             None => self.name_of_file(),
         };
         let units = Units {
-            length: self.given_value(Key::UnitLength).map(unit).transpose()?,
-            force: self.given_value(Key::UnitForce).map(unit).transpose()?,
+            length: self
+                .given_value(Key::UnitLength)
+                .map(read_unit)
+                .transpose()?,
+            force: self
+                .given_value(Key::UnitForce)
+                .map(read_unit)
+                .transpose()?,
             time: self
                 .given_value(Key::UnitTime)
-                .map(|item| unit_of_time(self, item))
+                .map(|item| read_unit_of_time(self, item))
                 .transpose()?,
         };
         let rods = self.value_or_default(Key::Rods)?.whole_number(MOST_RODS)?;
-        let made = StiffnessSource::from_entries(self, rods)?;
-        let rods = veins(self, rods, &made)?;
-        let joined = joined(self, made.blade())?;
-        let coupling = coupling(self, rods.len() - 1)?;
-        let base_held = supports::of_bases(self)?;
-        let tissue = match &made {
-            StiffnessSource::Blade(_, parts) => (rods.len() > 1).then(|| parts.tissue()),
-            _ => tissue(self, rods.len() - 1)?,
-        };
-        let (gravity, own_gravity) = loads::gravity(self, rods.len())?;
-        let g = loads::g(self)?;
-        let distributed = loads::distributed(self, rods.len())?;
-        let points = loads::points(self, rods.len())?;
+        let source = StiffnessSource::from_entries(self, rods)?;
+        let rods = read_veins(self, rods, &source)?;
+        let joined = read_joined(self, source.blade())?;
+        let coupling = read_coupling(self, rods.len() - 1)?;
+        let base_held = supports::read_base_support(self)?;
+        let tissue = read_tissue(self, rods.len() - 1, &source)?;
+        let weights = loads::read_weights(self, rods.len())?;
+        let g = loads::read_gravity_acceleration(self)?;
+        let distributed = loads::read_distributed_loads(self, rods.len())?;
+        let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
         let tip_moment = item.vector()?;
         check_single_rod_moments(item, rods.len(), &[tip_moment])?;
-        let held_tip = supports::held(self, &rods, joined)?;
+        let held_tip = supports::read_held_tip(self, &rods, joined)?;
         let shared = held_tip.is_some() || joined && rods.len() > 1;
-        let grips = supports::grips(self, &rods, shared)?;
-        let wind = wind(self, rods.len())?;
-        let photo = photo(self)?;
-        let tolerance = tolerance(self.value_or_default(Key::Tolerance)?)?;
-        let loads = [gravity, tip_force, tip_moment];
-        let dynamics = dynamics(self, &rods, &made, loads)?;
+        let grips = supports::read_grips(self, &rods, shared)?;
+        let wind = read_wind(self, rods.len())?;
+        let photo = read_photo(self)?;
+        let tolerance = read_tolerance(self.value_or_default(Key::Tolerance)?)?;
+        let loads = [weights.shared, tip_force, tip_moment];
+        let dynamics = read_dynamics(self, &rods, &source, loads)?;
         Ok(Scenario {
             name,
             units,
             rods,
-            radii: made.radii(),
-            blade: made.blade().cloned(),
+            radii: source.radii(),
+            blade: source.blade().cloned(),
             base_held,
             joined,
             coupling,
             tissue,
             tissue_grown: self.value_or_default(Key::TissueGrown)?.switch()?,
-            gravity,
-            own_gravity,
+            gravity: weights.shared,
+            own_gravity: weights.own,
             g,
             distributed,
             points,
@@ -115,13 +243,29 @@ impl Entries {
     }
 }
 
-fn name(item: EntryValue) -> ScenarioResult<String> {
+impl CollectedEntries {
+    /// Refuses unknown names, with the errors about the values of the other entries.
+    fn refuse_unknown(self) -> ScenarioResult<Entries> {
+        let CollectedEntries { entries, unknown } = self;
+        let mut unknown = unknown.into_iter();
+        match unknown.next() {
+            None => Ok(entries),
+            Some(first) => {
+                let others = unknown.chain(entries.value_errors()).collect();
+                Err(ScenarioError { others, ..first })
+            }
+        }
+    }
+}
+
+fn read_name(item: EntryValue) -> ScenarioResult<String> {
     let name = item.text()?;
     item.refuse_unless(
         is_name(name),
         format_args!(
-            "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits, spaces and the \
-             signs _ - . + with a letter, digit or _ first and no space last"
+            "must be usable as a folder name: 1 to {} letters, digits, spaces and the \
+             signs _ - . + with a letter, digit or _ first and no space last",
+            LIMITS.longest_name
         ),
     )?;
     Ok(name.to_string())
@@ -132,31 +276,32 @@ fn is_name(name: &str) -> bool {
     let allowed = |c: char| c.is_alphanumeric() || "_-.+ ".contains(c);
     let starts_well = name.starts_with(|c: char| c.is_alphanumeric() || c == '_');
     let ends_well = !name.ends_with(' ');
-    starts_well && ends_well && name.len() <= LONGEST_NAME && name.chars().all(allowed)
+    starts_well && ends_well && name.len() <= LIMITS.longest_name && name.chars().all(allowed)
 }
 
-fn unit(item: EntryValue) -> ScenarioResult<String> {
+fn read_unit(item: EntryValue) -> ScenarioResult<String> {
     let unit = item.text()?;
+    let longest = LIMITS.longest_unit;
     let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
     item.refuse_unless(
-        printed && unit.chars().count() <= LONGEST_UNIT,
-        format_args!("must be 1 to {LONGEST_UNIT} characters that can be printed"),
+        printed && unit.chars().count() <= longest,
+        format_args!("must be 1 to {longest} characters that can be printed"),
     )?;
     Ok(unit.trim().to_string())
 }
 
 /// The unit of time, which is that of the others only if the mass is given.
-fn unit_of_time(entries: &Entries, item: EntryValue) -> ScenarioResult<String> {
+fn read_unit_of_time(entries: &Entries, item: EntryValue) -> ScenarioResult<String> {
     let densities = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
     item.refuse_unless(
         densities.iter().any(|key| entries.is_given(*key)),
         "without a density times are in units of T = sqrt(rho L^4/A), whatever the other units: \
          give dynamics.density or a mass_density, or leave this out",
     )?;
-    unit(item)
+    read_unit(item)
 }
 
-fn coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
+fn read_coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
     for (axis, key) in Key::COUPLING.into_iter().enumerate() {
         let stiffness = entries.value_or_default(key)?.number_for_each(gaps)?;
@@ -167,161 +312,29 @@ fn coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
     Ok(coupling)
 }
 
-fn tolerance(item: EntryValue) -> ScenarioResult<f64> {
+fn read_tolerance(item: EntryValue) -> ScenarioResult<f64> {
     let tolerance = item.number()?;
+    let (least, largest) = (LIMITS.least_tolerance, LIMITS.largest_tolerance);
     item.refuse_unless(
-        tolerance > 0.0 && tolerance <= TOLERANCE_MOST,
+        tolerance > 0.0 && tolerance <= largest,
         format_args!(
-            "must be greater than 0 and at most {TOLERANCE_MOST}: \
+            "must be greater than 0 and at most {largest}: \
              it is the error of the centerlines relative to the length of a rod"
         ),
     )?;
     item.refuse_unless(
-        tolerance >= TOLERANCE_LEAST,
+        tolerance >= least,
         format_args!(
-            "must be at least {TOLERANCE_LEAST:e}: double precision carries 16 digits, \
+            "must be at least {least:e}: double precision carries 16 digits, \
              and rounding in the solve takes about four of them"
         ),
     )?;
     Ok(tolerance)
 }
 
-/// The table `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
-fn dynamics(
-    entries: &Entries,
-    rods: &[Rod],
-    made: &StiffnessSource,
-    loads: [[f64; 3]; 3],
-) -> ScenarioResult<Dynamics> {
-    let [gravity, tip_force, tip_moment] = loads;
-    let mass = [Key::MassDensity, Key::BladeMassDensity];
-    let mass = mass.into_iter().find(|key| entries.is_given(*key));
-    let of_mass = |property| mass.and_then(|_| made.profiles(property));
-    let density = match entries.given_value(Key::Density) {
-        Some(item) => {
-            if let Some(key) = mass {
-                let path = key.path();
-                let why = format!("{path} is given, too: leave one of them out");
-                return Err(item.value_error(why));
-            }
-            Some(item.quantity(rods.len())?)
-        }
-        None => of_mass(Property::Density),
-    };
-    let preset = match density {
-        Some(density) => Dynamics::of_density(rods, density),
-        None => Dynamics::default_for(rods),
-    }
-    .with_loads(gravity, tip_force, tip_moment);
-    let number = |key, default| {
-        entries
-            .given_value(key)
-            .map_or(Ok(default), |item| item.number())
-    };
-    let load = |key, default| match entries.given_value(key) {
-        Some(item) => item.vectors_in_time(),
-        None => Ok(default),
-    };
-    let duration = number(Key::Duration, preset.duration)?;
-    let section = rotary_inertia(entries, &preset.density)?;
-    let section = section.or_else(|| of_mass(Property::RotaryInertia));
-    let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
-    let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;
-    let output_interval = match entries.given_value(Key::OutputInterval) {
-        Some(item) => output_interval(item, duration)?,
-        None => duration / DEFAULT_OUTPUTS,
-    };
-    let clamped = clamped(entries.value_or_default(Key::Clamped)?, rods.len())?;
-    let start = start(entries.value_or_default(Key::Start)?, clamped)?;
-    let gravity = load(Key::GravityInTime, preset.gravity)?;
-    let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
-    let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
-    if let Some(item) = entries.given_value(Key::TipMomentInTime) {
-        check_single_rod_moments(item, rods.len(), &tip_moment.value)?;
-    }
-    Ok(Dynamics {
-        polar_excess: if section.is_some() { 1.0 } else { 0.0 },
-        rotary_inertia: section.unwrap_or(preset.rotary_inertia),
-        external_damping,
-        internal_damping,
-        duration,
-        output_interval,
-        clamped,
-        start,
-        gravity,
-        tip_force,
-        tip_moment,
-        rest: match entries.given_value(Key::RestInTime) {
-            Some(item) => item.factors_in_time()?,
-            None => preset.rest,
-        },
-        density: preset.density,
-    })
-}
-
-fn rotary_inertia(entries: &Entries, density: &[Profile]) -> ScenarioResult<Option<Vec<Profile>>> {
-    let quantity = |item: EntryValue| item.quantity(density.len());
-    let inertia = entries
-        .given_value(Key::RotaryInertia)
-        .map(quantity)
-        .transpose()?;
-    let Some(item) = entries.given_value(Key::SectionRadius) else {
-        return Ok(inertia);
-    };
-    item.refuse_unless(
-        inertia.is_none(),
-        "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
-         leave one of them out",
-    )?;
-    let radius = quantity(item)?;
-    let round = density.iter().zip(&radius);
-    Ok(Some(
-        round
-            .map(|(density, radius)| round_inertia(density, radius))
-            .collect(),
-    ))
-}
-
-fn output_interval(item: EntryValue, duration: f64) -> ScenarioResult<f64> {
-    let interval = item.number()?;
-    item.refuse_unless(
-        interval <= duration,
-        format_args!(
-            "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
-        ),
-    )?;
-    Ok(interval)
-}
-
-fn clamped(item: EntryValue, rods: usize) -> ScenarioResult<bool> {
-    let clamped = item.switch()?;
-    item.refuse_unless(
-        clamped || rods == 1,
-        format_args!(
-            "a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base"
-        ),
-    )?;
-    Ok(clamped)
-}
-
-fn start(item: EntryValue, clamped: bool) -> ScenarioResult<MotionStart> {
-    let start = item.word(
-        "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
-         (in equilibrium under the loads at time 0)",
-    )?;
-    item.refuse_unless(
-        clamped || start == MotionStart::Released,
-        "a rod with a free base has no equilibrium to start from: use \"released\"",
-    )?;
-    Ok(start)
-}
-
-/// Most mistakes that are told at once.
-const MAX_REPORTED_MISTAKES: usize = 8;
-
 impl Entries {
     /// The errors about the values of keys that are there.
-    pub(super) fn value_errors(&self) -> Vec<ScenarioError> {
+    fn value_errors(&self) -> Vec<ScenarioError> {
         let Err(error) = self.read() else {
             return Vec::new();
         };
@@ -333,7 +346,7 @@ impl Entries {
 
     /// An error, with those about other entries that do not follow from it: the refused entry gives
     /// way to one that is allowed, and all are read again.
-    pub(super) fn error_with_others(&self, error: ScenarioError) -> ScenarioError {
+    fn error_with_others(&self, error: ScenarioError) -> ScenarioError {
         let mut entries = self.clone();
         let mut found = vec![error.clone()];
         while found.len() < Key::COUNT
@@ -351,20 +364,20 @@ impl Entries {
             }
             found.push(next);
         }
-        // The first that is missing names all others.
+        // The error about the first missing key names all missing keys.
         let is_missing = |error: &ScenarioError| error.key.is_some_and(|key| !self.is_given(key));
         let first = found.iter().position(is_missing);
         let others = found.into_iter().enumerate().skip(1);
         let others = others.filter(|(k, error)| first == Some(*k) || !is_missing(error));
         let others = others
             .map(|(_, error)| error)
-            .take(MAX_REPORTED_MISTAKES - 1)
+            .take(LIMITS.reported_mistakes - 1)
             .collect();
         ScenarioError { others, ..error }
     }
 
-    /// Replaces the entry that is refused by one that is allowed; false if none is known, or if others
-    /// are right or wrong by what it says.
+    /// Replaces the refused entry by one that is allowed. Returns false if none is known, or if other
+    /// entries are right or wrong by what the refused one says.
     fn replace_refused_entry(&mut self, error: &ScenarioError) -> bool {
         let Some(key) = error.key.filter(|key| !self.other_entries_depend(*key)) else {
             return false;
@@ -373,7 +386,7 @@ impl Entries {
             MissingKeyRule::Required(example) => Some(example),
             _ => None,
         };
-        self.replace(key, value);
+        self.replace_value(key, value);
         true
     }
 
@@ -384,7 +397,7 @@ impl Entries {
             ValueSchema::Whole if key == Key::Rods => {
                 Key::all().any(|key| self.is_list_of_rods(key))
             }
-            ValueSchema::Text | ValueSchema::Whole => key.table_and_name().0 != "units",
+            ValueSchema::Text | ValueSchema::Whole => key.table() != "units",
             _ => false,
         }
     }
@@ -400,17 +413,17 @@ impl Entries {
             _ => return false,
         };
         self.given_value(key)
-            .is_some_and(|item| depth(item.value) > single)
+            .is_some_and(|item| list_depth(item.value) > single)
     }
 }
 
-/// How deep lists stand within each other; of a profile in those at each knot.
-fn depth(value: &Value) -> usize {
+/// How deep lists are nested; in a profile, within the value at a knot.
+fn list_depth(value: &Value) -> usize {
     match value {
-        Value::Array(list) => 1 + list.first().map_or(0, depth),
+        Value::Array(list) => 1 + list.first().map_or(0, list_depth),
         Value::Table(profile) => profile
             .get("value")
-            .map_or(0, |value| depth(value).saturating_sub(1)),
+            .map_or(0, |value| list_depth(value).saturating_sub(1)),
         _ => 0,
     }
 }
@@ -418,9 +431,7 @@ fn depth(value: &Value) -> usize {
 /// Whether an error may follow from the value that replaced that of another: a wall is compared with
 /// its diameter.
 fn may_follow_from(error: &ScenarioError, on: &ScenarioError) -> bool {
-    let in_section = on
-        .key
-        .is_some_and(|key| key.table_and_name().0 == "section");
+    let in_section = on.key.is_some_and(|key| key.table() == "section");
     in_section && matches!(error.key, Some(Key::Wall | Key::InnerDiameter))
 }
 

@@ -1,0 +1,464 @@
+//! What is said of an equilibrium and of its margin: why a relaxation did not succeed and what would
+//! help, what makes its result doubtful, and why a part of a margin is missing.
+
+use crate::leaf::HalfTurn;
+use crate::numbers::{format_error_bound, format_two_digits};
+use crate::relax::path::{Path, PathPosition, Route};
+use crate::run::remarks;
+use crate::scenario::PlausibilityWarning;
+use crate::shooting::{NeutralDirection, ShootingFailureReason};
+use serde::{Serialize, Serializer};
+use std::fmt;
+
+remarks! {
+    /// Why a relaxation did not succeed, with what would help; or what else is to be said of a leaf at
+    /// rest. Segments are those per rod of the finest grid.
+    pub enum EquilibriumRemark {
+        /// A leaf at rest in wind.
+        #[error(
+            "wind has no potential: energy and eigenvalues are not stated; the leaf rests where its damped motion \
+             came to rest, and is stable as that motion is"
+        )]
+        WindWithoutPotential = "wind-without-potential",
+        /// A leaf at rest under a dead moment.
+        #[error(
+            "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated"
+        )]
+        MomentWithoutPotential = "moment-without-potential",
+        /// Negative eigenvalues that cannot be counted.
+        #[error(
+            "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
+             its stability is not known"
+        )]
+        IndexNotCounted = "index-not-counted",
+        /// At rest on all grids, at a saddle by eigenvalues extrapolated over them.
+        #[error(
+            "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
+             still stable; a load that is a little larger, or a small disturbance, shows where it goes"
+        )]
+        BeyondBifurcation = "beyond-bifurcation",
+        /// A tolerance that no grid reaches.
+        #[error(
+            "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one"
+        )]
+        ToleranceBelowRounding = "tolerance-below-rounding",
+        /// A tolerance that finer grids than are allowed might reach.
+        #[error(
+            "{segments} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
+        )]
+        ToleranceBeyondFinestGrid {
+            /// Segments.
+            segments: usize,
+        } = "tolerance-beyond-finest-grid",
+        /// Interpolated stations that are less accurate than the tolerance.
+        #[error(
+            "the tolerance is kept where the leaf was solved for, but not at all of the \
+             stations between: ask for a smaller tolerance, or for other stations"
+        )]
+        InaccurateBetweenStations = "inaccurate-between-stations",
+        /// A descent that finds no lower energy.
+        #[error("no step lowers the energy on {segments} segments{}", obstacle_text(.obstacle))]
+        NoDescent {
+            /// Segments.
+            segments: usize,
+            /// What may keep the leaf from coming to rest.
+            obstacle: Option<RestObstacle>,
+        } = "no-descent",
+        /// A vein that bends more than the grid resolves.
+        #[error(
+            "a vein bends by more than a right angle within one of {segments} segments{}",
+            obstacle_text(.obstacle)
+        )]
+        UnresolvedBend {
+            /// Segments.
+            segments: usize,
+            /// What may keep the leaf from coming to rest.
+            obstacle: Option<RestObstacle>,
+        } = "unresolved-bend",
+        /// As many steps as are allowed.
+        #[error(
+            "the step limit came before rest on {segments} segments: the load may admit no stable equilibrium{}",
+            obstacle_text(.obstacle)
+        )]
+        StepLimit {
+            /// Segments.
+            segments: usize,
+            /// What may keep the leaf from coming to rest.
+            obstacle: Option<RestObstacle>,
+        } = "step-limit",
+        /// As many steps of the explicit method as are allowed.
+        #[error(
+            "the step limit came before rest on {segments} segments: use fewer, or the semi-implicit method"
+        )]
+        ExplicitStepLimit {
+            /// Segments.
+            segments: usize,
+        } = "explicit-step-limit",
+        /// The end of the time allowed.
+        #[error("the time allowed was over before rest on {segments} segments: allow more")]
+        OutOfTime {
+            /// Segments.
+            segments: usize,
+        } = "out-of-time",
+        /// A matrix that does not fit into memory.
+        #[error(
+            "the factorised matrix of the leaf on {segments} segments does not fit into the memory that is allowed: \
+             use fewer rods or segments, or raise the limit on memory"
+        )]
+        OutOfMemory {
+            /// Segments.
+            segments: usize,
+        } = "out-of-memory",
+        /// Newton's method for an equilibrium, stable or not, that leads to none.
+        #[error(
+            "Newton's method leads to no equilibrium from this start on {segments} segments: let the leaf relax, \
+             which moves it to a stable one"
+        )]
+        NoEquilibriumFromStart {
+            /// Segments.
+            segments: usize,
+        } = "no-equilibrium-from-start",
+        /// An unstable equilibrium found by shooting.
+        #[error(
+            "shooting finds equilibria, stable or not: the method semi-implicit finds a stable one"
+        )]
+        ShotSaddle = "shot-saddle",
+        /// An equilibrium found by shooting, of unknown index.
+        #[error(
+            "the number of negative eigenvalues is not known: a dead moment has no energy, the leaf is too fine to \
+             count them, or one may have either sign"
+        )]
+        ShotIndexUnknown = "shot-index-unknown",
+        /// An equilibrium found by shooting, near a bifurcation or one of a family.
+        #[error("{0}")]
+        NeutralDirection(NeutralDirection) = "neutral-direction",
+        /// A solution by shooting beside one with smaller local errors that was not found.
+        #[error("this is the best solution found; with smaller local errors {0}")]
+        NotSharpened(ShootingFailureReason) = "not-sharpened",
+        /// A solution by shooting that is less accurate than the tolerance.
+        #[error(
+            "double precision does not carry more through this leaf: ask for a larger tolerance"
+        )]
+        DoublePrecision = "double-precision",
+        /// No solution by shooting.
+        #[error("{reason}{}", way_from_arcs(*.part))]
+        ShootingFailed {
+            /// Why.
+            reason: ShootingFailureReason,
+            /// Part of the change from the leaf of arcs to this leaf that was made.
+            part: f64,
+        } = "shooting-failed",
+    }
+
+    /// What may keep a leaf from coming to rest, with what would help. Its sentence ends that of an
+    /// [`EquilibriumRemark`]. Veins are counted from 0.
+    pub enum RestObstacle {
+        /// What in the scenario is probably not what was intended.
+        #[error(": {0}")]
+        Implausible(PlausibilityWarning) = inner.code(),
+        /// Sections of neighbouring veins turned against each other by half a turn.
+        #[error(": {}", .place.sentence())]
+        HalfTurn {
+            /// Where.
+            place: HalfTurn,
+        } = "half-turn",
+        /// An inextensible vein that is held straight between two holders.
+        #[error(
+            ": vein {} is inextensible and held straight between {} and {}: no finite force in it bears what pulls it aside, \
+             and what it carries along itself is not determined; give stiffness.axial a number, or move one holder towards the other",
+            .vein + 1, .between[0], .between[1]
+        )]
+        TautSpan {
+            /// The vein.
+            vein: usize,
+            /// What holds it, in the order of its length.
+            between: [SpanHolder; 2],
+        } = "taut-span",
+        /// Loads that are large for the stiffness.
+        #[error(
+            "{}: lower {}, or raise stiffness.{stiffness} of vein {}{}",
+            reached_text(*.reached), loads_text(.loads), .vein + 1,
+            if *.may_shoot { ", or try the method shooting" } else { "" }
+        )]
+        Loads {
+            /// Up to where the leaf came to rest on its path, if it has one.
+            reached: Option<PathPosition>,
+            /// Keys of the largest loads; none of a leaf without loads.
+            loads: Vec<&'static str>,
+            /// Key of the softest stiffness, in its table.
+            stiffness: &'static str,
+            /// The vein that bends most.
+            vein: usize,
+            /// Whether another method may find an equilibrium.
+            may_shoot: bool,
+        } = "loads",
+    }
+
+    /// What makes the result of a relaxation doubtful. Veins are counted from 0, stations are fractions
+    /// of their lengths.
+    pub enum EquilibriumDoubt {
+        /// What in the scenario is probably not what was intended.
+        #[error("{0}")]
+        Implausible(PlausibilityWarning) = inner.code(),
+        /// A vein that is stretched far.
+        #[error(
+            "vein {} is stretched by {:.0} % at {station:.2} of its length: few materials follow a linear law so far",
+            .vein + 1, 100.0 * .stretch
+        )]
+        Stretched {
+            /// The vein.
+            vein: usize,
+            /// Where it is stretched most.
+            station: f64,
+            /// Stretch beyond that at rest.
+            stretch: f64,
+        } = "stretched",
+        /// A vein with inverted elements.
+        #[error(
+            "vein {} is turned through itself at {station:.2} of its length, which no body can be: raise stiffness.axial",
+            .vein + 1
+        )]
+        Inverted {
+            /// The vein.
+            vein: usize,
+            /// Where its stretch is not positive.
+            station: f64,
+        } = "inverted",
+        /// A path whose events lead elsewhere on another grid.
+        #[error(
+            "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
+             different grids: this is one in which it can rest"
+        )]
+        UnconfirmedPath = "unconfirmed-path",
+        /// A leaf that two grids never bring to the same equilibrium.
+        #[error(
+            "from its start the leaf moves to different equilibria on different grids: \
+             this is one in which it can rest"
+        )]
+        UnconfirmedEquilibrium = "unconfirmed-equilibrium",
+        /// A path that could not be followed.
+        #[error(
+            "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
+             loads instead, and may rest elsewhere than slow loading leads"
+        )]
+        ReleasedInstead = "released-instead",
+        /// A given shape from which the leaf did not come to rest.
+        #[error("from the given start the leaf does not come to rest: it was relaxed as without one")]
+        RelaxedAnew = "relaxed-anew",
+        /// An eigenvalue that may have either sign.
+        #[error(
+            "an eigenvalue may be negative or positive for all that these grids tell: \
+             whether the leaf is stable is not certain"
+        )]
+        UndecidedStability = "undecided-stability",
+        /// An eigenvalue that may have either sign beside others that are negative.
+        #[error(
+            "an eigenvalue may be negative or positive for all that these grids tell: \
+             the index is the number of those that are certainly negative, or larger"
+        )]
+        UndecidedIndex = "undecided-index",
+        /// A number that decides where a leaf turns to that turns without resistance.
+        #[error(
+            "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
+             change of this number decides where it turns to"
+        )]
+        NoDerivative {
+            /// The number.
+            key: String,
+        } = "no-derivative",
+    }
+
+    /// Why a margin, or a part of it, is missing.
+    pub enum MarginRemark {
+        /// An unstable leaf.
+        #[error("an unstable leaf has no margin to lose")]
+        Unstable = "unstable",
+        /// A leaf that is not at rest, or of unknown stability.
+        #[error("only a leaf at rest whose stability is known has a margin")]
+        StabilityUnknown = "stability-unknown",
+        /// A softest eigenvalue that no grid resolves.
+        #[error("its softest eigenvalue cannot be told from zero on any grid tried")]
+        UnresolvedEigenvalue = "unresolved-eigenvalue",
+        /// A leaf that is unstable on finer grids.
+        #[error("the leaf is unstable on grids finer than those of its relaxation")]
+        UnstableOnFinerGrids = "unstable-on-finer-grids",
+        /// The end of the time allowed.
+        #[error("the time allowed was over before all was tried")]
+        OutOfTime = "out-of-time",
+        /// Tips that are all held.
+        #[error("the tip is held: a force on it moves nothing")]
+        TipHeld = "tip-held",
+        /// A leaf that turns without resistance.
+        #[error(
+            "the leaf turns about its base without resistance, towards any push across that axis: only \
+             pushes along it are tried"
+        )]
+        ZeroEnergyRotation = "zero-energy-rotation",
+    }
+
+    /// Why it is not known at which force on its tip a leaf loses its stability.
+    pub enum CriticalTipForceRemark {
+        /// The end of the time allowed.
+        #[error("the time allowed was over")]
+        OutOfTime = "out-of-time",
+        /// A loss that may be at any force below this one.
+        #[error("its loss, below {}, cannot be told from zero", format_error_bound(*.below))]
+        NearZero {
+            /// The force.
+            below: f64,
+        } = "near-zero",
+        /// A branch that is lost, or not verified, in the words of the continuation.
+        #[error("{0}")]
+        BranchLost(String) = "branch-lost",
+        /// A branch that ended early for another reason.
+        #[error("the branch could not be followed further")]
+        NotFollowed = "not-followed",
+    }
+}
+
+impl EquilibriumRemark {
+    /// What may have kept the leaf from coming to rest.
+    pub fn obstacle(&self) -> Option<&RestObstacle> {
+        match self {
+            EquilibriumRemark::NoDescent { obstacle, .. }
+            | EquilibriumRemark::UnresolvedBend { obstacle, .. }
+            | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_ref(),
+            _ => None,
+        }
+    }
+}
+
+impl EquilibriumDoubt {
+    /// What is not certain about a path, where this route was meant.
+    pub(super) fn about_path(path: &Path, meant: Route) -> Option<Self> {
+        match path {
+            Path::Loaded {
+                confirmed: false, ..
+            } => Some(EquilibriumDoubt::UnconfirmedPath),
+            Path::Released if meant == Route::LoadedLeaf => Some(EquilibriumDoubt::ReleasedInstead),
+            _ => None,
+        }
+    }
+}
+
+/// What holds a vein at one end of a span.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpanHolder {
+    /// Its base.
+    Base,
+    /// A grip at this fraction of its length.
+    Grip(f64),
+    /// What holds its tip.
+    Tip,
+}
+
+impl fmt::Display for SpanHolder {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            SpanHolder::Base => f.write_str("its base"),
+            SpanHolder::Grip(sigma) => {
+                write!(f, "the grip at {} of its length", format_two_digits(*sigma))
+            }
+            SpanHolder::Tip => f.write_str("its tip"),
+        }
+    }
+}
+
+fn obstacle_text(obstacle: &Option<RestObstacle>) -> String {
+    obstacle
+        .as_ref()
+        .map(ToString::to_string)
+        .unwrap_or_default()
+}
+
+fn reached_text(reached: Option<PathPosition>) -> String {
+    match reached {
+        Some(PathPosition { stage, lambda }) if lambda > 0.0 => {
+            let percent = 100.0 * lambda;
+            format!(" (it came to rest up to {percent:.2} % of {stage})")
+        }
+        _ => String::new(),
+    }
+}
+
+fn loads_text(loads: &[&str]) -> String {
+    match loads.is_empty() {
+        true => "the curvatures at rest".to_owned(),
+        false => loads.join(" or "),
+    }
+}
+
+fn way_from_arcs(part: f64) -> String {
+    match part {
+        part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
+        _ => String::new(),
+    }
+}
+
+/// A remark as the keys `remark` and `remark_code`, if there is one.
+pub(crate) fn serialize_remark<S: Serializer>(
+    remark: &Option<EquilibriumRemark>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys<'a> {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        remark: Option<&'a EquilibriumRemark>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        remark_code: Option<&'static str>,
+    }
+    let remark = remark.as_ref();
+    Keys {
+        remark,
+        remark_code: remark.map(EquilibriumRemark::code),
+    }
+    .serialize(serializer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::path::Stage;
+
+    /// Words that stay, and that the documents explain.
+    #[test]
+    fn codes_are_documented() {
+        let formats = include_str!("../../docs/formats.md");
+        let codes = EquilibriumRemark::CODES;
+        for (k, code) in codes.iter().enumerate() {
+            assert!(formats.contains(&format!("`{code}`")), "{code}");
+            assert!(!codes[..k].contains(code), "{code}");
+        }
+    }
+
+    #[test]
+    fn a_remark_ends_with_what_may_keep_the_leaf_from_rest() {
+        let mut remark = EquilibriumRemark::StepLimit {
+            segments: 8,
+            obstacle: Some(RestObstacle::Loads {
+                reached: Some(PathPosition {
+                    stage: Stage::Joining,
+                    lambda: 0.5,
+                }),
+                loads: vec!["load.gravity", "load.tip_force"],
+                stiffness: "torsion",
+                vein: 2,
+                may_shoot: true,
+            }),
+        };
+        let sentence = "the step limit came before rest on 8 segments: the load may admit no stable equilibrium \
+                        (it came to rest up to 50.00 % of joining): lower load.gravity or load.tip_force, or raise \
+                        stiffness.torsion of vein 3, or try the method shooting";
+        assert_eq!(remark.to_string(), sentence);
+        if let EquilibriumRemark::StepLimit { obstacle, .. } = &mut remark {
+            *obstacle = None;
+        }
+        assert!(remark.to_string().ends_with("no stable equilibrium"));
+        let key = "leaf.fan";
+        let slip = PlausibilityWarning::AngleInDegrees { key, angle: -60.0 };
+        let doubt = EquilibriumDoubt::Implausible(slip);
+        assert_eq!(doubt.code(), "angle-in-degrees");
+        let sentence = "leaf.fan is in radians, and -60 is more than a turn";
+        assert_eq!(doubt.to_string(), sentence);
+    }
+}

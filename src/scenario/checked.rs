@@ -1,0 +1,255 @@
+//! The checked scenario, and what follows from it alone.
+
+use crate::numbers::sorted_distinct;
+use crate::scenario::blade::Blade;
+use crate::scenario::format::Key;
+use crate::scenario::format::units::Units;
+use crate::scenario::loads::{Dynamics, PointLoad, Weight, Wind, natural_time_unit};
+use crate::scenario::photo::Photo;
+use crate::scenario::profile::Profile;
+use crate::scenario::section::{Moduli, Radii};
+use crate::scenario::supports::{Grip, HeldTip, SupportKind};
+use crate::scenario::veins::{Rod, Scale, Tissue};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// A checked scenario. All quantities are in the units the file was written
+/// in, which only have to be consistent with each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Name of the scenario; output goes to `out/<name>` by default.
+    pub name: String,
+    /// Names of the units, for axes; nothing is converted.
+    pub units: Units,
+    /// The veins, from one edge of the leaf to the other; at least one.
+    pub rods: Vec<Rod>,
+    /// Radii of the veins where sections are given: for pictures.
+    pub radii: Radii,
+    /// The blade that the veins and the tissue follow from, if a blade is given in place of them.
+    pub blade: Option<Arc<Blade>>,
+    /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
+    pub base_held: SupportKind,
+    /// Whether all tips share one point.
+    pub joined: bool,
+    /// Coupling stiffness of each gap between neighbouring rods along the lab
+    /// axes x, y, z: force per unit displacement and unit length of leaf, the
+    /// length of a gap being the mean of its two rods'. N - 1 entries.
+    pub coupling: Vec<[f64; 3]>,
+    /// Tissue in each gap, N - 1 entries; `None` if there is none.
+    pub tissue: Option<Vec<Tissue>>,
+    /// Whether the tissue has grown with the veins, or is that of veins whose rest length has not:
+    /// [`Rod::rest_stretch`] then strains it.
+    pub tissue_grown: bool,
+    /// Gravity, force per unit reference length, on every vein; [`Scenario::weight`] has all of it.
+    pub gravity: [f64; 3],
+    /// Gravity that each vein has besides, N entries; empty if veins do not differ.
+    pub own_gravity: Vec<[f64; 3]>,
+    /// The acceleration of gravity, which pulls [`Dynamics::density`] and the masses of points.
+    pub g: [f64; 3],
+    /// Dead force per unit reference length along each vein, by components; `None` if there is none.
+    pub distributed: Option<Vec<[Profile; 3]>>,
+    /// Dead loads on points.
+    pub points: Vec<PointLoad>,
+    /// Dead force on the joint tip, or on every tip when the tips are free.
+    pub tip_force: [f64; 3],
+    /// Dead moment about the lab axes on the tip of a single rod.
+    pub tip_moment: [f64; 3],
+    /// The tip, if it is held.
+    pub held_tip: Option<HeldTip>,
+    /// Holders along the veins; no point has two.
+    pub grips: Vec<Grip>,
+    /// Wind.
+    pub wind: Option<Wind>,
+    /// How a photograph shows the leaf, if points in a photograph are data of a fit; equilibria do not
+    /// depend on it.
+    pub photo: Option<Photo>,
+    /// Wanted accuracy of the centerlines, relative to the largest rod length.
+    pub tolerance: f64,
+    /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
+    /// pulls it.
+    pub dynamics: Dynamics,
+}
+
+impl Scenario {
+    /// The units that make the leaf dimensionless.
+    pub fn scale(&self) -> Scale {
+        Scale::of(&self.rods)
+    }
+
+    /// The natural unit of the quantity of a key.
+    pub(crate) fn unit(&self, key: Key) -> f64 {
+        if let (Key::PhotoX | Key::PhotoY, Some(photo)) = (key, &self.photo) {
+            return self.scale().length / photo.scale;
+        }
+        self.scale().unit(key, self.natural_time())
+    }
+
+    /// T: the natural unit of time, sqrt(rho L^4/A).
+    pub(super) fn natural_time(&self) -> f64 {
+        natural_time_unit(self.scale(), &self.dynamics.density)
+    }
+}
+
+/// Differences of fractions of a length below which two places are the same: no segment may be so
+/// short.
+const PLACE_TOLERANCE: f64 = 1e-12;
+
+/// A grip that ends within this fraction of the length from the tip holds the tip.
+const TIP_GRIP_TOLERANCE: f64 = 1e-11;
+
+impl Scenario {
+    /// Where vein `j` begins, and the rotation of its directors there.
+    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+        let rod = &self.rods[j];
+        (rod.base_position(), rod.base_rotation())
+    }
+
+    /// Fractions inside (0, 1) where a grid must have a node: kinks of stiffnesses, rest shapes,
+    /// loads and the wind's width, points that are loaded, and the ends of what is gripped;
+    /// ascending, each once, and none within rounding of another or of an end: what is there is at
+    /// the nearest node.
+    pub fn kinks(&self) -> Vec<f64> {
+        let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
+        let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
+        let profiles = profiles
+            .chain(masses.map(|(_, mass)| mass))
+            .chain(
+                self.tissue
+                    .iter()
+                    .flatten()
+                    .flat_map(Tissue::stiffness_profiles),
+            )
+            .chain(self.distributed.iter().flatten().flatten())
+            .chain(self.wind.iter().flat_map(|wind| &wind.width));
+        let points = self.points.iter().map(|point| point.at);
+        let ends = self.grips.iter().flat_map(|grip| grip.at);
+        let inside = points.chain(ends);
+        let all = profiles.flat_map(Profile::kinks).copied().chain(inside);
+        let mut kinks =
+            sorted_distinct(all.filter(|&at| at > PLACE_TOLERANCE && at < 1.0 - PLACE_TOLERANCE));
+        kinks.dedup_by(|next, kept| *next - *kept <= PLACE_TOLERANCE);
+        kinks
+    }
+
+    /// Whether all tips are held: as `[tip]` says, or by grips.
+    pub fn holds_all_tips(&self) -> bool {
+        let gripped = |vein: usize| {
+            let mut grips = self.grips.iter().filter(|grip| grip.vein == vein);
+            grips.any(|grip| 1.0 - grip.at[1] < TIP_GRIP_TOLERANCE)
+        };
+        self.held_tip.is_some() || (0..self.rods.len()).all(gripped)
+    }
+
+    /// Whether tissue, which has no force in the natural leaf, or grips, which hold veins where they
+    /// are in it, make a leaf depend on shapes at rest in another way than by their strains.
+    pub fn needs_stress_free_leaf(&self) -> bool {
+        self.tissue.is_some() || !self.grips.is_empty()
+    }
+
+    /// The weight of a vein per reference length.
+    pub fn weight(&self, vein: usize) -> Weight<'_> {
+        let own = self.own_gravity.get(vein).copied().unwrap_or([0.0; 3]);
+        let pulls = self.g != [0.0; 3];
+        Weight {
+            even: [0, 1, 2].map(|axis| self.gravity[axis] + own[axis]),
+            of_mass: pulls.then(|| (self.g, &self.dynamics.density[vein])),
+        }
+    }
+
+    /// This leaf without weight, loads and wind; what is held of it stays where it is.
+    pub fn unloaded(&self) -> Scenario {
+        let none = [0.0; 3];
+        Scenario {
+            gravity: none,
+            own_gravity: Vec::new(),
+            g: none,
+            distributed: None,
+            points: Vec::new(),
+            tip_force: none,
+            tip_moment: none,
+            wind: None,
+            photo: None,
+            dynamics: self.dynamics.clone().with_loads(none, none, none),
+            ..self.clone()
+        }
+    }
+
+    /// Whether veins have loads of their own besides the gravity that all share.
+    pub fn has_own_loads(&self) -> bool {
+        let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];
+        weights || self.distributed.is_some() || !self.points.is_empty()
+    }
+
+    /// Whether dead moments act at rest.
+    pub fn has_moments(&self) -> bool {
+        let on_points = || self.points.iter().any(|point| point.moment != [0.0; 3]);
+        self.tip_moment != [0.0; 3] || on_points()
+    }
+
+    /// Whether all rods begin in the origin, in the plane z = 0.
+    pub(crate) fn is_fan(&self) -> bool {
+        let in_plane = |rod: &Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;
+        self.rods.iter().all(in_plane)
+    }
+
+    /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
+    pub fn is_loaded_in_plane(&self) -> bool {
+        let flat = |load: [f64; 3]| load[2] == 0.0;
+        let even = |vein: usize| flat(self.weight(vein).even);
+        self.rods
+            .iter()
+            .all(|rod| flat(rod.base) && rod.elevation == 0.0)
+            && (0..self.rods.len()).all(even)
+            && flat(self.g)
+            && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
+            && self.points.iter().all(|point| flat(point.force))
+            && self.grips.iter().all(|grip| flat(grip.displacement))
+            && flat(self.tip_force)
+            && !self.has_moments()
+            && self.wind.is_none()
+    }
+
+    /// The sum of all weights, and of the loads along veins and on points.
+    pub fn total_load(&self) -> DVec3 {
+        let length: f64 = self.rods.iter().map(|rod| rod.length).sum();
+        let mut total = length * DVec3::from_array(self.gravity);
+        for (vein, rod) in self.rods.iter().enumerate() {
+            let Weight { even, of_mass } = self.weight(vein);
+            let own = DVec3::from_array(even) - DVec3::from_array(self.gravity);
+            total += rod.length * own;
+            if let Some((g, mass)) = of_mass {
+                total += rod.length * mass.integral(1.0) * DVec3::from_array(g);
+            }
+            for load in self.distributed.iter().map(|all| &all[vein]) {
+                let sums = load.each_ref().map(|one| one.integral(1.0));
+                total += rod.length * DVec3::from_array(sums);
+            }
+        }
+        let points = self
+            .points
+            .iter()
+            .map(|point| DVec3::from_array(self.force_on(point)));
+        total + points.sum::<DVec3>()
+    }
+
+    /// The force on a point: what is given, and the weight of its mass.
+    pub fn force_on(&self, point: &PointLoad) -> [f64; 3] {
+        [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])
+    }
+
+    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
+    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
+    /// sections.
+    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
+        if self.blade.is_none() {
+            return self.radii.moduli(rod, sigma);
+        }
+        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
+        let rod = self.rods.get(rod)?;
+        let side = |axis: usize| {
+            let bending = rod.couple_stiffness[axis].at(sigma);
+            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
+        };
+        Some(Moduli::for_strip(side(2), side(1)))
+    }
+}

@@ -1,0 +1,458 @@
+//! Veins that can turn without resistance: directions of zero energy.
+//!
+//! Round veins that are clamped in line, loaded along this line and held on it, if at all, turn about
+//! the axis of their base. Where every vein of a group that is tied together, or a single vein, turns
+//! about the axis by an angle and every section back about its own tangent, no clamp, load or strain
+//! energy changes: a bent group has a circle of equilibria, and no bifurcation. Groups with tissue, and
+//! axes that do not go through the origin, are left out.
+//!
+//! On hinges a vein that is straight or round spins: every section turns about its own tangent,
+//! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
+//! turns as a rigid body about the line through all points where it is held, if it is loaded along
+//! this line, whatever its sections.
+
+#[cfg(test)]
+mod tests;
+
+use crate::rotation::angle_about;
+use crate::scenario::checked::Scenario;
+use crate::scenario::profile::Profile;
+use crate::scenario::supports::{Grip, SupportKind};
+use crate::scenario::veins::{Rod, Tissue, longest};
+use glam::{DQuat, DVec3};
+use std::ops::Range;
+
+/// What counts as the same, or as straight, where veins turn.
+struct TurnTolerances {
+    /// Tangents whose parts across an axis are smaller tell no direction about it.
+    tangent: f64,
+    /// Relative difference below which numbers are equal.
+    equality: f64,
+    /// A vein that is not round spins without resistance only where it is straight. Where it is bent
+    /// by more than this part of what else counts as near, its stiffer side rolls over.
+    straightness: f64,
+    /// Veins whose points are all nearer to the axis than this part of the leaf's length do not move
+    /// when they turn.
+    axis_distance: f64,
+    /// Profiles are compared at so many equal distances, and at their kinks.
+    profile_steps: usize,
+}
+
+const TOLERANCES: TurnTolerances = TurnTolerances {
+    tangent: 1e-8,
+    equality: 1e-12,
+    straightness: 1e-3,
+    axis_distance: 1e-6,
+    profile_steps: 16,
+};
+
+/// Neighbouring veins that can turn together without resistance, whatever their shape: at unit rate
+/// all turn about the axis, and every section at `section_rate` about its own tangent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ZeroEnergyRotation {
+    /// The numbers of the veins.
+    pub rods: Range<usize>,
+    /// A point of the axis.
+    pub point: DVec3,
+    /// The direction of the axis, or zero for a vein that only spins.
+    pub axis: DVec3,
+    /// Rate of the turn of sections about their own tangents: -1, 0 or 1.
+    pub section_rate: f64,
+    /// Whether the veins turn so also where they are bent.
+    pub includes_bent_veins: bool,
+}
+
+/// Moments about a line about which nothing holds a group of veins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnbalancedMoment {
+    /// The line, for messages.
+    pub line: &'static str,
+    /// The sum of the moments about the line.
+    pub moment: f64,
+}
+
+/// The rotations of the directors at the base of a vein.
+pub struct BaseRotations {
+    /// In the natural leaf.
+    pub stress_free: DQuat,
+    /// In the equilibrium.
+    pub now: DQuat,
+}
+
+impl ZeroEnergyRotation {
+    /// The angle by which a leaf turns to the one of its circle of equilibria that stands for all:
+    /// clamped veins until their `moment` on the bases bends them down (towards -e3); on hinges until
+    /// the veins begin as near as possible to where they do in the natural leaf, or down; what spins
+    /// until it has no twist from there.
+    pub fn angle_to_representative(&self, begin: &[BaseRotations], moment: Option<DVec3>) -> f64 {
+        let axis = self.axis;
+        if let (
+            true,
+            [
+                BaseRotations {
+                    stress_free: natural,
+                    now,
+                },
+            ],
+        ) = (axis == DVec3::ZERO, begin)
+        {
+            let from_natural = natural.conjugate() * *now;
+            return -2.0 * from_natural.x.atan2(from_natural.w);
+        }
+        // Down, or for a vertical axis e1, normal to the axis.
+        let down = match axis.z.abs() > 0.99 {
+            true => DVec3::X,
+            false => -DVec3::Z,
+        };
+        if let Some(moment) = moment {
+            return angle_about(axis, moment, axis.cross(down));
+        }
+        // The angle with the least sum of squared distances of the tangents.
+        let across = |q: DQuat| (q * DVec3::X).reject_from_normalized(axis);
+        let (mut sin, mut cos, mut sum) = (0.0, 0.0, DVec3::ZERO);
+        for [natural, now] in begin.iter().map(|it| [it.stress_free, it.now].map(across)) {
+            sin += axis.dot(now.cross(natural));
+            cos += now.dot(natural);
+            sum += now;
+        }
+        match (
+            f64::hypot(sin, cos) > TOLERANCES.tangent,
+            sum.length() > TOLERANCES.tangent,
+        ) {
+            (true, _) => sin.atan2(cos),
+            (false, true) => angle_about(axis, sum, down.reject_from_normalized(axis)),
+            (false, false) => 0.0,
+        }
+    }
+
+    /// Whether anything moves when veins through these points turn: some point farther than `near` from
+    /// the axis through `point`. Of a vein that spins the sections move if the vein is round or nearly
+    /// straight.
+    pub fn moves_something(&self, points: &[DVec3], point: DVec3, near: f64) -> bool {
+        let off = |from: DVec3, axis: DVec3, near: f64| {
+            let mut points = points.iter();
+            points.any(|at| (*at - from).reject_from_normalized(axis).length() > near)
+        };
+        match (self.axis == DVec3::ZERO, points) {
+            (false, _) => off(point, self.axis, near),
+            (true, [base, .., tip]) => {
+                let chord = (*tip - *base).normalize_or(DVec3::X);
+                self.includes_bent_veins || !off(*base, chord, TOLERANCES.straightness * near)
+            }
+            (true, _) => self.includes_bent_veins,
+        }
+    }
+
+    /// The rotations by this angle about the axis and, from the right, of sections about their own
+    /// tangents.
+    pub fn rotations(&self, angle: f64) -> [DQuat; 2] {
+        let turn = match self.axis == DVec3::ZERO {
+            true => DQuat::IDENTITY,
+            false => DQuat::from_axis_angle(self.axis, angle),
+        };
+        [turn, DQuat::from_rotation_x(self.section_rate * angle)]
+    }
+
+    /// The angular velocity and the velocity, at unit rate, of a node in the position `x`, whose unit of
+    /// length is `length`, with the rotation `q`.
+    pub fn node_velocity(&self, x: DVec3, q: DQuat, length: f64) -> [DVec3; 2] {
+        let spin = self.axis + self.section_rate * (q * DVec3::X);
+        [spin, self.axis.cross(x - self.point / length)]
+    }
+}
+
+impl Scenario {
+    /// The groups of veins that can turn without resistance: in wind only those that spin.
+    pub fn zero_energy_rotations(&self) -> Vec<ZeroEnergyRotation> {
+        let mut rotations = Vec::new();
+        let hinged = self.base_held == SupportKind::Pinned;
+        for rods in self.tied_groups() {
+            let windy = self.wind.is_some();
+            let between_clamps = self.axis_between_clamps(rods.clone()).filter(|_| !windy);
+            rotations.extend(between_clamps.map(|axis| ZeroEnergyRotation {
+                rods: rods.clone(),
+                point: DVec3::ZERO,
+                axis,
+                section_rate: -1.0,
+                includes_bent_veins: true,
+            }));
+            if hinged {
+                // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
+                let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
+                rotations.extend(rigid);
+                rotations.extend(
+                    rods.filter(|j| self.spins(*j))
+                        .map(|j| self.spin_rotation(j)),
+                );
+            }
+        }
+        rotations
+    }
+
+    /// Whether every section of a vein on a hinge can turn about its own tangent, provided that the
+    /// vein is round or straight.
+    fn spins(&self, vein: usize) -> bool {
+        let gaps = [vein.checked_sub(1), Some(vein)].into_iter().flatten();
+        let tissue = |gap| (self.tissue.iter()).any(|all| all.get(gap).is_some_and(has_some));
+        let clamps = |grip: &Grip| grip.vein == vein && grip.held == SupportKind::Clamped;
+        let tip = self.held_tip.as_ref();
+        tip.is_none_or(|held| held.clamps.is_none())
+            && !gaps.clone().any(tissue)
+            && !self.grips.iter().any(clamps)
+            && !self.has_moments_on(&(vein..vein + 1))
+    }
+
+    fn spin_rotation(&self, vein: usize) -> ZeroEnergyRotation {
+        ZeroEnergyRotation {
+            rods: vein..vein + 1,
+            point: DVec3::ZERO,
+            axis: DVec3::ZERO,
+            section_rate: 1.0,
+            includes_bent_veins: is_round(&self.rods[vein]),
+        }
+    }
+
+    /// The turn of a group of tied veins on hinges as a rigid body, about the line through the points
+    /// where it is held or, if there is only one, along its loads.
+    fn rigid_rotation(&self, group: &Range<usize>) -> Option<ZeroEnergyRotation> {
+        let apart = self.support_offsets(group)?;
+        let axis = self.axis_between_hinges(group, &apart)?;
+        (!self.has_moments_on(group)).then(|| ZeroEnergyRotation {
+            rods: group.clone(),
+            point: self.rods[group.start].base_position(),
+            axis,
+            section_rate: 0.0,
+            includes_bent_veins: true,
+        })
+    }
+
+    /// The axis about which a group of tied veins on hinges, which is held in places that are so far
+    /// `apart`, can turn as a rigid body while its forces do no work.
+    fn axis_between_hinges(&self, group: &Range<usize>, apart: &[DVec3]) -> Option<DVec3> {
+        let near = TOLERANCES.equality * longest(&self.rods);
+        let on_line = |axis: DVec3| {
+            let mut apart = apart.iter();
+            apart.all(|it| it.reject_from_normalized(axis).length() <= near)
+        };
+        let loads = self.group_loads(group);
+        let axis = self.support_line(group, apart)?;
+        let turns = on_line(axis)
+            && loads.iter().all(|load| is_along(*load, axis))
+            && self.coupling_is_isotropic(group, axis);
+        turns.then_some(axis)
+    }
+
+    /// Moments that keep a leaf from resting: on a group of veins that turns as a rigid body while no
+    /// force does work, their sum about the axis is not zero.
+    pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
+        if self.base_held != SupportKind::Pinned || self.wind.is_some() {
+            return None;
+        }
+        self.tied_groups().into_iter().find_map(|group| {
+            let apart = self.support_offsets(&group)?;
+            let moments = self.group_moments(&group);
+            let whole: DVec3 = moments.iter().sum();
+            let size: f64 = moments.iter().map(|moment| moment.length()).sum();
+            let (line, moment) = match self.support_line(&group, &apart) {
+                Some(_) => {
+                    let axis = self.axis_between_hinges(&group, &apart)?;
+                    let held = apart
+                        .iter()
+                        .any(|place| is_along(*place, axis) && *place != DVec3::ZERO);
+                    let line = if held {
+                        "the line through its holders"
+                    } else {
+                        "the line along its loads through its hinge"
+                    };
+                    (line, whole.dot(axis))
+                }
+                None => ("any line through its hinge", whole.length()),
+            };
+            (moment.abs() > TOLERANCES.equality * size).then_some(UnbalancedMoment { line, moment })
+        })
+    }
+
+    /// The places where a group of veins is held, from that of its first hinge; `None` if clamps hold
+    /// it, or grips, whose places depend on the shapes at rest.
+    fn support_offsets(&self, group: &Range<usize>) -> Option<Vec<DVec3>> {
+        let tip = self.held_tip.as_ref();
+        let gripped = self.grips.iter().any(|grip| group.contains(&grip.vein));
+        let clamped = tip.is_some_and(|held| held.clamps.is_some());
+        if gripped || clamped {
+            return None;
+        }
+        let tip = tip.map(|held| DVec3::from_array(held.position));
+        let bases = self.rods[group.clone()].iter().map(Rod::base_position);
+        let first = self.rods[group.start].base_position();
+        Some(bases.chain(tip).map(|place| place - first).collect())
+    }
+
+    /// The direction of the line through these places, or of a load; `None` without any.
+    fn support_line(&self, group: &Range<usize>, apart: &[DVec3]) -> Option<DVec3> {
+        let near = TOLERANCES.equality * longest(&self.rods);
+        let line = apart.iter().find(|apart| apart.length() > near).copied();
+        let load = |load: &DVec3| *load != DVec3::ZERO;
+        let axis = line.or_else(|| self.group_loads(group).into_iter().find(load));
+        axis.map(DVec3::normalize)
+    }
+
+    /// Whether a group of veins on one hinge has no load: nothing tells where it points.
+    pub fn has_undetermined_orientation(&self) -> bool {
+        let free = |group: Range<usize>| {
+            let apart = self.support_offsets(&group);
+            let points = |apart: Vec<DVec3>| self.support_line(&group, &apart).is_some();
+            !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
+        };
+        let hinged = self.base_held == SupportKind::Pinned && self.wind.is_none();
+        hinged && self.tied_groups().into_iter().any(free)
+    }
+
+    /// Whether every coupling within a group has one stiffness in all directions across an axis: no
+    /// turn about the axis changes its energy.
+    fn coupling_is_isotropic(&self, group: &Range<usize>, axis: DVec3) -> bool {
+        self.coupling[group.start..group.end - 1].iter().all(|k| {
+            (0..3).any(|own| {
+                let [one, other] = [k[(own + 1) % 3], k[(own + 2) % 3]];
+                let on_axis =
+                    axis.reject_from_normalized(DVec3::AXES[own]).length() <= TOLERANCES.equality;
+                are_nearly_equal(one, other) && (are_nearly_equal(one, k[own]) || on_axis)
+            })
+        })
+    }
+
+    /// Whether dead moments, which have no potential, act on a group of veins.
+    fn has_moments_on(&self, group: &Range<usize>) -> bool {
+        self.group_moments(group)
+            .iter()
+            .any(|it| *it != DVec3::ZERO)
+    }
+
+    /// The dead moments on a group of veins.
+    fn group_moments(&self, group: &Range<usize>) -> Vec<DVec3> {
+        let points = self.points.iter().filter(|it| group.contains(&it.vein));
+        let moments = points.map(|it| it.moment).chain([self.tip_moment]);
+        moments.map(DVec3::from_array).collect()
+    }
+
+    /// All loads on a group of veins, those that vary along a vein at the knots of their profiles.
+    fn group_loads(&self, group: &Range<usize>) -> Vec<DVec3> {
+        let points = self.points.iter();
+        let points = points.filter(|point| group.contains(&point.vein));
+        let of_veins = group.clone().flat_map(|vein| {
+            let weight = self.weight(vein);
+            let of_mass = weight.of_mass.map(|(g, _)| g);
+            let weights = [weight.even].into_iter().chain(of_mass);
+            weights.chain(self.distributed_at_knots(vein))
+        });
+        let forces = points.map(|point| self.force_on(point));
+        let all = of_veins.chain(forces).chain([self.tip_force]);
+        all.map(DVec3::from_array).collect()
+    }
+
+    /// The veins that couplings, tissue or a free joint tip tie together.
+    fn tied_groups(&self) -> Vec<Range<usize>> {
+        let share_tip = self.joined && self.held_tip.is_none();
+        let tissue = |gap: usize| self.tissue.as_ref().is_some_and(|all| has_some(&all[gap]));
+        let tied = |gap: usize| share_tip || self.coupling[gap] != [0.0; 3] || tissue(gap);
+        let ends = (1..=self.rods.len()).filter(|&end| end == self.rods.len() || !tied(end - 1));
+        let mut start = 0;
+        ends.map(|end| std::mem::replace(&mut start, end)..end)
+            .collect()
+    }
+
+    /// The axis about which a group of tied veins can turn between clamps.
+    fn axis_between_clamps(&self, group: Range<usize>) -> Option<DVec3> {
+        let rods = &self.rods[group.clone()];
+        let tangent = |rod: &Rod| rod.base_rotation() * DVec3::X;
+        let mut grips = self.grips.iter().filter(|grip| group.contains(&grip.vein));
+        let gripped = grips.clone().any(|grip| grip.held == SupportKind::Clamped);
+        let clamps = self.held_tip.as_ref().and_then(|tip| tip.clamps.as_ref());
+        let clamp = clamps.map(|clamps| clamps[group.start].rotation() * DVec3::X);
+        // Where grips hold a vein depends on how it begins in the natural leaf.
+        let free = self.base_held == SupportKind::Pinned && grips.clone().next().is_none();
+        let axis = match self.base_held {
+            SupportKind::Pinned if free => clamp?,
+            SupportKind::Pinned if !gripped && clamp.is_none() => return None,
+            _ => tangent(rods.first()?),
+        };
+        let in_line = |direction: DVec3| direction.distance(axis) <= TOLERANCES.equality;
+        let along = |load: [f64; 3]| is_along(DVec3::from_array(load), axis);
+        let held = self.held_tip.as_ref().is_none_or(|held| {
+            let clamps = held.clamps.as_ref().map(|clamps| &clamps[group.clone()]);
+            let mut clamps = clamps.into_iter().flatten();
+            along(held.position) && clamps.all(|clamp| in_line(clamp.rotation() * DVec3::X))
+        });
+        let gaps = group.start..group.end - 1;
+        let tissue = self
+            .tissue
+            .iter()
+            .any(|all| all[gaps.clone()].iter().any(has_some));
+        let begins =
+            |rod: &Rod| (free || in_line(tangent(rod))) && is_along(rod.base_position(), axis);
+        let turns = rods.iter().all(begins)
+            && !tissue
+            && self.group_loads(&group).iter().all(|load| is_along(*load, axis))
+            && grips.all(|grip| along(grip.displacement))
+            && !self.has_moments_on(&group)
+            && held
+            && self.coupling_is_isotropic(&group, axis)
+            // Comparing profiles takes longest.
+            && rods.iter().all(is_round);
+        turns.then_some(axis)
+    }
+
+    /// The distributed load of a vein where it may have extremes.
+    fn distributed_at_knots(&self, vein: usize) -> impl Iterator<Item = [f64; 3]> {
+        let loads = self.distributed.iter().map(move |all| &all[vein]);
+        loads.flat_map(|load| {
+            let inner = load.iter().flat_map(|one| one.kinks()).copied();
+            let knots = [0.0, 1.0].into_iter().chain(inner);
+            knots.map(|sigma| load.each_ref().map(|one| one.at(sigma)))
+        })
+    }
+
+    /// Number of directions in which the leaf can move without resistance in an equilibrium: one
+    /// for every vein that can spin, and for every group that can turn and is bent. Each has an
+    /// eigenvalue that is zero. `points` gives the points of a vein.
+    pub fn neutral_directions<P: IntoIterator<Item = DVec3>>(
+        &self,
+        points: impl Fn(usize) -> P,
+    ) -> usize {
+        let near = TOLERANCES.axis_distance * longest(&self.rods);
+        let moves = |rotation: &ZeroEnergyRotation| {
+            let points: Vec<DVec3> = rotation.rods.clone().flat_map(&points).collect();
+            rotation.moves_something(&points, rotation.point, near)
+        };
+        self.zero_energy_rotations()
+            .iter()
+            .filter(|it| moves(it))
+            .count()
+    }
+}
+
+fn is_along(vector: DVec3, axis: DVec3) -> bool {
+    vector.reject_from_normalized(axis).length() <= TOLERANCES.equality * vector.length()
+}
+
+fn has_some(tissue: &Tissue) -> bool {
+    *tissue != Tissue::default()
+}
+
+fn are_nearly_equal(a: f64, b: f64) -> bool {
+    a == b || (a - b).abs() <= TOLERANCES.equality * a.abs().max(b.abs())
+}
+
+/// Whether sections have no preferred direction, and a vein at rest is straight.
+fn is_round(rod: &Rod) -> bool {
+    let alike = |a: &Profile, b: &Profile| {
+        let steps = TOLERANCES.profile_steps;
+        let even = (0..=steps).map(|i| i as f64 / steps as f64);
+        let kinks = a.kinks().iter().chain(b.kinks()).copied();
+        even.chain(kinks)
+            .all(|sigma| are_nearly_equal(a.at(sigma), b.at(sigma)))
+    };
+    let [_, bending_2, bending_3] = &rod.couple_stiffness;
+    let [_, shear_2, shear_3] = &rod.force_stiffness;
+    let curved = rod.rest_curvature[1..].iter().any(|of| of.max_abs() > 0.0);
+    !curved && alike(bending_2, bending_3) && alike(shear_2, shear_3)
+}
