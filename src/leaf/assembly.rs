@@ -248,7 +248,7 @@ struct GroupRods<'a> {
     q: [&'a [DQuat]; GROUP],
     n: [&'a [DVec3]; GROUP],
     /// Positions of the previous and the next rods, or their own if there is none.
-    neighbour_positions: [[&'a [DVec3]; GROUP]; 2],
+    neighbor_positions: [[&'a [DVec3]; GROUP]; 2],
     loads: GroupLoads,
 }
 
@@ -264,7 +264,7 @@ impl<'a> GroupRods<'a> {
             x: rods.map(x),
             q: rods.map(|j| &state.q[state.base(j)..][..=n]),
             n: rods.map(|j| &state.n[j * n..][..n]),
-            neighbour_positions: [
+            neighbor_positions: [
                 rods.map(|j| x(j.saturating_sub(1))),
                 rods.map(|j| x((j + 1).min(last))),
             ],
@@ -379,7 +379,7 @@ impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
             }
             let tip = i + 1 == n;
             let weights = rods.leaf.node_weights(i + 1);
-            let [previous, next] = rods.neighbour_positions;
+            let [previous, next] = rods.neighbor_positions;
             let x = [
                 lane_vectors(simd, previous, i + 1, part),
                 lane_vectors(simd, rods.x, i + 1, part),

@@ -300,7 +300,7 @@ impl DiscreteLeaf {
         (0..self.rods()).flat_map(move |j| of.clone().map(move |i| (j, i)))
     }
 
-    /// Whether neighbouring rods are coupled.
+    /// Whether neighboring rods are coupled.
     pub fn coupled(&self) -> bool {
         let between = self.coupling.iter().take(self.rods() - 1);
         between.into_iter().any(|&k| k != DVec3::ZERO)

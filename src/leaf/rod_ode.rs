@@ -90,7 +90,7 @@ pub struct RodIntegrator<'a> {
 struct RungeKuttaStage {
     fields: Vec<GroupFields>,
     /// Positions again, contiguous for each axis, with padding before the first rod and after
-    /// the last, so that those of neighbours are adjacent.
+    /// the last, so that those of neighbors are adjacent.
     x: [Vec<f64>; 3],
 }
 
@@ -100,7 +100,7 @@ impl<'a> RodIntegrator<'a> {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);
             if leaf.leaf.is_halved_midrib(j) {
-                // The image of the neighbour pulls the midrib back into the plane.
+                // The image of the neighbor pulls the midrib back into the plane.
                 load.previous.y = 0.0;
             }
             load
@@ -241,7 +241,7 @@ impl<'a> RodIntegrator<'a> {
             slopes[at.group][ENERGY].0[at.lane] += energy;
             for (j, mut load) in [g, g + 1].into_iter().zip(on_nodes) {
                 if leaf.is_halved_midrib(j) {
-                    // The image of the neighbour pulls the midrib back into the plane.
+                    // The image of the neighbor pulls the midrib back into the plane.
                     (load.moment.x, load.moment.z, load.force.y) = (0.0, 0.0, 0.0);
                 }
                 let at = rod_lane(j);

@@ -179,7 +179,7 @@ impl DiscreteLeaf {
         tips.into_iter().chain(grips).collect()
     }
 
-    /// Moment and force on node `i` of rod `j` by its segments, loads and neighbours.
+    /// Moment and force on node `i` of rod `j` by its segments, loads and neighbors.
     pub(super) fn unbalanced_node_load(&self, state: &State, j: usize, i: usize) -> Wrench {
         let n = self.segments();
         let gradient = |i: usize| {
@@ -294,7 +294,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Sets the entries of held components between neighbouring rods to zero.
+    /// Sets the entries of held components between neighboring rods to zero.
     pub(super) fn clear_held_gap_blocks(&self, system: &mut System) {
         for (g, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             if g + 1 < self.rods() {

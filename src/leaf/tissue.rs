@@ -1,5 +1,5 @@
-//! Tissue between neighbouring veins: the law of a strip ([`TissueStrip`]) at every node of every gap,
-//! in the sums over the leaf, and the blocks between nodes of neighbouring rods, which strips tie by
+//! Tissue between neighboring veins: the law of a strip ([`TissueStrip`]) at every node of every gap,
+//! in the sums over the leaf, and the blocks between nodes of neighboring rods, which strips tie by
 //! forces and moments.
 
 use crate::leaf::block_tridiagonal::{RodLane, rod_lane};
@@ -11,7 +11,7 @@ use crate::rod::{NodeBlock, NodePair, StripLoads, TissueStrip, Wrench};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
-/// Sections of two neighbouring veins that tissue ties, turned against each other by half a turn.
+/// Sections of two neighboring veins that tissue ties, turned against each other by half a turn.
 /// The law of the tissue depends on the shorter one of both rotations between them, and jumps there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfTurn {
@@ -132,7 +132,7 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// Whether tissue ties neighbouring rods.
+    /// Whether tissue ties neighboring rods.
     pub fn has_tissue(&self) -> bool {
         !self.strips.is_empty()
     }
@@ -361,13 +361,13 @@ fn strip_ends(state: &State, g: usize, i: usize) -> NodePair {
 }
 
 impl System {
-    /// Whether tissue ties neighbours, also by moments: then the matrix must be factorized as a
+    /// Whether tissue ties neighbors, also by moments: then the matrix must be factorized as a
     /// whole, as rod by rod conjugate gradients take too many iterations.
     pub fn has_tissue(&self) -> bool {
         !self.gap_blocks.is_empty()
     }
 
-    /// The unknowns of a node (rotation, displacement) that are coupled with those of neighbours.
+    /// The unknowns of a node (rotation, displacement) that are coupled with those of neighbors.
     pub(super) fn coupled_unknowns(&self) -> [bool; 6] {
         let along = |c: usize| self.gaps.iter().any(|gap| gap[c] != 0.0);
         std::array::from_fn(|c| self.has_tissue() || c >= 3 && along(c - 3))

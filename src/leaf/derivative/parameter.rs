@@ -80,7 +80,7 @@ impl<'s> ProfileDerivative<'s> {
 }
 
 impl<'s> LeafParameterDerivative<'s> {
-    /// The derivative of `leaf` from neighbouring scenarios.
+    /// The derivative of `leaf` from neighboring scenarios.
     pub fn new(leaf: &Leaf, terms: &'s [Weighted<Scenario>]) -> Self {
         let scale = leaf.scale;
         let sum = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
@@ -416,7 +416,7 @@ fn moment_rates(terms: &[Weighted<Scenario>], unit: f64) -> Vec<PointMoment> {
     all.filter(|it| it.moment != DVec3::ZERO).collect()
 }
 
-/// The leaves of neighbouring scenarios, in the units of `leaf`.
+/// The leaves of neighboring scenarios, in the units of `leaf`.
 fn weighted_leaves(leaf: &Leaf, terms: &[Weighted<Scenario>]) -> Vec<Weighted<Leaf>> {
     let each = terms.iter().map(|it| Weighted {
         weight: it.weight,

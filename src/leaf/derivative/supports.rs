@@ -120,7 +120,7 @@ impl DiscreteLeaf {
     }
 
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
-    /// tip neighbours are displaced alike, and rotations that are prescribed there are held.
+    /// tip neighbors are displaced alike, and rotations that are prescribed there are held.
     fn add_coupling_response(
         &self,
         state: &State,

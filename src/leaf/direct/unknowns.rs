@@ -118,7 +118,7 @@ struct DissectionOrder {
 
 impl DissectionOrder {
     /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves first, then the line
-    /// between them. The coupled unknowns of a rod alone separate its neighbours: its other unknowns
+    /// between them. The coupled unknowns of a rod alone separate its neighbors: its other unknowns
     /// precede them.
     fn dissect(&mut self, rods: Range<usize>, nodes: Range<usize>) {
         let (width, length) = (rods.len(), nodes.len());
@@ -146,7 +146,7 @@ impl DissectionOrder {
         }
     }
 
-    /// Numbers the unknowns of a rod that are not coupled with neighbours, then those that are.
+    /// Numbers the unknowns of a rod that are not coupled with neighbors, then those that are.
     fn number_rod(&mut self, j: usize, nodes: Range<usize>) {
         let coupled = self.coupled;
         let is_coupled = |c: usize| coupled[c];
