@@ -6,7 +6,7 @@
 use crate::leaf::{DiscreteLeaf, State};
 use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
 use crate::numbers::format_two_digits;
-use crate::simulate::{Options, Scheme};
+use crate::simulate::request::{Options, Scheme};
 use crate::words;
 use serde::{Serialize, Serializer};
 use std::fmt;

@@ -1,75 +1,16 @@
 //! A leaf at an instant, the record of a simulation that has ended, and which outputs are chosen for a few
 //! pictures or a film.
 
-use crate::leaf::Leaf;
-use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
+use crate::motion::{Energy, StableStep};
 use crate::scenario;
-use crate::shape::{InterpolationWeights, interpolation_weights, serialize_tips};
+use crate::shape::serialize_tips;
+use crate::simulate::comparison::{OutputSample, ROUNDING, ShapeSnapshot};
 use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
-use crate::simulate::{Scheme, SchemeChoice, Simulation, Stopped};
-use glam::{DQuat, DVec3};
+use crate::simulate::request::Scheme;
+use crate::simulate::{SchemeChoice, Simulation, Stopped};
+use glam::DVec3;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
-
-/// Largest deviation of the energy balance, as a part of the largest energy that moved,
-/// without a remark.
-const LARGEST_IMBALANCE: f64 = 0.05;
-
-/// Energy, in units of A/L, that may be due to rounding.
-const ROUNDING: f64 = 1e-9;
-
-/// Data recorded at every output, in the units of the scenario.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OutputSample {
-    /// Time.
-    pub time: f64,
-    /// Number of time steps so far.
-    pub steps: usize,
-    /// Energies.
-    pub energy: Energy,
-    /// The shared tip, or the mean of free ones.
-    pub tip: DVec3,
-    /// A bound on the error of the tips and of the middles of all rods at all outputs so far,
-    /// where it is known.
-    pub error: Option<f64>,
-}
-
-impl OutputSample {
-    /// The data of a frame. Negative zeros become zeros, as in the files,
-    /// so that data read back are the same.
-    pub fn from_frame(frame: &Frame, joined: bool) -> Self {
-        let tips = frame.tips(joined);
-        OutputSample {
-            time: frame.time + 0.0,
-            steps: frame.steps,
-            energy: frame.energy.map(|e| e + 0.0),
-            tip: tips.iter().sum::<DVec3>() / tips.len() as f64 + DVec3::ZERO,
-            error: frame.error,
-        }
-    }
-}
-
-impl Imbalance {
-    /// The imbalance of the outputs of a motion, if it is more than a few per cent.
-    fn from_samples(moments: &[OutputSample], rounding: f64) -> Option<Self> {
-        let start = moments.first()?.energy;
-        let (mut moved, mut off) = (rounding, 0.0_f64);
-        for OutputSample { energy: e, .. } in moments {
-            moved = moved.max(e.exchanged_energy(start.potential));
-            off = off.max((e.balance() - start.balance()).abs());
-        }
-        (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))
-    }
-}
-
-/// The shape of a leaf at an instant, for pictures.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ShapeSnapshot {
-    /// Index of its moment.
-    pub moment: usize,
-    /// Positions of the nodes of every rod, base to tip.
-    pub curves: Vec<Vec<DVec3>>,
-}
 
 /// A simulation that has ended: its outcome and its outputs. In the units of
 /// the scenario. As JSON it is `motion.json`.
@@ -242,105 +183,6 @@ fn serialize_moments<S: Serializer>(
     keys.serialize_entry("frames", &moments.len())?;
     keys.serialize_entry("energy", &energies)?;
     keys.end()
-}
-
-/// Number of nodes for cubic interpolation.
-pub(super) const CUBIC: usize = 4;
-
-/// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
-/// by rod, base to tip.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// Time.
-    pub time: f64,
-    /// Number of time steps so far.
-    pub steps: usize,
-    /// Number of rods.
-    pub rods: usize,
-    /// Positions of all nodes.
-    pub positions: Vec<DVec3>,
-    /// Rotations of all nodes.
-    pub rotations: Vec<DQuat>,
-    /// Velocities of all nodes, along the lab axes.
-    pub velocities: Vec<Velocity>,
-    /// Energies.
-    pub energy: Energy,
-    /// As of a [`OutputSample`].
-    pub error: Option<f64>,
-}
-
-impl Frame {
-    pub(super) fn new(leaf: &Leaf, physics: &Physics, snapshot: &Snapshot, steps: usize) -> Self {
-        let (length, time, energy) = (leaf.scale.length, physics.time_unit, leaf.scale.moment());
-        let velocity = |v: &Velocity| Velocity {
-            angular: v.angular / time,
-            linear: v.linear * (length / time),
-        };
-        Frame {
-            time: snapshot.time * time,
-            steps,
-            rods: leaf.rods(),
-            positions: snapshot.state.x.iter().map(|x| *x * length).collect(),
-            rotations: snapshot.state.q.clone(),
-            velocities: snapshot.velocity.iter().map(velocity).collect(),
-            energy: snapshot.energy.map(|e| e * energy),
-            error: None,
-        }
-    }
-
-    /// The leaf with nodes at the fractions `to` of the length, by cubic interpolation between
-    /// those at the fractions `from`.
-    pub fn interpolated_to_stations(&self, from: &[f64], to: &[f64]) -> Frame {
-        let weights: Vec<_> = to
-            .iter()
-            .map(|&at| interpolation_weights(from, at, CUBIC))
-            .collect();
-        let mut there = Frame {
-            positions: Vec::new(),
-            rotations: Vec::new(),
-            velocities: Vec::new(),
-            ..self.clone()
-        };
-        for base in (0..self.rods).map(|rod| rod * from.len()) {
-            for InterpolationWeights { first, weights } in &weights {
-                let near = || (base + first..).zip(weights.iter().copied());
-                let sum = |of: &dyn Fn(usize) -> DVec3| near().map(|(i, w)| w * of(i)).sum();
-                // Quaternions of equal rotations may differ in sign: align them.
-                let side = self.rotations[base + first];
-                let rotation = near().fold(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), |sum, (i, w)| {
-                    let q = self.rotations[i];
-                    sum + q * w.copysign(w * q.dot(side))
-                });
-                there.positions.push(sum(&|i| self.positions[i]));
-                there.rotations.push(rotation.normalize());
-                there.velocities.push(Velocity {
-                    linear: sum(&|i| self.velocities[i].linear),
-                    angular: sum(&|i| self.velocities[i].angular),
-                });
-            }
-        }
-        there
-    }
-
-    /// Nodes of a rod: positions from base to tip.
-    pub fn centerline(&self, rod: usize) -> &[DVec3] {
-        let nodes = self.positions.len() / self.rods;
-        &self.positions[rod * nodes..(rod + 1) * nodes]
-    }
-
-    /// The centerlines of all rods.
-    pub fn curves(&self) -> Vec<Vec<DVec3>> {
-        (0..self.rods)
-            .map(|rod| self.centerline(rod).to_vec())
-            .collect()
-    }
-
-    /// The shared tip alone, or one tip per rod.
-    pub fn tips(&self, joined: bool) -> Vec<DVec3> {
-        let ends = self.positions.chunks(self.positions.len() / self.rods);
-        let tips = ends.map(|rod| rod[rod.len() - 1]);
-        tips.take(if joined { 1 } else { self.rods }).collect()
-    }
 }
 
 /// A tip that moves by less than this part of the longest rod counts as hardly moving.

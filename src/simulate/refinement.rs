@@ -11,16 +11,12 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
-use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
-use crate::shape::{InterpolationWeights, interpolation_weights};
-use crate::simulate::record::CUBIC;
+use crate::simulate::comparison::{MotionComparison, RunTrajectory, Trajectory};
 use crate::simulate::remark::MotionDoubt;
-use crate::simulate::{
-    DEFAULT_TIP_ERROR, Frame, Options, Scheme, SchemeChoice, Simulation, SimulationError,
-};
-use crate::{relax, scenario, simulate};
-use glam::DVec3;
+use crate::simulate::request::{DEFAULT_TIP_ERROR, Options, Scheme, SimulationError};
+use crate::simulate::{SchemeChoice, Simulation, start};
+use crate::{relax, scenario};
 
 /// Seconds, on one core of a machine of 2020, that all runs of a motion may take together. The
 /// first run, and that which it is compared with, take what they need.
@@ -303,7 +299,7 @@ impl Refinement {
             limit: self.options.limit.clone(),
         };
         let from = |leaf: &Leaf, grid: &Grid| {
-            simulate::start_state(leaf, grid, start_tolerance, options.limit.clone())
+            start::start_state(leaf, grid, start_tolerance, options.limit.clone())
         };
         Simulation::with_initial_state(&self.scenario, &options, &from)
     }
@@ -418,188 +414,5 @@ impl Refinement {
         let coarser = self.coarser.clone()?;
         next.halve_coarser_steps(&coarser.trajectory);
         Some(MotionComparison::new(next.segments(), coarser, self.length))
-    }
-}
-
-/// How the error of a run follows from its difference from another.
-struct RunComparison {
-    /// The bar over the error that the order of the methods says: the difference itself where a
-    /// phase is lost.
-    safety: f64,
-    /// Two runs have parted where they differ by more than this part of the largest displacement in
-    /// the motion: phases differ by so many radians, or one has snapped and the other has not.
-    parted: f64,
-    /// As long as displacements since the start differ by more than that part of the largest of
-    /// them so far, as those of a shared tip do while waves cross the first segments, the order of
-    /// the methods is not to be seen, and this factor is in its place. (A joined leaf let go needed
-    /// 8.)
-    unresolved_safety: f64,
-    /// Runs that differ by less than this part of the longest rod have not parted, however little
-    /// the leaf moves: they have come to rest, or vibrate with such an amplitude.
-    negligible: f64,
-    /// What rounding leaves of differences, relative to the longest rod.
-    rounding: f64,
-}
-
-const COMPARISON: RunComparison = RunComparison {
-    safety: 3.0,
-    parted: 0.2,
-    unresolved_safety: 10.0,
-    negligible: 1e-3,
-    rounding: 1e-12,
-};
-
-/// Where the compared points are at all outputs of a run.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Trajectory {
-    points: Vec<DVec3>,
-    /// Number of points at an output.
-    points_per_output: usize,
-    /// The longest step before every output but the first, in the method's unit; infinite where
-    /// all steps have the same length.
-    pub longest_steps: Vec<f64>,
-}
-
-impl Trajectory {
-    pub fn add(&mut self, points: &[DVec3]) {
-        self.points.extend_from_slice(points);
-        self.points_per_output = points.len();
-    }
-
-    fn output_points(&self, output: usize) -> Option<&[DVec3]> {
-        self.points
-            .chunks(self.points_per_output.max(1))
-            .nth(output)
-    }
-
-    /// The largest displacement from the first output.
-    fn largest_displacement(&self) -> f64 {
-        let start = self.output_points(0).unwrap_or(&[]);
-        let outputs = self.points.chunks(self.points_per_output.max(1));
-        outputs.fold(0.0, |most, points| {
-            largest_distance(points, start).max(most)
-        })
-    }
-
-    /// The largest distances so far from another run, at the outputs that both have.
-    pub fn distances(&self, other: &Trajectory) -> Vec<f64> {
-        let outputs =
-            (0..).map_while(|output| self.output_points(output).zip(other.output_points(output)));
-        let mut most = 0.0_f64;
-        let distances = outputs.map(|(own, other)| {
-            most = larger(most, largest_distance(own, other));
-            most
-        });
-        distances.collect()
-    }
-}
-
-fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
-    largest(own.iter().zip(other).map(|(a, b)| a.distance(*b)))
-}
-
-/// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
-/// held.
-pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
-    let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC);
-    let mut points = frame.tips(joined);
-    for rod in 0..frame.rods {
-        let near = frame.centerline(rod)[first..].iter().zip(&weights);
-        points.push(near.map(|(position, weight)| *position * *weight).sum());
-    }
-    points
-}
-
-/// Where the compared points are in a run on a grid of so many segments.
-#[derive(Clone, Debug)]
-pub(super) struct RunTrajectory {
-    pub segments: usize,
-    pub trajectory: Trajectory,
-}
-
-/// A run compared with others, output after output.
-#[derive(Clone, Debug)]
-pub(super) struct MotionComparison {
-    other: Trajectory,
-    /// Segments of the other run.
-    pub segments: usize,
-    /// The bar over the distance from the other run.
-    factor: f64,
-    /// Bars on what that distance does not show, where both runs have the same steps.
-    of_steps: Option<Vec<f64>>,
-    /// The distance from which runs have parted.
-    parting_distance: f64,
-    rounding: f64,
-    /// The points at the first output, and the largest displacement from there so far.
-    start: Vec<DVec3>,
-    displacement: f64,
-    /// The bar at the last output; none from where runs have parted.
-    pub error_bar: Option<f64>,
-}
-
-impl MotionComparison {
-    /// Compares a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
-    /// longest rod has this length.
-    pub fn new(segments: usize, other: RunTrajectory, length: f64) -> Self {
-        let RunTrajectory {
-            segments: others,
-            trajectory: other,
-        } = other;
-        let [own, its] = [segments, others].map(|count| (count as f64).powi(-2));
-        MotionComparison {
-            factor: COMPARISON.safety * own / (its - own).abs(),
-            segments: others,
-            of_steps: None,
-            parting_distance: (COMPARISON.parted * other.largest_displacement())
-                .max(COMPARISON.negligible * length),
-            rounding: COMPARISON.rounding * length,
-            start: Vec::new(),
-            displacement: 0.0,
-            error_bar: Some(0.0),
-            other,
-        }
-    }
-
-    /// Adds the distances of the other run from one like it in steps half as long.
-    pub fn with_half_steps(mut self, halved: &Trajectory) -> Self {
-        let distances = self.other.distances(halved);
-        let bar = |distance: f64| match distance <= self.parting_distance {
-            true => 4.0 / 3.0 * COMPARISON.safety * distance,
-            false => f64::INFINITY,
-        };
-        self.of_steps = Some(distances.into_iter().map(bar).collect());
-        self
-    }
-
-    /// Compares the points of an output, behind all before it.
-    pub fn compare_output(&mut self, output: usize, points: &[DVec3]) {
-        let of_steps = match &self.of_steps {
-            None => Some(0.0),
-            Some(bars) => bars.get(output).copied().filter(|bar| bar.is_finite()),
-        };
-        if output == 0 {
-            self.start = points.to_vec();
-        }
-        let displacement = largest_distance(points, &self.start);
-        self.displacement = larger(self.displacement, displacement);
-        let (others_start, start) = (self.other.output_points(0), &self.start);
-        let there = self
-            .other
-            .output_points(output)
-            .zip(others_start)
-            .zip(of_steps);
-        let there = there.zip(self.error_bar);
-        self.error_bar = there.and_then(|(((other, others_start), of_steps), before)| {
-            let distance = largest_distance(points, other);
-            let moves = points.iter().zip(other).zip(start.iter().zip(others_start));
-            let moves = moves.map(|((a, b), (a0, b0))| ((*a - *a0) - (*b - *b0)).length());
-            let of_moves = largest(moves);
-            let factor = match of_moves <= COMPARISON.parted * self.displacement {
-                true => self.factor,
-                false => COMPARISON.unresolved_safety * self.factor,
-            };
-            let bar = factor * distance + of_steps + self.rounding;
-            (distance <= self.parting_distance).then(|| bar.max(before))
-        });
     }
 }

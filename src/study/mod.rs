@@ -11,19 +11,23 @@ mod margin;
 mod remark;
 mod sensitivity;
 mod trace;
-mod vary;
+pub(crate) mod vary;
 
 pub use crate::branch::{BranchEnd, CorrectorFailure, CriticalKind, VerificationFailure};
 pub use crate::run::UnknownWord;
 pub use crate::shooting::{NeutralDirection, ShootingSolution};
+pub use crate::study::boundary::map::BoundaryMap;
 pub use crate::study::boundary::{
-    BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
-    StabilityBoundary, trace_stability_boundary,
+    BoundaryCurve, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES, StabilityBoundary,
+    trace_stability_boundary,
 };
+pub use crate::study::chart::contender::{
+    AccuracySetting, ChartProgress, SolverConfig, TimingSpread,
+};
+pub use crate::study::chart::result::{ScalingRow, ScalingStudy};
 pub use crate::study::chart::{
-    AccuracySetting, Chart, ChartError, ChartOptions, ChartOutcome, ChartProgress, ChartRemark,
-    ChartRow, ChartRowRemark, FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution,
-    ScalingRow, ScalingStudy, SolverConfig, TimingSpread, chart, scaling,
+    Chart, ChartError, ChartOptions, ChartOutcome, ChartRemark, ChartRow, ChartRowRemark,
+    FastestByAccuracy, PeerMeasurement, PeerProgram, ReferenceSolution, chart, scaling,
 };
 pub use crate::study::check::{
     Check, CheckOptions, CheckVerdict, ComparedQuantity, DifferenceLocation, ShootingResult, check,
@@ -31,35 +35,40 @@ pub use crate::study::check::{
 pub use crate::study::equilibria::{
     Equilibria, FoundEquilibrium, MOST_FRUITLESS_STARTS, equilibria,
 };
+pub use crate::study::fit::columns::FitError;
+pub use crate::study::fit::free::{FreeParameter, FreeParameterTarget, OffsetColumn};
+pub use crate::study::fit::result::{
+    ExperimentConditions, Fit, FitAlternative, FitCandidate, FitCostLimit, FitLeaf, FitOutcome,
+    FitParameter, FitResidual, FitStep, FitWork, SystematicResiduals,
+};
 pub use crate::study::fit::{
     ComparisonOperator, Data, DataFile, DataFileOptions, DataOrigin, Experiment,
-    ExperimentConditions, Fit, FitAlternative, FitCandidate, FitCandidateRemark, FitCostLimit,
-    FitError, FitLeaf, FitOutcome, FitParameter, FitRemark, FitRequest, FitResidual, FitStep,
-    FitWork, FreeParameter, FreeParameterTarget, MeasuredColumn, MeasuredQuantity, MeasuredValue,
-    OffsetColumn, RowCondition, RowFilter, SystematicResiduals, TracedVeinPoint, fit,
+    FitCandidateRemark, FitRemark, FitRequest, MeasuredColumn, MeasuredQuantity, MeasuredValue,
+    RowCondition, RowFilter, TracedVeinPoint, fit,
+};
+pub use crate::study::map::result::{
+    Map, MapMethod, MapOutcome, MapRequest, MapRow, MapShow, ReferenceConfidence,
 };
 pub use crate::study::map::{
-    DEFAULT_CELL_SECONDS, Map, MapJump, MapMethod, MapMotionFailure, MapOutcome, MapRefused,
-    MapRemark, MapRequest, MapRow, MapShow, ReferenceConfidence, map,
+    DEFAULT_CELL_SECONDS, MapJump, MapMotionFailure, MapRefused, MapRemark, map,
 };
-pub use crate::study::margin::{MarginError, MarginProgress, relax_with_margin};
+pub use crate::study::margin::barrier::MarginProgress;
+pub use crate::study::margin::{MarginError, relax_with_margin};
 pub use crate::study::remark::{
     BoundaryRemark, BranchRemark, CheckReason, EquilibriaRemark, SolutionRemark, TraceRemark,
 };
 pub use crate::study::sensitivity::{
     SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
 };
+pub use crate::study::trace::result::{ForceDisplacementLine, TraceShow, TraceUntil};
 pub use crate::study::trace::{
-    ForceDisplacementLine, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError,
-    TracePoint, TraceRequest, TraceShow, TraceUntil, trace, trace_through,
+    MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
+    TraceRequest, trace, trace_through,
 };
 pub use crate::study::vary::{
     BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,
     VariableTarget, VariedScenario, VaryError,
 };
-
-/// Names of the lab axes in the words for quantities.
-const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 crate::renamed! {
     Base => BaseScenario,

@@ -735,6 +735,9 @@ impl BaseScenario {
     }
 }
 
+/// Names of the lab axes in the words for quantities.
+pub(super) const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
+
 #[cfg(test)]
 mod numbers_tests {
     use super::*;

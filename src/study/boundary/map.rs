@@ -12,7 +12,6 @@ use crate::branch::{BranchEnd, CriticalKind, CriticalPoint};
 use crate::leaf::Grid;
 use crate::numbers::largest;
 use crate::shape::interpolation_weights;
-use crate::study::boundary::BoundaryMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -625,6 +624,21 @@ pub fn interpolate_polynomial(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) 
         }
     }
     sum
+}
+
+/// Cells of the plane of two parameters, of equal size on the scales of the axes.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryMap {
+    /// Values of the first parameter at the centers of the cells.
+    pub first: Vec<f64>,
+    /// Values of the second parameter there.
+    pub second: Vec<f64>,
+    /// Morse index of equilibria continued from cell to cell, beginning with that at
+    /// the start of the first parameter's range; row by row of the second; none where branches
+    /// turn back before, or could not be followed.
+    pub index: Vec<Vec<Option<usize>>>,
+    /// Cells for which the curves imply another index: column and row, from 1.
+    pub disagreeing: Vec<[usize; 2]>,
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Curves begin at the critical points of a trace along the first parameter, and at those of the paths by
 //! which the cells of a map are reached.
 
-mod map;
+pub(super) mod map;
 
 use crate::branch::boundary::{
     BoundaryAccuracy, BoundaryContinuationOptions, BoundaryNeighbour, BoundarySeed,
@@ -15,7 +15,7 @@ use crate::run::{Instant, RefusedOption};
 use crate::scenario::{PlausibilityWarning, Scenario};
 use crate::shape::serialize_tips;
 use crate::study::ParameterKeys;
-use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
+use crate::study::boundary::map::{BoundaryMap, IndexMapSweep, remove_repeated_ends};
 use crate::study::remark::BoundaryRemark;
 use crate::study::trace::{
     LONGEST_BRANCH_STEP, PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest,
@@ -504,21 +504,6 @@ pub struct BoundaryPoint {
     /// Centerlines on the finest grid, one per rod.
     #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
-}
-
-/// Cells of the plane of two parameters, of equal size on the scales of the axes.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct BoundaryMap {
-    /// Values of the first parameter at the centers of the cells.
-    pub first: Vec<f64>,
-    /// Values of the second parameter there.
-    pub second: Vec<f64>,
-    /// Morse index of equilibria continued from cell to cell, beginning with that at
-    /// the start of the first parameter's range; row by row of the second; none where branches
-    /// turn back before, or could not be followed.
-    pub index: Vec<Vec<Option<usize>>>,
-    /// Cells for which the curves imply another index: column and row, from 1.
-    pub disagreeing: Vec<[usize; 2]>,
 }
 
 impl StabilityBoundary {

@@ -2,7 +2,7 @@
 
 use crate::relax::RelaxError;
 use crate::run::remarks;
-use crate::study::chart::{AccuracySetting, SolverConfig};
+use crate::study::chart::contender::{AccuracySetting, SolverConfig};
 use crate::study::remark::SolutionRemark;
 
 remarks! {

@@ -4,12 +4,11 @@
 
 use crate::relax::Outcome;
 use crate::scenario::longest;
+use crate::study::chart::contender::{
+    AccuracySetting, RepeatedRuns, SolverConfig, TimingSpread, pareto_front, serialize_spread,
+};
 use crate::study::chart::reference::ReferenceSolution;
 use crate::study::chart::remark::{ChartRemark, ChartRowRemark};
-use crate::study::chart::{
-    AccuracySetting, RepeatedRuns, ScalingStudy, SolverConfig, TimingSpread, pareto_front,
-    serialize_spread,
-};
 use crate::study::judge::{MethodSolution, common_stations};
 use serde::{Serialize, Serializer};
 
@@ -521,6 +520,31 @@ pub fn combine_peer_measurements(
         peers,
         remarks: of_another_leaf.into_iter().chain(without_error).collect(),
     }
+}
+
+/// Cost against the number of veins.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingStudy {
+    /// Name of the scenario.
+    #[serde(skip)]
+    pub scenario: String,
+    /// Required accuracy, relative to the longest rod.
+    pub tolerance: f64,
+    /// Numbers of veins whose reference is not confirmed.
+    pub unconfirmed: Vec<usize>,
+    /// One row for each leaf and contender.
+    #[serde(rename = "runs")]
+    pub rows: Vec<ScalingRow>,
+}
+
+/// One contender on one leaf.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingRow {
+    /// Number of veins.
+    pub rods: usize,
+    /// The measurement.
+    #[serde(flatten)]
+    pub row: ChartRow,
 }
 
 #[cfg(test)]

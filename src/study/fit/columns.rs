@@ -4,8 +4,9 @@
 //! Columns with other names are given theirs by [`MeasuredColumn`], with a factor and an offset for
 //! other units; [`RowFilter`] chooses rows.
 
-use crate::study::fit::FitError;
-use crate::study::{AXIS_NAMES, ParameterKeys};
+use crate::relax::RelaxError;
+use crate::study::vary::AXIS_NAMES;
+use crate::study::{ParameterKeys, VaryError};
 use std::num::NonZeroUsize;
 use std::str::FromStr;
 
@@ -326,4 +327,24 @@ impl Default for DataFileOptions {
             rows: Vec::new(),
         }
     }
+}
+
+/// Why nothing can be fitted.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// Data that cannot be used.
+    #[error("{0}")]
+    Data(String),
+    /// A number that cannot be free.
+    #[error("{0}")]
+    Free(String),
+    /// An experiment whose leaf does not come to rest.
+    #[error("{0}")]
+    NoEquilibrium(String),
+    /// A scenario that is invalid.
+    #[error(transparent)]
+    Vary(#[from] VaryError),
+    /// A relaxation that cannot be run.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
 }

@@ -4,9 +4,8 @@
 //! Experiments under the same conditions share a leaf: they are one [`ExperimentCase`].
 
 use crate::study::ParameterKeys;
-use crate::study::fit::FitError;
 use crate::study::fit::columns::{
-    COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE,
+    COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE, FitError,
     MeasuredColumn, MeasuredQuantity, ObservedCoordinates, TRACED_POINT_COLUMNS,
 };
 use crate::study::fit::table::{DataTable, line_error};

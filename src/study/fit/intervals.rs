@@ -9,11 +9,11 @@ use crate::study::fit::least_squares::{
     GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
 use crate::study::fit::model::{FitPoint, MOST_RELAXATION_STEPS};
+use crate::study::fit::result::{FitParameter, FitStep};
 use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, ConstrainedMinimum, DifferentiatedPoint, EvaluatedPoint, FitStatistics,
     GaussNewtonModel, MinimumNeighbourhood, UNDETERMINED_UNCERTAINTY, normalized_excess,
 };
-use crate::study::fit::{FitParameter, FitStep};
 use nalgebra::DVector;
 
 /// The free numbers with their intervals. The shape of the sum of squares away from

@@ -9,9 +9,10 @@
 
 use crate::scenario::longest;
 use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
+use crate::study::fit::free::FreeParameterTarget;
 use crate::study::fit::prediction::{DatumQuantity, ScalarDatum};
+use crate::study::fit::result::{FitParameter, SystematicResiduals};
 use crate::study::fit::statistics::FitStatistics;
-use crate::study::fit::{FitParameter, FreeParameterTarget, SystematicResiduals};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 

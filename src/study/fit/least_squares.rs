@@ -6,7 +6,7 @@
 //! the point is not a minimum in a weakly determined direction.
 
 use crate::relax::{ContinuationFailure, GridPolicy};
-use crate::study::fit::LONGEST_COORDINATE_STEP;
+use crate::study::fit::free::LONGEST_COORDINATE_STEP;
 use crate::study::fit::model::{FitModel, FitPoint, WeightedDerivatives, Weighting};
 use crate::study::fit::statistics::{
     NULL_SINGULAR_VALUE, SingularDirections, singular_value_decomposition,

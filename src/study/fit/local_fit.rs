@@ -7,8 +7,9 @@ use crate::numbers::format_two_digits;
 use crate::relax::ContinuationFailure;
 use crate::scenario::longest;
 use crate::study::ParameterKeys;
-use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::columns::{DatumDimension, FitError};
 use crate::study::fit::data::{Experiment, ObservedExperiment};
+use crate::study::fit::free::{FitCoordinate, LONGEST_COORDINATE_STEP};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
 use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
@@ -16,13 +17,13 @@ use crate::study::fit::least_squares::{
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
 use crate::study::fit::remark::FitRemark;
+use crate::study::fit::result::{
+    ExperimentConditions, Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitStep, FitWork,
+};
 use crate::study::fit::statistics::{
     BETTER_MINIMUM_EXCESS, FitStatistics, UNDETERMINED_UNCERTAINTY, sparse_basis,
 };
-use crate::study::fit::{
-    ExperimentConditions, Fit, FitCoordinate, FitError, FitLeaf, FitOutcome, FitParameter,
-    FitResidual, FitStep, FitWork, LONGEST_COORDINATE_STEP, intervals, lack_of_fit, statistics,
-};
+use crate::study::fit::{intervals, lack_of_fit, statistics};
 use std::collections::BTreeMap;
 
 /// How often a local search begins again.

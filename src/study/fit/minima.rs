@@ -5,17 +5,17 @@
 //! the data may not distinguish.
 
 use crate::run::Instant;
+use crate::study::fit::columns::FitError;
 use crate::study::fit::data::Experiment;
+use crate::study::fit::free::FitCoordinate;
 use crate::study::fit::least_squares::{
     ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
 };
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
 use crate::study::fit::remark::FitRemark;
+use crate::study::fit::result::{Fit, FitAlternative, FitOutcome, FitParameter, FitStep};
 use crate::study::fit::statistics::{BETTER_MINIMUM_EXCESS, UNDETERMINED_UNCERTAINTY};
-use crate::study::fit::{
-    Fit, FitAlternative, FitCoordinate, FitError, FitOutcome, FitParameter, FitStep,
-};
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};

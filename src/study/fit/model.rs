@@ -10,12 +10,12 @@ use crate::relax::{
     ContinuationFailure, GridPolicy, LARGEST_TOLERANCE, NestedEquilibrium, Options,
 };
 use crate::scenario::{Scenario, longest};
-use crate::study::fit::columns::{DatumDimension, MeasuredQuantity};
+use crate::study::fit::columns::{DatumDimension, FitError, MeasuredQuantity};
 use crate::study::fit::data::{
     Data, DataOrigin, ExperimentCase, MeasuredValue, TracedVeinPoint, experiment_cases,
 };
+use crate::study::fit::free::{FitCoordinate, FreeParameterTarget};
 use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
-use crate::study::fit::{FitCoordinate, FitError, FreeParameterTarget};
 use crate::study::{BaseScenario, ParameterKeys};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

@@ -16,7 +16,7 @@ use crate::study::fit::columns::{
     ObservedCoordinates,
 };
 use crate::study::fit::data::{DataOrigin, ExperimentCase, ObservedExperiment};
-use crate::study::fit::{FitCoordinate, FreeParameterTarget, OffsetColumn};
+use crate::study::fit::free::{FitCoordinate, FreeParameterTarget, OffsetColumn};
 use glam::DVec3;
 use std::sync::{Mutex, PoisonError};
 

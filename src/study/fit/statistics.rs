@@ -6,14 +6,14 @@
 //! residuals near a minimum, and the least sum of squares for a given displacement of one number.
 
 use crate::relax::{ContinuationFailure, GridPolicy};
-use crate::study::fit::columns::DatumDimension;
+use crate::study::fit::columns::{DatumDimension, FitError};
 use crate::study::fit::data::{Data, Experiment};
 use crate::study::fit::model::{
     EvaluationBudget, FitModel, FitPoint, WeightedDerivatives, Weighting,
 };
 use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
 use crate::study::fit::remark::FitCandidateRemark;
-use crate::study::fit::{FitCandidate, FitError};
+use crate::study::fit::result::FitCandidate;
 use nalgebra::{DMatrix, DVector};
 
 /// A number with an uncertainty of more than this, in logarithms or units, is not determined: a

@@ -4,9 +4,8 @@
 //! itself; where it can be read in two ways, the file is refused with what to change.
 
 use crate::scenario::MOST_BYTES;
-use crate::study::fit::FitError;
 use crate::study::fit::columns::{
-    DataFileOptions, EXPERIMENT_NAME_COLUMN, RowFilter, is_known_column,
+    DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, RowFilter, is_known_column,
 };
 
 pub(super) struct DataTable<'t> {

@@ -20,21 +20,21 @@ use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shape::Undulation;
 use crate::shooting::{ShootingFailureReason, ShootingStart};
-use crate::simulate::DEFAULT_MOTION_SEGMENTS;
+use crate::simulate::request::DEFAULT_MOTION_SEGMENTS;
 use crate::study::judge::{
     LEAST_EIGENVALUE_SEGMENTS, MethodSolution, SAME_LEAF_DISTANCE, Timed, eigenvalue_grid,
     morse_index_near, run_timed, single_grid_error, union_of_stations,
 };
 use crate::study::map::remark::{MapMotionFailure, MapRemark};
-use crate::study::map::{
-    CellSolution, CellVerdict, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
+use crate::study::map::result::{
+    CellSolution, CellVerdict, Map, MapJump, MapMethod, MapOutcome, MapRequest, MapRow,
+    ReferenceConfidence,
 };
 use crate::study::remark::SolutionRemark;
 use crate::study::vary::{SolverSettings, VariedScenario};
 use crate::{relax, shooting};
 use glam::DVec3;
 use rayon::prelude::*;
-use serde::Serialize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -583,21 +583,6 @@ const JUMP_SEARCH: JumpSearch = JumpSearch {
     continuous_part: 0.1,
     bisections: 12,
 };
-
-/// Two neighbouring cells between which the leaf jumps to another equilibrium.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MapJump {
-    /// The key that varies between them.
-    pub key: String,
-    /// The varied values of one cell.
-    pub from: Vec<String>,
-    /// The varied values of the other cell.
-    pub to: Vec<String>,
-    /// The two values of the key between which it jumps.
-    pub between: [f64; 2],
-    /// Size of the jump, in units of length.
-    pub distance: f64,
-}
 
 /// Two neighbouring cells along an axis.
 struct NeighbouringCells {

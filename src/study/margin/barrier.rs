@@ -1,15 +1,19 @@
 //! The lowest pass from a stable leaf to another equilibrium.
 
 use crate::branch::{
-    BranchEquations, EquilibriumPoint, increments_between, on_finer, prolong_field, scale_field,
+    BranchEquations, EquilibriumPoint, LeafFamily, increments_between, on_finer, prolong_field,
+    scale_field,
 };
 use crate::leaf::{Grid, NodalField, State};
 use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::accuracy::transfer::prolong;
 use crate::relax::solve_on_grid::relax_from_state;
-use crate::relax::{Barrier, Neighbour, Saddle};
-use crate::study::margin::{SaddleSearchStart, StableLeaf};
+use crate::relax::{AxisDirection, Barrier, Equilibrium, Neighbour, Progress, Saddle};
+use crate::run::Limit;
+use crate::scenario::Scenario;
 use rayon::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Number of modes along which saddles are sought, in both directions.
 const SOFTEST_MODE_COUNT: usize = 3;
@@ -285,4 +289,66 @@ fn energies_above_leaf(
         0.0,
         0.0,
     ])
+}
+
+/// A stable leaf on the grid on which it is pushed, with the options.
+pub(super) struct StableLeaf<'a> {
+    pub(super) scenario: &'a Scenario,
+    /// The scenario's leaf alone, at any value of the parameter.
+    pub(super) family: &'a LeafFamily<'a>,
+    pub(super) rest: &'a Equilibrium,
+    pub(super) grid: Grid,
+    pub(super) state: State,
+    pub(super) accuracy: f64,
+    pub(super) largest_force: f64,
+    pub(super) limit: &'a Limit,
+    pub(super) searches: SearchProgress<'a>,
+}
+
+/// Counts searches and reports their progress.
+pub(super) struct SearchProgress<'a> {
+    pub(super) finished_count: AtomicUsize,
+    pub(super) total_count: AtomicUsize,
+    pub(super) progress: Mutex<&'a mut (dyn FnMut(&MarginProgress) + Send)>,
+}
+
+impl SearchProgress<'_> {
+    pub(super) fn report(&self, push: Option<(AxisDirection, f64)>) {
+        // If another thread is reporting, this report is skipped.
+        if let Ok(mut progress) = self.progress.try_lock() {
+            progress(&MarginProgress::Searching {
+                done: self.finished_count.load(Ordering::Relaxed),
+                all: self.total_count.load(Ordering::Relaxed),
+                push,
+            });
+        }
+    }
+
+    pub(super) fn finish_one(&self) {
+        self.finished_count.fetch_add(1, Ordering::Relaxed);
+        self.report(None);
+    }
+}
+
+/// A start point for a saddle search, on its grid, with a direction.
+pub(super) struct SaddleSearchStart {
+    pub(super) grid: Grid,
+    pub(super) state: State,
+    pub(super) direction: NodalField,
+}
+
+/// Progress of the computation of a margin.
+#[derive(Clone, Copy, Debug)]
+pub enum MarginProgress {
+    /// The leaf comes to rest.
+    Relaxing(Progress),
+    /// Number of searches done and in all; and the direction and force of one that is running.
+    Searching {
+        /// Searches done.
+        done: usize,
+        /// Number of all searches.
+        all: usize,
+        /// Direction and force of a running one.
+        push: Option<(AxisDirection, f64)>,
+    },
 }

@@ -4,28 +4,31 @@
 //! unstable; saddles are sought from there and along the softest modes, and the lowest is the barrier to
 //! another equilibrium.
 
-mod barrier;
+pub(super) mod barrier;
 
 use crate::branch::{
     BranchEnd, BranchEquations, ContinuationOptions, CorrectorFailure, CriticalKind, CriticalPoint,
     EquilibriumPoint, ExtrapolatedPoint, LeafFamily, NEARLY_RIGID, NestedBranchEquations,
     VerifiedBranch, on_finer, scale_field, switch_branches, verify_at_parameter,
 };
-use crate::leaf::{Grid, NodalField, State, are_mirror_symmetric, is_mirrored};
+use crate::leaf::{Grid, are_mirror_symmetric, is_mirrored};
 use crate::memory;
 use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
     AxisDirection, CriticalTipForce, CriticalTipForceRemark, Equilibrium, GridLevel,
-    InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, Progress,
-    RelaxError, RelaxedLeaf, relax_on_grids, without_wind,
+    InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, RelaxError,
+    RelaxedLeaf, relax_on_grids, without_wind,
 };
-use crate::run::{Instant, Limit};
+use crate::run::Instant;
 use crate::scenario::Scenario;
+use crate::study::margin::barrier::{
+    MarginProgress, SaddleSearchStart, SearchProgress, StableLeaf,
+};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::AtomicUsize;
 
 /// The largest push: the sum of the first two loads, but no more than the third.
 struct LargestPush {
@@ -85,22 +88,6 @@ pub enum MarginError {
     Moment,
 }
 
-/// Progress of the computation of a margin.
-#[derive(Clone, Copy, Debug)]
-pub enum MarginProgress {
-    /// The leaf comes to rest.
-    Relaxing(Progress),
-    /// Number of searches done and in all; and the direction and force of one that is running.
-    Searching {
-        /// Searches done.
-        done: usize,
-        /// Number of all searches.
-        all: usize,
-        /// Direction and force of a running one.
-        push: Option<(AxisDirection, f64)>,
-    },
-}
-
 /// Largest relative difference of the softest eigenvalue between two successive grids, or of that
 /// extrapolated over them.
 const EIGENVALUE_AGREEMENT: f64 = 0.25;
@@ -134,52 +121,6 @@ pub fn relax_with_margin(
         _ => Margin::none(MarginRemark::StabilityUnknown),
     });
     Ok(leaf)
-}
-
-/// A stable leaf on the grid on which it is pushed, with the options.
-struct StableLeaf<'a> {
-    scenario: &'a Scenario,
-    /// The scenario's leaf alone, at any value of the parameter.
-    family: &'a LeafFamily<'a>,
-    rest: &'a Equilibrium,
-    grid: Grid,
-    state: State,
-    accuracy: f64,
-    largest_force: f64,
-    limit: &'a Limit,
-    searches: SearchProgress<'a>,
-}
-
-/// Counts searches and reports their progress.
-struct SearchProgress<'a> {
-    finished_count: AtomicUsize,
-    total_count: AtomicUsize,
-    progress: Mutex<&'a mut (dyn FnMut(&MarginProgress) + Send)>,
-}
-
-impl SearchProgress<'_> {
-    fn report(&self, push: Option<(AxisDirection, f64)>) {
-        // If another thread is reporting, this report is skipped.
-        if let Ok(mut progress) = self.progress.try_lock() {
-            progress(&MarginProgress::Searching {
-                done: self.finished_count.load(Ordering::Relaxed),
-                all: self.total_count.load(Ordering::Relaxed),
-                push,
-            });
-        }
-    }
-
-    fn finish_one(&self) {
-        self.finished_count.fetch_add(1, Ordering::Relaxed);
-        self.report(None);
-    }
-}
-
-/// A start point for a saddle search, on its grid, with a direction.
-struct SaddleSearchStart {
-    grid: Grid,
-    state: State,
-    direction: NodalField,
 }
 
 fn stability_margin(

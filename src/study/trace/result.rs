@@ -1,14 +1,18 @@
 //! The result of a trace.
 
 use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
+use crate::numbers::largest;
 use crate::run::join_remarks;
 use crate::scenario::{PlausibilityWarning, Units};
 use crate::shape::{Undulation, serialize_tips};
-use crate::study::ParameterKeys;
 use crate::study::remark::{BranchRemark, TraceRemark};
-use crate::study::trace::{ForceDisplacementLine, TraceShow, TraceUntil};
+use crate::study::trace::serialize_axis;
+use crate::study::vary::AXIS_NAMES;
+use crate::study::{ParameterKeys, UnknownWord};
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
 
 /// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -280,4 +284,169 @@ fn serialize_index<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok,
     keys.serialize_field("negative_eigenvalues", index)?;
     keys.serialize_field("stable", &(*index == 0))?;
     keys.end()
+}
+
+/// The straight line fitted to the forces on a tip as a function of its displacements
+/// along them: Hooke's law, and how well it holds.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ForceDisplacementLine {
+    /// Axis of the force: 0, 1, 2 for x, y, z.
+    #[serde(serialize_with = "serialize_axis")]
+    pub axis: usize,
+    /// Stiffness: slope of the least-squares line, force per length.
+    pub slope: f64,
+    /// Coefficient of determination of that line: 1 for an exact one.
+    pub r_squared: f64,
+    /// The largest deviation from the line, as a part of the range of the forces.
+    pub deviation: f64,
+    /// Distance of base and tip at the start of the range.
+    pub length: f64,
+}
+
+impl ForceDisplacementLine {
+    /// `None` with fewer than three points, if the tip moves by no more than rounding, or if the
+    /// forces are not linear.
+    pub(super) fn fit(axis: usize, points: &[LoadedTip]) -> Option<ForceDisplacementLine> {
+        let tip = points.first()?.tip;
+        let points: Vec<(f64, f64)> = (points.iter())
+            .map(|point| (point.tip[axis] - tip[axis], point.force))
+            .collect();
+        let count = points.len() as f64;
+        if points.len() < 3 {
+            return None;
+        }
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
+        let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+        let xx = mean(&|p| (p.0 - x) * (p.0 - x));
+        let xy = mean(&|p| (p.0 - x) * (p.1 - y));
+        let yy = mean(&|p| (p.1 - y) * (p.1 - y));
+        let length = tip.length();
+        if xx.sqrt() <= DISPLACEMENT_ROUNDING * length {
+            return None;
+        }
+        let slope = xy / xx;
+        let off = |p: &(f64, f64)| (p.1 - y - slope * (p.0 - x)).abs();
+        let forces = points.iter().map(|p| p.1);
+        let range =
+            forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
+        Some(ForceDisplacementLine {
+            axis,
+            slope,
+            r_squared: xy * xy / (xx * yy),
+            deviation: largest(points.iter().map(off)) / range,
+            length,
+        })
+        .filter(|law| law.slope.is_finite() && law.deviation <= LINEARITY_TOLERANCE)
+    }
+}
+
+/// What the figure of a trace shows against the number that varies. Axes are 0, 1, 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraceShow {
+    /// A coordinate of the tip; of the first one if they are free.
+    Tip(usize),
+    /// A component of the reaction at held tips.
+    Reaction(usize),
+    /// A component of the force on a grip.
+    Grip {
+        /// The grip, counted from 0.
+        grip: usize,
+        /// The axis.
+        axis: usize,
+    },
+    /// The potential energy.
+    Energy,
+    /// The mean twist of the veins, in radians.
+    Twist,
+}
+
+impl Display for TraceShow {
+    fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
+        match self {
+            TraceShow::Tip(axis) => f.write_str(AXIS_NAMES[*axis]),
+            TraceShow::Reaction(axis) => write!(f, "reaction_{}", AXIS_NAMES[*axis]),
+            TraceShow::Grip { grip, axis } => write!(f, "grip_{}_{}", grip + 1, AXIS_NAMES[*axis]),
+            TraceShow::Energy => f.write_str("energy"),
+            TraceShow::Twist => f.write_str("twist"),
+        }
+    }
+}
+
+impl FromStr for TraceShow {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let axis = |word: &str| AXIS_NAMES.iter().position(|axis| *axis == word);
+        let parts: Vec<&str> = text.split('_').collect();
+        let found = match parts.as_slice() {
+            ["energy"] => Some(TraceShow::Energy),
+            ["twist"] => Some(TraceShow::Twist),
+            [word] => axis(word).map(TraceShow::Tip),
+            ["reaction", word] => axis(word).map(TraceShow::Reaction),
+            ["grip", number, word] => {
+                let number = number.parse::<usize>().ok();
+                let grip = number.and_then(|number| number.checked_sub(1));
+                grip.zip(axis(word))
+                    .map(|(grip, axis)| TraceShow::Grip { grip, axis })
+            }
+            _ => None,
+        };
+        found.ok_or_else(|| UnknownWord {
+            found: text.into(),
+            allowed: vec![
+                "x",
+                "y",
+                "z",
+                "reaction_x",
+                "reaction_y",
+                "reaction_z",
+                "grip_1_x, ...",
+                "energy",
+                "twist",
+            ],
+        })
+    }
+}
+
+/// What ends a branch before the end of the range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraceUntil {
+    /// The loss of its stability; a branch that is unstable from its beginning ends where it
+    /// becomes unstable in one more direction: where its Morse index grows.
+    Unstable,
+}
+
+impl TraceUntil {
+    /// The word on the command line and in Python.
+    pub fn word(self) -> &'static str {
+        match self {
+            TraceUntil::Unstable => "unstable",
+        }
+    }
+}
+
+impl FromStr for TraceUntil {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let allowed = [TraceUntil::Unstable];
+        let found = allowed.into_iter().find(|it| it.word() == text);
+        found.ok_or_else(|| UnknownWord {
+            found: text.into(),
+            allowed: allowed.map(TraceUntil::word).into(),
+        })
+    }
+}
+
+/// Smaller displacements, in lengths, are due to rounding.
+pub(super) const DISPLACEMENT_ROUNDING: f64 = 1e-11;
+
+/// The largest deviation of forces from a straight line, as a part of their range, for which that
+/// is their law: what a testing machine of class 1 measures differs as much (ISO 7500-1).
+pub(super) const LINEARITY_TOLERANCE: f64 = 0.01;
+
+/// A tip under a force along an axis.
+pub(super) struct LoadedTip {
+    pub(super) force: f64,
+    pub(super) tip: DVec3,
 }
