@@ -352,7 +352,7 @@ fn gravity_of_another_unit(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let (other, _) = GRAVITY_BY_LENGTH_UNIT.iter().find(of_other)?;
     Some(PlausibilityWarning::GravityOfAnotherUnit {
         given,
-        other: *other,
+        other,
         unit: own.to_owned(),
         expected: *known,
     })

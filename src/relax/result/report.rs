@@ -233,7 +233,7 @@ pub fn outcome(
     stopped: Option<EquilibriumFailure>,
     reached: Option<(Stage, f64)>,
 ) -> (Outcome, Option<EquilibriumRemark>) {
-    let obstacle = || obstacle_to_rest(problem, found, reached);
+    let obstacle = || obstacle_to_rest(problem, found, reached).map(Box::new);
     let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     match stopped {
