@@ -62,7 +62,7 @@ remarks! {
             /// Segments.
             segments: usize,
             /// What may keep the leaf from coming to rest.
-            obstacle: Option<RestObstacle>,
+            obstacle: Option<Box<RestObstacle>>,
         } = "no-descent",
         /// A vein that bends more than the grid resolves.
         #[error(
@@ -73,7 +73,7 @@ remarks! {
             /// Segments.
             segments: usize,
             /// What may keep the leaf from coming to rest.
-            obstacle: Option<RestObstacle>,
+            obstacle: Option<Box<RestObstacle>>,
         } = "unresolved-bend",
         /// As many steps as are allowed.
         #[error(
@@ -84,7 +84,7 @@ remarks! {
             /// Segments.
             segments: usize,
             /// What may keep the leaf from coming to rest.
-            obstacle: Option<RestObstacle>,
+            obstacle: Option<Box<RestObstacle>>,
         } = "step-limit",
         /// As many steps of the explicit method as are allowed.
         #[error(
@@ -322,7 +322,7 @@ impl EquilibriumRemark {
         match self {
             EquilibriumRemark::NoDescent { obstacle, .. }
             | EquilibriumRemark::UnresolvedBend { obstacle, .. }
-            | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_ref(),
+            | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_deref(),
             _ => None,
         }
     }
@@ -364,7 +364,7 @@ impl fmt::Display for SpanHolder {
     }
 }
 
-fn obstacle_text(obstacle: &Option<RestObstacle>) -> String {
+fn obstacle_text(obstacle: &Option<Box<RestObstacle>>) -> String {
     obstacle
         .as_ref()
         .map(ToString::to_string)
@@ -435,7 +435,7 @@ mod tests {
     fn a_remark_ends_with_what_may_keep_the_leaf_from_rest() {
         let mut remark = EquilibriumRemark::StepLimit {
             segments: 8,
-            obstacle: Some(RestObstacle::Loads {
+            obstacle: Some(Box::new(RestObstacle::Loads {
                 reached: Some(PathPosition {
                     stage: Stage::Joining,
                     lambda: 0.5,
@@ -444,7 +444,7 @@ mod tests {
                 stiffness: "torsion",
                 vein: 2,
                 may_shoot: true,
-            }),
+            })),
         };
         let sentence = "the step limit came before rest on 8 segments: the load may admit no stable equilibrium \
                         (it came to rest up to 50.00 % of joining): lower load.gravity or load.tip_force, or raise \

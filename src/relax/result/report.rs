@@ -292,7 +292,7 @@ pub fn outcome(
     stopped: Option<EquilibriumFailure>,
     reached: Option<PathPosition>,
 ) -> RunEnd {
-    let obstacle = || obstacle_to_rest(problem, found, reached);
+    let obstacle = || obstacle_to_rest(problem, found, reached).map(Box::new);
     let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
     let explicit = problem.options.method.is_explicit();
     match stopped {
