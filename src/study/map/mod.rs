@@ -460,14 +460,14 @@ pub type CellSolution = Result<MethodSolution, CellVerdict>;
 #[derive(Clone, Debug)]
 pub struct CellVerdict {
     outcome: MapOutcome,
-    remark: Option<MapRemark>,
+    remark: Option<Box<MapRemark>>,
 }
 
 impl CellVerdict {
-    fn new(outcome: MapOutcome, remark: MapRemark) -> Self {
+    fn new(outcome: MapOutcome, remark: impl Into<Option<MapRemark>>) -> Self {
         CellVerdict {
             outcome,
-            remark: Some(remark),
+            remark: remark.into().map(Box::new),
         }
     }
 }
