@@ -3,11 +3,13 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
-use crate::modes::{Eigenpair, ModeRequest};
+use crate::modes::{Eigenpair, ModeRequest, ModesBelow};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
-use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
+use crate::relax::accuracy::richardson::{
+    BestColumn, EXTRAPOLATED_GRIDS, Extrapolated, Richardson,
+};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
 use crate::relax::loading::arrival::on_next_grid;
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
@@ -35,8 +37,6 @@ struct EigenvalueAccuracy {
     compared_grids: usize,
     /// Largest number of grids finer than those of the relaxation.
     added_grids: usize,
-    /// Largest number of grids that are extrapolated.
-    extrapolated_grids: usize,
     /// Growth of the rounding error of an eigenvalue from grid to grid.
     rounding_growth: f64,
 }
@@ -50,11 +50,10 @@ const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
     largest_listed: 4e-5,
     compared_grids: 3,
     added_grids: 6,
-    extrapolated_grids: 4,
     rounding_growth: 4.0,
 };
 
-/// The lowest modes of a settled leaf.
+/// The lowest modes of a leaf at rest.
 pub struct LowestModes {
     pub modes: Vec<Mode>,
     /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
@@ -63,7 +62,7 @@ pub struct LowestModes {
     pub undecided_size: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
-    /// So many eigenvalues are below those of the list.
+    /// Number of eigenvalues below those of the list.
     pub left_out: usize,
     /// Whether each of the list is negative, where that is certain.
     pub signs: Vec<Option<bool>>,
@@ -79,7 +78,7 @@ impl LowestModes {
         self.left_out + negative.count()
     }
 
-    /// How many are negative where the first so `many` are known to be, if that is certain.
+    /// How many eigenvalues are negative where the first so `many` are known to be, if that is certain.
     pub fn negative_beyond(&self, many: usize) -> Option<usize> {
         let others = self.signs.iter().skip(many.saturating_sub(self.left_out));
         let negative = |sum, sign: &Option<bool>| Some(sum + usize::from((*sign)?));
@@ -121,7 +120,7 @@ impl EigenvalueRequest {
 
 /// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
 /// large, or there are several equal ones that cannot be told apart.
-/// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
+/// Where eigenvalues are neither requested nor needed in themselves, only their signs are computed.
 pub fn lowest(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
@@ -150,7 +149,10 @@ pub fn lowest(
     let on = |level: &GridLevel, near: &[Vec<Increment>]| {
         let wanted = ModeRequest {
             count,
-            modes_below: omitted.map(|omitted| (omitted.count, omitted.shift)),
+            modes_below: omitted.map(|omitted| ModesBelow {
+                count: omitted.count,
+                shift: omitted.shift,
+            }),
             accuracy: (EIGENVALUES.vectors * tolerance.sqrt())
                 .clamp(EIGENVALUES.best_vectors, EIGENVALUES.worst_vectors),
             approximate_modes: near,
@@ -188,7 +190,7 @@ pub fn lowest(
             && (!compares || series.grids.len() >= EIGENVALUES.compared_grids)
     };
     let sufficient_grids = sufficient_grids(options, found);
-    let skipped = sufficient_grids.saturating_sub(EIGENVALUES.extrapolated_grids);
+    let skipped = sufficient_grids.saturating_sub(EXTRAPOLATED_GRIDS);
     for (k, level) in found.levels.iter().enumerate().skip(skipped) {
         let series = &nested.series;
         let decided = !series.grids.is_empty() && series.undecided_size().is_none();
@@ -370,7 +372,7 @@ impl GridModes<'_> {
         self.pairs.iter().map(on_grid).collect()
     }
 
-    /// Normalised shapes at the nodes of the same or a coarser grid: the largest displacement
+    /// Normalized shapes at the nodes of the same or a coarser grid: the largest displacement
     /// is the longest rod's length, and the last of the largest components is positive.
     fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<NodalModeShape> {
         let length = coarse.leaf.scale.length;
@@ -425,7 +427,7 @@ fn normalize_mode_shape(shape: &[Vec<Increment>], length: f64) -> NodalModeShape
     }
 }
 
-/// From what the error bar of an extrapolated eigenvalue is made.
+/// What the error bar of an extrapolated eigenvalue is made from.
 struct EigenvalueBar {
     /// Where all grids show the orders of their columns: factor on the largest correction of an
     /// eigenvalue.
@@ -434,7 +436,7 @@ struct EigenvalueBar {
     /// small by chance. Of 895 eigenvalues of 390 random leaves on three grids, and of 542 on finer or
     /// four, the largest error was 0.7 of the bar that follows.
     correction_part: f64,
-    /// That part where signs alone are needed: grids then go on until they are certain.
+    /// The part of each correction where signs alone are needed: grids then go on until they are certain.
     correction_part_of_signs: f64,
     /// Elsewhere: safety factor on the error.
     safety: f64,
@@ -463,34 +465,34 @@ const BAR: EigenvalueBar = EigenvalueBar {
 };
 
 /// An extrapolated eigenvalue.
-pub struct ExtrapolatedEigenvalue {
-    pub value: f64,
+struct ExtrapolatedEigenvalue {
+    value: f64,
     /// If there are at least two grids.
-    pub error: Option<f64>,
+    error: Option<f64>,
     /// Its number on the finest grid.
-    pub number: usize,
+    number: usize,
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
-pub struct EigenvalueSeries {
+struct EigenvalueSeries {
     /// Number of the listed eigenvalues that are negative on the finest grid.
-    pub index: usize,
+    index: usize,
     /// Whether their signs on a single grid are enough.
-    pub trusts_single_grid: bool,
-    pub grids: Vec<Vec<f64>>,
-    pub tolerance: f64,
+    trusts_single_grid: bool,
+    grids: Vec<Vec<f64>>,
+    tolerance: f64,
     /// Relative error of frequencies that is small enough.
-    pub wanted_relative_error: f64,
+    wanted_relative_error: f64,
     /// Rounding error of an eigenvalue on the finest grid.
-    pub rounding: f64,
+    rounding: f64,
     /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
     /// doubt.
-    pub turns: bool,
+    turns: bool,
 }
 
 impl EigenvalueSeries {
     /// Adds the eigenvalues on a grid twice as fine as the last.
-    pub fn push(&mut self, pairs: &[Eigenpair]) {
+    fn push(&mut self, pairs: &[Eigenpair]) {
         let values = pairs.iter().map(|pair| pair.eigenvalue);
         self.grids.push(values.collect());
     }
@@ -510,13 +512,13 @@ impl EigenvalueSeries {
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
         let all = values.clone().count();
         let values = values
-            .skip(all.saturating_sub(EIGENVALUES.extrapolated_grids))
+            .skip(all.saturating_sub(EXTRAPOLATED_GRIDS))
             .enumerate();
         let table: Richardson = values
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
         let error = |best: BestColumn| {
-            if best.columns > 1 && best.columns + 1 == all.min(EIGENVALUES.extrapolated_grids) {
+            if best.columns > 1 && best.columns + 1 == all.min(EXTRAPOLATED_GRIDS) {
                 let part = match self.tolerance < EIGENVALUES.sign_tolerance {
                     true => BAR.correction_part,
                     false => BAR.correction_part_of_signs,
@@ -543,7 +545,7 @@ impl EigenvalueSeries {
 
     /// Extrapolated values, ascending, and their errors if there are at least two grids: the
     /// geometric mean of its own bound, which may be small by chance, and the largest of all.
-    pub fn values(&self) -> Vec<ExtrapolatedEigenvalue> {
+    fn values(&self) -> Vec<ExtrapolatedEigenvalue> {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.extrapolate_eigenvalue(k))
             .collect();
@@ -568,7 +570,7 @@ impl EigenvalueSeries {
     }
 
     /// Whether the relative error of all frequencies is as small as wanted.
-    pub fn accurate(&self) -> bool {
+    fn accurate(&self) -> bool {
         let known = |(k, it): (usize, ExtrapolatedEigenvalue)| {
             let wanted = 2.0 * self.wanted_relative_error * self.unit(k);
             it.error
@@ -579,14 +581,14 @@ impl EigenvalueSeries {
 
     /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
     /// grid.
-    pub fn negative_count(&self) -> Option<usize> {
+    fn negative_count(&self) -> Option<usize> {
         let negative = |sum, sign: Option<bool>| Some(sum + usize::from(sign?));
         self.signs().into_iter().try_fold(0, negative)
     }
 
     /// Whether each eigenvalue, ascending, is negative, if that is certain; on a single grid
     /// whether it is there.
-    pub fn signs(&self) -> Vec<Option<bool>> {
+    fn signs(&self) -> Vec<Option<bool>> {
         let alone = |k: usize| {
             BAR.rounding * self.rounding + BAR.iterations * self.tolerance * self.unit(k)
         };
@@ -601,7 +603,7 @@ impl EigenvalueSeries {
 
     /// The largest ratio of a positive eigenvalue on a grid and what it is at least without errors
     /// of grids, either way, of those that are larger than their errors; at least one.
-    pub fn bifurcation_error_factor(&self, grid: usize) -> f64 {
+    fn bifurcation_error_factor(&self, grid: usize) -> f64 {
         let ratio = |it: ExtrapolatedEigenvalue| {
             let on_grid = *self.grids[grid].get(it.number)?;
             let least = it.value - it.error?;
@@ -617,7 +619,7 @@ impl EigenvalueSeries {
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
     /// finest grid. One that is zero to the tolerance may have either sign, and of a leaf that
     /// can turn one that is zero to rounding.
-    pub fn undecided_size(&self) -> Option<f64> {
+    fn undecided_size(&self) -> Option<f64> {
         let unknown = |(k, it): (usize, ExtrapolatedEigenvalue)| {
             let size = it.value.abs();
             let Some(error) = it.error else {

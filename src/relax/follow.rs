@@ -77,7 +77,8 @@ impl NestedEquilibrium {
         &self,
         scenario: Arc<Scenario>,
         response: &[LinearResponse],
-        (options, grids): (&Options, GridPolicy),
+        options: &Options,
+        grids: GridPolicy,
     ) -> Result<NestedEquilibrium, ContinuationFailure> {
         let scale = scenario.scale();
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
@@ -141,7 +142,7 @@ fn relax_with_progress(
 }
 
 /// A state of a level in the units of another leaf, with the base rotations of that leaf.
-pub(super) fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) -> State {
+fn rescale_state(level: &GridLevel, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);
@@ -204,7 +205,7 @@ pub struct EquilibriumTracker {
     at: NestedEquilibrium,
     /// Segments of the coarsest grid away from folds.
     usual_coarsest_segments: usize,
-    /// Those that are tried instead, once, where it takes more than [`ENOUGH`] grids.
+    /// Those that are tried instead, once, where it takes more than [`MAX_ECONOMICAL_GRIDS`].
     alternative_segments: Option<usize>,
 }
 
@@ -299,9 +300,10 @@ impl EquilibriumTracker {
         let begun = NestedEquilibrium::without_grids(&problem);
         match arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort) {
             Ok(found) if found.is_stable() => {
-                let (at, result) = decide(&problem, found, clock, &mut effort);
-                let follower = EquilibriumTracker::new(Arc::clone(&scenario), options, at);
-                Ok((result, Some(follower)))
+                let leaf = equilibrium_with_stability(&problem, Ok(found), clock, &mut effort);
+                let follower =
+                    EquilibriumTracker::new(Arc::clone(&scenario), options, leaf.on_grids);
+                Ok((leaf.result, Some(follower)))
             }
             _ => EquilibriumTracker::begin(&scenario, options),
         }
@@ -453,9 +455,9 @@ impl EquilibriumTracker {
         let mut effort = WorkLog::new(ignored);
         effort.work = self.at.work;
         let found = std::mem::replace(&mut self.at, NestedEquilibrium::without_grids(&problem));
-        let (at, result) = decide(&problem, found, clock, &mut effort);
-        self.at = at;
-        result
+        let leaf = equilibrium_with_stability(&problem, Ok(found), clock, &mut effort);
+        self.at = leaf.on_grids;
+        leaf.result
     }
 
     fn tolerance(&self, scenario: &Scenario) -> f64 {
@@ -493,7 +495,7 @@ impl EquilibriumTracker {
                     true => GridPolicy::AsNeeded,
                     false => GridPolicy::These,
                 };
-                near.continue_to_scenario(scenario, &responses, (&self.options, grids))?
+                near.continue_to_scenario(scenario, &responses, &self.options, grids)?
             }
             false => self.equilibrium_on_grid(&leaf, self.grid(&leaf))?,
         };
@@ -563,16 +565,4 @@ impl EquilibriumTracker {
         leaf.place_held_tips(&mut state);
         state
     }
-}
-
-/// The result of an equilibrium, and the grids on which its stability is known.
-fn decide(
-    problem: &RelaxationProblem,
-    found: NestedEquilibrium,
-    clock: Instant,
-    effort: &mut WorkLog,
-) -> (NestedEquilibrium, Equilibrium) {
-    let RelaxedLeaf { result, on_grids } =
-        equilibrium_with_stability(problem, Ok(found), clock, effort);
-    (on_grids, result)
 }

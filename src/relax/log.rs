@@ -95,14 +95,14 @@ impl fmt::Display for Attempt {
     }
 }
 
-/// Counts of the work on all grids, whatever becomes of them, and its progress.
+/// The work for a leaf on all grids, whatever becomes of them, with its progress and its memory.
 pub(crate) struct WorkLog<'o> {
-    /// Told of every step.
+    /// Receives every step.
     pub progress: &'o mut dyn FnMut(&Progress),
     pub work: SolverCounts,
-    /// Nodes times force evaluations so far.
+    /// Nodes times force evaluations of the relaxation so far.
     pub node_evaluations: usize,
-    /// Nodes times force evaluations of all walks.
+    /// Nodes times force evaluations of slow loading on all grids.
     pub loading_node_evaluations: usize,
     /// How far the leaf came on its path before it failed.
     pub farthest_position: Option<PathPosition>,
@@ -113,7 +113,7 @@ pub(crate) struct WorkLog<'o> {
 }
 
 impl<'o> WorkLog<'o> {
-    /// None so far.
+    /// The log of a leaf for which nothing was done so far.
     pub fn new(progress: &'o mut dyn FnMut(&Progress)) -> Self {
         WorkLog {
             progress,

@@ -91,7 +91,7 @@ impl Scenario {
         self.relaxation().run()
     }
 
-    /// The same with options:
+    /// A relaxation of the scenario's leaf with options:
     ///
     /// ```
     /// use leafdyn::relax::Method;

@@ -22,10 +22,10 @@ words! {
     /// Which equilibrium a relaxation finds, where there are several.
     #[derive(Default)]
     pub enum Route {
-        /// That of a leaf which is loaded slowly: see [`Path`].
+        /// The equilibrium of a leaf that is loaded slowly: see [`Path`].
         #[default]
         LoadedLeaf = "loading",
-        /// That in which a leaf comes to rest which is released under all of its loads, with
+        /// The equilibrium to which a leaf moves that is released under all of its loads, with
         /// its tips together and its veins bent to circular arcs.
         Release = "release",
     }
@@ -46,7 +46,7 @@ words! {
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPosition {
-    /// The stage.
+    /// The stage that the leaf is in.
     pub stage: Stage,
     /// The part of the stage, from 0 to 1.
     pub lambda: f64,
@@ -57,9 +57,9 @@ pub struct PathPosition {
 pub struct Event {
     /// The stage.
     pub stage: Stage,
-    /// The part of it, from 0 to 1.
+    /// The part of the stage, from 0 to 1.
     pub part: f64,
-    /// What happened.
+    /// How the stability was lost.
     #[serde(flatten)]
     pub happening: StabilityLoss,
 }
@@ -82,28 +82,28 @@ pub enum StabilityLoss {
 pub enum Path {
     /// Loaded slowly; stable all the way if nothing happened.
     Loaded {
-        /// What happened.
+        /// Where the path lost its stability.
         events: Vec<Event>,
         /// Whether two grids lead to the same equilibrium.
         confirmed: bool,
     },
     /// Moved to its holders; stably if nothing happened.
     Held {
-        /// What happened.
+        /// Where the path lost its stability.
         events: Vec<Event>,
     },
-    /// Released.
+    /// Released under all loads.
     Released,
 }
 
 impl Path {
-    /// Stable all the way.
+    /// Slow loading on which the leaf stays stable all the way.
     pub const STABLE: Path = Path::Loaded {
         events: Vec::new(),
         confirmed: true,
     };
 
-    /// What happened on it.
+    /// Where the stability of the path was lost.
     pub fn events(&self) -> &[Event] {
         match self {
             Path::Loaded { events, .. } | Path::Held { events } => events,
@@ -111,7 +111,7 @@ impl Path {
         }
     }
 
-    /// The word for it in files.
+    /// The word for the path in files.
     pub fn word(&self) -> &'static str {
         let snapped = |event: &Event| event.happening == StabilityLoss::Snapped;
         match self.events() {

@@ -18,7 +18,7 @@ pub(super) struct GridLimits {
     /// kinks. Twice as many double the work for a tolerance that the first grids keep.
     pub coarsest: usize,
     /// The coarsest grid where the tolerance is loose or only the shape is requested, as forces and
-    /// eigenvalues have larger errors, of a leaf that settles in the valley it starts in.
+    /// eigenvalues have larger errors, of a leaf that comes to rest in the valley it starts in.
     pub coarsest_of_shape: usize,
     /// The coarsest grid of a blade, which is narrow at its tip: with half as many two error bars of 86
     /// were too low by a factor of two.
@@ -115,6 +115,7 @@ pub struct RelaxationProblem<'a> {
     /// The full leaf, if `leaf` is half of it.
     pub whole_leaf: Option<&'a Leaf>,
     pub options: &'a Options,
+    /// Requested error of positions, in lengths of the leaf.
     pub tolerance: f64,
     /// Whether only the shape and its stability are requested, without forces on the grids,
     /// eigenvalues or derivatives.
@@ -126,7 +127,7 @@ pub struct RelaxationProblem<'a> {
 }
 
 impl<'a> RelaxationProblem<'a> {
-    /// The leaf with forces and eigenvalues, wherever it comes to rest.
+    /// The problem of a leaf with forces and eigenvalues, wherever it comes to rest.
     pub fn new(leaf: &'a Leaf, options: &'a Options, tolerance: f64) -> Self {
         RelaxationProblem {
             leaf,
@@ -139,7 +140,7 @@ impl<'a> RelaxationProblem<'a> {
         }
     }
 
-    /// The same for the half of the leaf, if there is one.
+    /// The problem for the half of the leaf, if there is one.
     pub fn reduced_to_half(self, half: Option<&'a Leaf>) -> Self {
         match half {
             None => self,
@@ -166,7 +167,7 @@ impl<'a> RelaxationProblem<'a> {
         self.options.limit.reached()
     }
 
-    /// Whether a grid is so coarse that it only serves leaves that settle in the valley they
+    /// Whether a grid is so coarse that it only serves leaves that come to rest in the valley they
     /// start in.
     pub fn too_coarse(&self, segments: usize) -> bool {
         self.segments().is_none() && segments < GRIDS.coarsest
@@ -231,9 +232,9 @@ impl<'a> RelaxationProblem<'a> {
 /// From this tolerance on a leaf may begin on the coarsest grid for its shape alone.
 const LOOSE_TOLERANCE: f64 = 1e-3;
 
-/// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
+/// Whether a leaf may come to rest in the valley it starts in by this method: semi-implicit, free to leave
 /// saddles, and not disturbed.
-pub(super) fn may_keep_start_valley(method: Method) -> bool {
+fn may_keep_start_valley(method: Method) -> bool {
     matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
 }
 
@@ -252,7 +253,7 @@ pub fn least_segments(method: Method, tolerance: f64, shape_alone: bool) -> usiz
 }
 
 /// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
-/// one is first settled with this compliance, which also gives its segment forces, and then
+/// one is first brought to rest with this compliance, which also gives its segment forces, and then
 /// with its own.
 const MOVING_COMPLIANCE: f64 = 2e-3;
 
@@ -264,9 +265,9 @@ const MOVING_STRETCH: f64 = 0.05;
 pub enum Acceptance {
     /// Slow loading leads there: it is stable and near the arcs, and the veins take their loads stably.
     EndOfLoading,
-    /// It is stable.
+    /// It is stable, wherever that is.
     Stable,
-    /// It is at rest.
+    /// It is at rest, stable or not.
     AtRest,
 }
 
@@ -367,7 +368,7 @@ pub(super) fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
 }
 
 /// Whether a leaf is so stiff that it is softened while it moves.
-pub fn softens(leaf: &Leaf) -> bool {
+fn softens(leaf: &Leaf) -> bool {
     let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
     compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
 }

@@ -100,7 +100,7 @@ fn find_rest<'a>(
                 LoadingEnd::GivenUp(failure) => Err(failure),
             },
             _ => {
-                let (found, end) = solve_planned(problem, half, &attempt, effort);
+                let MadeAttempt { found, end } = solve_planned(problem, half, &attempt, effort);
                 effort.log(attempt.strategy, attempt.extent, attempt.segments, end);
                 if found.is_ok() && end == AttemptEnd::Accepted {
                     return found;
@@ -118,13 +118,19 @@ fn find_rest<'a>(
     }
 }
 
+/// An attempt to bring a leaf to rest, and what came of it.
+struct MadeAttempt {
+    found: RelaxationResult,
+    end: AttemptEnd,
+}
+
 /// Makes an attempt from arcs, or from the start of the request, of the `half` or of the whole.
 fn solve_planned<'a>(
     problem: &RelaxationProblem<'a>,
     half: Option<&'a Leaf>,
     attempt: &PlannedAttempt,
     effort: &mut WorkLog,
-) -> (RelaxationResult, AttemptEnd) {
+) -> MadeAttempt {
     let part = RelaxationProblem {
         stays_in_valley: attempt.strategy == Strategy::FirstValley,
         ..problem.reduced_to_half(half)
@@ -136,12 +142,15 @@ fn solve_planned<'a>(
         Err(failure) => AttemptEnd::Failed(failure.stop),
     };
     let path = match attempt.needs_time {
-        // It takes the place of slow loading.
+        // The leaf is released in place of slow loading.
         true => Some(Path::Released),
         false => problem.undisturbed_path(),
     };
     let whole = found.map(|found| found.mirrored_to_whole(&part));
-    (result_with_path(whole, path), end)
+    MadeAttempt {
+        found: result_with_path(whole, path),
+        end,
+    }
 }
 
 /// Whether an equilibrium is accepted by this rule, or why not.
@@ -173,7 +182,7 @@ fn is_in_first_valley(history: &History) -> bool {
     history.from_start.is_some_and(near) && history.saddle.is_none()
 }
 
-/// Rest from the start, on this grid and finer ones.
+/// Brings a leaf to rest from its start, on this grid and finer ones.
 fn find_rest_on_grid(
     problem: &RelaxationProblem,
     grid: Grid,
@@ -270,7 +279,7 @@ impl Equilibrium {
             self.outcome = Outcome::Saddle;
             self.remark = Some(EquilibriumRemark::BeyondBifurcation);
         } else if unknown {
-            // It said so.
+            // The remark was that the index is not known.
             self.remark = None;
         }
     }
@@ -336,7 +345,7 @@ pub fn relax_from(
 }
 
 /// Refuses the shape of another leaf, and one that is no shape.
-pub(super) fn check_start(
+fn check_start(
     scenario: &Scenario,
     stations: &[f64],
     rods: &[RodShape],
@@ -362,7 +371,7 @@ pub(super) fn check_start(
 }
 
 /// A rod at other stations: on chords, with the directors turned evenly from node to node.
-pub(super) fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
+fn interpolate_rod_shape(stations: &[f64], rod: &RodShape, to: &[f64]) -> RodShape {
     let node = |&sigma: &f64| {
         let next = stations.partition_point(|&at| at < sigma);
         let next = next.clamp(1, stations.len() - 1);

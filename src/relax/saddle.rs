@@ -55,7 +55,7 @@ pub struct Saddle {
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the Hessian of its
 /// energy (the symmetric part of it, under a dead moment). Eigenvalues (with respect to the
-/// masses) between -`shift` and zero do not count. `None` if the factorisation does not fit
+/// masses) between -`shift` and zero do not count. `None` if the factorization does not fit
 /// into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
@@ -76,9 +76,9 @@ pub fn index(
 /// What is added to the Hessian of the energy before its negative eigenvalues are counted.
 #[derive(Clone, Copy)]
 struct HessianShift {
-    /// So many times the excess stiffness of the elements is subtracted.
+    /// Factor on the excess stiffness of the elements, which is subtracted.
     excess: f64,
-    /// So many times the mass matrix is added.
+    /// Factor on the mass matrix, which is added.
     shift: f64,
 }
 
@@ -105,7 +105,7 @@ fn count(
     count_coupled(leaf, state, system, shifted, work)
 }
 
-/// The matrix, minus `excess` times the excess stiffness of the elements.
+/// Assembles the Hessian, minus `excess` times the excess stiffness of the elements.
 fn assemble_minus_excess(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -135,17 +135,20 @@ fn count_coupled(
     pattern.count_negative(system, shift).ok()
 }
 
-/// How many eigenvalues of an equilibrium are negative beyond doubt, how many may be on this
-/// grid, being close to zero, and how many on finer ones: those of the Hessian less what
-/// [`clearly_stable`] subtracts. Also how close to zero is close.
+/// Bounds of the Morse index of an equilibrium, by its eigenvalues with respect to the masses.
 pub struct IndexBounds {
+    /// Eigenvalues that are negative beyond doubt.
     pub least: usize,
+    /// Eigenvalues that may be negative on this grid, being close to zero.
     pub here: usize,
+    /// Eigenvalues that may be negative on finer grids: those of the Hessian less what
+    /// [`clearly_stable`] subtracts.
     pub finer: usize,
+    /// The size up to which an eigenvalue is close to zero.
     pub close: f64,
 }
 
-/// The bounds of the Morse index of a state at rest. `None` if the factorisation does not fit
+/// The bounds of the Morse index of a state at rest. `None` if the factorization does not fit
 /// into memory.
 pub fn bounds(
     leaf: &DiscreteLeaf,
@@ -317,8 +320,8 @@ impl SideOfSaddle {
     }
 }
 
-/// Of the sides of a saddle to which a leaf turned that of less energy, or the first of two that are
-/// equal.
+/// The side of less energy of those to which a leaf turned from a saddle, or the first of two equal
+/// ones.
 pub fn lower_energy_side(sides: [Option<SideOfSaddle>; 2]) -> Option<SideOfSaddle> {
     match sides {
         [Some(one), Some(other)] => {
@@ -351,7 +354,7 @@ pub fn saddle_summary(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddl
 /// (along e2) and forward, in this order of importance, more so away from the base and, with
 /// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
 /// would turn out of any other on its way.
-pub fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
+fn symmetry_breaking_field(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> NodalField {
     let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
     let given = GIVEN_BIAS_WEIGHT * leaning.normalize_or_zero();
     let everywhere = given + down + 0.5 * left + 0.25 * forward;

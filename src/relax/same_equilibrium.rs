@@ -55,6 +55,12 @@ pub fn is_noticed_saddle(noticed: &State, saddle: &State) -> bool {
     noticed.largest_displacement_to(saddle) < 0.1
 }
 
+/// Whether two states in which the forces on a leaf in wind are balanced are one, to rounding: by
+/// displacements and rotations (radians).
+pub fn is_same_balance(one: &State, other: &State) -> bool {
+    one.distance(other) < 1e-8
+}
+
 /// Whether two equilibria on one grid have the same energy: they are members of a circle of equilibria,
 /// as of a buckled round column, or mirror images.
 pub fn is_same_energy(one: f64, other: f64) -> bool {

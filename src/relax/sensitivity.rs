@@ -1,5 +1,5 @@
 //! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
-//! scenario, from the linearised equations on each grid, extrapolated like the results
+//! scenario, from the linearized equations on each grid, extrapolated like the results
 //! themselves. Derivatives of eigenvalues, and of the moments on clamps, are finite differences between
 //! neighbouring equilibria, which are known to first order from the response.
 
@@ -39,14 +39,14 @@ struct DifferentiatedParameter<'n, 'a> {
 #[derive(Default)]
 struct ResultDerivatives<T> {
     tips: T,
-    /// Of the energy: a number as x.
+    /// The derivative of the energy, as x.
     energy: T,
-    /// Of the eigenvalues: numbers as x.
+    /// The derivatives of the eigenvalues, as x.
     eigenvalues: T,
-    /// Of the reaction at a held tip: of the force, then of the moments.
+    /// The derivative of the force on the holder of the tip, then those of the moments.
     reaction: T,
     positions: T,
-    /// Of the force and the moment on each grip.
+    /// The derivatives of the force and the moment on each grip, one after the other.
     grips: T,
 }
 
@@ -411,16 +411,24 @@ struct NeighbouringEquilibrium {
     state: State,
 }
 
-/// Relative differences below which two eigenvalues, and their derivatives, count as equal;
-/// the third number bounds the error of eigenvalues by rounding, as a part of the first.
-const EQUAL_EIGENVALUE_TOLERANCE: f64 = 1e-6;
+/// When two eigenvalues of a leaf are one that is multiple.
+struct MultipleEigenvalue {
+    /// Largest relative difference of the eigenvalues.
+    eigenvalues: f64,
+    /// Largest relative difference of their derivatives.
+    derivatives: f64,
+    /// Bound on the error of the eigenvalues by rounding, as a part of their largest difference.
+    rounding: f64,
+}
 
-const EQUAL_DERIVATIVE_TOLERANCE: f64 = 1e-3;
-
-const EIGENVALUE_ROUNDING_LIMIT: f64 = 1e-3;
+const MULTIPLE: MultipleEigenvalue = MultipleEigenvalue {
+    eigenvalues: 1e-6,
+    derivatives: 1e-3,
+    rounding: 1e-3,
+};
 
 impl NeighbouringEquilibria {
-    /// From scenarios nearby, with their offsets and weights.
+    /// Moves the leaf of a level along its response to each of the scenarios nearby.
     pub fn new(
         level: &GridLevel,
         scenarios: &[NeighbouringScenario],
@@ -449,9 +457,9 @@ impl NeighbouringEquilibria {
         self.0.iter().map(term).sum()
     }
 
-    /// The same for several modes. NaN where a multiple eigenvalue splits: its modes change
+    /// The derivatives of the eigenvalues of several modes. NaN where a multiple eigenvalue splits: its modes change
     /// differently, and the lower one is another mode on either side.
-    pub fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
+    fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
         let mut rates: Vec<f64> = modes
             .iter()
             .map(|mode| self.eigenvalue_rate(mode))
@@ -461,15 +469,14 @@ impl NeighbouringEquilibria {
         let pairs = modes.windows(2).enumerate();
         let equal = |pair: &[Eigenpair]| {
             let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
-            (a - b).abs() <= EQUAL_EIGENVALUE_TOLERANCE * a.abs().max(b.abs())
+            (a - b).abs() <= MULTIPLE.eigenvalues * a.abs().max(b.abs())
         };
         for (k, pair) in pairs.filter(|(_, pair)| equal(pair)) {
             let [a, b] = [rates[k], rates[k + 1]];
             let mixed = self.eigenvalue_rate(&pair[0].plus(&pair[1])) - 0.5 * (a + b);
             let rounding =
-                EQUAL_EIGENVALUE_TOLERANCE * EIGENVALUE_ROUNDING_LIMIT * pair[0].eigenvalue.abs()
-                    / farthest;
-            let same = EQUAL_DERIVATIVE_TOLERANCE * a.abs().max(b.abs()) + rounding;
+                MULTIPLE.eigenvalues * MULTIPLE.rounding * pair[0].eigenvalue.abs() / farthest;
+            let same = MULTIPLE.derivatives * a.abs().max(b.abs()) + rounding;
             if !(mixed.abs() <= same && (a - b).abs() <= same) {
                 rates[k..k + 2].fill(f64::NAN);
             }
@@ -478,12 +485,12 @@ impl NeighbouringEquilibria {
     }
 
     /// The derivatives of the moments of the rods on a clamp.
-    pub fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+    fn clamp_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
         self.vector_derivatives(level, |leaf, state| leaf.reaction(state).moments)
     }
 
     /// The derivatives of the moments on grips about their middles.
-    pub fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+    fn grip_moment_rates(&self, level: &GridLevel) -> Vec<DVec3> {
         self.vector_derivatives(level, |leaf, state| {
             let reactions = leaf.grip_reactions(state).into_iter();
             reactions.map(|on_grip| on_grip.moment).collect()
@@ -507,16 +514,21 @@ impl NeighbouringEquilibria {
     }
 }
 
-/// Relative step of finite differences with respect to a parameter on which the scenario
-/// depends linearly: large, since rounding is the only error.
-const LINEAR_PARAMETER_STEP: f64 = 0.125;
+/// Steps of finite differences with respect to a parameter, relative to its size.
+struct DifferenceSteps {
+    /// Where the scenario depends linearly on the parameter: large, since rounding is the only error.
+    linear: f64,
+    /// For other parameters, with differences of fourth order.
+    nonlinear: f64,
+    /// For eigenvalues, whose modes may be close together, and for moments on clamps.
+    eigenvalues: f64,
+}
 
-/// Relative step for other parameters, with differences of fourth order.
-const NONLINEAR_PARAMETER_STEP: f64 = 1e-3;
-
-/// Relative step of differences of eigenvalues, whose modes may be close together, and of
-/// clamp moments.
-const EIGENVALUE_DIFFERENCE_STEP: f64 = 3e-4;
+const STEPS: DifferenceSteps = DifferenceSteps {
+    linear: 0.125,
+    nonlinear: 1e-3,
+    eigenvalues: 3e-4,
+};
 
 /// A term of a finite-difference rule.
 struct DifferenceTerm {
@@ -605,12 +617,9 @@ impl Parameter<'_> {
     /// The derivative of the scenario as a weighted sum of scenarios.
     pub fn rate(&self) -> Option<Vec<Weighted<Scenario>>> {
         let found = match self.linear {
-            true => self.differences(
-                LINEAR_PARAMETER_STEP * self.step_unit(),
-                &[&LINEAR_DIFFERENCE_RULE],
-            ),
+            true => self.differences(STEPS.linear * self.step_unit(), &[&LINEAR_DIFFERENCE_RULE]),
             false => self.differences(
-                NONLINEAR_PARAMETER_STEP * self.step_unit(),
+                STEPS.nonlinear * self.step_unit(),
                 &[&CENTRAL_DIFFERENCE_RULE, &ONE_SIDED_DIFFERENCE_RULE],
             ),
         };
@@ -625,7 +634,7 @@ impl Parameter<'_> {
     /// Neighbouring scenarios for the finite difference of a function of the scenario.
     pub fn neighbouring_scenarios(&self) -> Option<Vec<NeighbouringScenario>> {
         let found = self.differences(
-            EIGENVALUE_DIFFERENCE_STEP * self.step_unit(),
+            STEPS.eigenvalues * self.step_unit(),
             &[&CENTRAL_DIFFERENCE_RULE, &ONE_SIDED_DIFFERENCE_RULE],
         )?;
         let shared = |near: NeighbouringScenario<Scenario>| NeighbouringScenario {
@@ -643,24 +652,24 @@ const CONJUGATE_GRADIENT_ACCURACY: f64 = 3e-3;
 
 const BEST_CONJUGATE_GRADIENT_ACCURACY: f64 = 1e-11;
 
-/// A settled leaf (all rods, in space) with its equations linearised and factorised once for
+/// A leaf at rest (all rods, in space) with its equations linearized and factorized once for
 /// all right-hand sides.
 pub(crate) struct Linearized {
     system: System,
     segments: Vec<Segment>,
     /// Relative accuracy of the conjugate gradients.
     accuracy: f64,
-    /// Whether the matrix is factorised rod by rod; otherwise a sparse direct factorisation is
+    /// Whether the matrix is factorized rod by rod; otherwise a sparse direct factorization is
     /// used.
     factorized: bool,
     /// Linear solutions so far.
     pub solves: usize,
-    /// Factorisations so far.
+    /// Factorizations so far.
     pub factorizations: usize,
 }
 
 impl Linearized {
-    /// Linearises about the state of a level.
+    /// Linearizes about the state of a level.
     pub fn new(level: &GridLevel, tolerance: f64) -> Linearized {
         let (leaf, state) = (&level.leaf, &level.state);
         let mut system = System::new(leaf);
@@ -704,7 +713,7 @@ impl Linearized {
         self.responses_to(level, loads, self.accuracy)
     }
 
-    /// The same to another relative accuracy.
+    /// The responses to forces, to another relative accuracy.
     pub fn responses_to(
         &mut self,
         level: &GridLevel,
@@ -790,7 +799,7 @@ fn response(
 }
 
 /// The state, moved along a response.
-pub(crate) fn displace_along_response(
+fn displace_along_response(
     level: &GridLevel,
     rate: &LeafParameterDerivative,
     response: &LinearResponse,
@@ -807,14 +816,22 @@ pub(crate) fn displace_along_response(
     state
 }
 
-/// Safety factor on the error estimate: errors of derivatives decrease less regularly than
-/// those of positions.
-const SAFETY: f64 = 3.0;
+/// What the error bar of a derivative is made from.
+struct DerivativeBar {
+    /// Safety factor on the error by extrapolation: errors of derivatives decrease less regularly
+    /// than those of positions.
+    safety: f64,
+    /// Relative error by rounding.
+    rounding: f64,
+    /// Relative error by unfinished iterations, as a part of the tolerance.
+    iterations: f64,
+}
 
-/// Relative errors by rounding, and by unfinished iterations as a part of the tolerance.
-const ROUNDING: f64 = 1e-10;
-
-const ITERATION_ERROR_FRACTION: f64 = 0.1;
+const BAR: DerivativeBar = DerivativeBar {
+    safety: 3.0,
+    rounding: 1e-10,
+    iterations: 0.1,
+};
 
 /// Values on successively refined grids, extrapolated together.
 #[derive(Default)]
@@ -855,7 +872,7 @@ impl VectorSeries {
         let table: Richardson = self.0.iter().map(on).collect();
         let values = table.extrapolated().chunks(3);
         let error = |best: BestColumn| {
-            (SAFETY * best.error + ROUNDING + ITERATION_ERROR_FRACTION * tolerance) * unit
+            (BAR.safety * best.error + BAR.rounding + BAR.iterations * tolerance) * unit
         };
         Extrapolated {
             value: values.map(|v| DVec3::from_slice(v) * unit).collect(),
@@ -870,7 +887,7 @@ mod tests {
     use crate::relax::{Options, relax_on_grids};
     use crate::scenario::Scenario;
 
-    /// A derivative costs one solution on each grid, and no factorisation of its own.
+    /// A derivative costs one solution on each grid, and no factorization of its own.
     #[test]
     fn a_number_costs_one_solution_on_a_grid() {
         let text = include_str!("../../scenarios/paper/fig04.toml");

@@ -22,8 +22,8 @@ use crate::shooting::{ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::{memory, shooting};
 use glam::DVec3;
 
-/// Smallest number of segments between stations.
-const SEGMENTS: usize = 32;
+/// Smallest number of segments between the stations of a solution by shooting.
+const LEAST_STATION_SEGMENTS: usize = 32;
 
 /// Tolerance of the relaxation that shooting starts from: the coarsest grids are enough, as
 /// Newton's method converges from there faster than finer grids.
@@ -32,7 +32,7 @@ pub const START_TOLERANCE: f64 = 1e-3;
 /// The grid whose nodes are the stations of a boundary-value solution.
 fn station_grid(scenario: &Scenario) -> Grid {
     let leaf = Leaf::new(scenario);
-    let segments = coarsest(&leaf, SEGMENTS).max(leaf.kinks().len() + 1);
+    let segments = coarsest(&leaf, LEAST_STATION_SEGMENTS).max(leaf.kinks().len() + 1);
     Grid::new(segments, leaf.kinks())
 }
 
@@ -152,7 +152,7 @@ fn relax_from_rest(
 }
 
 /// The work of shooting in terms of a relaxation: Newton corrections count as steps,
-/// linearisations as factorisations, evaluations of all slopes as force evaluations.
+/// linearizations as factorizations, evaluations of all slopes as force evaluations.
 impl From<shooting::ShootingCounts> for SolverCounts {
     fn from(work: shooting::ShootingCounts) -> Self {
         SolverCounts {

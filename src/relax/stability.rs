@@ -23,9 +23,9 @@ use crate::shape::{NodeState, RodShape};
 /// What is known of the Morse index.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// It is that counted on the finest grid.
+    /// The index is that counted on the finest grid.
     AsCounted,
-    /// It is this, by eigenvalues extrapolated over the grids.
+    /// The index is this, by eigenvalues extrapolated over the grids.
     Index(usize),
     /// An eigenvalue may have either sign; so many others are negative for certain.
     Undecided(usize),
@@ -33,7 +33,7 @@ pub enum Verdict {
     Unknown,
 }
 
-/// The decision on a leaf.
+/// The decision on the stability of a leaf.
 pub struct Decision {
     /// The leaf, on further grids where these were necessary.
     pub found: NestedEquilibrium,
@@ -59,7 +59,7 @@ impl Decision {
 /// Brings the leaf to rest on this grid, and on finer ones, if it can.
 pub type RelaxOnGrid<'a> = dyn Fn(Grid, &mut WorkLog) -> Option<NestedEquilibrium> + 'a;
 
-/// What to do on the grids so far.
+/// What has to be computed next for the decision on stability.
 enum NextStabilityCheck {
     /// The count is certain.
     CountIsCertain,
@@ -169,7 +169,7 @@ fn continue_on_finer_grid(
     }
 }
 
-/// What decides on the grids so far.
+/// What has to be computed next, with the leaf on its grids so far.
 fn next_stability_check(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
@@ -260,7 +260,7 @@ fn verdict(
 
 /// What extrapolated eigenvalues tell of the Morse index.
 struct NegativeEigenvalues {
-    /// So many are negative for certain.
+    /// Number of eigenvalues that are negative for certain.
     certain: usize,
     /// The number of negative ones, if it is known.
     all: Option<usize>,

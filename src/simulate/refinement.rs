@@ -13,7 +13,7 @@ use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
 use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
-use crate::shape::interpolation_weights;
+use crate::shape::{InterpolationWeights, interpolation_weights};
 use crate::simulate::record::CUBIC;
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::{
@@ -501,7 +501,7 @@ fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
 /// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
 /// held.
 pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
-    let (first, weights) = interpolation_weights(stations, 0.5, CUBIC);
+    let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC);
     let mut points = frame.tips(joined);
     for rod in 0..frame.rods {
         let near = frame.centerline(rod)[first..].iter().zip(&weights);

@@ -61,7 +61,7 @@ const CORRECTION: DefectCorrection = DefectCorrection {
     response_accuracy: 1e-6,
 };
 
-/// The factorised equations of one of the grids.
+/// The factorized equations of one of the grids of a leaf.
 pub struct FactorizedLevel {
     level_number: usize,
     pub system: System,
@@ -103,9 +103,9 @@ impl FactorizedLevel {
 /// The largest errors of positions, in lengths of the leaf.
 #[derive(Clone, Copy)]
 pub struct PositionErrors {
-    /// At the nodes from which the leaf was integrated.
+    /// The largest error at the nodes from which the leaf was integrated.
     pub at_nodes: f64,
-    /// On either side of the midpoints between them.
+    /// The largest error on either side of the midpoints between these nodes.
     pub between: f64,
 }
 
@@ -473,9 +473,9 @@ fn mean(a: &RodFields, b: &RodFields) -> RodFields {
     }
 }
 
-/// The linearised equations of a leaf on a grid that is divided into equal parts of `part`
+/// The linearized equations of a leaf on a grid that is divided into equal parts of `part`
 /// segments; its fields may jump at their midpoints.
-pub struct Tangents<'a> {
+struct Tangents<'a> {
     level: &'a GridLevel,
     part: usize,
     /// The segments just beyond the midpoints, rod after rod.
@@ -484,8 +484,8 @@ pub struct Tangents<'a> {
     at_ends: Vec<Vec<SegmentTangent>>,
 }
 
-/// The first-order response to jumps.
-pub struct JumpResponse {
+/// The first-order response of a leaf to jumps of its fields.
+struct JumpResponse {
     /// Displacements and rotations of all nodes from the `first` on.
     solution: NodalField,
     first: usize,
@@ -494,8 +494,8 @@ pub struct JumpResponse {
 }
 
 impl<'a> Tangents<'a> {
-    /// Of the leaf of `level`, divided into `parts` parts.
-    pub fn new(level: &'a GridLevel, parts: usize) -> Self {
+    /// Linearizes the equations of the leaf of `level`, divided into `parts` parts.
+    fn new(level: &'a GridLevel, parts: usize) -> Self {
         let GridLevel { leaf, state } = level;
         let part = leaf.segments() / parts;
         let middles = |j: usize| {
@@ -548,7 +548,7 @@ impl<'a> Tangents<'a> {
     }
 
     /// The changes of all fields in a response, at the ends of the parts.
-    pub fn changes(
+    fn changes(
         &mut self,
         response: &JumpResponse,
         jumps: &[Vec<FieldChange>],
@@ -569,7 +569,7 @@ impl<'a> Tangents<'a> {
         jumps.iter().enumerate().map(ends).collect()
     }
 
-    /// At the beginning of part `k` of rod `j`, as [`resultants`](crate::relax::accuracy::transfer::resultants) takes
+    /// The change at the beginning of part `k` of rod `j`, as [`resultants`](crate::relax::accuracy::transfer::resultants) takes
     /// forces and moments: from the segment before it.
     fn change(
         &self,
@@ -637,8 +637,8 @@ impl JumpResponse {
     }
 }
 
-/// The largest rotation, and the largest change of a force or moment.
-pub fn largest_rotation_and_stress(changes: &[Vec<FieldChange>]) -> [f64; 2] {
+/// The largest rotation (radians), and the largest change of a force or moment.
+fn largest_rotation_and_stress(changes: &[Vec<FieldChange>]) -> [f64; 2] {
     let most = |of: fn(&FieldChange) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
     [
         most(|it| it.rotation.length()),
@@ -646,8 +646,8 @@ pub fn largest_rotation_and_stress(changes: &[Vec<FieldChange>]) -> [f64; 2] {
     ]
 }
 
-/// Applies the changes.
-pub fn apply_changes(changes: &[Vec<FieldChange>], known: &mut [Vec<RodFields>]) {
+/// Adds the changes to the fields of the leaf.
+fn apply_changes(changes: &[Vec<FieldChange>], known: &mut [Vec<RodFields>]) {
     let changes = changes.iter().flatten();
     for (node, change) in known.iter_mut().flatten().zip(changes) {
         node.x += change.position;
@@ -670,23 +670,23 @@ fn displace_state(state: &State, response: &JumpResponse) -> State {
     moved
 }
 
-/// The part of the integration error that remains with halved steps, or less: with order 8 it
-/// is a 256th.
+/// Bound on the part of the integration error that remains with halved steps: with order 8 it is a
+/// 256th.
 const HALVED_STEP_ERROR_RATIO: f64 = 1.0 / 16.0;
 
 /// The steps of the integration from a node to a midpoint.
-pub struct IntegrationSteps {
-    pub count: usize,
+struct IntegrationSteps {
+    count: usize,
     /// Whether they are half of those of the round before.
-    pub halved: bool,
+    halved: bool,
     /// Bound on the error of the integration.
-    pub error: f64,
+    error: f64,
     /// Whether the leaf is on a single grid.
     alone: bool,
 }
 
 impl IntegrationSteps {
-    pub fn new(count: usize, alone: bool) -> Self {
+    fn new(count: usize, alone: bool) -> Self {
         IntegrationSteps {
             count,
             halved: false,
@@ -695,9 +695,9 @@ impl IntegrationSteps {
         }
     }
 
-    /// With the estimated error of a round: after a round with longer steps it includes their
-    /// error, and so bounds that of the halved steps.
-    pub fn measure(&mut self, largest: f64) {
+    /// Bounds the error of the integration by the estimated error of a round: after a round with longer
+    /// steps that includes their error, and so bounds that of the halved steps.
+    fn measure(&mut self, largest: f64) {
         self.error = match (self.halved, self.alone) {
             (true, true) => HALVED_STEP_ERROR_RATIO * largest,
             (true, false) => 0.0,
@@ -709,7 +709,7 @@ impl IntegrationSteps {
     /// Halves the steps if the next round, whose error is `expected`, may be the last; on a
     /// single grid only if their own error is not known to be small. For small tolerances, with
     /// several grids, the ends of more steps make better stations.
-    pub fn choose(&mut self, expected: f64, enough: f64) {
+    fn choose(&mut self, expected: f64, enough: f64) {
         let unknown = !self.alone || self.error > 0.5 * enough;
         self.halved = unknown && expected <= enough;
         if self.halved {
@@ -731,7 +731,7 @@ mod tests {
         load = { gravity = [0.0, 0.0, -1.0] }
     "#;
 
-    /// The linear equations are factorised once for all rounds, and each of these leaves less
+    /// The linear equations are factorized once for all rounds, and each of these leaves less
     /// than a thirtieth of the error, for rods that are rigid in stretch or not.
     #[test]
     fn every_round_leaves_a_small_part() {

@@ -11,7 +11,8 @@ use glam::{DQuat, DVec3};
 /// A node's values that are extrapolated: position, quaternion, n and m along the directors.
 type PackedNode = [f64; 13];
 
-/// Nodes of the interpolation of lower order.
+/// Nodes of the interpolation of lower order, whose distance from the usual one is taken for the error
+/// of both.
 const LOWER_ORDER_NODES: usize = 5;
 
 /// The leaf's fields after `columns` extrapolations at the ends of `parts` equal parts of its
@@ -31,7 +32,7 @@ pub fn extrapolated_node_fields(
     rods.map(rod).collect()
 }
 
-/// The fields of a rod on one grid.
+/// The fields of rod `j` on one grid, at the ends of equal parts.
 fn on_grid(level: &GridLevel, j: usize, parts: usize) -> Vec<RodFields> {
     let GridLevel { leaf, state } = level;
     let stride = leaf.segments() / parts;
@@ -172,7 +173,7 @@ fn extrapolated(levels: &[GridLevel], signs: &[DQuat], j: usize, parts: usize) -
     table.column(levels.len() - 1).as_chunks().0.to_vec()
 }
 
-/// The fields with these values.
+/// The fields of a rod whose nodes have these values.
 fn unpack_nodes(rod: &[PackedNode]) -> Vec<RodFields> {
     let fields = |node: &PackedNode| {
         let vector = |k: usize| DVec3::from_slice(&node[k..]);
@@ -199,15 +200,16 @@ fn rotations(level: &GridLevel, j: usize) -> Vec<DQuat> {
     rotations.map(same).collect()
 }
 
-/// Of q and -q the one nearer to `other`.
+/// The quaternion q or -q, which are the same rotation: the one nearer to `other`.
 pub fn align_quaternion_sign(q: DQuat, other: DQuat) -> DQuat {
     if q.dot(other) < 0.0 { -q } else { q }
 }
 
-/// Longest step of the integration.
-const STEP: f64 = 1.0 / 64.0;
+/// Longest step of the integration between stations, as a fraction of the length. Half of it doubles
+/// the work for stations between those of the solution.
+const LONGEST_STEP: f64 = 1.0 / 64.0;
 
-/// Safety factor on the error estimate.
+/// Safety factor on the error between stations.
 const SAFETY: f64 = 2.0;
 
 /// All rods at one sigma.
@@ -293,7 +295,7 @@ fn integrate_from_section(
             stops.reverse();
         }
         for stop in stops.into_iter().chain([point]) {
-            let steps = ((stop - at).abs() / STEP).ceil().max(1.0);
+            let steps = ((stop - at).abs() / LONGEST_STEP).ceil().max(1.0);
             let mut after = vec![StationFields::default(); steps as usize];
             flow.integrate(|j| section[j], [at, stop], &mut after);
             if let Some(last) = after.last() {

@@ -18,7 +18,7 @@ use crate::newton::{Contraction, EquilibriumFailure, SolverCounts};
 use crate::numbers::larger;
 use crate::relax::accuracy::defect::{CorrectionGoal, DefectEstimate, FactorizedLevel};
 use crate::relax::accuracy::fields::{FieldsAtNodes, finer_nodes};
-use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
+use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
 use crate::relax::path::Path;
 use crate::relax::plan::{GRIDS, RelaxationProblem, WayFromStart};
@@ -26,18 +26,14 @@ use crate::relax::request::MAX_NODES;
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
 
-/// Changes of the energy below this part of it, or of the leaf's bending energy, are rounding.
+/// Changes of the energy from grid to grid below this part of it, or of A/L, are rounding.
 const ENERGY_NOISE: f64 = 1e-11;
-
-/// Largest number of grids over which the energy is extrapolated: errors on those before, which the
-/// finest have no more, need not be small.
-const ENERGY_GRIDS: usize = 4;
 
 /// A leaf at rest on nested grids.
 pub struct NestedEquilibrium {
     /// The leaf on each grid, from coarse to fine. Where it failed the last is that of the failure.
     pub levels: Vec<GridLevel>,
-    /// The positions on all grids.
+    /// The positions on all grids, extrapolated to a segment length of zero.
     pub convergence_table: Richardson,
     /// Weight of each grid in the extrapolated values.
     pub weights: Vec<f64>,
@@ -45,20 +41,20 @@ pub struct NestedEquilibrium {
     /// indicates: then layers are thinner than the segments, and what they change in positions,
     /// which is the same on all grids that miss them, is not seen in these.
     unresolved: f64,
-    /// The error estimated from the defect of the extrapolated values, if it is known, and the
-    /// linear equations for it.
+    /// The error estimated from the defect of the extrapolated values, if it is known.
     pub estimate: Option<DefectEstimate>,
+    /// The factorized linear equations of that estimate.
     pub factorized_level: Option<FactorizedLevel>,
-    /// Whether its error is within the tolerance; always on a fixed grid.
+    /// Whether the error of positions is within the tolerance; always on a fixed grid.
     pub keeps_tolerance: bool,
     /// Negative eigenvalues, as counted on the finest grid.
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly_stable: bool,
     /// Factor on the error estimate of a leaf that is beside a bifurcation: see
-    /// [`LowestModes::softening`](crate::relax::eigenvalues::Lowest::softening).
+    /// [`LowestModes::bifurcation_error_factor`](crate::relax::eigenvalues::LowestModes::bifurcation_error_factor).
     pub bifurcation_error_factor: f64,
-    /// Rods solved for.
+    /// Veins solved for; the others are mirror images.
     pub solved_rods: usize,
     /// Whether a grid was added for the nodes of the finest one.
     pub added_for_nodes: bool,
@@ -66,20 +62,20 @@ pub struct NestedEquilibrium {
     pub unconfirmed: bool,
     /// How the leaf came to where it is, if that is known.
     pub path: Option<Path>,
-    /// How it came to rest on its grids.
+    /// How the iterations on its grids went.
     pub history: History,
-    /// The work for it.
+    /// The work on all grids.
     pub work: SolverCounts,
-    /// The tolerance to which it is meant.
+    /// The requested error of positions, in lengths of the leaf.
     tolerance: f64,
-    /// Whether its grid is a requested one.
+    /// Whether its only grid is a requested one.
     has_fixed_grid: bool,
 }
 
-/// How a leaf came to rest on its grids so far.
+/// How the iterations that brought a leaf to rest on its grids went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct History {
-    /// The last saddle that it left.
+    /// The last saddle that the leaf left.
     pub saddle: Option<Saddle>,
     /// What neglecting strains of the veins would change.
     pub strain_effects: StrainEffects,
@@ -92,7 +88,7 @@ pub struct History {
     pub saddle_escapes: i32,
     /// How far the first equilibrium is from the start, if the leaf began there.
     pub from_start: Option<WayFromStart>,
-    /// Segments of the coarsest grid on which it rests, if there is one.
+    /// Segments of the coarsest grid on which the leaf rests, if there is one.
     pub coarsest: Option<usize>,
 }
 
@@ -115,17 +111,18 @@ impl StrainEffects {
     }
 }
 
-/// Where a leaf was when it failed to come to rest, and why.
+/// Why a leaf failed to come to rest.
 pub struct RelaxationFailure {
+    /// The leaf on its grids when that happened.
     pub at: NestedEquilibrium,
     pub stop: EquilibriumFailure,
 }
 
-/// An equilibrium, or where none was found.
+/// An equilibrium, or why none was found.
 pub type RelaxationResult = Result<NestedEquilibrium, Box<RelaxationFailure>>;
 
 impl RelaxationFailure {
-    /// On this path.
+    /// The failure of a leaf that came there on this path.
     pub fn with_path(self, path: Option<Path>) -> Self {
         let at = self.at.with_path(path);
         RelaxationFailure { at, ..self }
@@ -142,7 +139,7 @@ pub fn result_with_path(found: RelaxationResult, path: Option<Path>) -> Relaxati
 }
 
 impl NestedEquilibrium {
-    /// On no grid so far.
+    /// The leaf of a problem before it is at rest on any grid.
     pub fn without_grids(problem: &RelaxationProblem) -> Self {
         NestedEquilibrium {
             levels: Vec::new(),
@@ -166,32 +163,32 @@ impl NestedEquilibrium {
         }
     }
 
-    /// With the next finer grid.
+    /// The leaf with its state on the next finer grid, without estimates so far.
     pub fn with_finer_level(mut self, finest: GridLevel) -> Self {
         self.levels.push(finest);
         self.with_convergence_table()
     }
 
-    /// On these grids in place of its own, without estimates so far.
+    /// The leaf on these grids in place of its own, without estimates so far.
     pub fn with_levels(self, levels: Vec<GridLevel>) -> Self {
         NestedEquilibrium { levels, ..self }.with_convergence_table()
     }
 
     /// Takes the leaf on its finest grid out of the list.
     pub fn take_finest(&mut self) -> GridLevel {
-        let finest = self.levels.pop().expect("the leaf has settled");
+        let finest = self.levels.pop().expect("the leaf is at rest on a grid");
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
         finest
     }
 
-    /// With the leaf on its finest grid, which [`take_finest`](Self::take_finest) took, in the list again.
+    /// The leaf with its finest grid again, which [`take_finest`](Self::take_finest) took.
     pub fn rejoin_finest(mut self, finest: GridLevel) -> Self {
         self.levels.push(finest);
         self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
         self
     }
 
-    /// With its negative eigenvalues counted.
+    /// The leaf with this number of negative eigenvalues.
     pub fn with_index(self, clearly_stable: bool, index: Option<usize>) -> Self {
         NestedEquilibrium {
             clearly_stable,
@@ -226,7 +223,7 @@ impl NestedEquilibrium {
         self
     }
 
-    /// The same leaf on the same grids, without estimates and their equations.
+    /// A copy of the leaf on its grids, without error estimates and their equations.
     pub fn without_estimates(&self) -> Self {
         NestedEquilibrium {
             levels: self.levels.clone(),
@@ -240,7 +237,7 @@ impl NestedEquilibrium {
         }
     }
 
-    /// The same on the coarsest `count` grids alone; `None` unless each of them halves the
+    /// A copy of the leaf on its coarsest `count` grids alone; `None` unless each of them halves the
     /// segments of the one before.
     pub fn on_coarsest_grids(&self, count: usize) -> Option<Self> {
         let levels = self.levels.get(..count)?;
@@ -249,7 +246,7 @@ impl NestedEquilibrium {
         nested.then(|| self.without_estimates().with_levels(levels.to_vec()))
     }
 
-    /// That of the whole leaf, where the problem was one of its half.
+    /// The whole leaf, if the problem was one of its half.
     pub fn mirrored_to_whole(mut self, problem: &RelaxationProblem) -> Self {
         let Some(whole) = problem.whole_leaf else {
             return self;
@@ -269,15 +266,15 @@ impl NestedEquilibrium {
         }
     }
 
-    /// With a bar that is larger by this factor.
-    pub fn with_bifurcation_factor(self, softening: f64) -> Self {
+    /// The leaf with an error bar that is larger by this factor, as it is beside a bifurcation.
+    pub fn with_bifurcation_factor(self, bifurcation_error_factor: f64) -> Self {
         NestedEquilibrium {
-            bifurcation_error_factor: softening,
+            bifurcation_error_factor,
             ..self
         }
     }
 
-    /// At the end of refinement, within the tolerance or not.
+    /// The leaf at the end of refinement, within the tolerance or not.
     pub fn with_tolerance_kept(self, keeps_tolerance: bool) -> Self {
         NestedEquilibrium {
             keeps_tolerance,
@@ -285,12 +282,12 @@ impl NestedEquilibrium {
         }
     }
 
-    /// On this path.
+    /// The leaf that came to rest on this path.
     pub fn with_path(self, path: Option<Path>) -> Self {
         NestedEquilibrium { path, ..self }
     }
 
-    /// As a result: after this work, and without the equations of its estimate.
+    /// The leaf as a result: after this work, and without the equations of its estimate.
     pub fn with_work(self, work: SolverCounts) -> Self {
         NestedEquilibrium {
             work,
@@ -299,7 +296,7 @@ impl NestedEquilibrium {
         }
     }
 
-    /// A failure here.
+    /// The failure of an iteration that stopped with this leaf.
     pub fn into_failure<T>(self, stop: EquilibriumFailure) -> Result<T, Box<RelaxationFailure>> {
         Err(Box::new(RelaxationFailure { at: self, stop }))
     }
@@ -369,7 +366,7 @@ impl NestedEquilibrium {
                 error: Some(self.energy_error(estimate)),
             };
         }
-        let finest = &self.levels[self.levels.len().saturating_sub(ENERGY_GRIDS)..];
+        let finest = &self.levels[self.levels.len().saturating_sub(EXTRAPOLATED_GRIDS)..];
         let (table, columns) = (
             energies(finest),
             self.convergence_table.best_column_number(),
@@ -429,39 +426,46 @@ fn energies(levels: &[GridLevel]) -> Richardson {
         .with_noise(noise)
 }
 
-/// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
-/// absolute values.
-const EXTRAPOLATION_ERROR_AMPLIFICATION: f64 = 2.0;
+/// What the error bar of positions and energy is made from.
+struct ErrorBar {
+    /// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
+    /// absolute values.
+    amplification: f64,
+    /// Safety factor on the error estimated from the defect of the extrapolated leaf.
+    safety: f64,
+    /// Safety factor on the error of the energy: the linear equations of a coarse grid tell less of
+    /// what is of second order.
+    energy_safety: f64,
+    /// The least part of the largest error between the nodes of the coarsest grid that is taken
+    /// for the error at these nodes: where layers are thinner than its segments the linear
+    /// equations of a coarse grid are wrong by so much.
+    layer_fraction: f64,
+    /// Upper bound of the error by the defect in units of that estimated from the last extrapolation:
+    /// the response of a neutral mode to rounding is not an error.
+    largest_ratio: f64,
+    /// Rounding error per segment, in lengths of the leaf.
+    rounding: f64,
+    /// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
+    /// not computed: it would hardly be small enough.
+    unreachable: f64,
+    /// The part of the error that each correction by the defect leaves at best.
+    correction_remainder: f64,
+}
 
-/// Safety factor on the error estimated from the defect of the extrapolated leaf.
-const SAFETY: f64 = 2.0;
-
-/// The same on that of the energy: the linear equations of a coarse grid tell less of what is of
-/// second order.
-const ENERGY_SAFETY: f64 = 3.0;
-
-/// The least part of the largest error between the nodes of the coarsest grid that is taken
-/// for the error at these nodes: where layers are thinner than its segments the linear
-/// equations of a coarse grid are wrong by so much.
-const LAYER_ERROR_FRACTION: f64 = 0.1;
-
-/// Upper bound of that estimate in units of the error estimated from the last extrapolation:
-/// the response of a neutral mode to rounding is not an error.
-const LARGEST_ESTIMATE_RATIO: f64 = 10.0;
-
-/// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
-/// not computed: it would hardly be small enough.
-const UNREACHABLE_TOLERANCE_FACTOR: f64 = 3e3;
-
-/// The part of the error that each correction leaves at best.
-const CORRECTION_REMAINDER: f64 = 1e-2;
+const BAR: ErrorBar = ErrorBar {
+    amplification: 2.0,
+    safety: 2.0,
+    energy_safety: 3.0,
+    layer_fraction: 0.1,
+    largest_ratio: 10.0,
+    rounding: 4e-15,
+    unreachable: 3e3,
+    correction_remainder: 1e-2,
+};
 
 /// For leaves with more nodes than this no equations are kept while others are solved, which
-/// saves memory at the cost of another factorisation on a coarse grid.
+/// saves memory at the cost of another factorization on a coarse grid.
 const MANY_NODES: usize = 50_000;
-
-/// Rounding error per segment.
-const ROUNDING: f64 = 4e-15;
 
 /// Whether the equations of a leaf need much memory.
 pub fn is_large(leaf: &DiscreteLeaf) -> bool {
@@ -489,23 +493,24 @@ impl NestedEquilibrium {
         let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
         let best = self.convergence_table.best();
         let best = best.map(|best| larger(best.error, self.unresolved));
-        let most = best.map_or(f64::INFINITY, |best| LARGEST_ESTIMATE_RATIO * best);
+        let most = best.map_or(f64::INFINITY, |best| BAR.largest_ratio * best);
         let too_coarse = !self.has_fixed_grid && segments[0] < GRIDS.coarsest;
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
                 return Some(
-                    SAFETY * estimate.position_errors.largest() + ROUNDING * segments[0] as f64,
+                    BAR.safety * estimate.position_errors.largest()
+                        + BAR.rounding * segments[0] as f64,
                 );
             }
             // If nodes are few the midpoints are stations, too.
             Some(estimate) if too_coarse || best.is_none() => {
-                (SAFETY * estimate.position_errors.largest()).min(most)
+                (BAR.safety * estimate.position_errors.largest()).min(most)
             }
             Some(estimate) => {
                 let errors = estimate.position_errors;
-                let at_nodes = (errors.at_nodes).max(LAYER_ERROR_FRACTION * errors.between);
-                (SAFETY * at_nodes).min(most)
+                let at_nodes = (errors.at_nodes).max(BAR.layer_fraction * errors.between);
+                (BAR.safety * at_nodes).min(most)
             }
             None => best?,
         };
@@ -514,23 +519,22 @@ impl NestedEquilibrium {
 
     /// Error by unfinished iterations and rounding on a grid of `segments` segments.
     fn iteration_rounding_error(&self, segments: usize) -> f64 {
-        EXTRAPOLATION_ERROR_AMPLIFICATION * self.history.iteration_error
-            + ROUNDING * segments as f64
+        BAR.amplification * self.history.iteration_error + BAR.rounding * segments as f64
     }
 
     /// Error of the energy of an integrated leaf: that of grids, and rounding of what is summed along
     /// the rods.
     pub(super) fn energy_error(&self, estimate: &DefectEstimate) -> f64 {
         let segments = estimate.grid.segments() * estimate.rods.len();
-        let rounding = ROUNDING * segments as f64 * larger(1.0, estimate.energy.abs());
-        self.bifurcation_error_factor * ENERGY_SAFETY * estimate.energy_error + rounding
+        let rounding = BAR.rounding * segments as f64 * larger(1.0, estimate.energy.abs());
+        self.bifurcation_error_factor * BAR.energy_safety * estimate.energy_error + rounding
     }
 
     /// The estimated errors of the fields of the leaf integrated along its rods.
     pub fn field_errors(&self) -> Option<FieldErrors<'_>> {
         Some(FieldErrors {
             estimate: self.estimate.as_ref()?,
-            safety: self.bifurcation_error_factor * SAFETY,
+            safety: self.bifurcation_error_factor * BAR.safety,
         })
     }
 
@@ -545,7 +549,7 @@ impl NestedEquilibrium {
         let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
         let error = match estimate.corrections {
             0 => {
-                SAFETY * estimate.position_errors.largest()
+                BAR.safety * estimate.position_errors.largest()
                     + self.iteration_rounding_error(segments)
             }
             _ => self.error()?,
@@ -554,14 +558,14 @@ impl NestedEquilibrium {
             .then_some(IntegratedLeaf { estimate, error })
     }
 
-    /// The integrated leaf, if its error was corrected.
+    /// The leaf integrated along its rods, if its error was corrected.
     pub fn corrected_estimate(&self) -> Option<&DefectEstimate> {
         self.estimate
             .as_ref()
             .filter(|estimate| estimate.corrections > 0)
     }
 
-    /// The same with the error of the values on its only grid or of the extrapolated values
+    /// The leaf with the error of the values on its only grid, or of the extrapolated values,
     /// estimated from their defect, and corrected if that makes them accurate enough. The
     /// equations are set up in the memory of the `workspace`.
     pub fn with_error_estimate(
@@ -571,9 +575,8 @@ impl NestedEquilibrium {
         work: &mut SolverCounts,
     ) -> Self {
         let most = problem.corrections();
-        let farthest = UNREACHABLE_TOLERANCE_FACTOR
-            * CORRECTION_REMAINDER.powi(-(most as i32))
-            * self.tolerance;
+        let farthest =
+            BAR.unreachable * BAR.correction_remainder.powi(-(most as i32)) * self.tolerance;
         // A leaf that can turn is the same one of its circle on every grid: the response to a defect
         // leaves where on the circle it is as it was, with the error of that.
         let turns = |level: &GridLevel| !level.leaf.zero_energy_fields(&level.state).is_empty();
@@ -587,7 +590,7 @@ impl NestedEquilibrium {
             }
         };
         let goal = CorrectionGoal {
-            error: self.tolerance / SAFETY - ROUNDING * GRIDS.coarsest as f64,
+            error: self.tolerance / BAR.safety - BAR.rounding * GRIDS.coarsest as f64,
             most_corrections: most,
         };
         let (levels, linear) = (&self.levels, &mut self.factorized_level);

@@ -24,14 +24,14 @@ const ORDER: OrderTest = OrderTest {
 
 /// Safety factors of error estimates.
 struct ExtrapolationSafety {
-    /// On the last change of a column without a proven order.
+    /// Factor on the last change of a column without a proven order.
     unproven_order: f64,
-    /// Slope of the factor on the last correction over the root of the ratio of the last two.
+    /// Slope of the safety factor on the last correction over the root of the ratio of the last two.
     slope: f64,
     /// The least factor on the last correction, and the largest.
     least: f64,
     most: f64,
-    /// On the corrections of few numbers, each weighted by the part of it that those after it must
+    /// Factor on the corrections of few numbers, each weighted by the part of it that those after it must
     /// reach: of 1,800 forces, moments and energies of random leaves the largest error was 4.6
     /// times the largest of the corrections so weighted.
     few_values: f64,
@@ -49,6 +49,10 @@ const SAFETY: ExtrapolationSafety = ExtrapolationSafety {
 
 /// Changes below this, relative to the leaf's length, are rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// Largest number of grids over which single numbers are extrapolated: errors on coarser ones, which the
+/// finest have no more, need not be small.
+pub const EXTRAPOLATED_GRIDS: usize = 4;
 
 /// The selected column of a table, and its error estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,7 +112,7 @@ impl Richardson {
         self.segments.push(segments);
     }
 
-    /// The same table, of values with rounding errors of this size.
+    /// The table, of values with rounding errors of this size.
     pub fn with_noise(self, noise: f64) -> Self {
         Richardson { noise, ..self }
     }

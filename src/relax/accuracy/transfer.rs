@@ -7,9 +7,9 @@ use crate::rotation;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
-/// Segments of a panel from which on such polynomials are better than cubic Hermite
-/// interpolants.
-const SEGMENTS: usize = 4;
+/// Segments of a panel between kinks from which on polynomials along it predict better than cubic
+/// Hermite interpolants.
+const LEAST_PANEL_SEGMENTS: usize = 4;
 
 /// Predicts the state on the finest grid refined: the polynomial in ds^2 through the states on
 /// nested `levels`, from coarse to fine. Interpolation along the panels between kinks is
@@ -29,7 +29,7 @@ pub fn predict_on_finer_grid(levels: &[&GridLevel], state: &mut State) {
     };
     let panels: Vec<Panel> = edges.windows(2).map(panel).collect();
     for panel in &panels {
-        if panel.count(&finest.state) >= SEGMENTS {
+        if panel.count(&finest.state) >= LEAST_PANEL_SEGMENTS {
             panel.interpolate(&finest.state, state);
         }
     }
@@ -78,17 +78,17 @@ struct Panel {
 }
 
 impl Panel {
-    /// Its first node or segment on the grid of a state.
+    /// The number of the panel's first node or segment on the grid of a state.
     fn first(&self, state: &State) -> usize {
         self.first * state.segments() / self.coarsest
     }
 
-    /// Its segments there.
+    /// The number of the panel's segments on the grid of a state.
     fn count(&self, state: &State) -> usize {
         (self.last - self.first) * state.segments() / self.coarsest
     }
 
-    /// Interpolation from its nodes on one grid to those on another.
+    /// Interpolation from the panel's nodes on one grid to those on another.
     fn nodes(&self, from: &State, to: &State) -> Vec<Stencil> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |k: usize| (k * have) as f64 / want as f64;
@@ -96,7 +96,7 @@ impl Panel {
         (0..=want).map(through).collect()
     }
 
-    /// The same for midpoints of segments.
+    /// Interpolation from the midpoints of the panel's segments on one grid to those on another.
     fn middles(&self, from: &State, to: &State) -> Vec<Stencil> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |i: usize| (i as f64 + 0.5) * have as f64 / want as f64 - 0.5;
@@ -359,8 +359,8 @@ pub(crate) struct Stencil<const MOST: usize = NODES> {
 }
 
 impl<const MOST: usize> Stencil<MOST> {
-    /// Of the value at `place` among `points` equally spaced points, of which `first` is the
-    /// first: through at most `MOST` of the nearest of them.
+    /// The stencil of the value at `place` among `points` equally spaced points, of which `first` is
+    /// the first: through at most `MOST` of the nearest of them.
     pub fn new(first: usize, points: usize, place: f64) -> Self {
         let count = MOST.min(points);
         let centred = (place - 0.5 * (count - 1) as f64).round().max(0.0);
@@ -386,8 +386,8 @@ impl<const MOST: usize> Stencil<MOST> {
         self.terms().map(|(i, weight)| weight * at(i)).sum()
     }
 
-    /// Of the value at a fraction of the length, and of its derivative with sigma, of values at
-    /// nodes numbered from 0; linear extrapolation beyond the ends of the rod.
+    /// The stencils of the value at a fraction of the length, and of its derivative with sigma, of
+    /// values at nodes numbered from 0; linear extrapolation beyond the ends of the rod.
     pub fn value_and_derivative_stencils(leaf: &DiscreteLeaf, sigma: f64) -> [Self; 2] {
         let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
         let nodes = leaf.grid.sigma();

@@ -42,7 +42,7 @@ pub enum LoadingEnd {
 }
 
 /// Loads the leaf slowly, and brings it to rest on nested grids from where that leads; the
-/// `half` of it where it keeps its mirror symmetry. A grid that was too coarse for the walk
+/// `half` of it where it keeps its mirror symmetry. A grid that was too coarse for slow loading
 /// is refined.
 pub fn load_slowly<'a>(
     problem: &RelaxationProblem<'a>,
@@ -55,7 +55,7 @@ pub fn load_slowly<'a>(
         let segments = grid.segments();
         let LoadPathEnd {
             level,
-            path: walked,
+            path: followed_path,
         } = match follow_load_path(problem, grid, effort) {
             Ok(arrived) => arrived,
             Err(failure) => {
@@ -65,7 +65,7 @@ pub fn load_slowly<'a>(
             }
         };
         grid = level.leaf.grid.refined();
-        path = Some(walked);
+        path = Some(followed_path);
         let mut begun = NestedEquilibrium::without_grids(problem);
         let StateOnGrid { grid: on, state } =
             state_on_requested_grid(problem, &mut begun.history, level, effort);
@@ -137,7 +137,7 @@ fn end_of(
     }
 }
 
-/// Whether nothing happened on a path.
+/// Whether a leaf kept its stability all along its path.
 fn path_is_stable(path: &Option<Path>) -> bool {
     (path.as_ref()).is_some_and(|path| path.events().is_empty())
 }
@@ -158,14 +158,14 @@ fn coarsest_grid(leaf: &Leaf) -> Grid {
     grid
 }
 
-/// Where a walk arrived, and how.
+/// Where slow loading led, and how.
 pub struct LoadPathEnd {
     pub level: GridLevel,
     pub path: Path,
 }
 
-/// Walks on this grid, and on finer ones where it does not resolve the leaf or where
-/// stability was lost; the leaf on the coarser of two grids that agree. If no grid leads to
+/// Loads a leaf slowly on this grid, and on finer ones where that does not resolve it or where
+/// stability was lost; returns the leaf on the coarser of two grids that agree. If no grid leads to
 /// rest, the last state is kept.
 pub fn follow_load_path(
     problem: &RelaxationProblem,
@@ -254,7 +254,7 @@ pub fn state_on_requested_grid(
     StateOnGrid { grid, state }
 }
 
-/// Nodes times force evaluations that are left for walks.
+/// Nodes times force evaluations that are left for slow loading.
 fn remaining_loading_budget(effort: &WorkLog) -> usize {
     (WORK.loading_node_evaluations).saturating_sub(effort.loading_node_evaluations)
 }
@@ -286,7 +286,7 @@ struct LoadPathRun {
     end: Result<(), EquilibriumFailure>,
 }
 
-/// Walks on one grid to the end of a stage.
+/// Loads a leaf slowly on one grid, to the end of a stage.
 fn follow_path_on_grid(
     problem: &RelaxationProblem,
     grid: Grid,
@@ -307,23 +307,25 @@ fn follow_path_on_grid(
     };
     let (before, nodes) = (effort.work.force_evaluations, leaf.rods() * segments);
     let most = before + (left / nodes).min(WORK.loading_evaluations);
-    let mut walk = LoadPath::new(
+    let mut loading = LoadPath::new(
         &leaf,
-        (&mut effort.work, &mut progress),
-        (&problem.options.limit, most),
+        &mut effort.work,
+        &mut progress,
+        &problem.options.limit,
+        most,
     );
-    walk.bias_direction = problem.options.bias_direction;
-    let end = walk.run(last);
-    let events = std::mem::take(&mut walk.events);
+    loading.bias_direction = problem.options.bias_direction;
+    let end = loading.run(last);
+    let events = std::mem::take(&mut loading.events);
     let reached = PathPosition {
-        stage: walk.stage,
-        lambda: walk.lambda,
+        stage: loading.stage,
+        lambda: loading.lambda,
     };
-    let evaluations = walk.work.force_evaluations - before;
+    let evaluations = loading.work.force_evaluations - before;
     // On coarse grids slow loading is cheap, and yet not repeated often.
     let least = WORK.loading_node_evaluations / WORK.loading_evaluations;
     effort.loading_node_evaluations += evaluations * nodes.max(least);
-    let mut state = walk.last();
+    let mut state = loading.last();
     if leaf.tips_move_together() {
         state.join_tips();
     }
@@ -342,8 +344,8 @@ const NEXT_GRID_ITERATIONS: usize = 12;
 /// The accuracy of these, as a part of the tolerance.
 const NEXT_GRID_ACCURACY: f64 = 1e-3;
 
-/// From the start to rest, on as many grids as the tolerance needs. A held leaf whose rest on a coarse
-/// grid leads to none on finer ones is moved to its holders on these.
+/// Brings a leaf to rest from its start, on as many grids as the tolerance needs. A held leaf whose rest
+/// on a coarse grid leads to none on finer ones is moved to its holders on these.
 pub fn solve_from_start(
     problem: &RelaxationProblem,
     mut grid: Grid,
@@ -366,7 +368,8 @@ pub fn solve_from_start(
     }
 }
 
-/// The same from initial guesses on nested grids, each close to an equilibrium.
+/// Brings a leaf to rest from initial guesses on nested grids, each close to an equilibrium, and on as
+/// many finer grids as the tolerance needs.
 pub fn solve_from_guesses(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
@@ -377,8 +380,8 @@ pub fn solve_from_guesses(
     refine_to_tolerance(problem, found, effort)
 }
 
-/// The same on these grids alone, whatever their accuracy; stability is not checked beyond
-/// the positive definite matrix of the iteration.
+/// Brings a leaf to rest from initial guesses on these grids alone, whatever their accuracy; stability
+/// is not checked beyond the positive definite matrix of the iteration.
 pub fn solve_on_given_grids(
     problem: &RelaxationProblem,
     begun: NestedEquilibrium,
@@ -444,14 +447,14 @@ fn needs_another_grid(problem: &RelaxationProblem, found: &NestedEquilibrium) ->
     found.finer_nodes(found.levels.len()).grid + 1 < found.levels.len()
 }
 
-/// Settles the leaf on the next finer grid, from a guess by the grids before.
+/// Brings a leaf to rest on the next finer grid, from a guess by the grids before.
 fn predict_and_solve(
     problem: &RelaxationProblem,
     found: NestedEquilibrium,
     finer: Grid,
     effort: &mut WorkLog,
 ) -> RelaxationResult {
-    let level = found.levels.last().expect("the leaf has settled");
+    let level = found.levels.last().expect("the leaf is at rest on a grid");
     let mut state = prolong(&level.leaf, &level.state);
     let guess = match found.levels_for_prediction().as_slice() {
         [_] => InitialGuess::Coarser(state),
@@ -464,7 +467,7 @@ fn predict_and_solve(
     solve_from_guess(problem, found, next, effort)
 }
 
-/// Settles the leaf on the next finer grid from this guess.
+/// Brings a leaf to rest on its next finer grid from this guess.
 fn solve_from_guess(
     problem: &RelaxationProblem,
     mut found: NestedEquilibrium,
@@ -483,7 +486,7 @@ fn solve_from_guess(
     }
 }
 
-/// The same equilibrium, of any index, on the grid next to the `finest`, predicted from a
+/// An equilibrium, of any index, continued to the grid next to the `finest`, predicted from a
 /// `coarser` one, too; `None` if Newton's method leads elsewhere.
 pub fn on_next_grid(
     coarser: Option<&GridLevel>,
@@ -509,7 +512,7 @@ pub fn on_next_grid(
     is_near_guess(&guess, &state).then_some(GridLevel { leaf, state })
 }
 
-/// From the start to rest on the first grid that resolves it. A leaf that had to move far
+/// Brings a leaf to rest from its start on the first grid that resolves it. A leaf that had to move far
 /// must reach the same equilibrium on two grids.
 fn solve_first_grid(
     problem: &RelaxationProblem,
@@ -604,8 +607,8 @@ fn is_confirmed_on(
     rest.is_ok() && is_same_on_two_grids(level, &other)
 }
 
-/// With up to two of the coarser grids that failed from the start, settled from the
-/// restricted equilibrium of the only grid so far.
+/// The leaf with up to two of the coarser grids that failed from the start, brought to rest there from
+/// the restricted equilibrium of its only grid so far.
 fn add_coarser_grids(
     problem: &RelaxationProblem,
     mut found: NestedEquilibrium,

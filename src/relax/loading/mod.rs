@@ -26,54 +26,79 @@ const STEPS: StepSizes = StepSizes {
     failure: 0.25,
 };
 
-/// The distance of a state from its prediction (lengths, radians) that steps are made for, and
-/// the largest accepted.
-const WANTED_DRIFT: f64 = 0.1;
+/// How states on the path of slow loading are predicted and corrected; lengths and radians.
+struct LoadStepCorrection {
+    /// The distance of a state from its prediction that steps are made for. Half of it makes steps
+    /// shorter by a third.
+    wanted_drift: f64,
+    /// The largest distance accepted: farther away is another equilibrium.
+    largest_drift: f64,
+    /// Largest increment of Newton's method: the first after the natural leaf may be large.
+    largest_increment: f64,
+    /// Accuracy of states on the way.
+    intermediate_accuracy: f64,
+    /// Accuracy of the state at the end of a stage.
+    final_accuracy: f64,
+    /// Accuracy of a state whose index is in doubt.
+    index_accuracy: f64,
+    /// Newton iterations of a step.
+    iterations: usize,
+    /// Newton iterations towards an equilibrium of any index that are made at a time.
+    iterations_per_batch: usize,
+    /// The part of its motion in the iterations before by which the leaf moves in a batch, or no
+    /// equilibrium is near.
+    batch_contraction: f64,
+    /// Relative accuracy of the first solutions with conjugate gradients.
+    cg_tolerance: f64,
+}
 
-const LARGEST_DRIFT: f64 = 0.3;
+const CORRECTION: LoadStepCorrection = LoadStepCorrection {
+    wanted_drift: 0.1,
+    largest_drift: 0.3,
+    largest_increment: 2.0,
+    intermediate_accuracy: 1e-3,
+    final_accuracy: 1e-4,
+    index_accuracy: 1e-10,
+    iterations: 8,
+    iterations_per_batch: 4,
+    batch_contraction: 0.25,
+    cg_tolerance: 1e-3,
+};
 
-/// Largest increment of Newton's method, lengths or radians: the first after the natural leaf
-/// may be large.
-const LARGEST_INCREMENT: f64 = 2.0;
-
-/// Accuracy of states on the way, at its end, and where the index is in doubt.
-const INTERMEDIATE_STATE_ACCURACY: f64 = 1e-3;
-
-const FINAL_STATE_ACCURACY: f64 = 1e-4;
-
-const INDEX_STATE_ACCURACY: f64 = 1e-10;
-
-/// Newton iterations of a step.
-const ITERATIONS: usize = 8;
-
-/// Towards an equilibrium of any index so many iterations at a time are made, in which the leaf moves
-/// by less than this part of what it moved in those before, or none is near.
-const ITERATIONS_PER_BATCH: usize = 4;
-
-const BATCH_CONTRACTION_LIMIT: f64 = 0.25;
-
-/// Relative accuracy of the first solutions with conjugate gradients.
-const CG_TOLERANCE: f64 = 1e-3;
-
-/// States through which the next is predicted.
+/// Number of states through which the next is predicted.
 const PREDICTED_THROUGH: usize = 3;
 
-/// A walk on one grid.
+/// A leaf at rest on the path.
+struct PathState {
+    /// The part of the stage, from 0 to 1.
+    lambda: f64,
+    state: State,
+}
+
+/// An equilibrium that Newton's method found from a prediction.
+struct CorrectedState {
+    /// The Morse index.
+    index: usize,
+    /// Distance from the prediction, lengths or radians.
+    drift: f64,
+}
+
+/// Slow loading of a leaf on one grid.
 pub struct LoadPath<'w> {
     pub loading: LoadedLeaf<'w>,
     pub system: System,
     pub work: &'w mut SolverCounts,
     pub limit: &'w Limit,
     pub progress: &'w mut dyn FnMut(usize, f64),
-    /// Count of force evaluations at which it ends without success.
+    /// Count of force evaluations at which the loading ends without success.
     pub most_evaluations: usize,
     pub solver: DefiniteSolver,
-    /// The last states at rest, with their parts of the loading.
-    previous_states: Vec<(f64, State)>,
-    /// The next one.
+    /// The last states at rest.
+    previous_states: Vec<PathState>,
+    /// The next state.
     pub next: State,
     pub events: Vec<Event>,
-    /// Where it is.
+    /// The stage in which the leaf is, and the part of that.
     pub stage: Stage,
     pub lambda: f64,
     /// Towards which a leaf turns aside that may turn to either side: a force on all nodes.
@@ -91,13 +116,15 @@ enum LoadStepOutcome {
 }
 
 impl<'w> LoadPath<'w> {
-    /// At the natural leaf.
+    /// Begins with the natural leaf.
     pub fn new(
         whole: &'w DiscreteLeaf,
-        (work, progress): (&'w mut SolverCounts, &'w mut dyn FnMut(usize, f64)),
-        (limit, most_evaluations): (&'w Limit, usize),
+        work: &'w mut SolverCounts,
+        progress: &'w mut dyn FnMut(usize, f64),
+        limit: &'w Limit,
+        most_evaluations: usize,
     ) -> Self {
-        let (loading, natural) = LoadedLeaf::new(whole);
+        let (loading, state) = (LoadedLeaf::new(whole), whole.stress_free_state());
         LoadPath {
             system: System::new(&loading.leaf),
             work,
@@ -105,8 +132,8 @@ impl<'w> LoadPath<'w> {
             progress,
             most_evaluations,
             solver: DefiniteSolver::default(),
-            next: natural.clone(),
-            previous_states: vec![(0.0, natural)],
+            next: state.clone(),
+            previous_states: vec![PathState { lambda: 0.0, state }],
             events: Vec::new(),
             stage: Stage::LoadedLeaf,
             lambda: 0.0,
@@ -115,13 +142,13 @@ impl<'w> LoadPath<'w> {
         }
     }
 
-    /// Walks to the end of a stage, if it can; the last state and what happened on the way are kept.
+    /// Loads the leaf to the end of a stage, as far as it can; the last state and what happened on the way are kept.
     pub fn run(&mut self, last: Stage) -> Result<(), EquilibriumFailure> {
         for stage in self.loading.stages() {
             if stage == Stage::Joining && last == Stage::LoadedLeaf {
                 break;
             }
-            let (_, state) = self.previous_states.pop().expect("the last state");
+            let PathState { state, .. } = self.previous_states.pop().expect("the last state");
             self.loading.begin(stage, &state);
             if stage == Stage::Joining {
                 // Its tips move together, and its veins will be coupled.
@@ -129,7 +156,7 @@ impl<'w> LoadPath<'w> {
                 self.solver = DefiniteSolver::default();
             }
             self.previous_states.clear();
-            self.previous_states.push((0.0, state));
+            self.previous_states.push(PathState { lambda: 0.0, state });
             (self.stage, self.lambda) = (stage, 0.0);
             self.follow_stage()?;
         }
@@ -139,7 +166,7 @@ impl<'w> LoadPath<'w> {
     /// The state in which it ended.
     pub fn last(self) -> State {
         let last = self.previous_states.into_iter().next_back();
-        last.map_or(self.next, |(_, state)| state)
+        last.map_or(self.next, |last| last.state)
     }
 
     fn follow_stage(&mut self) -> Result<(), EquilibriumFailure> {
@@ -150,7 +177,7 @@ impl<'w> LoadPath<'w> {
             match self.step_to(step.to, step.is_shortest) {
                 LoadStepOutcome::Stable(drift) => {
                     self.accept(step.to);
-                    let growth = (WANTED_DRIFT / drift).sqrt().min(STEPS.growth);
+                    let growth = (CORRECTION.wanted_drift / drift).sqrt().min(STEPS.growth);
                     StepEnd::Made { growth }
                 }
                 LoadStepOutcome::Lost(EquilibriumFailure::Unresolved) => {
@@ -191,18 +218,22 @@ impl<'w> LoadPath<'w> {
         if self.previous_states.len() == PREDICTED_THROUGH {
             self.previous_states.rotate_left(1);
             let last = self.previous_states.last_mut().expect("states");
-            last.0 = part;
-            last.1.clone_from(&self.next);
+            last.lambda = part;
+            last.state.clone_from(&self.next);
         } else {
-            self.previous_states.push((part, self.next.clone()));
+            let state = self.next.clone();
+            self.previous_states.push(PathState {
+                lambda: part,
+                state,
+            });
         }
     }
 
     /// Carries the last state at rest to another part.
     pub fn carry_last(&mut self, part: f64) {
-        let (at, last) = self.previous_states.last().expect("states");
-        self.next.clone_from(last);
-        self.loading.carry_to_lambda([*at, part], &mut self.next);
+        let last = self.previous_states.last().expect("states");
+        self.next.clone_from(&last.state);
+        (self.loading).carry_to_lambda([last.lambda, part], &mut self.next);
         self.system.set_coupling(&self.loading.leaf);
     }
 
@@ -216,7 +247,7 @@ impl<'w> LoadPath<'w> {
         let weight = |k: usize| {
             let others = (0..count).filter(|other| *other != k);
             let part = others.map(|other| {
-                let [own, other] = [k, other].map(|k| self.previous_states[k].0);
+                let [own, other] = [k, other].map(|k| self.previous_states[k].lambda);
                 (part - other) / (own - other)
             });
             part.product()
@@ -224,12 +255,12 @@ impl<'w> LoadPath<'w> {
         // The last one, which the others change, has the rest of the weight.
         let mut weights = [0.0; PREDICTED_THROUGH];
         (0..count - 1).for_each(|k| weights[k] = weight(k));
-        let (_, last) = &self.previous_states[count - 1];
+        let last = &self.previous_states[count - 1].state;
         let others = || self.previous_states[..count - 1].iter().zip(weights);
         for k in 0..last.x.len() {
             let mut shift = DVec3::ZERO;
             let mut turn = DVec3::ZERO;
-            for ((_, state), weight) in others() {
+            for (PathState { state, .. }, weight) in others() {
                 shift += weight * (state.x[k] - last.x[k]);
                 turn += weight * rotation::log(state.q[k] * last.q[k].conjugate());
             }
@@ -238,14 +269,14 @@ impl<'w> LoadPath<'w> {
         }
         for k in 0..last.n.len() {
             let change: DVec3 = others()
-                .map(|((_, state), weight)| weight * (state.n[k] - last.n[k]))
+                .map(|(before, weight)| weight * (before.state.n[k] - last.n[k]))
                 .sum();
             self.next.n[k] = last.n[k] + change;
         }
-        let tied = others().all(|((_, state), _)| state.tissue.len() == last.tissue.len());
+        let tied = others().all(|(before, _)| before.state.tissue.len() == last.tissue.len());
         self.next.tissue.clone_from(&last.tissue);
         for (k, force) in self.next.tissue.iter_mut().enumerate().filter(|_| tied) {
-            for ((_, state), weight) in others() {
+            for (PathState { state, .. }, weight) in others() {
                 *force += weight * (state.tissue[k] - last.tissue[k]);
             }
         }
@@ -263,25 +294,27 @@ impl<'w> LoadPath<'w> {
         self.predict(part);
         let predicted = self.next.clone();
         let accuracy = if part < 1.0 {
-            INTERMEDIATE_STATE_ACCURACY
+            CORRECTION.intermediate_accuracy
         } else {
-            FINAL_STATE_ACCURACY
+            CORRECTION.final_accuracy
         };
-        let stable = (self.correct(accuracy, ITERATIONS, positive_definite_equations))
+        let stable = (self.correct(accuracy, CORRECTION.iterations, positive_definite_equations))
             .and_then(|_| self.index_and_drift(&predicted));
         match stable {
-            Ok((0, drift)) => return LoadStepOutcome::Stable(drift),
+            Ok(CorrectedState { index: 0, drift }) => return LoadStepOutcome::Stable(drift),
             Err(stop) if !any_sign => return LoadStepOutcome::Lost(stop),
             Err(_) => {}
             Ok(_) => {
                 // Forces of stiff rods that are not converged may be compressive.
                 let again = self.correct(
-                    INDEX_STATE_ACCURACY,
-                    ITERATIONS,
+                    CORRECTION.index_accuracy,
+                    CORRECTION.iterations,
                     positive_definite_equations,
                 );
                 match again.and_then(|_| self.index_and_drift(&predicted)) {
-                    Ok((0, drift)) => return LoadStepOutcome::Stable(drift),
+                    Ok(CorrectedState { index: 0, drift }) => {
+                        return LoadStepOutcome::Stable(drift);
+                    }
                     _ if !any_sign => return LoadStepOutcome::Unstable,
                     _ => {}
                 }
@@ -290,40 +323,42 @@ impl<'w> LoadPath<'w> {
         self.next.clone_from(&predicted);
         match (self.correct_to_any_index(&predicted)).and_then(|_| self.index_and_drift(&predicted))
         {
-            Ok((0, drift)) => LoadStepOutcome::Stable(drift),
+            Ok(CorrectedState { index: 0, drift }) => LoadStepOutcome::Stable(drift),
             Ok(_) => LoadStepOutcome::Unstable,
             Err(stop) => LoadStepOutcome::Lost(stop),
         }
     }
 
-    /// The Morse index of the next state, and its distance from the one predicted, if it is
-    /// near that.
-    fn index_and_drift(&mut self, predicted: &State) -> Result<(usize, f64), EquilibriumFailure> {
+    /// Counts the negative eigenvalues of the next state, if it is near the predicted one.
+    fn index_and_drift(&mut self, predicted: &State) -> Result<CorrectedState, EquilibriumFailure> {
         let drift = self.next.distance(predicted);
-        if self.previous_states.len() > 1 && drift > LARGEST_DRIFT {
+        if self.previous_states.len() > 1 && drift > CORRECTION.largest_drift {
             return Err(EquilibriumFailure::NoDescent);
         }
         let leaf = &self.loading.leaf;
         let shift = leaf.neutral_shift();
         let index = saddle::index(leaf, &self.next, &mut self.system, shift, self.work);
-        Ok((index.ok_or(EquilibriumFailure::NoDescent)?, drift))
+        let index = index.ok_or(EquilibriumFailure::NoDescent)?;
+        Ok(CorrectedState { index, drift })
     }
 
     /// Newton's method from the predicted state to an equilibrium of any index nearby: beyond a fold
     /// there is none, and the iteration would wander.
     fn correct_to_any_index(&mut self, predicted: &State) -> Result<f64, EquilibriumFailure> {
         let mut moved = f64::INFINITY;
-        for _ in 0..2 * ITERATIONS / ITERATIONS_PER_BATCH {
+        for _ in 0..2 * CORRECTION.iterations / CORRECTION.iterations_per_batch {
             let from = self.next.clone();
-            match self.correct(INDEX_STATE_ACCURACY, ITERATIONS_PER_BATCH, |_| {
-                saddle::INDEFINITE_NEWTON_EQUATIONS
-            }) {
+            match self.correct(
+                CORRECTION.index_accuracy,
+                CORRECTION.iterations_per_batch,
+                |_| saddle::INDEFINITE_NEWTON_EQUATIONS,
+            ) {
                 Err(EquilibriumFailure::StepLimit) => {}
                 end => return end,
             }
             let moves = from.distance(&self.next);
-            let approaches = moves <= BATCH_CONTRACTION_LIMIT * moved;
-            if !approaches || self.next.distance(predicted) > LARGEST_DRIFT {
+            let approaches = moves <= CORRECTION.batch_contraction * moved;
+            if !approaches || self.next.distance(predicted) > CORRECTION.largest_drift {
                 return Err(EquilibriumFailure::NoDescent);
             }
             moved = moves;
@@ -368,9 +403,9 @@ impl<'w> LoadPath<'w> {
 fn positive_definite_equations(solver: &mut DefiniteSolver) -> NewtonEquations<'_> {
     NewtonEquations::Definite {
         solver,
-        largest: LARGEST_INCREMENT,
+        largest: CORRECTION.largest_increment,
         shifted: false,
-        cg_tolerance: CG_TOLERANCE,
+        cg_tolerance: CORRECTION.cg_tolerance,
     }
 }
 
@@ -447,23 +482,21 @@ impl TipJoiningPath {
 }
 
 impl<'a> LoadedLeaf<'a> {
-    /// The natural leaf, and its state.
-    pub fn new(whole: &'a DiscreteLeaf) -> (Self, State) {
-        let natural = whole.stress_free_state();
+    /// The leaf before it is loaded.
+    fn new(whole: &'a DiscreteLeaf) -> Self {
         let tips = match whole.tips_move_together() {
             true => TipMotion::Joining(Vec::new()),
             false => TipMotion::Free,
         };
         let mut leaf = whole.decoupled_leaf();
         leaf.load_factor = 0.0;
-        let loading = LoadedLeaf {
+        LoadedLeaf {
             whole,
             leaf,
             tips,
             stage: Stage::LoadedLeaf,
             lambda: 0.0,
-        };
-        (loading, natural)
+        }
     }
 
     /// The stages in which anything happens.
@@ -512,7 +545,7 @@ impl<'a> LoadedLeaf<'a> {
     }
 
     /// Puts the tips of a state predicted for the present part where they are exactly.
-    pub fn place_tips(&self, state: &mut State) {
+    fn place_tips(&self, state: &mut State) {
         if let (TipMotion::Joining(offsets), Stage::Joining) = (&self.tips, self.stage) {
             let common = |j: usize| state.tip(j) - offsets[j].tip_offset(self.lambda);
             let mean = (0..offsets.len()).map(common).sum::<DVec3>() / offsets.len() as f64;
@@ -524,15 +557,32 @@ impl<'a> LoadedLeaf<'a> {
     }
 }
 
-/// The part of its bending energy that is set against the moments of a vein in
-/// [`veins_cannot_buckle`]: about the best where the bound decides.
-const MOMENT_ENERGY_FRACTION: f64 = 0.3;
+/// The bound by which veins cannot buckle.
+struct BucklingBound {
+    /// The part of its bending energy that is set against the moments of a vein: about the best where
+    /// the bound decides.
+    moment_energy_fraction: f64,
+    /// Safety factor on the loads.
+    safety: f64,
+    /// The largest strain of stretch or shear by the loads: the bound is that of rods that neither
+    /// stretch nor shear.
+    largest_strain: f64,
+}
 
-/// Factor on the loads there, and the largest strain of stretch or shear by these: the bound is that
-/// of rods that neither stretch nor shear.
-const SAFETY: f64 = 1.2;
+const BUCKLING: BucklingBound = BucklingBound {
+    moment_energy_fraction: 0.3,
+    safety: 1.2,
+    largest_strain: 0.05,
+};
 
-const LARGEST_STRAIN: f64 = 0.05;
+/// A segment in the bound by which its vein cannot buckle.
+struct BucklingSegment {
+    length: f64,
+    /// The part of the bending stiffness that is not set against the moments.
+    stiffness: f64,
+    /// What makes the vein buckle: the force along the segment and the moment, as a force.
+    compression: f64,
+}
 
 /// Whether no vein, apart from the others, can lose its stability under any part of its loads, by
 /// a bound that asks for no equilibrium.
@@ -548,24 +598,29 @@ const LARGEST_STRAIN: f64 = 0.05;
 pub fn veins_cannot_buckle(leaf: &DiscreteLeaf) -> bool {
     let stands = |j: usize| {
         let mut moment = 0.0;
-        let mut segments: Vec<[f64; 3]> = Vec::with_capacity(leaf.segments());
+        let mut segments: Vec<BucklingSegment> = Vec::with_capacity(leaf.segments());
         for (section, carried) in carried_forces(leaf, j) {
-            let force = SAFETY * carried;
-            if force * section.compliance.max_element() > LARGEST_STRAIN {
+            let force = BUCKLING.safety * carried;
+            if force * section.compliance.max_element() > BUCKLING.largest_strain {
                 return false;
             }
             let length = section.ds * section.rest_strain.length();
             moment += force * length;
             let stiffness = section.couple_stiffness.min_element();
-            let against = force + moment * moment / (4.0 * MOMENT_ENERGY_FRACTION * stiffness);
-            segments.push([length, (1.0 - MOMENT_ENERGY_FRACTION) * stiffness, against]);
+            let compression =
+                force + moment * moment / (4.0 * BUCKLING.moment_energy_fraction * stiffness);
+            segments.push(BucklingSegment {
+                length,
+                stiffness: (1.0 - BUCKLING.moment_energy_fraction) * stiffness,
+                compression,
+            });
         }
         // y and (1 - a) B y', half of a segment each in turn.
         let (mut y, mut z) = (0.0, 1.0);
-        for [length, stiffness, against] in segments.into_iter().rev() {
-            y += 0.5 * length * z / stiffness;
-            z -= length * against * y;
-            y += 0.5 * length * z / stiffness;
+        for it in segments.into_iter().rev() {
+            y += 0.5 * it.length * z / it.stiffness;
+            z -= it.length * it.compression * y;
+            y += 0.5 * it.length * z / it.stiffness;
             if z <= 0.0 {
                 return false;
             }

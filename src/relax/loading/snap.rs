@@ -15,43 +15,58 @@ use crate::relax::saddle::{
     lower_energy_side,
 };
 
-/// and the rates above which the motion fails, in general and where segments are unresolved.
-pub(crate) const FIRST_RATE: f64 = 3.0;
+/// The viscous motion of a leaf that has lost its stability. Its implicit Euler steps have springs to the
+/// state before, whose rates are squared frequencies; the lowest of a clamped rod is 12.
+struct ViscousMotion {
+    /// The first spring rate. A smaller one makes longer steps, which may leave the valley.
+    first_rate: f64,
+    /// The rate below which there are no springs: beside a bifurcation a leaf moves slowly.
+    least_rate: f64,
+    /// The rate above which the motion fails.
+    largest_rate: f64,
+    /// The rate above which it fails where segments are unresolved.
+    largest_unresolved_rate: f64,
+    /// Factor on the rate after the first of several successful steps, squared after each further one.
+    first_decrease: f64,
+    /// The least of these factors.
+    largest_decrease: f64,
+    /// Factor on the rate after the first of several failed steps, squared after each further one.
+    first_increase: f64,
+    /// The largest of these factors.
+    largest_increase: f64,
+    /// Newton iterations of a step.
+    iterations: usize,
+    /// Accuracy of a step, lengths and radians.
+    step_accuracy: f64,
+    /// Largest increment of an iteration (radians, lengths): a longer one could leave the valley.
+    largest_increment: f64,
+    /// Largest change in a step (radians, lengths), for the same reason.
+    largest_change: f64,
+    /// Accuracy of the equilibrium at the end, lengths and radians.
+    rest_accuracy: f64,
+    /// Saddles that are left in one motion.
+    most_saddles: usize,
+}
 
-pub(crate) const LEAST_RATE: f64 = 0.02;
-
-pub(crate) const LARGEST_RATE: f64 = 1e12;
-
-pub(crate) const LARGEST_UNRESOLVED_RATE: f64 = 1e6;
-
-/// Factors by which the rate falls after the first of several successful steps and rises after
-/// the first of several failed ones, each time squared, and their limits.
-pub(crate) const FIRST_DECREASE: f64 = 0.8;
-
-pub(crate) const LARGEST_DECREASE: f64 = 1.0 / 8.0;
-
-pub(crate) const FIRST_INCREASE: f64 = 3.0;
-
-pub(crate) const LARGEST_INCREASE: f64 = 16.0;
-
-/// Newton iterations of a step, their accuracy, and the largest increment and the largest change
-/// in a step (radians, lengths): longer steps could leave the valley.
-pub(crate) const ITERATIONS: usize = 12;
-
-pub(crate) const STEP_ACCURACY: f64 = 0.1;
-
-pub(crate) const LARGEST_INCREMENT: f64 = 0.5;
-
-pub(crate) const LARGEST_CHANGE: f64 = 0.5;
-
-/// Accuracy of the equilibrium at the end of a motion.
-pub(crate) const REST_ACCURACY: f64 = 1e-3;
-
-/// Saddles that are left in one motion.
-pub(crate) const MAX_SADDLE_ESCAPES: usize = 6;
+const MOTION: ViscousMotion = ViscousMotion {
+    first_rate: 3.0,
+    least_rate: 0.02,
+    largest_rate: 1e12,
+    largest_unresolved_rate: 1e6,
+    first_decrease: 0.8,
+    largest_decrease: 1.0 / 8.0,
+    first_increase: 3.0,
+    largest_increase: 16.0,
+    iterations: 12,
+    step_accuracy: 0.1,
+    largest_increment: 0.5,
+    largest_change: 0.5,
+    rest_accuracy: 1e-3,
+    most_saddles: 6,
+};
 
 /// A leaf that moves no farther (lengths, radians) has not snapped.
-pub(crate) const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
+const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
 
 impl LoadPath<'_> {
     /// From the unstable equilibrium in which Newton's method has put the next state the leaf
@@ -105,11 +120,11 @@ impl LoadPath<'_> {
             let from = self.next.clone();
             let step = NewtonIteration {
                 accuracy: if rate.now > 0.0 {
-                    STEP_ACCURACY
+                    MOTION.step_accuracy
                 } else {
-                    REST_ACCURACY
+                    MOTION.rest_accuracy
                 },
-                iterations: ITERATIONS,
+                iterations: MOTION.iterations,
                 work: self.work,
                 progress: self.progress,
             };
@@ -117,10 +132,10 @@ impl LoadPath<'_> {
                 solver: &mut self.solver,
                 at: &from,
                 rate: rate.now,
-                largest: LARGEST_INCREMENT,
+                largest: MOTION.largest_increment,
             };
             let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
-            if moved.is_ok() && from.distance(&self.next) > LARGEST_CHANGE {
+            if moved.is_ok() && from.distance(&self.next) > MOTION.largest_change {
                 moved = Err(EquilibriumFailure::NoDescent);
             }
             match moved {
@@ -148,7 +163,7 @@ impl LoadPath<'_> {
             match moved {
                 Err(EquilibriumFailure::Saddle) => {
                     saddles += 1;
-                    if saddles > MAX_SADDLE_ESCAPES {
+                    if saddles > MOTION.most_saddles {
                         return Err(EquilibriumFailure::Saddle);
                     }
                     let (state, system) = (&mut self.next, &mut self.system);
@@ -161,8 +176,8 @@ impl LoadPath<'_> {
                     self.next = from;
                     rate.increase_after_failure();
                     let unresolved = stop == EquilibriumFailure::Unresolved
-                        && rate.now > LARGEST_UNRESOLVED_RATE;
-                    if rate.now > LARGEST_RATE || unresolved {
+                        && rate.now > MOTION.largest_unresolved_rate;
+                    if rate.now > MOTION.largest_rate || unresolved {
                         return Err(stop);
                     }
                 }
@@ -173,7 +188,7 @@ impl LoadPath<'_> {
 }
 
 /// The spring rate of the steps.
-pub(crate) struct SpringRate {
+struct SpringRate {
     now: f64,
     /// The factor of its last change.
     factor: f64,
@@ -182,7 +197,7 @@ pub(crate) struct SpringRate {
 impl SpringRate {
     fn new() -> Self {
         SpringRate {
-            now: FIRST_RATE,
+            now: MOTION.first_rate,
             factor: 1.0,
         }
     }
@@ -190,11 +205,11 @@ impl SpringRate {
     /// After a step that succeeded.
     fn decrease_after_success(&mut self) {
         self.factor = match self.factor {
-            fell if fell < 1.0 => (fell * fell).max(LARGEST_DECREASE),
-            _ => FIRST_DECREASE,
+            fell if fell < 1.0 => (fell * fell).max(MOTION.largest_decrease),
+            _ => MOTION.first_decrease,
         };
         self.now *= self.factor;
-        if self.now < LEAST_RATE {
+        if self.now < MOTION.least_rate {
             self.now = 0.0;
         }
     }
@@ -202,9 +217,9 @@ impl SpringRate {
     /// After a step that failed.
     fn increase_after_failure(&mut self) {
         self.factor = match self.factor {
-            rose if rose > 1.0 => (rose * rose).min(LARGEST_INCREASE),
-            _ => FIRST_INCREASE,
+            rose if rose > 1.0 => (rose * rose).min(MOTION.largest_increase),
+            _ => MOTION.first_increase,
         };
-        self.now = self.factor * self.now.max(LEAST_RATE);
+        self.now = self.factor * self.now.max(MOTION.least_rate);
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, FieldChange, Scale};
 use crate::numbers::{larger, largest};
-use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
+use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::accuracy::{FieldErrors, NestedEquilibrium, transfer};
 use crate::rod::Wrench;
@@ -59,13 +59,9 @@ pub struct GripReaction {
     pub moment_error: Option<f64>,
 }
 
-/// Largest number of grids that are extrapolated: on those before errors of forces, which the
-/// finest have no more, need not be small.
-const GRIDS: usize = 4;
-
 /// Errors of forces on a grid that are not errors of the grid.
 #[derive(Clone, Copy)]
-pub(in crate::relax) struct ForceNoise {
+struct ForceNoise {
     /// By unfinished iterations, as a part of the force.
     relative: f64,
     /// By rounding of positions, in units of A/L^2.
@@ -79,7 +75,7 @@ fn extrapolate_vectors(
     noise: ForceNoise,
 ) -> Extrapolated<Vec<DVec3>> {
     let ForceNoise { relative, rounding } = noise;
-    let levels = &levels[levels.len().saturating_sub(GRIDS)..];
+    let levels = &levels[levels.len().saturating_sub(EXTRAPOLATED_GRIDS)..];
     let values: Vec<Vec<DVec3>> = levels.iter().map(on).collect();
     let all = values.iter().flatten().map(|vector| vector.length());
     let size = largest(all);
@@ -211,13 +207,13 @@ pub struct Stresses {
     pub largest: Stress,
     /// Bound on the error of any of them; `None` on a single grid.
     pub error: Option<f64>,
-    /// Those at all stations, a list per rod.
+    /// The stresses at all stations, a list per rod.
     #[serde(skip)]
     pub rods: Vec<Vec<Stress>>,
 }
 
 impl Stresses {
-    /// Of rods at these stations; `None` if stiffnesses are given in place of sections.
+    /// The stresses of rods at these stations; `None` if stiffnesses are given in place of sections.
     pub fn of(scenario: &Scenario, stations: &[f64], rods: &[RodShape]) -> Option<Self> {
         let stress = |(j, rod): (usize, &RodShape)| -> Option<Vec<Stress>> {
             let nodes = stations.iter().zip(&rod.nodes);
@@ -250,7 +246,8 @@ impl Stresses {
         Some(Stresses { rods, ..largest })
     }
 
-    /// With the error by those of forces and moments anywhere: a stress is a norm of both.
+    /// The stresses with the error that follows from those of forces and moments anywhere: a stress is a
+    /// norm of both.
     pub fn with_field_errors(self, scenario: &Scenario, errors: Option<[f64; 2]>) -> Self {
         let Some([force, moment]) = errors else {
             return self;
@@ -261,7 +258,7 @@ impl Stresses {
         Stresses { error, ..self }
     }
 
-    /// With the error of a leaf that was integrated along its rods to these stations, from those of its
+    /// The stresses with the error of a leaf that was integrated along its rods to these stations, from those of its
     /// forces and moments: a stress is a norm of both, and may be the largest at another station.
     fn integrated(
         self,
@@ -303,8 +300,8 @@ impl Stresses {
         }
     }
 
-    /// With the error of a leaf on nested grids at these stations: where it was not integrated that of
-    /// the stresses at the nodes of the coarsest, and the distance of these from their extrapolation.
+    /// The stresses with the error of a leaf on nested grids at these stations: where it was not integrated, that
+    /// of the stresses at the nodes of the coarsest, and the distance of these from their extrapolation.
     pub(in crate::relax) fn with_grid_error(
         self,
         scenario: &Scenario,

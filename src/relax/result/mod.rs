@@ -73,7 +73,7 @@ pub struct Model {
     /// Largest displacement, in units of length, that would follow from
     /// neglecting shear, to first order, on the coarsest grid.
     pub shear_effect: Option<f64>,
-    /// The same for stretch.
+    /// Largest displacement, in units of length, that would follow from neglecting stretch.
     pub stretch_effect: Option<f64>,
 }
 
@@ -478,7 +478,7 @@ pub struct CriticalTipForce {
     pub force: Option<f64>,
     /// Bound on its error.
     pub error: Option<f64>,
-    /// The same in weights of the leaf, if it has any.
+    /// The force at which stability is lost, in weights of the leaf, if it has any.
     pub per_weight: Option<f64>,
     /// If no loss was found, the force up to which the leaf is stable.
     pub more_than: Option<f64>,
@@ -532,7 +532,7 @@ pub struct Barrier {
     pub error: Option<f64>,
     /// Height by which the whole leaf would have to be lifted for that energy: energy over weight.
     pub height: Option<f64>,
-    /// That height over the longest rod's length.
+    /// The height over the longest rod's length.
     pub relative: Option<f64>,
     /// The saddle.
     pub saddle: Saddle,
@@ -573,7 +573,7 @@ pub struct BladeReport {
     pub least_width: Option<f64>,
     /// By how much centerlines move if that is half as much, if it is known.
     pub least_width_effect: Option<f64>,
-    /// The same blade with half as many veins, if that is known.
+    /// What the blade does with half as many veins, if that is known.
     pub half_as_many: Option<FewerVeins>,
 }
 
@@ -587,7 +587,8 @@ pub struct FewerVeins {
 }
 
 impl BladeReport {
-    /// Of a scenario, without what other relaxations tell; `None` if it has no blade.
+    /// What follows from the blade of a scenario, without what other relaxations tell; `None` if it has
+    /// no blade.
     pub fn of(scenario: &Scenario) -> Option<Self> {
         let blade: &Blade = scenario.blade.as_ref()?;
         let (rods, middle) = (&scenario.rods, scenario.rods.len() / 2);

@@ -141,8 +141,8 @@ pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
     scenario.neutral_directions(|j| rods[j].nodes.iter().map(|node| node.position))
 }
 
-/// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
-/// belongs to it.
+/// How the leaf came to its equilibrium. What finer grids than that of slow loading make of its end
+/// belongs to the path.
 fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     let mut path = found.path.clone()?;
     if let Path::Loaded { events, .. } | Path::Held { events } = &mut path
@@ -163,8 +163,8 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     Some(path)
 }
 
-/// Segments of the coarsest grid from which on its nodes are enough stations.
-const STATIONS: usize = 8;
+/// Segments of the coarsest grid from which on its nodes are enough stations for a result.
+const LEAST_STATION_SEGMENTS: usize = 8;
 
 /// The leaf at the stations of its result.
 struct ResultStations {
@@ -190,7 +190,10 @@ fn stations_of_result(
         &found.levels[0].leaf.grid,
         &found.levels[found.levels.len() - 1],
     );
-    let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
+    let (every_node, few) = (
+        problem.options.every_node,
+        first.segments() < LEAST_STATION_SEGMENTS,
+    );
     let (grid, rods, added_error) = match found.integrated_leaf() {
         Some(IntegratedLeaf {
             estimate,
@@ -494,10 +497,10 @@ fn inversion_doubt(rods: &[RodShape], stations: &[f64]) -> Option<EquilibriumDou
 }
 
 /// Smallest number of parts into which the stations of a result divide a vein.
-pub(crate) const MIN_STATION_PARTS: usize = 16;
+const MIN_STATION_PARTS: usize = 16;
 
 impl Equilibrium {
-    /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
+    /// The leaf at stations that divide every vein into `parts` equal parts; `None`: at the
     /// nodes of the finest grid, with its segments halved until there are at least 17
     /// stations.
     ///
@@ -543,7 +546,7 @@ impl Equilibrium {
         (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
     }
 
-    /// The same at these stations.
+    /// The leaf at these stations, wherever its tolerance is kept.
     fn interpolated_to_stations(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
         let at_rest = !matches!(
             self.outcome,
@@ -619,7 +622,7 @@ impl Equilibrium {
 }
 
 /// Nodes of the finest grid, with all segments halved until there are enough.
-pub(crate) fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
+fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
     let mut stations = shape.curve_stations.clone();
     while (2..=MIN_STATION_PARTS).contains(&stations.len()) {
         let middles = stations

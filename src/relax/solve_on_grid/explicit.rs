@@ -3,7 +3,7 @@
 //! First the leaf moves with the true masses and damping of a relaxation, every motion
 //! resolved, until it is in a valley (basin of attraction) of its energy: that decides which
 //! equilibrium it finds. Then only the descent to the minimum matters, and masses and damping
-//! are chosen for speed: fictitious masses that equalise the highest frequencies of all
+//! are chosen for speed: fictitious masses that equalize the highest frequencies of all
 //! segments ([`crate::motion`]), and damping at the rate 3/t, restarted whenever the leaf
 //! moves uphill. (Such damping makes the motion an accelerated gradient descent, without
 //! knowledge of its lowest frequency: Su, Boyd and Candes, J. Mach. Learn. Res. 17, 2016;

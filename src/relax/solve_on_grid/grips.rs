@@ -18,10 +18,25 @@ use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// Largest displacement (lengths) and rotation (radians) of the grips in a step.
-const LARGEST_GRIP_DISPLACEMENT: f64 = 0.1;
+/// How far holders and the leaf may move in a step. Half of the first two double the number of steps.
+struct GripStepLimits {
+    /// Largest displacement of a holder, in lengths of the leaf.
+    displacement: f64,
+    /// Largest rotation of a holder, radians.
+    rotation: f64,
+    /// The largest change of the leaf beside that of its holders (radians, lengths), in the valley of its
+    /// energy: one that moves farther may have left its equilibrium.
+    drift: f64,
+    /// The largest such change elsewhere.
+    drift_outside_valley: f64,
+}
 
-const LARGEST_GRIP_ROTATION: f64 = 0.4;
+const LIMITS: GripStepLimits = GripStepLimits {
+    displacement: 0.1,
+    rotation: 0.4,
+    drift: 0.5,
+    drift_outside_valley: 0.05,
+};
 
 /// Steps along the path, of which the first and the longest are those in which the grips move by that.
 const STEPS: StepSizes = StepSizes {
@@ -32,18 +47,13 @@ const STEPS: StepSizes = StepSizes {
     failure: 0.25,
 };
 
-/// The largest change of a leaf in a step beside that of its holders (radians, lengths), in the valley
-/// of its energy and elsewhere: one that moves farther may have left its equilibrium.
-const LARGEST_DRIFT: f64 = 0.5;
-
-const LARGEST_DRIFT_OUTSIDE: f64 = 0.05;
-
-/// Accuracy of the equilibria along the path.
+/// Accuracy of the equilibria along the path, lengths and radians.
 const ACCURACY: f64 = 1e-2;
 
-/// Newton iterations of a step, and the largest increment (radians, lengths).
+/// Newton iterations of a step.
 const ITERATIONS: usize = 8;
 
+/// Largest increment of these, radians and lengths.
 const LARGEST_INCREMENT: f64 = 1.0;
 
 /// Saddles that are left in a step.
@@ -85,27 +95,27 @@ pub fn move_grips(
     };
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
-    let mut walk = SupportContinuation {
+    let mut continuation = SupportContinuation {
         leaf,
         system: System::new(leaf),
         held: GridRelaxation::new(state, ACCURACY, &mut effort.work, ignored, limit),
         keeps_unstable: problem.keeps_unstable(),
         events: Vec::new(),
     };
-    walk.relax_held_leaf(&holders);
+    continuation.relax_held_leaf(&holders);
     // Out of time, the leaf is placed where it is held from where it came to.
     let _ = steps.follow(|step| {
         if limit.reached() {
             return StepEnd::Ended(());
         }
-        match walk.step(&holders, step.to, step.is_shortest) {
+        match continuation.step(&holders, step.to, step.is_shortest) {
             true => StepEnd::Made {
                 growth: STEPS.growth,
             },
             false => StepEnd::TooLong(()),
         }
     });
-    let SupportContinuation { held, events, .. } = walk;
+    let SupportContinuation { held, events, .. } = continuation;
     let (mut state, near_rest, moved) = (held.state, held.near_rest, held.left_convex_valley);
     effort.node_evaluations +=
         leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
@@ -156,8 +166,8 @@ impl SupportContinuation<'_> {
             false => self.correct(),
         };
         let drift = carried.distance(&self.held.state);
-        let jumped =
-            drift > LARGEST_DRIFT || self.held.left_convex_valley && drift > LARGEST_DRIFT_OUTSIDE;
+        let jumped = drift > LIMITS.drift
+            || self.held.left_convex_valley && drift > LIMITS.drift_outside_valley;
         if !shortest && near_rest && (rest.is_err() || jumped) {
             (self.held.state, self.held.left_convex_valley) = (before, moved);
             return false;
@@ -281,9 +291,18 @@ impl SupportPaths {
 struct TipPath {
     from: DVec3,
     to: DVec3,
-    /// Of a clamp: the angle of d1 about e3 at both ends, the final twist about d1, and the
-    /// rest of the start's rotation, which is removed along the path.
-    clamp: Option<([f64; 2], f64, DVec3)>,
+    clamp: Option<ClampTurn>,
+}
+
+/// How the tip of a rod turns on its way from a free start to a clamp.
+#[derive(Clone, Copy)]
+struct ClampTurn {
+    /// The angle of d1 about e3 at the start and in the clamp, radians.
+    headings: [f64; 2],
+    /// The twist about d1 in the clamp, radians.
+    twist: f64,
+    /// The rest of the start's rotation, which is removed along the path.
+    other: DVec3,
 }
 
 /// The paths of all tips; `None` if they are free.
@@ -297,11 +316,11 @@ fn tip_paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<TipPath>> {
             let tip = rod[leaf.segments()];
             let heading = heading(rod);
             let other = DQuat::from_rotation_z(heading).conjugate() * tip;
-            (
-                [heading, clamps[j].angle],
-                clamps[j].twist,
-                rotation::log(other),
-            )
+            ClampTurn {
+                headings: [heading, clamps[j].angle],
+                twist: clamps[j].twist,
+                other: rotation::log(other),
+            }
         }),
     };
     Some((0..leaf.rods()).map(path).collect())
@@ -324,11 +343,12 @@ fn heading(rod: &[DQuat]) -> f64 {
 impl TipPath {
     /// The number of steps along the path.
     fn steps(&self) -> f64 {
-        let turn = self.clamp.map_or(0.0, |([from, to], twist, other)| {
-            (to - from).abs() + twist.abs() + other.length()
+        let turn = self.clamp.map_or(0.0, |clamp| {
+            let [from, to] = clamp.headings;
+            (to - from).abs() + clamp.twist.abs() + clamp.other.length()
         });
-        (self.from.distance(self.to) / LARGEST_GRIP_DISPLACEMENT)
-            .max(turn / LARGEST_GRIP_ROTATION)
+        (self.from.distance(self.to) / LIMITS.displacement)
+            .max(turn / LIMITS.rotation)
             .ceil()
     }
 
@@ -338,11 +358,12 @@ impl TipPath {
         let base = state.base(j);
         let tip = base + leaf.segments();
         let shift = self.from.lerp(self.to, part) - state.x[tip];
-        let turn = self.clamp.map(|([from, to], twist, other)| {
+        let turn = self.clamp.map(|clamp| {
+            let [from, to] = clamp.headings;
             let heading = DQuat::from_rotation_z(from + part * (to - from));
             let rotation = heading
-                * DQuat::from_rotation_x(part * twist)
-                * rotation::exp((1.0 - part) * other);
+                * DQuat::from_rotation_x(part * clamp.twist)
+                * rotation::exp((1.0 - part) * clamp.other);
             rotation::log(rotation * state.q[tip].conjugate())
         });
         for (i, &sigma) in leaf.grid.sigma().iter().enumerate().skip(1) {
@@ -375,8 +396,8 @@ impl GripPath {
     /// The number of steps along the path.
     fn steps(&self) -> f64 {
         let distance = self.from.distance(self.held.position);
-        (distance / LARGEST_GRIP_DISPLACEMENT)
-            .max(self.turn.length() / LARGEST_GRIP_ROTATION)
+        (distance / LIMITS.displacement)
+            .max(self.turn.length() / LIMITS.rotation)
             .ceil()
     }
 }
@@ -386,42 +407,51 @@ impl GripPath {
 fn carry_gripped_nodes(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) {
     let (n, sigma) = (leaf.segments(), leaf.grid.sigma());
     for j in 0..leaf.rods() {
-        let (base, mut before) = (state.base(j), (0, DVec3::ZERO));
+        let base = state.base(j);
+        let mut before = NodeDisplacement {
+            node: 0,
+            shift: DVec3::ZERO,
+        };
         let fixed_tip = leaf.leaf.tip_support.is_some() || leaf.tips_move_together();
         let of_rod: Vec<&GripPath> = paths.iter().filter(|path| path.held.rod == j).collect();
         for path in &of_rod {
             let node = path.held.node;
             let shift = path.from.lerp(path.held.position, part) - state.x[base + node];
-            interpolate_displacements(sigma, [before, (node, shift)], |i, shift| {
-                state.x[base + i] += shift
-            });
+            let here = NodeDisplacement { node, shift };
+            interpolate_displacements(sigma, [before, here], |i, shift| state.x[base + i] += shift);
             state.x[base + node] += shift;
             if let Some(rotation) = path.held.rotation {
                 let left = rotation::exp((part - 1.0) * path.turn);
                 state.q[base + node] = (left * rotation).normalize();
             }
-            before = (node, shift);
+            before = here;
         }
-        if !of_rod.is_empty() && before.0 < n {
-            let end = if fixed_tip { DVec3::ZERO } else { before.1 };
-            interpolate_displacements(sigma, [before, (n, end)], |i, shift| {
-                state.x[base + i] += shift
-            });
+        if !of_rod.is_empty() && before.node < n {
+            let shift = if fixed_tip { DVec3::ZERO } else { before.shift };
+            let end = NodeDisplacement { node: n, shift };
+            interpolate_displacements(sigma, [before, end], |i, shift| state.x[base + i] += shift);
             if !fixed_tip {
-                state.x[base + n] += end;
+                state.x[base + n] += shift;
             }
         }
     }
 }
 
+/// The displacement of a node of a rod.
+#[derive(Clone, Copy)]
+struct NodeDisplacement {
+    node: usize,
+    shift: DVec3,
+}
+
 /// Passes the nodes between two nodes, with their displacements interpolated.
 fn interpolate_displacements(
     sigma: &[f64],
-    [(a, from), (b, to)]: [(usize, DVec3); 2],
+    [from, to]: [NodeDisplacement; 2],
     mut each: impl FnMut(usize, DVec3),
 ) {
-    for i in a + 1..b {
-        let part = (sigma[i] - sigma[a]) / (sigma[b] - sigma[a]);
-        each(i, from.lerp(to, part));
+    for i in from.node + 1..to.node {
+        let part = (sigma[i] - sigma[from.node]) / (sigma[to.node] - sigma[from.node]);
+        each(i, from.shift.lerp(to.shift, part));
     }
 }

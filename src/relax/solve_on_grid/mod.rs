@@ -28,11 +28,11 @@ use glam::DVec3;
 /// Errors of positions and rotations that the iteration on a grid may leave. Half of any of them costs
 /// a step of Newton's method on some of the finest grids.
 struct IterationErrors {
-    /// As a part of the tolerance.
+    /// The error as a part of the tolerance.
     usual: f64,
-    /// The part where the first grid is very coarse: that saves a step on the finest.
+    /// That part where the first grid is very coarse: a looser iteration there saves a step on the finest.
     from_coarse: f64,
-    /// The part on a grid that may be the only one, where the error of the iteration is estimated,
+    /// That part on a grid that may be the only one, where the error of the iteration is estimated,
     /// and subtracted, with that of the grid.
     alone: f64,
     /// The error on a fixed grid, whose results are meant for comparisons, in lengths and radians.
@@ -88,15 +88,15 @@ pub struct GridSolution {
     pub level: GridLevel,
     /// The remaining iteration error.
     pub iteration_error: Result<f64, EquilibriumFailure>,
-    /// Whether it had to move through states of non-convex energy, instead of settling in the
-    /// valley of the initial guess.
+    /// Whether the leaf had to move through states of non-convex energy, instead of coming to rest in
+    /// the valley of the initial guess.
     pub left_convex_valley: bool,
     /// Where a leaf that was moved to its holders lost its stability; `None` if it was not.
     pub events: Option<Vec<Event>>,
 }
 
-/// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
-/// resistance leans down. The `history` is that on the grids before, and goes on here.
+/// Brings a leaf to rest on one grid; leaves saddles unless they are accepted. A leaf that can turn
+/// without resistance is turned to lean down. The `history` is that on the grids before, and goes on here.
 pub fn find_grid_equilibrium(
     problem: &RelaxationProblem,
     history: &mut History,
@@ -109,7 +109,7 @@ pub fn find_grid_equilibrium(
     settled
 }
 
-/// Settles on one grid. A leaf that can turn without resistance is left wherever it came to rest.
+/// Brings a leaf to rest on one grid. One that can turn without resistance is left where it came to rest.
 fn find_unleaned_equilibrium(
     problem: &RelaxationProblem,
     history: &mut History,
@@ -224,7 +224,7 @@ fn find_unleaned_equilibrium(
 }
 
 /// The start of a leaf without an initial guess.
-pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteLeaf) -> State {
+fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteLeaf) -> State {
     if let Some(whole) = problem.whole_leaf {
         let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
         return half_state(problem.leaf, &initial_state(&whole));
@@ -237,7 +237,7 @@ pub(super) fn scenario_start_state(problem: &RelaxationProblem, leaf: &DiscreteL
     state
 }
 
-/// Iteration error allowed on a grid.
+/// The error that the iteration on a grid may leave in positions and rotations, in lengths and radians.
 fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf) -> f64 {
     let first = history.coarsest.unwrap_or(leaf.segments());
     match problem.segments() {
@@ -252,7 +252,7 @@ fn accuracy(problem: &RelaxationProblem, history: &History, leaf: &DiscreteLeaf)
     }
 }
 
-/// Settles by the semi-implicit method.
+/// Brings a leaf to rest on one grid by the semi-implicit method, off saddles.
 fn solve_semi_implicit(
     problem: &RelaxationProblem,
     history: &mut History,
@@ -362,7 +362,7 @@ fn strain_effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> St
     }
 }
 
-/// What is known of the stability on one grid.
+/// What is known of the stability of a leaf on one grid.
 struct Count {
     /// Whether the leaf is clearly stable.
     clearly_stable: bool,
@@ -428,7 +428,7 @@ pub fn check_stability(
     last: bool,
     effort: &mut WorkLog,
 ) -> Result<StabilityCheck, Box<RelaxationFailure>> {
-    let level = found.levels.last().expect("the leaf has settled");
+    let level = found.levels.last().expect("the leaf is at rest on a grid");
     if !level.leaf.leaf.has_potential() {
         return Ok(StabilityCheck::new(found, true));
     }

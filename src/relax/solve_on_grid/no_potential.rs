@@ -19,19 +19,40 @@ use crate::leaf::{
 use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegrator, WindDrag};
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
+use crate::relax::same_equilibrium::is_same_balance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::{RESOLVED_TURN, Section, Wrench};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Rotation of the tip (radians) in one load step.
-const TURN_PER_STEP: f64 = 1.0;
+/// How dead moments are applied to a rod.
+struct MomentLoading {
+    /// Rotation of the tip (radians) in one load step. Half of it doubles the steps.
+    turn_per_step: f64,
+    /// Newton iterations of a load step before it is halved.
+    iterations: usize,
+    /// Accuracy of all load steps but the last, lengths and radians.
+    step_accuracy: f64,
+    /// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
+    /// grid.
+    coarse_segment_bending: f64,
+    /// Rotation of the tip (radians) beyond which the moments on a free rod are not applied in steps.
+    largest_stepped_turn: f64,
+    /// Largest number of steps of the other loads in that case.
+    most_steps_of_other_loads: usize,
+    /// Largest number of steps of the moments on a held rod.
+    most_steps_of_held_rod: usize,
+}
 
-/// Newton iterations of a load step before it is halved.
-const MAX_ITERATIONS: usize = 15;
-
-/// Accuracy of all load steps but the last.
-const STEP_ACCURACY: f64 = 1e-3;
+const LOADING: MomentLoading = MomentLoading {
+    turn_per_step: 1.0,
+    iterations: 15,
+    step_accuracy: 1e-3,
+    coarse_segment_bending: 0.5 * RESOLVED_TURN,
+    largest_stepped_turn: 250.0,
+    most_steps_of_other_loads: 100,
+    most_steps_of_held_rod: 1000,
+};
 
 /// Load steps, of which the first depends on the load.
 const STEPS: StepSizes = StepSizes {
@@ -42,41 +63,59 @@ const STEPS: StepSizes = StepSizes {
     failure: 0.5,
 };
 
-/// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
-/// grid.
-const COARSE_SEGMENT_BENDING: f64 = 0.5 * RESOLVED_TURN;
+/// Newton's method for the rotation of one segment.
+struct SegmentIteration {
+    most_iterations: usize,
+    /// The step at which it ends, radians.
+    accuracy: f64,
+    /// The step of its finite differences, radians.
+    difference: f64,
+}
 
-/// Rotation (radians) beyond which the moments on a free rod are not applied in steps, and the
-/// largest number of steps of the other loads in that case; and of the moments on a held rod.
-const LARGEST_STEPPED_ROTATION: f64 = 250.0;
-
-const MAX_STEPS: usize = 100;
-
-const MAX_STEPS_HELD: usize = 1000;
-
-/// Newton iterations for the rotation of one segment, the step (radians) at which they end,
-/// and the step of their finite differences, radians.
-const SEGMENT_ITERATIONS: usize = 20;
-
-const SEGMENT_ACCURACY: f64 = 1e-13;
-
-const DIFFERENCE: f64 = 1e-7;
+const SEGMENT: SegmentIteration = SegmentIteration {
+    most_iterations: 20,
+    accuracy: 1e-13,
+    difference: 1e-7,
+};
 
 /// Squared half rotation below which series replace quotients that tend to 0/0.
 const SERIES_ROTATION_THRESHOLD: f64 = 1e-5;
 
-/// The parts of the moments and of the other loads that are applied after a part of the loading.
-type Order = fn(f64) -> [f64; 2];
+/// The order in which the loads of a rod are applied: what is applied after a part of the loading, as
+/// parts, where less than none is none, and more than all is all.
+#[derive(Clone, Copy)]
+struct LoadingOrder {
+    moments: fn(f64) -> f64,
+    other_loads: fn(f64) -> f64,
+}
 
-/// Orders of loading: the path may end at a fold in one of them, and pass it in another.
-const ORDERS: [Order; 3] = [
-    |part| [part, part],
-    |part| [2.0 * part, 2.0 * part - 1.0],
-    |part| [2.0 * part - 1.0, 2.0 * part],
+/// Orders for a free rod: the path may end at a fold in one of them, and pass it in another.
+const FREE_ROD_ORDERS: [LoadingOrder; 3] = [
+    LoadingOrder {
+        moments: |part| part,
+        other_loads: |part| part,
+    },
+    LoadingOrder {
+        moments: |part| 2.0 * part,
+        other_loads: |part| 2.0 * part - 1.0,
+    },
+    LoadingOrder {
+        moments: |part| 2.0 * part - 1.0,
+        other_loads: |part| 2.0 * part,
+    },
 ];
 
-/// That of a held rod, which the other loads act on from the beginning.
-const HELD_ROD_LOADING: Order = |part| [part, 1.0];
+/// The order for a held rod, on which the other loads act from the beginning.
+const HELD_ROD_ORDER: LoadingOrder = LoadingOrder {
+    moments: |part| part,
+    other_loads: |_| 1.0,
+};
+
+/// The order for a rod that was given the shape under its moments.
+const WOUND_ROD_ORDER: LoadingOrder = LoadingOrder {
+    moments: |_| 1.0,
+    other_loads: |part| part,
+};
 
 /// Loads the rod from its rest shape, or corrects a state near rest.
 pub fn solve_with_dead_moments(
@@ -89,25 +128,27 @@ pub fn solve_with_dead_moments(
     }
     if is_strongly_wound(&leaf.leaf) {
         shape_by_moment(leaf, &mut rod.state)?;
-        return apply_loads(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
+        let most_steps = LOADING.most_steps_of_other_loads;
+        return apply_loads(leaf, system, rod, WOUND_ROD_ORDER, 1.0, most_steps);
     }
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
     let turn = leaf.leaf.moment_integral_bound() * leaf.leaf.length(0) / softest;
-    let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    let mut step = 1.0 / (turn / LOADING.turn_per_step).ceil().max(1.0);
     if leaf.leaf.has_placed_supports() {
-        return apply_loads(leaf, system, rod, HELD_ROD_LOADING, (step, MAX_STEPS_HELD));
+        let most_steps = LOADING.most_steps_of_held_rod;
+        return apply_loads(leaf, system, rod, HELD_ROD_ORDER, step, most_steps);
     }
     let unloaded = rod.state.clone();
     let mut end = Err(EquilibriumFailure::StepLimit);
-    for order in ORDERS {
+    for order in FREE_ROD_ORDERS {
         rod.state.clone_from(&unloaded);
-        end = apply_loads(leaf, system, rod, order, (step, usize::MAX));
+        end = apply_loads(leaf, system, rod, order, step, usize::MAX);
         if end.is_ok() || end == Err(EquilibriumFailure::Unresolved) || rod.limit.reached() {
             break;
         }
-        // In the others the moments are applied in half of the loading.
-        step = 0.5 / (turn / TURN_PER_STEP).ceil().max(1.0);
+        // In the other orders the moments are applied in half of the loading.
+        step = 0.5 / (turn / LOADING.turn_per_step).ceil().max(1.0);
     }
     end
 }
@@ -120,7 +161,7 @@ fn newton(
 ) -> Result<f64, EquilibriumFailure> {
     let newton = NewtonIteration {
         accuracy,
-        iterations: MAX_ITERATIONS,
+        iterations: LOADING.iterations,
         work: rod.work,
         progress: rod.progress,
     };
@@ -133,8 +174,9 @@ fn apply_loads(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
     rod: &mut GridRelaxation,
-    order: Order,
-    (step, mut steps): (f64, usize),
+    order: LoadingOrder,
+    step: f64,
+    mut most_steps: usize,
 ) -> Result<f64, EquilibriumFailure> {
     let loads = leaf.loads;
     let sizes = StepSizes {
@@ -144,18 +186,19 @@ fn apply_loads(
     let mut before = rod.state.clone();
     let mut error = 0.0;
     let end = sizes.follow(|step| {
-        if steps == 0 || rod.limit.reached() {
+        if most_steps == 0 || rod.limit.reached() {
             return StepEnd::Ended(EquilibriumFailure::StepLimit);
         }
-        steps -= 1;
-        let [moments, others] = order(step.to).map(|part| part.clamp(0.0, 1.0));
+        most_steps -= 1;
+        let moments = (order.moments)(step.to).clamp(0.0, 1.0);
+        let others = (order.other_loads)(step.to).clamp(0.0, 1.0);
         leaf.loads = Loads {
             tip_moment: moments * loads.tip_moment,
             dead_moment_factor: moments * loads.dead_moment_factor,
             ..loads * others
         };
         let wanted = match step.to < 1.0 {
-            true => STEP_ACCURACY,
+            true => LOADING.step_accuracy,
             false => rod.accuracy,
         };
         match newton(leaf, system, rod, wanted) {
@@ -169,7 +212,7 @@ fn apply_loads(
             Err(stop) => {
                 rod.state.clone_from(&before);
                 let mut coarse =
-                    || leaf.assemble(&before, system).largest_turn > COARSE_SEGMENT_BENDING;
+                    || leaf.assemble(&before, system).largest_turn > LOADING.coarse_segment_bending;
                 let unresolved = stop == EquilibriumFailure::Unresolved;
                 if !step.is_shortest && !(unresolved && coarse()) {
                     return StepEnd::TooLong(stop);
@@ -190,7 +233,7 @@ fn apply_loads(
 fn is_strongly_wound(leaf: &Leaf) -> bool {
     let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
     let turn = leaf.moment_integral_bound() * leaf.length(0) / softest;
-    turn > LARGEST_STEPPED_ROTATION && !leaf.has_placed_supports()
+    turn > LOADING.largest_stepped_turn && !leaf.has_placed_supports()
 }
 
 /// The largest curvature (radians per length) of the rod under large moments alone; `None` if
@@ -250,16 +293,18 @@ fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> O
         pull_back_vector(psi, couple) - rotation::exp(-0.5 * psi) * moment
     };
     let mut psi = near;
-    for _ in 0..SEGMENT_ITERATIONS {
+    for _ in 0..SEGMENT.most_iterations {
         let value = unbalanced(psi);
-        let column = |axis: DVec3| (unbalanced(psi + DIFFERENCE * axis) - value) / DIFFERENCE;
+        let column = |axis: DVec3| {
+            (unbalanced(psi + SEGMENT.difference * axis) - value) / SEGMENT.difference
+        };
         let rate = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
         let step = rate.inverse() * value;
         psi -= step;
         if psi.is_nan() || psi.length() > RESOLVED_TURN {
             return None;
         }
-        if step.length() <= SEGMENT_ACCURACY {
+        if step.length() <= SEGMENT.accuracy {
             return Some(psi);
         }
     }
@@ -267,37 +312,50 @@ fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> O
     Some(psi)
 }
 
-/// Local error of the steps of the motion (lengths, radians).
-const MOTION_ERROR: f64 = 1e-3;
+/// The damped motion of a leaf in wind, in lengths, radians and the unit of time sqrt(rho L^4/A).
+struct MotionInWind {
+    /// Local error of its steps. A tenth of it doubles their number.
+    error: f64,
+    /// Time between looks at the moving leaf.
+    check_interval: f64,
+    /// Time after which a leaf that still moves is given up.
+    longest_time: f64,
+    /// Largest velocity with which the leaf hardly moves.
+    slow: f64,
+    /// Factor on that velocity where Newton's method led elsewhere.
+    slow_reduction: f64,
+    /// A balance is elsewhere if it is farther from the moving leaf than so many times the way in a unit
+    /// of time.
+    nearby: f64,
+}
 
-/// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
-const REST_CHECK_INTERVAL: f64 = 0.5;
+const MOTION: MotionInWind = MotionInWind {
+    error: 1e-3,
+    check_interval: 0.5,
+    longest_time: 400.0,
+    slow: 3e-2,
+    slow_reduction: 0.1,
+    nearby: 10.0,
+};
 
-const LONGEST_TIME_TO_REST: f64 = 400.0;
+/// Newton iterations for the balance of forces in wind.
+const BALANCE_ITERATIONS: usize = 20;
 
-/// Largest velocity (lengths or radians per unit of time) with which the leaf hardly moves, and the
-/// factor on it where Newton's method led elsewhere.
-const SLOW: f64 = 3e-2;
-
-const SLOW_VELOCITY_REDUCTION: f64 = 0.1;
-
-/// Farther from the moving leaf (lengths, radians) than this many times the way in a unit of time
-/// is elsewhere.
-const NEARBY_DISTANCE_FACTOR: f64 = 10.0;
-
-/// Two balances no farther apart (lengths, radians) are one: a leaf that has come closer to it in
-/// between, however slowly, comes to rest there.
-const SAME_BALANCE_DISTANCE: f64 = 1e-8;
-
-/// Newton iterations, their longest increment (radians, lengths), and their accuracy: forces are
-/// balanced to rounding, as nothing else shows that the leaf rests.
-const ITERATIONS: usize = 20;
-
+/// Their largest increment, radians and lengths.
 const LARGEST_BALANCE_INCREMENT: f64 = 1.0;
 
-const ACCURACY: f64 = 1e-13;
+/// Their accuracy, radians and lengths: forces are balanced to rounding, as nothing else shows that the
+/// leaf rests.
+const BALANCE_ACCURACY: f64 = 1e-13;
 
-/// Brings the leaf to rest. The drag then acts on its nodes as dead forces, in which all sums over
+/// A state in which all forces on a leaf in wind are balanced.
+struct WindBalance {
+    state: State,
+    /// Distance from the moving leaf, lengths and radians.
+    away: f64,
+}
+
+/// Brings a leaf to rest in wind. The drag then acts on its nodes as dead forces, in which all sums over
 /// the leaf are balanced.
 pub fn solve_in_wind(
     leaf: &mut DiscreteLeaf,
@@ -308,7 +366,7 @@ pub fn solve_in_wind(
     let air = SteadyWind::new(leaf, &physics).ok_or(EquilibriumFailure::NoDescent)?;
     let remaining = match rest.near_rest {
         true => balance_wind_forces(leaf, system, &air, rest)?,
-        false => approach_rest_in_wind(leaf, system, (physics, &air), rest)?,
+        false => approach_rest_in_wind(leaf, system, physics, &air, rest)?,
     };
     let mut forces = vec![DVec3::ZERO; rest.state.x.len()];
     let still = |_| DVec3::ZERO;
@@ -321,16 +379,16 @@ pub fn solve_in_wind(
 fn approach_rest_in_wind(
     leaf: &DiscreteLeaf,
     system: &mut System,
-    (physics, air): (Physics, &SteadyWind),
+    physics: Physics,
+    air: &SteadyWind,
     rest: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
-    let steps = StepControl::LocalError(MOTION_ERROR);
+    let steps = StepControl::LocalError(MOTION.error);
     let mut motion = SemiImplicit::new(leaf.clone(), physics, &rest.state, steps);
-    let (mut slow, mut until) = (SLOW, REST_CHECK_INTERVAL);
+    let (mut slow, mut until) = (MOTION.slow, MOTION.check_interval);
     let mut end = Err(EquilibriumFailure::StepLimit);
-    // Where forces are balanced, as found before, and how far from there the leaf was.
-    let mut before: Option<(State, f64)> = None;
-    while until < LONGEST_TIME_TO_REST && !rest.limit.reached() {
+    let mut before: Option<WindBalance> = None;
+    while until < MOTION.longest_time && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
             end = Err(EquilibriumFailure::NoDescent);
             break;
@@ -338,7 +396,7 @@ fn approach_rest_in_wind(
         if motion.time() < until {
             continue;
         }
-        until += REST_CHECK_INTERVAL;
+        until += MOTION.check_interval;
         let now = motion.snapshot();
         let speeds = (now.velocity.iter()).flat_map(|v| [v.linear.length(), v.angular.length()]);
         let speed = largest(speeds);
@@ -349,18 +407,19 @@ fn approach_rest_in_wind(
             let balanced = balance_wind_forces(leaf, system, air, rest);
             if balanced.is_ok() {
                 let away = moving.distance(&rest.state);
-                let comes_closer = |(other, then): &(State, f64)| {
-                    away < *then && other.distance(&rest.state) < SAME_BALANCE_DISTANCE
+                // A leaf that has come closer to a balance, however slowly, comes to rest there.
+                let comes_closer = |before: &WindBalance| {
+                    away < before.away && is_same_balance(&before.state, &rest.state)
                 };
-                if away < NEARBY_DISTANCE_FACTOR * slow || before.as_ref().is_some_and(comes_closer)
-                {
+                if away < MOTION.nearby * slow || before.as_ref().is_some_and(comes_closer) {
                     end = balanced;
                     break;
                 }
-                before = Some((rest.state.clone(), away));
+                let state = rest.state.clone();
+                before = Some(WindBalance { state, away });
             }
             rest.state = moving;
-            slow *= SLOW_VELOCITY_REDUCTION;
+            slow *= MOTION.slow_reduction;
         }
     }
     rest.work.steps += motion.steps();
@@ -377,8 +436,8 @@ fn balance_wind_forces(
     rest: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
     let newton = NewtonIteration {
-        accuracy: ACCURACY,
-        iterations: ITERATIONS,
+        accuracy: BALANCE_ACCURACY,
+        iterations: BALANCE_ITERATIONS,
         work: rest.work,
         progress: rest.progress,
     };

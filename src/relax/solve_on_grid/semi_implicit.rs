@@ -14,11 +14,13 @@
 use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
-    SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
+    RequiredAccuracy, SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error,
+    satisfies_lengths,
 };
 use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
+use crate::scenario::CLAMPED_ROD_FREQUENCY;
 
 /// Limits on the steps of the motion.
 struct MotionStepLimits {
@@ -165,7 +167,8 @@ impl GridRelaxation<'_> {
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 let rounding = stalled.increment_rounding(leaf, &self.state, size);
-                rest = remaining_error(size, previous, tolerances, (accuracy, rounding), first);
+                let required = RequiredAccuracy { accuracy, rounding };
+                rest = remaining_error(size, previous, tolerances, required, first);
             } else {
                 motion.newton_step_size = f64::INFINITY;
             }
@@ -217,7 +220,7 @@ impl GridRelaxation<'_> {
         Err(EquilibriumFailure::StepLimit)
     }
 
-    /// Factorises and solves for the next step, with as long a time step as makes the matrix
+    /// Factorizes and solves for the next step, with as long a time step as makes the matrix
     /// positive definite. A small shift keeps modes that are neutral up to rounding from
     /// moving.
     fn solve_shortening_step(
@@ -291,8 +294,7 @@ fn assembled(
 
 /// The time steps of the damped motion, in units of sqrt(rho L^4/A).
 struct DampedTimeSteps {
-    /// Damping c: critical for the lowest bending mode of a single rod, whose frequency is 3.516
-    /// (canonical value beta_1^2 of the clamped-free beam).
+    /// Damping c: critical for the lowest bending mode of a single rod.
     damping: f64,
     /// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
     /// Twice as long a one may carry the leaf into another valley.
@@ -310,7 +312,7 @@ struct DampedTimeSteps {
 }
 
 const TIME_STEPS: DampedTimeSteps = DampedTimeSteps {
-    damping: 2.0 * 3.516,
+    damping: 2.0 * CLAMPED_ROD_FREQUENCY,
     first: 0.06,
     shortest: 1e-7,
     longest: 1e3,
@@ -320,24 +322,24 @@ const TIME_STEPS: DampedTimeSteps = DampedTimeSteps {
 };
 
 /// Velocities, and the time step; an infinite time step is Newton's method.
-pub(in crate::relax) struct Motion {
+struct Motion {
     dt: f64,
     /// Growth factor of the time step after an accepted step.
     growth: f64,
-    pub(in crate::relax) velocity: Vec<Vec<Increment>>,
+    velocity: Vec<Vec<Increment>>,
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
-    pub(in crate::relax) newton_step_size: f64,
+    newton_step_size: f64,
     /// The part of Newton's step that the energy allows near rest: close to a bifurcation the
     /// whole step may leave a curved valley.
     newton_fraction: f64,
     /// Whether it was at a possible saddle, or at rest, before the next step of Newton's method.
-    pub(in crate::relax) was_stationary: bool,
+    was_stationary: bool,
 }
 
 impl Motion {
-    /// At rest, with the longest step.
-    pub(in crate::relax) fn new(leaf: &DiscreteLeaf) -> Self {
+    /// The motion of a leaf that is at rest so far; its first step is Newton's.
+    fn new(leaf: &DiscreteLeaf) -> Self {
         let velocity = vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()];
         Motion {
             dt: f64::INFINITY,
@@ -350,19 +352,19 @@ impl Motion {
         }
     }
 
-    pub(in crate::relax) fn is_newton(&self) -> bool {
+    fn is_newton(&self) -> bool {
         self.dt.is_infinite()
     }
 
     /// Factors (1/dt + c)/dt on the mass in the matrix of the next step, and 1/dt on the momenta;
     /// `None` if it is Newton's.
-    pub(in crate::relax) fn mass_factors(&self) -> Option<[f64; 2]> {
+    fn mass_factors(&self) -> Option<[f64; 2]> {
         let dt = self.dt;
         (!self.is_newton()).then_some([(1.0 / dt + TIME_STEPS.damping) / dt, 1.0 / dt])
     }
 
     /// The longest part of the next step that may be taken.
-    pub(in crate::relax) fn largest_step_fraction(&self) -> f64 {
+    fn largest_step_fraction(&self) -> f64 {
         if self.is_newton() {
             self.newton_fraction
         } else {
@@ -372,7 +374,7 @@ impl Motion {
 
     /// Shortens a step that raises the energy: near rest a part of Newton's step is taken,
     /// otherwise a shorter time step. False if there is none.
-    pub(in crate::relax) fn shorten(&mut self) -> bool {
+    fn shorten(&mut self) -> bool {
         let near_rest = self.is_newton() && (self.was_stationary || self.newton_fraction < 1.0);
         if near_rest && self.newton_fraction > TIME_STEPS.smallest_newton_fraction {
             self.newton_fraction /= 2.0;
@@ -382,7 +384,7 @@ impl Motion {
     }
 
     /// Shortens the time step; false if it falls below the shortest.
-    pub(in crate::relax) fn shorten_in_time(&mut self) -> bool {
+    fn shorten_in_time(&mut self) -> bool {
         self.dt = match self.dt.is_finite() {
             true => self.dt / 4.0,
             false => TIME_STEPS.first,
@@ -393,12 +395,7 @@ impl Motion {
 
     /// Whether the total energy does not grow in a step, of which the fraction `part` is
     /// taken, with these potential energies before and after it.
-    pub(in crate::relax) fn energy_does_not_grow(
-        &mut self,
-        system: &System,
-        part: f64,
-        potential: [f64; 2],
-    ) -> bool {
+    fn energy_does_not_grow(&mut self, system: &System, part: f64, potential: [f64; 2]) -> bool {
         let [mut energy, mut next_energy] = potential;
         if !self.is_newton() {
             energy += system.kinetic_energy(&self.velocity);
@@ -412,7 +409,7 @@ impl Motion {
     /// Updates velocity and time step after an accepted step. At a possible saddle the next
     /// step is Newton's, without inertia or damping: it leaves the saddle, or shows that the
     /// leaf is at rest.
-    pub(in crate::relax) fn accept(&mut self, at_saddle: bool, part: f64) {
+    fn accept(&mut self, at_saddle: bool, part: f64) {
         std::mem::swap(&mut self.velocity, &mut self.next_velocity);
         self.was_stationary |= at_saddle;
         if at_saddle {
@@ -428,7 +425,7 @@ impl Motion {
     }
 
     /// After an accepted step of Newton's method.
-    pub(in crate::relax) fn accept_newton(&mut self) {
+    fn accept_newton(&mut self) {
         self.was_stationary = false;
         self.newton_fraction = (2.0 * self.newton_fraction).min(1.0);
     }

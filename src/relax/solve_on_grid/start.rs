@@ -173,7 +173,7 @@ pub struct GridRelaxation<'a> {
 }
 
 impl<'a> GridRelaxation<'a> {
-    /// From a state far from rest, without a limit on its work but `limit`.
+    /// The relaxation of a state far from rest, without a limit on its work but `limit`.
     pub fn new(
         state: State,
         accuracy: f64,

@@ -618,7 +618,8 @@ fn is_on_interpolated_interval(
 /// The polynomial through points at these values of a variable.
 pub fn interpolate_polynomial(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
     let mut sum = vec![0.0; points[0].as_ref().len()];
-    for (coordinates, weight) in points.iter().zip(interpolation_weights(at, t, at.len()).1) {
+    let weights = interpolation_weights(at, t, at.len()).weights;
+    for (coordinates, weight) in points.iter().zip(weights) {
         for (sum, x) in sum.iter_mut().zip(coordinates.as_ref()) {
             *sum += weight * x;
         }

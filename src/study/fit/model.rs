@@ -385,11 +385,10 @@ impl<'a> FitModel<'a> {
             let scenario =
                 scenario.map_err(|refused| ContinuationFailure::NotAtRest(refused.to_string()))?;
             let from = &from.case_solutions[case];
-            let how = (&self.options, grids);
             let answer = from.response_to_steps(&from.equilibrium.levels, &steps)?;
-            let at = from
-                .equilibrium
-                .continue_to_scenario(scenario, &answer, how)?;
+            let at =
+                from.equilibrium
+                    .continue_to_scenario(scenario, &answer, &self.options, grids)?;
             self.solved_case(case, theta, at)
         };
         self.assemble_point(theta, follow)
