@@ -127,7 +127,7 @@ impl<'a> MapCell<'a> {
             Err(CellVerdict { outcome, remark }) => {
                 return MapRow {
                     outcome,
-                    remark,
+                    remark: remark.map(|it| *it),
                     ..blank
                 };
             }
@@ -140,7 +140,7 @@ impl<'a> MapCell<'a> {
         let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
         MapRow {
             outcome,
-            remark,
+            remark: remark.map(|it| *it),
             index: answer.index,
             tip_x: tip.map(|node| node.position.x),
             tip_y: tip.map(|node| node.position.y),
@@ -257,7 +257,7 @@ impl<'a> MapCell<'a> {
         match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
             Err(CellVerdict { outcome, remark }) => {
-                let why = remark.clone().map(Box::new);
+                let why = remark.clone();
                 Err(CellVerdict::new(*outcome, MapRemark::NoStart { why }))
             }
         }
@@ -274,10 +274,7 @@ impl<'a> MapCell<'a> {
             return CellVerdict::new(MapOutcome::Right, MapRemark::Uncompared { remark });
         };
         if answer.agrees_within_errors(reference, distance) {
-            return CellVerdict {
-                outcome: MapOutcome::Right,
-                remark: remark.map(MapRemark::Solution),
-            };
+            return CellVerdict::new(MapOutcome::Right, remark.map(MapRemark::Solution));
         }
         let elsewhere = MapRemark::Elsewhere {
             distance: distance / longest(&self.scenario.rods),
@@ -367,10 +364,10 @@ pub fn relax_with_error_estimate(
             Outcome::Diverged => MapOutcome::Diverged,
             _ => MapOutcome::NotConverged,
         };
-        return Err(CellVerdict {
+        return Err(CellVerdict::new(
             outcome,
-            remark: answer.remark.map(MapRemark::Solution),
-        });
+            answer.remark.map(MapRemark::Solution),
+        ));
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();

@@ -124,14 +124,14 @@ pub type CellSolution = Result<MethodSolution, CellVerdict>;
 #[derive(Clone, Debug)]
 pub struct CellVerdict {
     pub(super) outcome: MapOutcome,
-    pub(super) remark: Option<MapRemark>,
+    pub(super) remark: Option<Box<MapRemark>>,
 }
 
 impl CellVerdict {
-    pub(super) fn new(outcome: MapOutcome, remark: MapRemark) -> Self {
+    pub(super) fn new(outcome: MapOutcome, remark: impl Into<Option<MapRemark>>) -> Self {
         CellVerdict {
             outcome,
-            remark: Some(remark),
+            remark: remark.into().map(Box::new),
         }
     }
 }
