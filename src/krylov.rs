@@ -14,8 +14,15 @@ pub struct KrylovLimits {
     /// Directions of a singular value up to this are left out: A is singular in them, up to
     /// rounding. With zero none is.
     pub singular_value_limit: f64,
-    /// The search ends where so many directions in a row leave more than this part of the residual.
-    pub stagnation_limit: Option<(usize, f64)>,
+    /// Where the search ends without progress, if it does.
+    pub stagnation: Option<StagnationLimit>,
+}
+
+/// The search ends where so many directions in a row leave more than this remainder of the residual.
+#[derive(Clone, Copy, Debug)]
+pub struct StagnationLimit {
+    pub directions: usize,
+    pub remainder: f64,
 }
 
 /// A solution as a sum over orthonormal directions.
@@ -53,9 +60,11 @@ pub fn solve_minimal_residual(
     let mut remaining = vec![length];
     while found.directions.len() < limits.most {
         let k = triangle.len();
-        let stagnates = limits.stagnation_limit.is_some_and(|(count, part)| {
-            let before = k.checked_sub(count);
-            before.is_some_and(|before| remaining[k].abs() > part * remaining[before].abs())
+        let stagnates = limits.stagnation.is_some_and(|limit| {
+            let before = k.checked_sub(limit.directions);
+            before.is_some_and(|before| {
+                remaining[k].abs() > limit.remainder * remaining[before].abs()
+            })
         });
         if remaining[k].abs() <= limits.accuracy * length || stagnates {
             break;
@@ -118,7 +127,7 @@ pub fn solve_minimal_residual(
 }
 
 impl KrylovSolution {
-    /// The solution.
+    /// The sum x; `None` without a direction.
     pub fn solution(&self) -> Option<Vec<f64>> {
         let (first, rest) = self.directions.split_first()?;
         let mut sum: Vec<f64> = first.iter().map(|v| self.coefficients[0] * v).collect();
@@ -150,7 +159,10 @@ mod tests {
         accuracy: 1e-12,
         most: 10,
         singular_value_limit: 1e-8,
-        stagnation_limit: Some((3, 0.99)),
+        stagnation: Some(StagnationLimit {
+            directions: 3,
+            remainder: 0.99,
+        }),
     };
 
     /// The identity with one outlier of any size takes two directions.

@@ -1,5 +1,5 @@
 //! Rotations as unit quaternions and rotation vectors: exponential, logarithm,
-//! geodesic midpoint, and the derivatives that a rod element needs.
+//! geodesic midpoint, and the derivatives that a rod element needs; one by one, or in lanes.
 //!
 //! Increments are spatial: a rotation q becomes exp(theta) q.
 
@@ -10,7 +10,7 @@ use pulp::{Scalar, Simd};
 /// A point of a centerline, and the rotation of the directors there.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
-    /// Position.
+    /// Position of the point.
     pub position: DVec3,
     /// Rotation of the directors: R e_i = d_i.
     pub rotation: DQuat,
@@ -22,8 +22,12 @@ pub fn angle_about(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
     -from.dot(axis.cross(to)).atan2(from.dot(to))
 }
 
-/// The vector and the scalar part of unit quaternions.
-pub type Quaternions<S> = (Vectors<S>, Lanes<S>);
+/// Quaternions in lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Quaternions<S: Simd> {
+    pub vector: Vectors<S>,
+    pub scalar: Lanes<S>,
+}
 
 /// Taylor's series of cos and of sin y/y in y^2.
 const COS: [f64; 9] = [
@@ -50,7 +54,7 @@ const SINC: [f64; 9] = [
     1.0 / 355_687_428_096_000.0,
 ];
 
-/// Up to this squared half angle they are accurate to rounding: a rotation by 1.09.
+/// Squared half angle up to which these series are accurate to rounding: a rotation by 1.09.
 const SERIES_LIMIT: f64 = 0.3;
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being y/sin y of a half angle
@@ -70,7 +74,7 @@ pub const HALF_ANGLE_POLYNOMIAL: [f64; 11] = [
     1.5773720034975787e-07,
 ];
 
-/// Up to there: a rotation by 1.68, a little more than what counts as resolved.
+/// Largest delta for this polynomial: a rotation by 1.68, a little more than what counts as resolved.
 const POLYNOMIAL_LIMIT: f64 = 2.0 / 3.0;
 
 /// The unit quaternion of the rotation vector `theta` (angle times axis).
@@ -93,36 +97,48 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
         sinc = (half.each(f64::sin) * half.recip()).select_where_positive(large, sinc);
         cos = half.each(f64::cos).select_where_positive(large, cos);
     }
-    (theta.scale(sinc * Lanes::splat(simd, 0.5)), cos)
+    Quaternions {
+        vector: theta.scale(sinc * Lanes::splat(simd, 0.5)),
+        scalar: cos,
+    }
 }
 
 /// Products a b of unit quaternions, renormalized to first order in the rounding error.
 #[inline(always)]
-pub fn multiply_each<S: Simd>((a, aw): Quaternions<S>, (b, bw): Quaternions<S>) -> Quaternions<S> {
+pub fn multiply_each<S: Simd>(left: Quaternions<S>, right: Quaternions<S>) -> Quaternions<S> {
+    let (a, aw) = (left.vector, left.scalar);
+    let (b, bw) = (right.vector, right.scalar);
     let simd = aw.simd;
     let (v, w) = (a.mul_add(bw, b.scale(aw)) + a.cross(b), aw * bw - a.dot(b));
     let length = w.mul_add(w, v.dot(v));
     let (half, three_halves) = (Lanes::splat(simd, 0.5), Lanes::splat(simd, 1.5));
     let scale = length.neg_mul_add(half, three_halves);
-    (v.scale(scale), w * scale)
+    Quaternions {
+        vector: v.scale(scale),
+        scalar: w * scale,
+    }
 }
 
-/// The vector and the scalar part of a quaternion.
+/// A quaternion as that of a single lane.
 #[inline(always)]
 pub fn from_quaternion(q: DQuat) -> Quaternions<Scalar> {
-    (DVec3::new(q.x, q.y, q.z).into(), q.w.into())
+    Quaternions {
+        vector: DVec3::new(q.x, q.y, q.z).into(),
+        scalar: q.w.into(),
+    }
 }
 
-/// The quaternion with these parts.
+/// The quaternion of a single lane.
 #[inline(always)]
-pub fn to_quaternion((v, w): Quaternions<Scalar>) -> DQuat {
-    let v = DVec3::from(v);
-    DQuat::from_xyzw(v.x, v.y, v.z, w.into())
+fn to_quaternion(q: Quaternions<Scalar>) -> DQuat {
+    let v = DVec3::from(q.vector);
+    DQuat::from_xyzw(v.x, v.y, v.z, q.scalar.into())
 }
 
 /// The rotation vector of the unit quaternion `q`, of length at most pi.
 pub fn log(q: DQuat) -> DVec3 {
-    let (w, cos) = from_quaternion(if q.w < 0.0 { -q } else { q });
+    let q = from_quaternion(if q.w < 0.0 { -q } else { q });
+    let (w, cos) = (q.vector, q.scalar);
     let off = cos - Lanes::from(1.0);
     let [sigma, ..] = half_angle_series(off.mul_add(off, w.dot(w)));
     w.scale(sigma + sigma).into()
@@ -134,9 +150,10 @@ pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The directors of quaternions `s` of any length, `scale` being 2/|s|^2.
+/// The directors of quaternions s of any length, `scale` being 2/|s|^2.
 #[inline(always)]
-pub fn directors<S: Simd>((s, sw): Quaternions<S>, scale: Lanes<S>) -> [Vectors<S>; 3] {
+pub fn directors<S: Simd>(quaternions: Quaternions<S>, scale: Lanes<S>) -> [Vectors<S>; 3] {
+    let (s, sw) = (quaternions.vector, quaternions.scalar);
     let one = Lanes::splat(scale.simd, 1.0);
     let r = s.scale(scale);
     let (xy, xz, yz) = (s.x * r.y, s.x * r.z, s.y * r.z);
@@ -196,7 +213,7 @@ pub fn half_angle_series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
 ///      + ((delta . tau)(eta + (delta x tau)/2) - (eta . delta) tau)/4 + O(3)
 ///
 /// with eta = (alpha + beta)/2 and tau = tan(|psi|/4) psi/|psi|. With b and c of
-/// [`series`] and g = 2/(1 + cos y) nothing is a quotient of small numbers:
+/// [`half_angle_series`] and g = 2/(1 + cos y) nothing is a quotient of small numbers:
 ///
 /// k = -b g,  2 c1 = -(1/2 + b) g/2,  c2 = (sigma/2 - b) g/2,  c3 = -(b - 3 c) g^2/4.
 #[derive(Clone, Copy, Debug)]
@@ -215,12 +232,28 @@ pub struct RelativeRotation<S: Simd> {
     pub second_coefficients: [Lanes<S>; 3],
 }
 
-impl<S: Simd> RelativeRotation<S> {
-    /// Between two rotations given as unit quaternions of any sign; also the
-    /// directors of their geodesic midpoint.
+/// The relative rotation of two ends, with the directors of their geodesic midpoint.
+pub struct MidpointRotation<S: Simd> {
+    pub relative: RelativeRotation<S>,
+    /// Directors of the midpoint.
+    pub frame: [Vectors<S>; 3],
+}
+
+/// A symmetric matrix as a sum of a diagonal matrix, a multiple of the identity, and half of a dyad
+/// v w^T + w v^T, w being that of a [`RelativeRotation`].
+pub struct DerivativeMatrix<S: Simd> {
+    pub diagonal: Vectors<S>,
+    pub multiple: Lanes<S>,
+    /// The vector v of the dyad.
+    pub dyad: Vectors<S>,
+}
+
+impl<S: Simd> MidpointRotation<S> {
+    /// The rotation between two rotations given as unit quaternions of any sign.
     #[inline(always)]
-    pub fn between(q: [Quaternions<S>; 2]) -> (Self, [Vectors<S>; 3]) {
-        let [(a, aw), (b, bw)] = q;
+    pub fn between([left, right]: [Quaternions<S>; 2]) -> Self {
+        let (a, aw) = (left.vector, left.scalar);
+        let (b, bw) = (right.vector, right.scalar);
         let simd = aw.simd;
         let (one, half) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.5));
         let cos = aw.mul_add(bw, a.dot(b));
@@ -247,31 +280,39 @@ impl<S: Simd> RelativeRotation<S> {
                 series_c.mul_add(three, -series_b) * half_g * half_g,
             ],
         };
-        (relative, directors((a + b, aw + bw), twice))
+        let sum = Quaternions {
+            vector: a + b,
+            scalar: aw + bw,
+        };
+        MidpointRotation {
+            relative,
+            frame: directors(sum, twice),
+        }
     }
+}
 
-    /// S a.
+impl<S: Simd> RelativeRotation<S> {
+    /// S a, S being the derivative of the rotation vector.
     #[inline(always)]
     pub fn apply_derivative(&self, a: Vectors<S>) -> Vectors<S> {
         self.w.mul_add(self.k * self.w.dot(a), a.scale(self.sigma))
     }
 
     /// S diag(a) S plus the second derivatives of m . psi' with respect to delta (without the
-    /// bilinear part in alpha and beta), as a sum of: the diagonal matrix sigma^2 diag(a), a
-    /// multiple of the identity, and half of a dyad v w^T + w v^T, as v.
+    /// bilinear part in alpha and beta), with the diagonal matrix sigma^2 diag(a).
     #[inline(always)]
-    pub fn second_derivatives(
-        &self,
-        a: Vectors<S>,
-        m: Vectors<S>,
-    ) -> (Vectors<S>, Lanes<S>, Vectors<S>) {
+    pub fn second_derivatives(&self, a: Vectors<S>, m: Vectors<S>) -> DerivativeMatrix<S> {
         let (w, k, [twice_c1, c2, c3]) = (self.w, self.k, self.second_coefficients);
         let half = Lanes::splat(k.simd, 0.5);
         let (aw, along) = (a * w, w.dot(m));
         let v = aw.scale(self.sigma * k);
         let v = w.mul_add((half * k * k).mul_add(w.dot(aw), c3 * along), v);
         let v = m.mul_add(c2, v);
-        (a.scale(self.sigma * self.sigma), twice_c1 * along, v)
+        DerivativeMatrix {
+            diagonal: a.scale(self.sigma * self.sigma),
+            multiple: twice_c1 * along,
+            dyad: v,
+        }
     }
 }
 

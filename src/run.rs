@@ -1,14 +1,9 @@
-//! The clock that measures the time of runs, and ends those that have a deadline.
+//! What a run is given and may refuse: a limit of its time and its cancellation, refused options and
+//! what methods do not model, as data that each interface words as its users do, and words for the
+//! variants of an enum, such as a method or an outcome.
 //!
-//! On `wasm32-unknown-unknown`, which has none, it is the one that the host has set by `set`; without it,
-//! no time passes.
-//!
-//! Limits of the time of a run, and its cancellation.
-//!
-//! Refused options, and what methods do not model, as data: what reads them writes them as its
-//! users do.
-//!
-//! Words for the variants of an enum, such as a method or an outcome, and what may be said of a result.
+//! The clock that measures the time of runs is that of the system; on `wasm32-unknown-unknown`, which has
+//! none, it is the one that the host has set by `set`, without which no time passes.
 
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
 pub use crate::run::host::{Instant, set};
@@ -53,7 +48,7 @@ impl Limit {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{option} = {value}: {reason}")]
 pub struct RefusedOption {
-    /// Its name, words with `_` between them.
+    /// Name of the option, words with `_` between them.
     pub option: &'static str,
     /// The value.
     pub value: String,
@@ -141,10 +136,10 @@ macro_rules! words {
         }
 
         impl $type {
-            /// All of them.
+            /// All variants.
             pub const ALL: [$type; [$($word),*].len()] = [$($type::$variant),*];
 
-            /// The word for it on the command line and in files.
+            /// The word for the variant in requests and in files.
             pub fn word(self) -> &'static str {
                 match self {
                     $($type::$variant => $word),*
@@ -222,11 +217,11 @@ macro_rules! read_and_write {
         }
 
         impl std::str::FromStr for $type {
-            type Err = $crate::study::UnknownWord;
+            type Err = $crate::run::UnknownWord;
 
             fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
                 let found = Self::ALL.into_iter().find(|it| it.word() == text);
-                found.ok_or_else(|| $crate::study::UnknownWord {
+                found.ok_or_else(|| $crate::run::UnknownWord {
                     found: text.into(),
                     allowed: Self::ALL.map(|it| it.word()).to_vec(),
                 })

@@ -1,7 +1,6 @@
-//! The state of rods at stations along them, which every method returns.
-//!
-//! Measures of undulation: the waves of each vein out of the leaf's surface, the twist of
-//! its section, and the waves predicted by linear theory.
+//! The state of rods at stations along them, which every method returns, and measures of its
+//! undulation: the waves of each vein out of the leaf's surface, the twist of its section, and the waves
+//! predicted by linear theory.
 //!
 //! **Waves.** A vein has waves where it bends out of the surface alternately to both
 //! sides. Its normal curvature is the component of its curvature along the normal of the
@@ -117,9 +116,17 @@ pub fn equally_spaced(parts: usize) -> Vec<f64> {
     (0..=parts).map(|i| i as f64 / parts as f64).collect()
 }
 
-/// Interpolation at `at` by the polynomial through `count` neighboring `nodes`: the index
-/// of the first of them, and their weights.
-pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
+/// Interpolation by a polynomial through neighboring nodes.
+#[derive(Clone, Debug)]
+pub struct InterpolationWeights {
+    /// Index of the first of the nodes.
+    pub first: usize,
+    /// Weights of the nodes from the first on.
+    pub weights: Vec<f64>,
+}
+
+/// Interpolation at `at` by the polynomial through `count` neighboring `nodes`.
+pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> InterpolationWeights {
     let count = count.min(nodes.len());
     let right = nodes.partition_point(|node| *node < at);
     let first = right
@@ -132,7 +139,10 @@ pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> (usize, Ve
             .map(|j| (at - near[j]) / (near[i] - near[j]))
             .product()
     };
-    (first, (0..count).map(weight).collect())
+    InterpolationWeights {
+        first,
+        weights: (0..count).map(weight).collect(),
+    }
 }
 
 /// Serializes tips as the key `tip`, which is null if there are several; these follow as
@@ -354,7 +364,7 @@ impl Undulation {
         sum / self.veins.len().max(1) as f64
     }
 
-    /// Its handedness.
+    /// The handedness of the twist.
     pub fn hand(&self) -> Handedness {
         match self.twist() {
             twist if twist > LEAST_TWIST => Handedness::Right,
@@ -382,7 +392,7 @@ fn twist(line: &Centerline) -> f64 {
 /// A half-wave between two inflections.
 #[derive(Clone, Copy, Debug)]
 struct HalfWave {
-    /// Its ends: indices of nodes plus fractions of the segments after them.
+    /// Ends of the half-wave: indices of nodes plus fractions of the segments after them.
     ends: [f64; 2],
     /// Height of its extremum over the chord.
     height: f64,

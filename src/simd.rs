@@ -17,7 +17,7 @@ pub const GROUP: usize = 4;
 pub struct NumberGroup(pub [f64; GROUP]);
 
 impl NumberGroup {
-    /// The same number everywhere.
+    /// One number in every lane.
     pub fn splat(value: f64) -> Self {
         NumberGroup([value; GROUP])
     }
@@ -36,7 +36,7 @@ pub fn widest_arch() -> Arch {
     Arch::new()
 }
 
-/// A loop over groups.
+/// A loop over the nodes or segments of a group of rods, on numbers in lanes.
 pub trait GroupKernel {
     /// Processes the lanes from `part` on, as many as an instruction has.
     fn run<S: Simd>(&mut self, simd: S, part: usize);
@@ -78,9 +78,7 @@ pub fn run(arch: Arch, kernel: &mut impl GroupKernel) {
 /// A part of an array.
 #[derive(Clone, Copy, Debug)]
 pub struct ArraySpan {
-    /// First index.
     pub first: usize,
-    /// Length.
     pub count: usize,
 }
 
@@ -104,7 +102,7 @@ pub fn slice_mut(array: &mut [f64], span: ArraySpan) -> &mut [f64] {
     &mut array[span.first..span.first + span.count]
 }
 
-/// The same part of several arrays. (Written out, as compilers do not inline `map` here:
+/// A part of each of several arrays. (Written out, as compilers do not inline `map` here:
 /// measured at a twentieth of the time of short rods.)
 #[inline(always)]
 pub fn array_chunks<const K: usize>(
@@ -118,7 +116,17 @@ pub fn array_chunks<const K: usize>(
     parts
 }
 
-/// The same part of three arrays, mutably.
+/// The components of the vectors of a group.
+#[inline(always)]
+pub fn group_components([a, b, c, d]: [DVec3; GROUP]) -> [NumberGroup; 3] {
+    [
+        NumberGroup([a.x, b.x, c.x, d.x]),
+        NumberGroup([a.y, b.y, c.y, d.y]),
+        NumberGroup([a.z, b.z, c.z, d.z]),
+    ]
+}
+
+/// A part of each of three arrays, mutably.
 #[inline(always)]
 pub fn array_chunks_mut(arrays: &mut [impl AsMut<[f64]>; 3], span: ArraySpan) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;
@@ -137,7 +145,7 @@ pub struct Lanes<S: Simd> {
 }
 
 impl<S: Simd> Lanes<S> {
-    /// The same number everywhere.
+    /// One number in every lane.
     #[inline(always)]
     pub fn splat(simd: S, value: f64) -> Self {
         let v = simd.splat_f64s(value);
@@ -225,7 +233,7 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_max_f64s(self.v)
     }
 
-    /// Square root.
+    /// Square roots of all numbers.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
         self.with_value(self.simd.sqrt_f64s(self.v))
@@ -342,7 +350,7 @@ pub struct Vectors<S: Simd> {
 }
 
 impl<S: Simd> Vectors<S> {
-    /// From its components.
+    /// Vectors with these components.
     #[inline(always)]
     pub fn new(x: Lanes<S>, y: Lanes<S>, z: Lanes<S>) -> Self {
         Vectors { x, y, z }
@@ -423,7 +431,7 @@ impl<S: Simd> Vectors<S> {
         d1.mul_add(self.x, d2.mul_add(self.y, d3.scale(self.z)))
     }
 
-    /// Its components.
+    /// The components of the vectors.
     #[inline(always)]
     pub fn array(self) -> [Lanes<S>; 3] {
         [self.x, self.y, self.z]
@@ -439,11 +447,16 @@ impl<S: Simd> Vectors<S> {
     /// Packs the vectors of a group, one in every lane, from the lane `part` on.
     #[inline(always)]
     pub fn from_group(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
-        let [a, b, c, d] = vectors;
+        Vectors::load_group(simd, &group_components(vectors), part)
+    }
+
+    /// The vectors of a group with these components, from the lane `part` on.
+    #[inline(always)]
+    pub fn load_group(simd: S, [x, y, z]: &[NumberGroup; 3], part: usize) -> Self {
         Vectors::new(
-            Lanes::load_group(simd, &NumberGroup([a.x, b.x, c.x, d.x]), part),
-            Lanes::load_group(simd, &NumberGroup([a.y, b.y, c.y, d.y]), part),
-            Lanes::load_group(simd, &NumberGroup([a.z, b.z, c.z, d.z]), part),
+            Lanes::load_group(simd, x, part),
+            Lanes::load_group(simd, y, part),
+            Lanes::load_group(simd, z, part),
         )
     }
 

@@ -10,59 +10,81 @@ use crate::branch::critical::{
     CriticalKind, CriticalPoint, locate_critical_points, locate_pitchfork_vertex,
 };
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::refine::on_finer;
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, add_scaled, increments_between, scaled_sum,
 };
+use crate::branch::refine::on_finer;
 use crate::numbers::larger;
 
-/// First step and shortest step, as parts of the longest.
-const FIRST: f64 = 0.25;
+/// How steps along a branch or a boundary are chosen and judged. Halving the turn or the
+/// prediction error that is allowed makes about as many more points, and is safer from other
+/// branches nearby.
+pub(super) struct StepControl {
+    /// The first step and the shortest, as parts of the longest.
+    pub first: f64,
+    pub shortest: f64,
+    /// Growth factor of the step, where the cosine of the turn exceeds `growth_cosine`.
+    pub growth: f64,
+    pub growth_cosine: f64,
+    /// A step in which the cosine of the turn is smaller is rejected.
+    pub smallest_cosine: f64,
+    /// Largest distance of a point from its prediction, as a part of the step.
+    pub largest_prediction_error: f64,
+}
 
-const SHORTEST: f64 = 1e-5;
+const STEPS: StepControl = StepControl {
+    first: 0.25,
+    shortest: 1e-5,
+    growth: 1.5,
+    growth_cosine: 0.97,
+    smallest_cosine: 0.85,
+    largest_prediction_error: 0.5,
+};
 
-/// Growth factor of the step, if Newton's method needs at most `FEW` iterations
-/// and the cosine of the branch's turn exceeds `STRAIGHT`.
-const GROWTH: f64 = 1.5;
-
+/// A step grows only if Newton's method needs at most so many iterations.
 const STEP_GROWTH_ITERATIONS: usize = 4;
-
-const STEP_GROWTH_COSINE: f64 = 0.97;
-
-/// A step in which the cosine of the branch's turn is below this is rejected.
-const SMALLEST_ACCEPTED_COSINE: f64 = 0.85;
-
-/// Largest distance of a point from its prediction, as a part of the step.
-const LARGEST_PREDICTION_ERROR: f64 = 0.5;
 
 /// A chord is parallel to the mean of the tangents at its ends up to third order. If a larger
 /// part of it than this is transverse, the step has led to another branch.
 const LARGEST_TRANSVERSE_FRACTION: f64 = 0.1;
 
-/// A step with more sign changes of eigenvalues than this is rejected, until it
-/// is as short as this part of the longest.
-const MAX_EIGENVALUE_SIGN_CHANGES: usize = 2;
+/// Changes of the index in one step. A longer step may have led to another branch.
+struct IndexChangeLimits {
+    /// Largest number of sign changes of eigenvalues, unless the step is shorter than
+    /// `many_changes_step` times the longest.
+    most: usize,
+    many_changes_step: f64,
+    /// A change that no critical point explains is accepted in a step not longer than this part of
+    /// the longest.
+    unexplained_change_step: f64,
+}
 
-const SIGN_CHANGE_STEP_FRACTION: f64 = 0.02;
+const INDEX_CHANGES: IndexChangeLimits = IndexChangeLimits {
+    most: 2,
+    many_changes_step: 0.02,
+    unexplained_change_step: 1e-3,
+};
 
-/// An unexplained change of the index is accepted if steps
-/// are shorter than this part of the longest.
-const UNEXPLAINED_CHANGE_STEP_FRACTION: f64 = 1e-3;
+/// The test whether a branch has come back to its first point.
+struct ClosureTest {
+    /// Distance from the first point, in steps, within which it is made, after so many points.
+    distance: f64,
+    points: usize,
+    /// Largest number of corrections to the plane through the first point normal to the branch.
+    corrections: usize,
+    /// How near both must then be (radians, lengths, fractions).
+    tolerance: f64,
+}
 
-/// A branch that comes to within this part of a step of its first point is
-/// tested for closure, after so many points: in at most `MAX_CLOSURE_CORRECTIONS` corrections to the plane
-/// through the first point normal to the branch. The two must then agree
-/// within `SAME` (radians, lengths, fractions).
-const CLOSURE_TEST_DISTANCE: f64 = 1.0;
-
-const CLOSURE_TEST_POINTS: usize = 8;
-
-const MAX_CLOSURE_CORRECTIONS: usize = 5;
-
-const CLOSURE_TOLERANCE: f64 = 1e-7;
+const CLOSURE: ClosureTest = ClosureTest {
+    distance: 1.0,
+    points: 8,
+    corrections: 5,
+    tolerance: 1e-7,
+};
 
 /// Least number of grids for a critical point.
-const CRITICAL_GRIDS: usize = 4;
+pub(super) const CRITICAL_GRIDS: usize = 4;
 
 /// Predicate on the points so far: whether to stop.
 type StopCriterion<'a> = dyn Fn(&[EquilibriumPoint]) -> bool + 'a;
@@ -73,7 +95,7 @@ pub struct ContinuationOptions<'a> {
     /// The longest step; the range of the parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest_step: f64,
-    /// Largest number of points.
+    /// Largest number of points of the branch, the first included.
     pub max_points: usize,
     /// Least number of grids for a critical point.
     pub critical_grids: usize,
@@ -82,7 +104,8 @@ pub struct ContinuationOptions<'a> {
 }
 
 impl ContinuationOptions<'_> {
-    /// Without a stopping criterion.
+    /// Follows a branch with steps up to `longest` to at most so many points, without a criterion
+    /// for stopping.
     pub fn new(longest: f64, most: usize) -> Self {
         ContinuationOptions {
             longest_step: longest,
@@ -100,7 +123,7 @@ pub enum BranchEnd {
     RangeEndReached,
     /// Back at the start of the range.
     RangeStartReached,
-    /// Where it began.
+    /// At the point where it began: it is closed.
     LoopClosed,
     /// On a boundary that was followed before.
     KnownBoundaryMet,
@@ -119,7 +142,7 @@ pub enum BranchEnd {
 }
 
 impl BranchEnd {
-    /// That of a branch which has reached this end of the range.
+    /// How a branch ends at this end of the range, 0 or 1.
     fn at_range_end(edge: f64) -> Self {
         match edge {
             1.0 => BranchEnd::RangeEndReached,
@@ -131,7 +154,7 @@ impl BranchEnd {
 /// A branch on one grid, or on finer and finer ones.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// Its points, in order.
+    /// The points in the order in which the branch was followed.
     pub points: Vec<EquilibriumPoint>,
     /// Critical points, each with the number of the point before it.
     pub critical: Vec<(usize, CriticalPoint)>,
@@ -140,7 +163,7 @@ pub struct Branch {
     /// Vertices of pitchforks at which no branch was found to cross, by the number of the point
     /// before.
     pub unmatched_vertices: Vec<usize>,
-    /// How it ended, once it has.
+    /// Why the branch ends, once it does.
     pub end: Option<BranchEnd>,
     /// The first point on the present grid, if it was found there.
     first: Option<EquilibriumPoint>,
@@ -164,7 +187,7 @@ pub fn follow_branch(
 }
 
 impl Branch {
-    /// A branch with one point.
+    /// A branch with one point, not yet followed.
     pub fn new(first: EquilibriumPoint, how: &ContinuationOptions) -> Self {
         Branch {
             points: vec![first.clone()],
@@ -173,7 +196,7 @@ impl Branch {
             unmatched_vertices: Vec::new(),
             end: None,
             first: Some(first),
-            step: FIRST * how.longest_step,
+            step: STEPS.first * how.longest_step,
             steps: Vec::new(),
         }
     }
@@ -231,7 +254,7 @@ impl Branch {
         self.step *= part;
     }
 
-    /// Drops a point between two others.
+    /// Drops a point between two others: critical points on both sides are then between these.
     pub fn drop_point(&mut self, number: usize) {
         self.points.remove(number);
         self.steps[number - 1] += self.steps.remove(number);
@@ -280,21 +303,21 @@ impl Branch {
         });
         let mut next = match found {
             Ok(found) => found,
-            Err(_) if 0.5 * step >= SHORTEST * how.longest_step => {
+            Err(_) if 0.5 * step >= STEPS.shortest * how.longest_step => {
                 self.step = 0.5 * step;
                 return Ok(());
             }
             Err(stuck) => return Err(stuck),
         };
         let turn = equations.direction_product(&now.tangent, &next.point.tangent);
-        let easy = next.point.iterations <= STEP_GROWTH_ITERATIONS && turn > STEP_GROWTH_COSINE;
+        let easy = next.point.iterations <= STEP_GROWTH_ITERATIONS && turn > STEPS.growth_cosine;
         let mut end = next
             .stop_at_range_end(equations, now, step)?
             .map(BranchEnd::at_range_end);
         if let Some(first) = &self.first
             && end.is_none()
-            && self.points.len() > CLOSURE_TEST_POINTS
-            && distance(first, &next.point) < CLOSURE_TEST_DISTANCE * step
+            && self.points.len() > CLOSURE.points
+            && distance(first, &next.point) < CLOSURE.distance * step
             && let Some(point) = close_branch(equations, first, &next.point, step)
         {
             next.point = point;
@@ -329,7 +352,7 @@ impl Branch {
             } else if !explained {
                 // An unexplained change of the index: the step has led to another branch
                 // nearby.
-                if next.step > UNEXPLAINED_CHANGE_STEP_FRACTION * how.longest_step {
+                if next.step > INDEX_CHANGES.unexplained_change_step * how.longest_step {
                     self.step = 0.5 * next.step;
                     return Ok(());
                 }
@@ -345,7 +368,7 @@ impl Branch {
         self.points.push(next.point);
         self.end = end;
         if easy {
-            self.step = (GROWTH * step).min(how.longest_step);
+            self.step = (STEPS.growth * step).min(how.longest_step);
         }
         Ok(())
     }
@@ -361,15 +384,15 @@ impl ContinuationOptions<'_> {
         step: f64,
     ) -> bool {
         let changes = found.point.index.abs_diff(now.index);
-        equations.direction_product(&now.tangent, &found.point.tangent) > SMALLEST_ACCEPTED_COSINE
-            && found.drift < LARGEST_PREDICTION_ERROR * step
-            && (changes <= MAX_EIGENVALUE_SIGN_CHANGES
-                || step < SIGN_CHANGE_STEP_FRACTION * self.longest_step)
+        equations.direction_product(&now.tangent, &found.point.tangent) > STEPS.smallest_cosine
+            && found.drift < STEPS.largest_prediction_error * step
+            && (changes <= INDEX_CHANGES.most
+                || step < INDEX_CHANGES.many_changes_step * self.longest_step)
             && transverse_part(equations, now, &found.point) < LARGEST_TRANSVERSE_FRACTION
     }
 }
 
-/// The difference of two points.
+/// The direction, not normalized, from one point to another.
 fn direction_between(
     equations: &BranchEquations,
     a: &EquilibriumPoint,
@@ -405,12 +428,12 @@ fn close_branch(
     step: f64,
 ) -> Option<EquilibriumPoint> {
     let mut near = near.clone();
-    for _ in 0..MAX_CLOSURE_CORRECTIONS {
+    for _ in 0..CLOSURE.corrections {
         let same = equations.direction_product(&near.tangent, &first.tangent);
-        if same < SMALLEST_ACCEPTED_COSINE || near.index != first.index {
+        if same < STEPS.smallest_cosine || near.index != first.index {
             return None;
         }
-        if distance(&near, first) < CLOSURE_TOLERANCE {
+        if distance(&near, first) < CLOSURE.tolerance {
             return Some(near);
         }
         let shift = equations

@@ -44,7 +44,12 @@ pub(super) trait NestedGridPoint {
     fn segments(&self) -> usize;
 
     /// Between how many grids the search must end.
-    fn grid_limits(&self) -> GridLimits;
+    fn grid_limits(&self) -> GridLimits {
+        GridLimits {
+            least: 1,
+            most: MAX_GRIDS,
+        }
+    }
 
     /// Adds the values of the point on the present grid to its convergence table.
     fn tabulate(&mut self, level: usize) -> Result<(), VerificationFailure>;
@@ -113,7 +118,7 @@ pub(super) fn verify_over_grids<P: NestedGridPoint>(
     Err(VerificationFailure::Inaccurate)
 }
 
-/// Why a point is not verified.
+/// Why a point is not verified over nested grids.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum VerificationFailure {
     /// Finer grids have no solution near it.
@@ -151,14 +156,14 @@ impl From<OutOfRange> for VerificationFailure {
     }
 }
 
-/// Smallest ratio of successive changes: that of a fourth-order term from grid to grid. A
-/// smaller change is small by chance.
+/// Smallest ratio of successive changes of a parameter from grid to grid, that of a fourth-order
+/// term. A smaller change is small by chance.
 const SMALLEST_CHANGE_RATIO: f64 = 1.0 / 16.0;
 
 /// Least safety factor on the last correction of a regular point whose order of convergence is
 /// not confirmed. Of 955 points of random branches of wild leaves none had an error of more
 /// than 25 such corrections.
-const CAUTION: f64 = 40.0;
+const UNCONFIRMED_ORDER_SAFETY: f64 = 40.0;
 
 /// A point extrapolated to zero segment length.
 #[derive(Clone, Debug)]
@@ -167,9 +172,10 @@ pub struct ExtrapolatedPoint {
     pub fraction: f64,
     /// Energy, in the family's units.
     pub energy: f64,
-    /// Tips of all rods, likewise.
+    /// Tips of all rods, in the family's units.
     pub tips: Vec<DVec3>,
-    /// The forces on the holder of held tips, if they are, and on every grip, likewise.
+    /// The forces on the holder of held tips, if tips are held, and on every grip, in the family's
+    /// units.
     pub reactions: Vec<DVec3>,
     /// Bound on the error of the tips, or of the rods' midpoints if the tips are held, and of both
     /// with grips: of the branch at this parameter, or, at a fold, of the fold itself.
@@ -178,18 +184,18 @@ pub struct ExtrapolatedPoint {
     pub fraction_error: f64,
     /// The state on the finest grid.
     pub state: State,
-    /// That grid.
+    /// The finest grid.
     pub grid: Grid,
 }
 
 impl ExtrapolatedPoint {
-    /// Whether its parameter may be in the range.
+    /// Whether the parameter may be in its range, given the error.
     pub fn may_be_in_range(&self) -> bool {
         let beyond = (-self.fraction).max(self.fraction - 1.0);
         beyond <= self.fraction_error
     }
 
-    /// Its leaf on the finest grid, in the scenario's units.
+    /// The leaf at the point on the finest grid, in the scenario's units.
     ///
     /// # Errors
     /// If the extrapolated parameter is one that no leaf can have.
@@ -207,7 +213,7 @@ pub(super) struct PointQuantities {
     pub points: Vec<f64>,
     pub fraction: f64,
     pub energy: f64,
-    /// The forces on the holders.
+    /// The forces on the holder of held tips and on grips, in the family's units.
     pub reactions: Vec<DVec3>,
 }
 
@@ -218,8 +224,9 @@ pub(super) fn observed_nodes(leaf: &DiscreteLeaf, segments: usize) -> impl Itera
 }
 
 impl PointQuantities {
-    /// Of a leaf that can turn those of the equilibrium that stands for its circle, as it does in a
-    /// relaxation: where on the circle a branch has led depends on where it began.
+    /// The quantities of an equilibrium. If the leaf can turn, they are those of the equilibrium
+    /// that stands for the circle of equilibria, as in a relaxation: where on the circle a branch has
+    /// led depends on where it began.
     pub fn at_state(
         equations: &mut BranchEquations,
         state: &State,
@@ -329,9 +336,9 @@ impl ConvergenceTable {
         };
         // So many grids do not show of which order the errors of the column before were.
         let error = match best.columns {
-            last if self.regular && last > 1 && last + 1 == self.rows.len() => {
-                best.error.max(CAUTION * points.correction(last))
-            }
+            last if self.regular && last > 1 && last + 1 == self.rows.len() => best
+                .error
+                .max(UNCONFIRMED_ORDER_SAFETY * points.correction(last)),
             _ => best.error,
         };
         error + self.common + self.noise

@@ -1,13 +1,15 @@
-//! Newton's method to a branch, within a plane or at a parameter, and the Morse index there.
-//!
-//! One step along a branch, which may end where the range of the parameter does.
+//! One step along a branch: a prediction along its tangent, which may end where the range of the
+//! parameter does, and Newton's method back to the branch, within a plane or at a parameter. The
+//! Morse index there is the number of negative eigenvalues of the matrix, without neutral modes.
 
 use crate::branch::equations::{
     ACCURACY, AssembledForces, BranchEquations, CorrectorFailure, ITERATIONS,
     LARGEST_CORRECTOR_INCREMENT, factorize_matrix, has_converged,
 };
-use crate::branch::family::{OutOfRange, force_parameter_derivative, place_supports};
-use crate::branch::{
+use crate::branch::family::{
+    CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports,
+};
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
     inject_forces, is_finite, largest, scaled_sum,
 };
@@ -18,6 +20,7 @@ use crate::relax::NOISY_EIGENVALUE_THRESHOLD;
 use crate::relax::accuracy::transfer::prolong;
 use glam::DVec3;
 
+/// Relative tolerance of the conjugate gradients by which rods that are coupled are solved for.
 const CG_TOLERANCE: f64 = 1e-11;
 
 /// A step too small to change the sign of any eigenvalue, even of a nearly neutral one.
@@ -54,7 +57,7 @@ impl ArclengthConstraint {
         }
     }
 
-    /// The same on the grid with all segments halved; `leaf` is on this one.
+    /// This plane on the grid with all segments halved, that of `leaf`.
     pub fn refined(&self, leaf: &DiscreteLeaf) -> Self {
         ArclengthConstraint {
             state_gradient: inject_forces(&self.state_gradient, leaf.first_node()),
@@ -84,7 +87,7 @@ struct CorrectorStep {
     law_forces: Vec<DVec3>,
     /// The rate of the increments with the parameter.
     rate: NodalField,
-    /// Negative eigenvalues, if they were counted.
+    /// The number of negative eigenvalues, if the factorization counts them.
     counted: Option<usize>,
 }
 
@@ -110,7 +113,7 @@ impl BranchEquations<'_> {
     }
 
     /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
-    /// else by a direct factorisation, which also counts the negative eigenvalues.
+    /// else by a direct factorization, which also counts the negative eigenvalues.
     fn solve(
         &mut self,
         at: &ParametrizedState,
@@ -128,10 +131,10 @@ impl BranchEquations<'_> {
                 };
                 let found = [&linear.forces, rate].map(|rhs| solved(&mut self.system, rhs));
                 if let [Some(mut forces), Some(rate)] = found {
-                    let (_, law_forces) = self.complete_law(at, &mut forces, &mut solved)?;
+                    let completion = self.complete_law(at, &mut forces, &mut solved)?;
                     return Ok(CorrectorStep {
                         forces,
-                        law_forces,
+                        law_forces: completion.segment_forces,
                         rate,
                         counted: None,
                     });
@@ -144,11 +147,10 @@ impl BranchEquations<'_> {
         let mut factor = factorize_matrix(&pattern, &self.system, shift)?;
         let mut solved = |rhs: &NodalField| factor.solve_bordered(rhs, &[]).increments;
         let [mut forces, rate] = [&linear.forces, rate].map(&mut solved);
-        let (_, law_forces) =
-            self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
+        let completion = self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
         Ok(CorrectorStep {
             forces,
-            law_forces,
+            law_forces: completion.segment_forces,
             rate,
             counted: Some(factor.negative_eigenvalue_count()),
         })
@@ -175,7 +177,7 @@ impl BranchEquations<'_> {
         Ok(point)
     }
 
-    /// As [`Equations::correct`], within any plane; the tangent points to growing
+    /// As [`BranchEquations::correct`], within any plane; the tangent points to growing
     /// values of the parameter.
     pub(super) fn correct_within(
         &mut self,
@@ -213,8 +215,11 @@ impl BranchEquations<'_> {
                 return Err(CorrectorFailure::NotConverged);
             }
             now.params[0] += step;
-            let next =
-                self.state_after_newton_step(&now.state, now.params, (&increments, &law_forces))?;
+            let completed = CompletedIncrements {
+                increments: &increments,
+                law_forces: &law_forces,
+            };
+            let next = self.state_after_newton_step(&now.state, now.params, completed)?;
             let progress = match &mut progress {
                 Some(progress) => progress,
                 none => none.insert(ForceConvergence::new(self.leaves.leaf_at(now.params)?)),
@@ -227,7 +232,7 @@ impl BranchEquations<'_> {
                     increments: rate,
                     params: [1.0],
                 });
-                // The factorised matrix is that of the previous state.
+                // The factorized matrix is that of the previous state.
                 let index = match counted {
                     Some(index) if size < INDEX_PRESERVING_STEP => index,
                     _ => self.index(&now)?,
@@ -285,7 +290,7 @@ impl BranchEquations<'_> {
         Ok(index)
     }
 
-    /// Number of eigenvalues below minus `shift`.
+    /// The number of eigenvalues (squared frequencies) below minus `shift`.
     fn index_below(
         &mut self,
         solution: &ParametrizedState,
@@ -308,7 +313,7 @@ impl BranchEquations<'_> {
     }
 }
 
-/// A point found by a step.
+/// A point of a branch found by a step from another, and the step that has led to it.
 pub struct SteppedPoint {
     pub point: EquilibriumPoint,
     /// Length of the step along the tangent at its start.
@@ -325,8 +330,8 @@ impl SteppedPoint {
         now: &EquilibriumPoint,
         step: f64,
     ) -> Result<Self, CorrectorFailure> {
-        match advance(equations, now, step) {
-            Err(CorrectorFailure::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
+        match step_along_tangent(equations, now, step) {
+            Err(CorrectorFailure::OutOfRange(out)) => step_to_range_end(equations, now, step, out),
             found => found,
         }
     }
@@ -347,13 +352,14 @@ impl SteppedPoint {
             _ => return Ok(None),
         };
         let part = (edge - now.fraction) / (self.point.fraction - now.fraction);
-        (self.point, _) = correct_at_range_end(equations, now, edge, part * step)?;
-        self.step = part * step;
+        let at_end = correct_at_range_end(equations, now, edge, part * step)?;
+        (self.point, self.step) = (at_end.point, at_end.step);
         Ok(Some(edge))
     }
 }
 
-fn advance(
+/// A step of this length along the tangent, corrected in the plane normal to that.
+fn step_along_tangent(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
     step: f64,
@@ -369,7 +375,7 @@ fn advance(
 }
 
 /// A step to the end of the range, if one of this length would leave it.
-fn advance_to_edge(
+fn step_to_range_end(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
     step: f64,
@@ -384,27 +390,28 @@ fn advance_to_edge(
     if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let (point, drift) = correct_at_range_end(equations, now, edge, length)?;
+    let found = correct_at_range_end(equations, now, edge, length)?;
     let part = length / step;
     Ok(SteppedPoint {
-        drift: drift / part,
-        point,
-        step: length,
+        drift: found.drift / part,
+        ..found
     })
 }
 
-/// The point at an end of the range, predicted `length` along the tangent, and its distance from
-/// the prediction.
+/// The point at an end of the range, predicted `length` along the tangent.
 fn correct_at_range_end(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
     edge: f64,
     length: f64,
-) -> Result<(EquilibriumPoint, f64), CorrectorFailure> {
+) -> Result<SteppedPoint, CorrectorFailure> {
     let state =
         equations.state_after_increments(&now.state, [edge], &now.tangent.increments, length)?;
     let mut point = equations.correct(&state, edge, None)?;
     point.tangent = equations.orient_direction(point.tangent, &now.tangent);
-    let drift = state.largest_displacement_to(&point.state);
-    Ok((point, drift))
+    Ok(SteppedPoint {
+        drift: state.largest_displacement_to(&point.state),
+        point,
+        step: length,
+    })
 }

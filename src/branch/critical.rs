@@ -1,15 +1,14 @@
-//! Critical points, at which the index changes: folds and branch points.
+//! Critical points of a branch on one grid: folds and branch points, at which the index changes,
+//! and vertices of pitchforks, where the branch turns back because another one crosses it.
 //!
-//! The vertex of a pitchfork: where a branch turns back because another one crosses it.
-//!
-//! No eigenvalue changes its sign along the branch that turns back, and the nearer its points are to
-//! the vertex, the nearer to singular is the matrix. So they are not sought there: the vertex
-//! is interpolated from points on either side, and the singular point is that of the other branch,
-//! with the bordered matrix, which is regular.
+//! At a vertex no eigenvalue changes its sign along the branch that turns back, and the nearer its
+//! points are to the vertex, the nearer to singular is the matrix. The vertex is therefore
+//! interpolated from points on either side; the singular point is that of the other branch, with
+//! the bordered matrix, which is regular.
 
 use crate::branch::equations::{BorderedLinearization, BranchEquations, CorrectorFailure};
 use crate::branch::family::eigenvalue_rounding;
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, add_scaled, combine_fields, dot, increments_between,
     scale_field, scaled_sum,
 };
@@ -19,14 +18,23 @@ use crate::numbers::larger;
 /// Additional modes in the border: others may be nearly neutral.
 pub(super) const EXTRA_BORDER_MODES: usize = 2;
 
-/// Largest number of evaluations in the search for a zero.
-const EVALUATIONS: usize = 40;
+/// How the zero of an eigenvalue, or of another function, along a curve is sought by a secant
+/// method.
+pub(super) struct SecantLimits {
+    /// Largest number of evaluations of the function, each by Newton's method.
+    pub evaluations: usize,
+    /// A step below this is the last (arclength).
+    pub accuracy: f64,
+    /// Over a shorter step rounding errors make a difference quotient worse than that before.
+    pub shortest_slope_difference: f64,
+}
 
-/// Accuracy of a zero, as a part of the step that contains it.
-const ACCURACY: f64 = 1e-13;
-
-/// Differences over less than this part of a step do not give a reliable slope.
-const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-6;
+/// The search for a critical point: lengths are parts of the step that contains it.
+const SECANT: SecantLimits = SecantLimits {
+    evaluations: 40,
+    accuracy: 1e-13,
+    shortest_slope_difference: 1e-6,
+};
 
 /// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
 const NEUTRAL_EIGENVALUE: f64 = 1e-6;
@@ -48,12 +56,12 @@ const SEARCH_END_TOLERANCE: f64 = 0.05;
 /// Two vertices nearer to each other than this are the same.
 const SAME_VERTEX_DISTANCE: f64 = 1e-4;
 
-/// Kind of a critical point.
+/// What a branch does where its matrix is singular.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CriticalKind {
     /// The branch turns back in the parameter.
     Fold,
-    /// Other branches cross.
+    /// Other branches cross the branch.
     Branching,
 }
 
@@ -67,9 +75,9 @@ pub struct CriticalPoint {
     pub kind: CriticalKind,
     /// Morse index before and after; the same at the vertex of a pitchfork.
     pub indices: [usize; 2],
-    /// The neutral modes, of mass one.
+    /// The modes with eigenvalue zero, of mass one.
     pub modes: Vec<NodalField>,
-    /// All modes used for the border.
+    /// The modes of the border: the neutral and others that are nearly so.
     pub border_modes: Vec<NodalField>,
     /// Position of the vanishing one among the sorted eigenvalues of H, and its derivative with
     /// respect to arclength along the tangent.
@@ -109,25 +117,24 @@ pub fn locate_critical_points(
     {
         return Err(CorrectorFailure::NotConverged);
     }
-    let mut found: Vec<(f64, CriticalPoint)> = Vec::new();
+    let mut found: Vec<EigenvalueZero> = Vec::new();
     for which in 0..ends[0].eigenvalues.len() {
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
         let large = values[0].abs().max(values[1].abs()) > NEUTRAL_EIGENVALUE;
         if values[0] * values[1] < 0.0 && large {
-            let (at, critical) = search.find_eigenvalue_zero(which, [0.0, step], values)?;
-            match found
-                .iter_mut()
-                .find(|(s, _)| (s - at).abs() < COINCIDENT_ZERO_TOLERANCE * step)
-            {
-                Some((_, same)) => same.modes.extend(critical.modes),
-                None => found.push((at, critical)),
+            let zero = search.find_eigenvalue_zero(which, [0.0, step], values)?;
+            match found.iter_mut().find(|other| {
+                (other.distance - zero.distance).abs() < COINCIDENT_ZERO_TOLERANCE * step
+            }) {
+                Some(same) => same.critical.modes.extend(zero.critical.modes),
+                None => found.push(zero),
             }
         }
     }
-    found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     // Each accounts for its part of the change of the index, in their order along the branch.
     let mut before = a.index;
-    for (_, critical) in &mut found {
+    for EigenvalueZero { critical, .. } in &mut found {
         let change = critical.modes.len();
         let after = match b.index > a.index {
             true => before + change,
@@ -139,21 +146,31 @@ pub fn locate_critical_points(
             critical.kind = CriticalKind::Branching;
         }
     }
-    Ok(found.into_iter().map(|(_, critical)| critical).collect())
+    Ok(found.into_iter().map(|zero| zero.critical).collect())
+}
+
+/// The zero of an eigenvalue of H along a branch.
+struct EigenvalueZero {
+    /// Its distance along the tangent from the point where the search began.
+    distance: f64,
+    critical: CriticalPoint,
 }
 
 /// Evaluates points along the tangent of one, and the eigenvalues of H there.
-pub(super) struct CriticalPointSearch<'s, 'a> {
-    pub equations: &'s mut BranchEquations<'a>,
-    pub from: &'s EquilibriumPoint,
-    pub soft: &'s [NodalField],
-    /// The parameter of a fold is known better than its shape.
-    pub parameter_only: bool,
+struct CriticalPointSearch<'s, 'a> {
+    equations: &'s mut BranchEquations<'a>,
+    from: &'s EquilibriumPoint,
+    /// The modes that border the matrix.
+    soft: &'s [NodalField],
+    /// Whether the parameter alone is sought to rounding: at a fold it is known better than the
+    /// shape.
+    parameter_only: bool,
 }
 
-pub(super) struct EvaluatedEigenvalues {
+/// The eigenvalues of H at a point.
+struct EvaluatedEigenvalues {
     sample: BorderedLinearization,
-    pub eigenvalues: Vec<f64>,
+    eigenvalues: Vec<f64>,
     /// Eigenvectors of H, in the order of the eigenvalues.
     vectors: Vec<Vec<f64>>,
 }
@@ -162,7 +179,7 @@ pub(super) struct EvaluatedEigenvalues {
 const ROUNDING_FORCING: f64 = 1e-6;
 
 impl CriticalPointSearch<'_, '_> {
-    pub fn eigenvalues_at_distance(
+    fn eigenvalues_at_distance(
         &mut self,
         distance: f64,
     ) -> Result<EvaluatedEigenvalues, CorrectorFailure> {
@@ -183,23 +200,23 @@ impl CriticalPointSearch<'_, '_> {
     }
 
     /// The zero of one eigenvalue by the Anderson-Bjorck method.
-    pub fn find_eigenvalue_zero(
+    fn find_eigenvalue_zero(
         &mut self,
         which: usize,
         mut distance: [f64; 2],
         mut value: [f64; 2],
-    ) -> Result<(f64, CriticalPoint), CorrectorFailure> {
+    ) -> Result<EigenvalueZero, CorrectorFailure> {
         let whole = distance[1] - distance[0];
         let largest = larger(value[0].abs(), value[1].abs());
         let mut slope = (value[1] - value[0]) / whole;
         let mut best: Option<(f64, EvaluatedEigenvalues)> = None;
         let (mut last, mut last_value) = (distance[1], value[1]);
-        for _ in 0..EVALUATIONS {
+        for _ in 0..SECANT.evaluations {
             let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
             let next = self.eigenvalues_at_distance(at)?;
             let now = next.eigenvalues[which];
-            let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
-            if (at - last).abs() > SHORTEST_SLOPE_DIFFERENCE * whole {
+            let done = (at - last).abs() < SECANT.accuracy * whole || now == 0.0;
+            if (at - last).abs() > SECANT.shortest_slope_difference * whole {
                 slope = (now - last_value) / (at - last);
             }
             let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
@@ -232,7 +249,10 @@ impl CriticalPointSearch<'_, '_> {
         if !vanishes {
             return Err(CorrectorFailure::NotConverged);
         }
-        Ok((at, self.critical_point_at_zero(best, which, slope)))
+        Ok(EigenvalueZero {
+            distance: at,
+            critical: self.critical_point_at_zero(best, which, slope),
+        })
     }
 
     /// The critical point from what was evaluated at a zero.
@@ -279,13 +299,13 @@ impl CriticalPoint {
         self.indices[0] == self.indices[1]
     }
 
-    /// Whether this is the same point, found again after a step that the walk gave up.
+    /// Whether this vertex is the same point, found again after a step that was rejected.
     pub fn is_same_point(&self, other: &CriticalPoint) -> bool {
         let apart = self.state.largest_displacement_to(&other.state);
         larger(apart, (self.fraction - other.fraction).abs()) < SAME_VERTEX_DISTANCE
     }
 
-    /// The same critical point on another grid or of a softened matrix, by a secant method from
+    /// This critical point on another grid or of a softened matrix, by a secant method from
     /// the known state.
     pub fn relocate(
         &self,
@@ -310,22 +330,22 @@ impl CriticalPoint {
             CriticalKind::Fold => {
                 let stiffest = search.equations.stiffest_condensed([self.fraction])?;
                 let rounding = eigenvalue_rounding(stiffest, self.state.segments());
-                (rounding / self.eigenvalue_slope.abs()).max(ACCURACY)
+                (rounding / self.eigenvalue_slope.abs()).max(SECANT.accuracy)
             }
-            CriticalKind::Branching => ACCURACY,
+            CriticalKind::Branching => SECANT.accuracy,
         };
         let (mut distance, mut slope) = (0.0, self.eigenvalue_slope);
         let mut best = search.eigenvalues_at_distance(distance)?;
         let mut value = best.eigenvalues[self.eigenvalue_position];
         let mut worse = 0;
-        for _ in 0..EVALUATIONS {
+        for _ in 0..SECANT.evaluations {
             let step = -value / slope;
             if !step.is_finite() || step.abs() > 1.0 {
                 return Err(CorrectorFailure::NotConverged);
             }
             let next = search.eigenvalues_at_distance(distance + step)?;
             let after = next.eigenvalues[self.eigenvalue_position];
-            if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
+            if step.abs() > SECANT.shortest_slope_difference {
                 slope = (after - value) / step;
             }
             (distance, value) = (distance + step, after);
@@ -367,7 +387,7 @@ impl CriticalPoint {
     }
 
     /// A direction along which another branch may leave: the first neutral mode
-    /// orthogonalised against this branch; at the vertex of a pitchfork the tangent, that of the
+    /// orthogonalized against this branch; at the vertex of a pitchfork the tangent, that of the
     /// other branch.
     pub fn branching_direction(&self, equations: &BranchEquations) -> BranchDirection {
         if self.is_vertex() {
@@ -405,7 +425,7 @@ pub fn locate_pitchfork_vertex(
     let across = crossing_direction(equations, &vertex, &soft)?;
     let mut stuck = CorrectorFailure::NotConverged;
     for beside in VERTEX_SEARCH_DISTANCES {
-        match locate_on_crossing_branch(equations, (&vertex, &across), &soft, beside) {
+        match locate_on_crossing_branch(equations, &vertex, &across, &soft, beside) {
             Ok(mut critical) => {
                 let shift = vertex.state.largest_displacement_to(&critical.state);
                 let apart = larger(shift, (critical.fraction - vertex.fraction).abs());
@@ -490,7 +510,8 @@ fn crossing_direction(
 /// The singular point of a branch that has this direction at a vertex, at most so far from that.
 fn locate_on_crossing_branch(
     equations: &mut BranchEquations,
-    (vertex, across): (&EquilibriumPoint, &BranchDirection),
+    vertex: &EquilibriumPoint,
+    across: &BranchDirection,
     soft: &[NodalField],
     beside: f64,
 ) -> Result<CriticalPoint, CorrectorFailure> {
@@ -521,7 +542,10 @@ fn locate_on_crossing_branch(
         .collect();
     // Eigenvalues of other modes keep their signs.
     match changing[..] {
-        [which] => Ok(search.find_eigenvalue_zero(which, ends, values[which])?.1),
+        [which] => {
+            let zero = search.find_eigenvalue_zero(which, ends, values[which])?;
+            Ok(zero.critical)
+        }
         _ => Err(CorrectorFailure::NotConverged),
     }
 }

@@ -1,18 +1,21 @@
-//! The equations of a branch on one grid, linearised and solved.
+//! The equations of a branch on one grid, assembled, linearized and solved.
 //!
-//! Bordered equations of a branch: where the matrix is singular, or nearly so.
+//! Where the matrix is singular, or nearly so, it is bordered by modes: the equations with the
+//! border are regular, and components along the modes that the forces leave undetermined are not
+//! changed. The modes come from subspace inverse iteration.
 
-pub use crate::branch::CorrectorFailure;
 use crate::branch::family::{
-    LeafFamily, Leaves, OutOfRange, force_parameter_derivative, place_supports, state_after_step,
-    stiffest_condensed, unbalanced_forces,
+    CompletedIncrements, LeafFamily, Leaves, OutOfRange, force_parameter_derivative,
+    place_supports, state_after_step, stiffest_condensed, unbalanced_forces,
 };
-use crate::branch::{
+use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, combine_fields, dot,
     is_finite, largest, prolong_field, scale_field, scaled_sum,
 };
-use crate::leaf::{BorderedSolution, DirectSolver, Grid, MatrixFactors, NodalField, State, System};
-use crate::newton::{Contraction, remaining_error};
+use crate::leaf::{
+    BorderedSolution, DirectError, DirectSolver, Grid, MatrixFactors, NodalField, State, System,
+};
+use crate::newton::{Contraction, RequiredAccuracy, remaining_error};
 use crate::numbers::larger;
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
@@ -35,20 +38,62 @@ const ROUNDING_INCREMENT: f64 = 1e-8;
 /// Rounding error of a force, in units of epsilon times the largest stiffness.
 const ROUNDING: f64 = 10.0;
 
+/// Why no point of a branch is found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CorrectorFailure {
+    /// The parameter has left its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A segment bends by more than the grid resolves.
+    #[error("a vein bends by more than a right angle within one segment")]
+    Unresolved,
+    /// Newton's method does not converge.
+    #[error("Newton's method does not lead back to the branch")]
+    NotConverged,
+    /// The matrix does not fit into memory.
+    #[error("the sparse factorisation of the leaf does not fit into memory")]
+    TooLarge,
+    /// No grid has the Morse index of the leaf.
+    #[error(
+        "no grid has as many negative eigenvalues as the leaf, which is too close to a bifurcation: start farther from it"
+    )]
+    BesideBifurcation,
+    /// Rounding may change the sign of the softest eigenvalues.
+    #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
+    Rounding,
+    /// Modes that became neutral together no longer do.
+    #[error("modes that become neutral together part")]
+    Separated,
+    /// The second parameter breaks the symmetry to which the branch point is due.
+    #[error("the second number breaks the symmetry by which branches cross")]
+    Unfolded,
+    /// The limit of the run was reached.
+    #[error("the run was stopped")]
+    Stopped,
+}
+
+impl From<DirectError> for CorrectorFailure {
+    fn from(error: DirectError) -> Self {
+        match error {
+            DirectError::Memory => CorrectorFailure::TooLarge,
+            DirectError::NotFinite => CorrectorFailure::NotConverged,
+        }
+    }
+}
+
 /// The equations of a family of leaves on a grid, with workspace.
 pub struct BranchEquations<'a, const N: usize = 1> {
-    /// The leaves.
+    /// The leaves of the family on one grid.
     pub leaves: Leaves<'a, N>,
-    /// The same with softened matrices, if these determine what is critical.
-    /// Newton's method needs the true ones: near singular points of the softened it
-    /// would not converge.
+    /// The leaves with softened matrices, if these determine what is critical. Newton's method
+    /// needs the true matrices: near singular points of the softened ones it would not converge.
     regularized_leaves: Option<Leaves<'a, N>>,
     /// The mass of the leaf without its base.
     pub(super) mass: f64,
     pub(super) system: System,
     /// Whether the equations are solved rod by rod, which needs a positive definite matrix.
     pub(super) solves_rod_by_rod: bool,
-    /// Matrices factorised so far.
+    /// Matrices factorized so far.
     pub factorizations: usize,
 }
 
@@ -59,6 +104,14 @@ pub(super) struct AssembledForces {
     pub(super) shift: f64,
     /// Rounding error of the forces.
     pub rounding_error: f64,
+}
+
+/// The forces by which the law of nearly rigid segments is completed; none without such segments.
+#[derive(Default)]
+pub(super) struct LawCompletion {
+    /// Forces on the nodes by which the increments are completed, if there are any.
+    nodal_forces: Option<NodalField>,
+    pub segment_forces: Vec<DVec3>,
 }
 
 impl<'a, const N: usize> BranchEquations<'a, N> {
@@ -89,19 +142,19 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         }
     }
 
-    /// The same on the grid with all segments halved.
+    /// The equations of the same leaves on the grid with all segments halved.
     pub fn refined(&self) -> Self {
         BranchEquations::from_leaves(self.leaves.refined())
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:
-    /// see [`Leaves::softened`].
+    /// see [`Leaves::with_regularization`].
     pub(super) fn regularize(&mut self, softening: f64) {
         let (family, grid) = (self.leaves.family, self.grid().clone());
         self.regularized_leaves = Some(Leaves::with_regularization(family, grid, softening));
     }
 
-    /// The grid.
+    /// The grid of all its leaves.
     pub fn grid(&self) -> &Grid {
         &self.leaves.grid
     }
@@ -116,7 +169,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         scale_field(&self.system.mass_product(a), 1.0 / self.mass)
     }
 
-    /// The same for each of these.
+    /// The mass matrix times each of these fields, per unit of the leaf's mass.
     pub(super) fn multiply_all_by_mass(&self, all: &[NodalField]) -> Vec<NodalField> {
         all.iter().map(|a| self.multiply_by_mass(a)).collect()
     }
@@ -130,13 +183,14 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         self.system.rods()
     }
 
-    /// Inner product of two directions.
+    /// Inner product of two directions: over the mass matrix, per unit of the leaf's mass, plus that
+    /// of the parameters' parts.
     pub fn direction_product(&self, a: &BranchDirection<N>, b: &BranchDirection<N>) -> f64 {
         let params = a.params.iter().zip(b.params).map(|(a, b)| a * b);
         self.mass_product(&a.increments, &b.increments) + params.sum::<f64>()
     }
 
-    /// Scales a direction to length one.
+    /// Scales a direction to length one in the inner product of directions.
     pub fn normalize_direction(&self, direction: BranchDirection<N>) -> BranchDirection<N> {
         let length = self.direction_product(&direction, &direction).sqrt();
         BranchDirection {
@@ -185,7 +239,11 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         increments: &NodalField,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        let (leaf, increments) = (self.leaves.leaf_at(params)?, (increments, [].as_slice()));
+        let increments = CompletedIncrements {
+            increments,
+            law_forces: &[],
+        };
+        let leaf = self.leaves.leaf_at(params)?;
         Ok(state_after_step(
             leaf,
             state,
@@ -195,35 +253,36 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         ))
     }
 
-    /// The same after a step of Newton's method, with the forces that complete the law of nearly
-    /// rigid segments.
+    /// A state after a whole step of Newton's method, for the leaf at these parameters.
     pub(super) fn state_after_newton_step(
         &mut self,
         state: &State,
         params: [f64; N],
-        step: (&NodalField, &[DVec3]),
+        step: CompletedIncrements,
     ) -> Result<State, OutOfRange> {
         let leaf = self.leaves.leaf_at(params)?;
         Ok(state_after_step(leaf, state, &mut self.system, step, 1.0))
     }
 
     /// Completes the law of nearly rigid segments in the increments under the forces assembled at
-    /// a solution; `solve` solves with the factors at hand. Returns the forces on the nodes by which
-    /// it does so, and those of the segments.
+    /// a solution; `solve` solves with the factors at hand.
     pub(super) fn complete_law(
         &mut self,
         at: &ParametrizedState<N>,
         increments: &mut NodalField,
         solve: &mut dyn FnMut(&mut System, &NodalField) -> Option<NodalField>,
-    ) -> Result<(Option<NodalField>, Vec<DVec3>), OutOfRange> {
+    ) -> Result<LawCompletion, OutOfRange> {
         let leaf = self.leaves.leaf_at(at.params)?;
         if !leaf.is_nearly_rigid() {
-            return Ok((None, Vec::new()));
+            return Ok(LawCompletion::default());
         }
         self.system.set_solution(increments);
-        let forces = self.system.complete_law(leaf, &at.state, solve);
+        let nodal_forces = self.system.complete_law(leaf, &at.state, solve);
         *increments = self.system.solution();
-        Ok((forces, self.system.law_forces().to_vec()))
+        Ok(LawCompletion {
+            nodal_forces,
+            segment_forces: self.system.law_forces().to_vec(),
+        })
     }
 
     /// Returns the forces; the matrix (the softened one, if `soft` and there is one) is left in
@@ -261,7 +320,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
     }
 
     /// Derivatives of the forces with respect to all parameters; `soft` as in
-    /// [`Equations::assemble`].
+    /// [`BranchEquations::assemble`].
     pub(super) fn parameter_derivatives(
         &mut self,
         solution: &ParametrizedState<N>,
@@ -290,7 +349,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
     }
 }
 
-/// The leaves whose matrices are assembled.
+/// The leaves whose matrices are assembled: the softened ones, if `soft` and there are such.
 fn leaves_to_assemble<'l, 'a, const N: usize>(
     leaves: &'l mut Leaves<'a, N>,
     softened: &'l mut Option<Leaves<'a, N>>,
@@ -302,7 +361,7 @@ fn leaves_to_assemble<'l, 'a, const N: usize>(
     }
 }
 
-/// A direct factorisation of the assembled matrix K + `shift` M.
+/// A direct factorization of the assembled matrix K + `shift` M.
 pub(super) fn factorize_matrix(
     pattern: &DirectSolver,
     system: &System,
@@ -314,14 +373,11 @@ pub(super) fn factorize_matrix(
 /// Whether the iteration has converged with a Newton step of this size after `previous`.
 pub(super) fn has_converged(size: f64, previous: f64) -> bool {
     let first = Contraction::default().error_after_first(size, 0.0);
-    remaining_error(
-        size,
-        previous,
-        [0.0; 2],
-        (ACCURACY, ROUNDING_INCREMENT),
-        first,
-    )
-    .is_some()
+    let required = RequiredAccuracy {
+        accuracy: ACCURACY,
+        rounding: ROUNDING_INCREMENT,
+    };
+    remaining_error(size, previous, [0.0; 2], required, first).is_some()
 }
 
 /// Singular values below this, relative to the largest, count as zero.
@@ -365,7 +421,11 @@ impl<const N: usize> BranchEquations<'_, N> {
         exactly: bool,
     ) -> Result<BorderedLinearization<N>, CorrectorFailure> {
         let duals = normals.map(|normal| self.multiply_by_mass(&normal.increments));
-        let normals: [_; N] = from_fn(|k| (&duals[k], normals[k].params.as_slice(), 0.0));
+        let normals: [_; N] = from_fn(|k| AugmentingFunction {
+            state_gradient: &duals[k],
+            parameter_gradient: &normals[k].params,
+            value: 0.0,
+        });
         let mut previous = f64::INFINITY;
         let mut finished = false;
         let mut corrected =
@@ -380,33 +440,40 @@ impl<const N: usize> BranchEquations<'_, N> {
             if finished {
                 return Ok(sample);
             }
-            let (next, size) = self.newton_step(&sample, &normals)?;
-            solution = next;
-            let rests = has_converged(size, previous);
+            let next = self.newton_step(&sample, &normals)?;
+            solution = next.solution;
+            let rests = has_converged(next.size, previous);
             finished = rests && corrected;
             corrected |= rests;
-            previous = size;
+            previous = next.size;
         }
         Err(CorrectorFailure::NotConverged)
     }
 
-    /// The state and parameters after the step of [`Solved::step`], and its size.
+    /// The state and parameters after the step of [`BorderedResponses::newton_step`].
     pub(super) fn newton_step(
         &mut self,
         sample: &BorderedLinearization<N>,
-        functions: &[(&NodalField, &[f64], f64)],
-    ) -> Result<(ParametrizedState<N>, f64), CorrectorFailure> {
+        functions: &[AugmentingFunction],
+    ) -> Result<NewtonIterate<N>, CorrectorFailure> {
         let ParametrizedState { state, params } = &sample.solution;
-        let (increments, changes, size) =
-            sample.solved.newton_increments(functions, sample.noise)?;
-        let params = from_fn(|i| params[i] + changes[i]);
-        let state =
-            self.state_after_newton_step(state, params, (&increments, &sample.law_forces))?;
-        Ok((ParametrizedState { state, params }, size))
+        let step = sample.solved.newton_step(functions, sample.noise)?;
+        let params = from_fn(|i| params[i] + step.parameter_changes[i]);
+        let increments = CompletedIncrements {
+            increments: &step.increments,
+            law_forces: &sample.law_forces,
+        };
+        Ok(NewtonIterate {
+            solution: ParametrizedState {
+                state: self.state_after_newton_step(state, params, increments)?,
+                params,
+            },
+            size: step.size,
+        })
     }
 
     /// Solves the bordered equations at a state, in equilibrium or not, given the rates of the
-    /// parameters; `soft` as in [`Equations::assemble`].
+    /// parameters; `soft` as in [`BranchEquations::assemble`].
     pub(super) fn linearize_bordered(
         &mut self,
         mut solution: ParametrizedState<N>,
@@ -415,17 +482,20 @@ impl<const N: usize> BranchEquations<'_, N> {
         soft: bool,
     ) -> Result<BorderedLinearization<N>, CorrectorFailure> {
         let linear = self.assemble(&mut solution, soft)?;
-        let (mut solved, mut factor) = self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
+        let BorderedSolve {
+            responses: mut solved,
+            factors: mut factor,
+        } = self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
         let none = vec![0.0; border.len()];
         let mut increments = solved.forces.increments.clone();
         // The softened matrix determines what is singular, and no step.
-        let (completing, law_forces) = match soft {
-            true => (None, Vec::new()),
+        let completion = match soft {
+            true => LawCompletion::default(),
             false => self.complete_law(&solution, &mut increments, &mut |_, forces| {
                 Some(factor.solve_bordered(forces, &none).increments)
             })?,
         };
-        if let Some(completing) = completing {
+        if let Some(completing) = completion.nodal_forces {
             solved.forces =
                 factor.solve_bordered(&scaled_sum(&linear.forces, 1.0, &completing), &none);
         }
@@ -434,19 +504,19 @@ impl<const N: usize> BranchEquations<'_, N> {
             solution,
             rates,
             noise: linear.rounding_error,
-            law_forces,
+            law_forces: completion.segment_forces,
         })
     }
 
     /// Solves the bordered equations with K + `shift` M, where K is the assembled matrix: for the
-    /// forces, their rates, and the unit vectors of the border. Also returns the factors.
+    /// forces, their rates, and the unit vectors of the border.
     pub(super) fn solve_bordered(
         &mut self,
         border: &[NodalField],
         forces: &NodalField,
         rates: &[NodalField],
         shift: f64,
-    ) -> Result<(BorderedResponses, MatrixFactors), CorrectorFailure> {
+    ) -> Result<BorderedSolve, CorrectorFailure> {
         let p = border.len();
         let pattern = self.pattern(p)?;
         self.factorizations += 1;
@@ -458,7 +528,7 @@ impl<const N: usize> BranchEquations<'_, N> {
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
         let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
         let columns: Vec<BorderedSolution> = columns.collect();
-        let solved = BorderedResponses {
+        let responses = BorderedResponses {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
@@ -469,7 +539,10 @@ impl<const N: usize> BranchEquations<'_, N> {
                 .collect(),
             negative: factor.negative_eigenvalue_count(),
         };
-        Ok((solved, factor))
+        Ok(BorderedSolve {
+            responses,
+            factors: factor,
+        })
     }
 }
 
@@ -533,12 +606,42 @@ impl BranchEquations<'_> {
     }
 }
 
+/// A function of the state and the parameters that becomes zero together with the unbalanced
+/// forces. For the plane normal to a direction its gradients are the momentum of that direction
+/// and the components of that along the parameters, and its value is zero.
+pub(super) struct AugmentingFunction<'f> {
+    /// Derivatives with respect to the increments of the nodes, and to the parameters.
+    pub state_gradient: &'f NodalField,
+    pub parameter_gradient: &'f [f64],
+    pub value: f64,
+}
+
+/// Newton's step of the bordered equations, augmented by as many functions as parameters.
+struct BorderedNewtonStep {
+    increments: NodalField,
+    parameter_changes: Vec<f64>,
+    /// The largest of all (radians, lengths, fractions).
+    size: f64,
+}
+
+/// The state and parameters after a step of Newton's method, and the size of the step.
+pub(super) struct NewtonIterate<const N: usize> {
+    pub solution: ParametrizedState<N>,
+    pub size: f64,
+}
+
+/// Solutions of the bordered equations, and the factors of their matrix.
+pub(super) struct BorderedSolve {
+    pub responses: BorderedResponses,
+    factors: MatrixFactors,
+}
+
 /// Solutions of the bordered equations at some state.
 pub struct BorderedResponses {
-    /// For the forces, and for their rates with respect to each parameter.
+    /// Solutions for the forces, and for their rates with respect to each parameter.
     pub forces: BorderedSolution,
     pub rates: Vec<BorderedSolution>,
-    /// H and X of the border.
+    /// The blocks H and X of the solution for the unit vectors of the border.
     pub h: DMatrix<f64>,
     pub modes: Vec<NodalField>,
     /// Negative eigenvalues of the bordered matrix: those of the matrix and those of H
@@ -547,15 +650,13 @@ pub struct BorderedResponses {
 }
 
 impl BorderedResponses {
-    /// Newton increments and changes of the parameters by which as many additional functions
-    /// become zero, and their size; fails if that is too large. Each function is given by its derivatives with respect to the increments and
-    /// to the parameters, and its value: for the plane normal to a direction, the momentum of that
-    /// direction, its parameter components, and zero.
-    pub fn newton_increments(
+    /// Newton's step by which as many additional functions as there are parameters become zero;
+    /// fails if it is too large.
+    fn newton_step(
         &self,
-        functions: &[(&NodalField, &[f64], f64)],
+        functions: &[AugmentingFunction],
         noise: f64,
-    ) -> Result<(NodalField, Vec<f64>, f64), CorrectorFailure> {
+    ) -> Result<BorderedNewtonStep, CorrectorFailure> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
         let mut matrix = self.h.clone().resize(p + numbers, p + numbers, 0.0);
         let mut right = DVector::zeros(p + numbers);
@@ -563,8 +664,8 @@ impl BorderedResponses {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(r, p + i)] = rate.multipliers[r];
             }
-            for (k, (dual, _, _)) in functions.iter().enumerate() {
-                matrix[(p + k, r)] = dot(dual, &self.modes[r]);
+            for (k, function) in functions.iter().enumerate() {
+                matrix[(p + k, r)] = dot(function.state_gradient, &self.modes[r]);
             }
             // Forces below rounding are ignored.
             right[r] = match -self.forces.multipliers[r] {
@@ -572,11 +673,13 @@ impl BorderedResponses {
                 force => force,
             };
         }
-        for (k, (dual, own, value)) in functions.iter().enumerate() {
+        for (k, function) in functions.iter().enumerate() {
+            let dual = function.state_gradient;
             for (i, rate) in self.rates.iter().enumerate() {
-                matrix[(p + k, p + i)] = dot(dual, &rate.increments) + own[i];
+                matrix[(p + k, p + i)] =
+                    dot(dual, &rate.increments) + function.parameter_gradient[i];
             }
-            right[p + k] = -value - dot(dual, &self.forces.increments);
+            right[p + k] = -function.value - dot(dual, &self.forces.increments);
         }
         let svd = matrix.svd(true, true);
         let least = NEUTRAL_SINGULAR_VALUE * svd.singular_values.max();
@@ -594,7 +697,11 @@ impl BorderedResponses {
         let sizes = changes.iter().map(|v| v.abs());
         let size = sizes.fold(largest(&increments), larger);
         match is_finite(&increments) && size <= LARGEST_CORRECTOR_INCREMENT {
-            true => Ok((increments, changes, size)),
+            true => Ok(BorderedNewtonStep {
+                increments,
+                parameter_changes: changes,
+                size,
+            }),
             false => Err(CorrectorFailure::NotConverged),
         }
     }

@@ -1,11 +1,11 @@
-//! Leaves that differ in one parameter, or in two.
+//! A family of leaves that differ in one parameter, or in two.
 //!
-//! A small cache of values that are expensive to compute, and that of sparsity patterns.
-//!
-//! States of leaves that vary: the forces on them, the derivatives of these, and the states
-//! to which increments lead.
+//! Its leaves on a grid and the sparsity patterns of their matrices are cached, as making them
+//! costs more than solving the equations of a small leaf. Forces on a state are differenced over
+//! the parameter, and a state is displaced by increments, with the supports where the leaf at
+//! the new value of the parameter has them.
 
-use crate::branch::{scale_field, scaled_sum};
+use crate::branch::points::{scale_field, scaled_sum};
 use crate::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, NodalField, Scale, State, System};
 use crate::run::Limit;
 use crate::scenario::Scenario;
@@ -28,8 +28,9 @@ pub fn value_at_fraction([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 
     }
 }
 
-/// Fractions within this of an end of the range are at the end.
-const RANGE_END_TOLERANCE: f64 = 1e-12;
+/// Values of a parameter, as fractions of its range, that differ by less are the same but for
+/// rounding: such as the end of the range and a value beyond it.
+pub(super) const PARAMETER_ROUNDING: f64 = 1e-12;
 
 /// Makes the scenario at values of the parameters.
 type MakeScenario<'a, const N: usize> = &'a (dyn Fn([f64; N]) -> Result<Scenario, String> + Sync);
@@ -43,13 +44,13 @@ pub struct LeafFamily<'a, const N: usize = 1> {
     first: Leaf,
     /// A leaf with coupled veins, if there is one at an end of a range.
     coupled: Leaf,
-    /// Sparsity patterns of their matrices.
+    /// Sparsity patterns of the matrices of the leaves.
     pub patterns: Arc<SparsityPatternCache>,
     /// When branches of these leaves are followed no further: every Newton iteration checks it.
     pub limit: Limit,
 }
 
-/// The range of a parameter.
+/// The range of a parameter, linear or logarithmic.
 #[derive(Clone, Copy)]
 pub struct ParameterRange {
     /// Values at the fractions 0 and 1.
@@ -59,17 +60,17 @@ pub struct ParameterRange {
 }
 
 impl ParameterRange {
-    /// The value at a fraction.
+    /// The value at a fraction of the range.
     fn value(self, fraction: f64) -> f64 {
         // At an end, rounding must not lead beyond: there may be no leaf.
         match fraction {
-            part if part.abs() < RANGE_END_TOLERANCE => self.ends[0],
-            part if (part - 1.0).abs() < RANGE_END_TOLERANCE => self.ends[1],
+            part if part.abs() < PARAMETER_ROUNDING => self.ends[0],
+            part if (part - 1.0).abs() < PARAMETER_ROUNDING => self.ends[1],
             part => value_at_fraction(self.ends, self.log, part),
         }
     }
 
-    /// The fraction at a value.
+    /// The fraction of the range at a value of the parameter.
     pub fn fraction(self, value: f64) -> f64 {
         let [from, to] = self.ends;
         match self.log {
@@ -160,7 +161,7 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
         })
     }
 
-    /// The same leaves, whose branches are followed until this limit is reached.
+    /// The family of the same leaves, whose branches are followed until this limit is reached.
     pub fn with_limit(self, limit: Limit) -> Self {
         LeafFamily { limit, ..self }
     }
@@ -195,12 +196,12 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
         std::array::from_fn(|i| self.ranges[i].value(params[i]))
     }
 
-    /// The scenario at fractions.
+    /// The scenario at fractions of the ranges.
     pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
         (self.make_scenario)(self.values(params)).map_err(OutOfRange)
     }
 
-    /// The leaf at fractions.
+    /// The leaf at fractions of the ranges.
     pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
         Ok(Leaf::with_scale(
             Arc::new(self.scenario(params)?),
@@ -214,7 +215,7 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
     }
 }
 
-/// A leaf on a grid, if requested softened: see [`Leaves::softened`].
+/// A leaf on a grid, if requested softened: see [`Leaves::with_regularization`].
 fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     for section in &mut discrete.sections {
@@ -232,7 +233,7 @@ fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> Discrete
     discrete
 }
 
-/// The same, with the sections of another leaf on this grid if its rods are the same.
+/// A leaf on a grid, with the sections of another leaf on this grid if its rods are the same.
 fn discretize_reusing_sections(
     other: Option<&DiscreteLeaf>,
     leaf: &Leaf,
@@ -265,9 +266,8 @@ impl<'a, const N: usize> Leaves<'a, N> {
         }
     }
 
-    /// The same, the matrices being those of leaves with this additional
-    /// compliance in stretch and shear (in units of L^2/A), equilibria
-    /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
+    /// Leaves with the equilibria of the family, but with matrices of leaves with this additional
+    /// compliance in stretch and shear (in units of L^2/A). The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
     /// the point at which they become neutral is analytic in the softening, and can be
     /// extrapolated to zero softening.
     pub fn with_regularization(family: &'a LeafFamily<'a, N>, grid: Grid, softening: f64) -> Self {
@@ -277,7 +277,7 @@ impl<'a, const N: usize> Leaves<'a, N> {
         }
     }
 
-    /// The same on the grid with all segments halved.
+    /// These leaves on the grid with all segments halved.
     pub fn refined(&self) -> Self {
         let (grid, softening) = (self.grid.refined(), self.regularization);
         let finer = |before: Option<&DiscreteLeaf>, coarse: &DiscreteLeaf| {
@@ -360,18 +360,27 @@ impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
 const CACHED_SYSTEMS: usize = 10;
 
 /// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
-/// equally many segments, and ordering it takes as long as factorising a matrix.
+/// equally many segments, and ordering it takes as long as factorizing a matrix.
 #[derive(Default)]
 pub struct SparsityPatternCache(Mutex<LruCache<PatternKey, Arc<DirectSolver>, CACHED_SYSTEMS>>);
 
-/// What determines the pattern of a system: its segments, whether its rods are coupled, and
-/// the number of border rows.
-type PatternKey = (usize, bool, usize);
+/// What determines the pattern of a system.
+#[derive(Clone, Copy, PartialEq)]
+struct PatternKey {
+    segments: usize,
+    /// Whether the rods are coupled.
+    coupled: bool,
+    border_rows: usize,
+}
 
 impl SparsityPatternCache {
     /// The pattern of a system with `border` border rows; `None` if memory is short.
     pub fn pattern_of_system(&self, system: &System, border: usize) -> Option<Arc<DirectSolver>> {
-        let shape = (system.segments(), system.coupled(), border);
+        let shape = PatternKey {
+            segments: system.segments(),
+            coupled: system.coupled(),
+            border_rows: border,
+        };
         let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let made = |_: Option<&_>| DirectSolver::with_border(system, border).map(Arc::new);
         cache.get_or_make(shape, made).ok().cloned()
@@ -421,14 +430,23 @@ pub fn unbalanced_forces(leaf: &DiscreteLeaf, state: &State, system: &mut System
     system.rhs()
 }
 
+/// Increments of the nodes with the forces of the segments that complete the law of nearly rigid
+/// ones (none if empty).
+pub struct CompletedIncrements<'s> {
+    pub increments: &'s NodalField,
+    pub law_forces: &'s [DVec3],
+}
+
 /// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
-/// segments at a clamp depend on all of its displacement, however short the step. The segments
-/// change by `law_forces` in addition (none if empty).
+/// segments at a clamp depend on all of its displacement, however short the step.
 pub fn state_after_step(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    (increments, law_forces): (&NodalField, &[DVec3]),
+    CompletedIncrements {
+        increments,
+        law_forces,
+    }: CompletedIncrements,
     step: f64,
 ) -> State {
     let mut clamped = state.clone();

@@ -20,7 +20,7 @@ use crate::branch::equations::{BranchEquations, CorrectorFailure};
 use crate::branch::family::{
     LeafFamily, STIFFEST, eigenvalue_rounding, stiffest_condensed, values_on_both_sides,
 };
-use crate::branch::{BranchDirection, EquilibriumPoint, prolong_field, restrict_field};
+use crate::branch::points::{BranchDirection, EquilibriumPoint, prolong_field, restrict_field};
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::numbers::larger;
 use crate::relax::accuracy::transfer::{prolong, restrict};
@@ -79,7 +79,7 @@ const INTERPOLATION_ERROR_FRACTION: f64 = 0.1;
 const FOURTH_ORDER_ERROR_RATIO: f64 = 1.0 / 30.0;
 
 /// Whether the branch goes along the parameter alone, or the point is at an end of its range.
-fn along_parameter(point: &EquilibriumPoint) -> bool {
+fn goes_along_parameter(point: &EquilibriumPoint) -> bool {
     let inside = point.fraction != 0.0 && point.fraction != 1.0;
     !inside || point.tangent.params[0].abs() >= FIXED_PARAMETER_COSINE
 }
@@ -90,9 +90,9 @@ pub fn on_finer<'a>(
     equations: &mut BranchEquations<'a>,
     point: &EquilibriumPoint,
 ) -> Result<(BranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
-    let mut plane =
-        (!along_parameter(point)).then(|| ArclengthConstraint::normal_to_branch(equations, point));
-    let finer = on_next_grid(equations, point, &mut plane)?;
+    let mut plane = (!goes_along_parameter(point))
+        .then(|| ArclengthConstraint::normal_to_branch(equations, point));
+    let finer = point_on_next_grid(equations, point, &mut plane)?;
     Ok((finer.equations, finer.point))
 }
 
@@ -104,12 +104,12 @@ struct FinerGridPoint<'a> {
     displacement: f64,
     /// Cosine between the tangents on both grids.
     tangent_cosine: f64,
-    /// As in [`ConvergedPoint`].
+    /// Displacement by the last iteration, as of a [`ConvergedPoint`].
     unfinished: f64,
 }
 
 impl FinerGridPoint<'_> {
-    /// Its comparison with the point on the previous grid; the index should be this.
+    /// Compares the point with that on the previous grid; `index` is what its index should be.
     fn relocation(&self, index: usize) -> Relocation {
         Relocation {
             displacement: self.displacement,
@@ -151,7 +151,7 @@ fn correct_to_rounding(
 }
 
 /// The point in the same plane, or at the same parameter, on the grid with all segments halved.
-fn on_next_grid<'a>(
+fn point_on_next_grid<'a>(
     equations: &mut BranchEquations<'a>,
     point: &EquilibriumPoint,
     plane: &mut Option<ArclengthConstraint>,
@@ -183,7 +183,7 @@ pub fn verify_regular_point(
     point: &EquilibriumPoint,
     accuracy: f64,
 ) -> Result<ExtrapolatedPoint, VerificationFailure> {
-    if along_parameter(point) {
+    if goes_along_parameter(point) {
         return verify_at_parameter(family, grid, point, accuracy);
     }
     let in_plane = NestedRegularPoint::new(family, grid, point, accuracy, true);
@@ -211,12 +211,12 @@ pub fn verify_at_parameter(
 
 /// The Morse index at a given parameter on which enough successively refined grids in a row
 /// agree; on all of them the point must be on the same branch.
-pub fn index_at(
+pub fn confirmed_index(
     equations: &mut BranchEquations,
     point: &EquilibriumPoint,
 ) -> Result<usize, VerificationFailure> {
     verify_over_grids(IndexCount {
-        finer: on_next_grid(equations, point, &mut None)?,
+        finer: point_on_next_grid(equations, point, &mut None)?,
         index: point.index,
         agreeing: 1,
     })
@@ -238,7 +238,7 @@ impl NestedGridPoint for IndexCount<'_> {
             let FinerGridPoint {
                 equations, point, ..
             } = &mut self.finer;
-            self.finer = on_next_grid(equations, point, &mut None)?;
+            self.finer = point_on_next_grid(equations, point, &mut None)?;
         }
         // Other indices are counted, and are no failure.
         Ok(self.finer.relocation(self.finer.point.index))
@@ -273,13 +273,13 @@ impl NestedGridPoint for IndexCount<'_> {
 /// A point on the grid with every second node.
 struct CoarserGridPoint {
     row: GridQuantities,
-    /// Its plane on the next finer grid, if it was sought in one.
+    /// The plane in which it was sought, if it was, on the next finer grid.
     plane: Option<ArclengthConstraint>,
 }
 
 /// A point on the grid with every second node, which adds to what the series of grids tells of
 /// its order. `None` if there is no such grid, or no point near on it.
-fn on_coarser(
+fn point_on_coarser_grid(
     family: &LeafFamily,
     grid: &Grid,
     point: &EquilibriumPoint,
@@ -317,7 +317,7 @@ fn on_coarser(
 /// A regular point that is verified on finer and finer grids.
 struct NestedRegularPoint<'a> {
     equations: BranchEquations<'a>,
-    /// The point on the present grid.
+    /// Where the point is on the present grid.
     point: EquilibriumPoint,
     /// The index that all grids must have.
     index: usize,
@@ -338,7 +338,7 @@ impl<'a> NestedRegularPoint<'a> {
     ) -> Self {
         let mut table = ConvergenceTable::of_regular_point();
         let equations = BranchEquations::new(family, grid.clone());
-        let plane = match on_coarser(family, grid, point, in_plane) {
+        let plane = match point_on_coarser_grid(family, grid, point, in_plane) {
             Some(coarser) => {
                 table.push(coarser.row);
                 coarser.plane
@@ -361,7 +361,7 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
 
     fn locate(&mut self, level: usize) -> Result<Relocation, VerificationFailure> {
         if level > 0 {
-            let finer = on_next_grid(&mut self.equations, &self.point, &mut self.plane)?;
+            let finer = point_on_next_grid(&mut self.equations, &self.point, &mut self.plane)?;
             let relocation = finer.relocation(self.index);
             self.table.noise = larger(self.table.noise, finer.unfinished);
             (self.equations, self.point) = (finer.equations, finer.point);
@@ -380,13 +380,6 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
 
     fn segments(&self) -> usize {
         self.equations.grid().segments()
-    }
-
-    fn grid_limits(&self) -> GridLimits {
-        GridLimits {
-            least: 1,
-            most: MAX_GRIDS,
-        }
     }
 
     fn tabulate(&mut self, level: usize) -> Result<(), VerificationFailure> {
@@ -415,7 +408,7 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
 
 /// Derivatives of a point's values with respect to the parameter: of points from the tangent;
 /// of the energy, stationary in the state, from that of the loads; of the forces on holders, of
-/// the energy if these may move, and of the points of a leaf that can turn, from neighbouring states.
+/// the energy if these may move, and of the points of a leaf that can turn, from neighboring states.
 fn parameter_derivatives(
     equations: &mut BranchEquations,
     point: &EquilibriumPoint,
@@ -484,7 +477,7 @@ pub fn refine_critical(
 /// A critical point that is verified on finer and finer grids.
 struct NestedCriticalPoint<'a> {
     equations: BranchEquations<'a>,
-    /// The point on the present grid.
+    /// Where the point is on the present grid.
     critical: CriticalPoint,
     /// The compliance by which the matrix of a nearly rigid leaf is softened.
     regularization: f64,
@@ -531,13 +524,6 @@ impl NestedGridPoint for NestedCriticalPoint<'_> {
 
     fn segments(&self) -> usize {
         self.equations.grid().segments()
-    }
-
-    fn grid_limits(&self) -> GridLimits {
-        GridLimits {
-            least: 1,
-            most: MAX_GRIDS,
-        }
     }
 
     fn tabulate(&mut self, _: usize) -> Result<(), VerificationFailure> {
@@ -687,12 +673,12 @@ fn extrapolate_regularization(
     })
 }
 
-/// A branch at a branch point.
+/// A branch interpolated at a branch point from points on both sides.
 struct InterpolatedBranchPoint {
     values: PointQuantities,
     /// A bound on the error of the tips.
     error: f64,
-    /// Derivatives of the values with respect to the fraction.
+    /// Derivatives of the values with respect to the fraction of the parameter.
     slope: PointQuantities,
 }
 

@@ -1,6 +1,6 @@
 //! From a stable equilibrium uphill to a saddle, and downhill from there.
 //!
-//! Along a direction v the energy is maximised, across it minimised:
+//! Along a direction v the energy is maximized, across it minimized:
 //! with the matrix bordered by the mass matrix times v (as at a critical point),
 //! the solution for the border's unit vector is the direction X of the valley floor, and
 //! -H its curvature. While this is positive, steps go along X, by a given length or
@@ -14,66 +14,97 @@
 use crate::branch::equations::{
     AssembledForces, BranchEquations, CorrectorFailure, factorize_matrix,
 };
-use crate::branch::{
+use crate::branch::points::{
     EquilibriumPoint, ParametrizedState, add_scaled, largest, scale_field, scaled_sum,
 };
 use crate::leaf::{NodalField, State};
 
-/// Largest number of steps of a climb, and the longest step (radians, lengths).
-const STEPS: usize = 60;
+/// Steps uphill to a saddle and downhill from it; lengths are largest increments of any node
+/// (radians, lengths).
+struct ValleySteps {
+    /// Largest number of steps of a climb and of a descent.
+    most_climbing: usize,
+    most_descending: usize,
+    /// The longest step: longer ones leave the valley.
+    longest: f64,
+    /// The first step of a climb, and the shortest to the maximum of the cubic.
+    first_climbing: f64,
+    /// The perturbation with which a descent begins, also the length of its first step, and the
+    /// growth factor of the next.
+    first_descending: f64,
+    descent_growth: f64,
+    /// A step of Newton's method below this is the last: a correction to the equilibrium follows.
+    final_newton: f64,
+}
 
-const LONGEST: f64 = 0.2;
+const STEPS: ValleySteps = ValleySteps {
+    most_climbing: 60,
+    most_descending: 200,
+    longest: 0.2,
+    first_climbing: 0.01,
+    first_descending: 0.01,
+    descent_growth: 1.5,
+    final_newton: 1e-2,
+};
 
-/// The first step, and the shortest of the cubic model, in the same measure.
-const FIRST: f64 = 0.01;
+/// Shifts (squared frequencies, times the mass matrix) that make the matrix across the path
+/// positive definite.
+struct MatrixShifts {
+    /// The first tried, and the one at which a climb is abandoned.
+    first: f64,
+    largest: f64,
+    /// Factor by which the shift for the lowest mode exceeds the magnitude of its eigenvalue.
+    eigenvalue_factor: f64,
+}
 
-/// Largest number of steps of a descent, its initial perturbation, and the growth of its steps.
-const MAX_DESCENT_STEPS: usize = 200;
+const SHIFTS: MatrixShifts = MatrixShifts {
+    first: 1.0,
+    largest: 1e6,
+    eigenvalue_factor: 1.05,
+};
 
-const DESCENT_PERTURBATION: f64 = 0.01;
-
-const GROWTH: f64 = 1.5;
-
-/// Increments below this end with a Newton correction to the equilibrium.
-const FINAL_CORRECTION_INCREMENT: f64 = 1e-2;
-
-/// Shift (in squared frequencies, times the mass matrix) that makes the matrix across the
-/// path positive definite: the first tried, and that at which a climb is abandoned.
-const FIRST_SHIFT: f64 = 1.0;
-
-const LARGEST_SHIFT: f64 = 1e6;
-
-/// Steps of inverse iteration for the lowest mode, and the factor by which the second shift
-/// exceeds the magnitude of its eigenvalue.
+/// Steps of inverse iteration for the lowest mode with one shift.
 const INVERSE_ITERATIONS: usize = 4;
-
-const EIGENVALUE_SHIFT_FACTOR: f64 = 1.05;
 
 /// Number of modes in the search for the softest.
 const SOFT_MODE_COUNT: usize = 3;
 
-/// The valley floor in a direction.
-struct Valley {
+/// A step along the valley floor, in lengths of X, and the curvature where it began.
+#[derive(Clone, Copy)]
+struct FloorStep {
+    curvature: f64,
+    length: f64,
+}
+
+/// A step of the descent from a saddle.
+struct DescentStep {
+    state: State,
+    /// Whether it was a step of Newton's method, short enough to end the descent.
+    near_equilibrium: bool,
+}
+
+/// The valley floor in a direction at a state.
+struct ValleyFloor {
     /// X, and the force and the curvature of the energy along it.
     along: NodalField,
     force: f64,
     curvature: f64,
-    /// Newton's step across it.
+    /// Newton's step across the floor.
     across: NodalField,
     shift: f64,
 }
 
-impl Valley {
+impl ValleyFloor {
     /// Newton's step, along the floor as well as across it.
     fn newton(&self) -> NodalField {
         scaled_sum(&self.across, self.force / self.curvature, &self.along)
     }
 
     /// Distance to the maximum of the energy along the floor, where its slope is minus the force,
-    /// for a cubic, which the energy is near a fold; `before`: the curvature `by` so much before.
-    /// Infinite if there is none.
-    fn distance_to_maximum(&self, (before, by): (f64, f64)) -> f64 {
-        let change = (self.curvature - before) / by;
+    /// for a cubic, which the energy is near a fold, given the step before. Infinite if there is
+    /// none.
+    fn distance_to_maximum(&self, before: FloorStep) -> f64 {
+        let change = (self.curvature - before.curvature) / before.length;
         let square = self.curvature * self.curvature + 2.0 * change * self.force;
         match change < 0.0 && square >= 0.0 {
             true => -(self.curvature + square.sqrt()) / change,
@@ -97,9 +128,8 @@ impl BranchEquations<'_> {
             state: state.clone(),
             params: [fraction],
         };
-        // The last step along the floor, and the curvature before it.
-        let mut before: Option<(f64, f64)> = None;
-        for _ in 0..STEPS {
+        let mut before: Option<FloorStep> = None;
+        for _ in 0..STEPS.most_climbing {
             if stop() {
                 return None;
             }
@@ -117,21 +147,25 @@ impl BranchEquations<'_> {
                 false => valley.across.clone(),
             };
             let size = largest(&increments);
-            let mut step = scale_field(&increments, (LONGEST / size).min(1.0));
-            if !newton && largest(&valley.across) < LONGEST {
-                let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(&valley.along));
+            let mut step = scale_field(&increments, (STEPS.longest / size).min(1.0));
+            if !newton && largest(&valley.across) < STEPS.longest {
+                let [shortest, longest] =
+                    [STEPS.first_climbing, STEPS.longest].map(|by| by / largest(&valley.along));
                 let length = match before {
                     None => shortest,
                     Some(before) => valley.distance_to_maximum(before).clamp(shortest, longest),
                 };
-                before = Some((valley.curvature, length));
+                before = Some(FloorStep {
+                    curvature: valley.curvature,
+                    length,
+                });
                 add_scaled(&mut step, length, &valley.along);
                 direction = self.normalize_by_mass(&valley.along);
             }
             now.state = self
                 .state_after_increments(&now.state, now.params, &step, 1.0)
                 .ok()?;
-            if newton && size < FINAL_CORRECTION_INCREMENT {
+            if newton && size < STEPS.final_newton {
                 let point = self.correct(&now.state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
@@ -147,12 +181,12 @@ impl BranchEquations<'_> {
         let modes = self.soft_modes(point, SOFT_MODE_COUNT)?;
         let linear = self.assemble(&mut point.solution(), false)?;
         let border = [self.multiply_by_mass(&modes[0])];
-        let (solved, _) = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
-        Ok(-solved.h[(0, 0)] / self.mass)
+        let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
+        Ok(-solved.responses.h[(0, 0)] / self.mass)
     }
 
     /// The equilibria to which the leaf descends from a saddle along its unstable mode, on the side
-    /// of `direction` and on the other: see [`Equations::descend`].
+    /// of `direction` and on the other: see [`BranchEquations::descend`].
     pub fn descend_both_sides(
         &mut self,
         saddle: &EquilibriumPoint,
@@ -178,22 +212,23 @@ impl BranchEquations<'_> {
         direction: &NodalField,
         stop: &dyn Fn() -> bool,
     ) -> Result<EquilibriumPoint, State> {
-        let (mut direction, mut length) = (self.normalize_by_mass(direction), DESCENT_PERTURBATION);
-        let push = scale_field(&direction, DESCENT_PERTURBATION / largest(&direction));
+        let (mut direction, mut length) =
+            (self.normalize_by_mass(direction), STEPS.first_descending);
+        let push = scale_field(&direction, STEPS.first_descending / largest(&direction));
         let params = [fraction];
         let pushed = self.state_after_increments(state, params, &push, 1.0);
         let state = pushed.map_err(|_| state.clone())?;
         let mut now = ParametrizedState { state, params };
-        for _ in 0..MAX_DESCENT_STEPS {
+        for _ in 0..STEPS.most_descending {
             let next = match stop() {
                 true => None,
                 false => self.descend_step(&mut now, &mut direction, &mut length),
             };
-            let Some((next, near)) = next else {
+            let Some(next) = next else {
                 return Err(now.state);
             };
-            now.state = next;
-            if near {
+            now.state = next.state;
+            if next.near_equilibrium {
                 let rest = self.correct(&now.state, fraction, None).ok();
                 return rest.filter(|point| point.index == 0).ok_or(now.state);
             }
@@ -201,46 +236,50 @@ impl BranchEquations<'_> {
         Err(now.state)
     }
 
-    /// A step down the valley floor; the flag says whether it was a short Newton step.
+    /// A step down the valley floor from `now`, after which `direction` is that of the floor and
+    /// `length` that of the next step.
     fn descend_step(
         &mut self,
         now: &mut ParametrizedState,
         direction: &mut NodalField,
         length: &mut f64,
-    ) -> Option<(State, bool)> {
+    ) -> Option<DescentStep> {
         let linear = self.assemble(now, false).ok()?;
         let valley = self.valley(direction, &linear)?;
         let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
         let increments = if newton {
             valley.newton()
-        } else if largest(&valley.across) < LONGEST {
+        } else if largest(&valley.across) < STEPS.longest {
             let part = length.copysign(valley.force) / largest(&valley.along);
-            *length = (GROWTH * *length).min(LONGEST);
+            *length = (STEPS.descent_growth * *length).min(STEPS.longest);
             scaled_sum(&valley.across, part, &valley.along)
         } else {
             valley.across
         };
         *direction = self.normalize_by_mass(&valley.along);
         let size = largest(&increments);
-        let step = scale_field(&increments, (LONGEST / size).min(1.0));
+        let step = scale_field(&increments, (STEPS.longest / size).min(1.0));
         let next = self
             .state_after_increments(&now.state, now.params, &step, 1.0)
             .ok()?;
-        Some((next, newton && size < FINAL_CORRECTION_INCREMENT))
+        Some(DescentStep {
+            state: next,
+            near_equilibrium: newton && size < STEPS.final_newton,
+        })
     }
 
     /// The valley along `direction`, from the assembled matrix.
-    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<Valley> {
+    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<ValleyFloor> {
         let border = [self.multiply_by_mass(direction)];
         let mut shift = linear.shift;
-        while shift < LARGEST_SHIFT {
+        while shift < SHIFTS.largest {
             let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
-            let (mut solved, _) = solved.ok()?;
+            let mut solved = solved.ok()?.responses;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {
                 let along = solved.modes.swap_remove(0);
                 let mass = self.mass * self.mass_product(&along, &along);
-                return Some(Valley {
+                return Some(ValleyFloor {
                     along,
                     force: solved.forces.multipliers[0],
                     curvature: -solved.h[(0, 0)] - shift * mass,
@@ -248,7 +287,7 @@ impl BranchEquations<'_> {
                     shift,
                 });
             }
-            shift = (4.0 * shift).max(FIRST_SHIFT);
+            shift = (4.0 * shift).max(SHIFTS.first);
         }
         None
     }
@@ -258,12 +297,12 @@ impl BranchEquations<'_> {
     fn lowest_mode(&mut self, direction: &NodalField) -> Option<NodalField> {
         let pattern = self.pattern(0).ok()?;
         let mut mode = direction.clone();
-        let mut shift = FIRST_SHIFT;
+        let mut shift = SHIFTS.first;
         for _ in 0..2 {
             let mut factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
             while factor.negative_eigenvalue_count() > 0 {
                 shift *= 2.0;
-                if shift > LARGEST_SHIFT {
+                if shift > SHIFTS.largest {
                     return None;
                 }
                 factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
@@ -276,13 +315,13 @@ impl BranchEquations<'_> {
                 eigenvalue = 1.0 / (self.mass * self.mass_product(&mode, &next)) - shift;
                 mode = self.normalize_by_mass(&next);
             }
-            shift = EIGENVALUE_SHIFT_FACTOR * eigenvalue.abs();
+            shift = SHIFTS.eigenvalue_factor * eigenvalue.abs();
         }
         let same = self.mass_product(&mode, direction) >= 0.0;
         Some(if same { mode } else { scale_field(&mode, -1.0) })
     }
 
-    /// Scales a direction to mass one.
+    /// Scales increments to unit product over the mass matrix, per unit of the leaf's mass.
     fn normalize_by_mass(&self, direction: &NodalField) -> NodalField {
         scale_field(
             direction,

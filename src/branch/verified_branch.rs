@@ -5,13 +5,13 @@
 //! verified, the branch is continued from the last one that is, with a shorter step or on the grid
 //! with all segments halved.
 
-use crate::branch::BranchDirection;
-use crate::branch::EquilibriumPoint;
 use crate::branch::continuation::{Branch, BranchEnd, ContinuationOptions};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::CriticalPoint;
 use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::family::LeafFamily;
+use crate::branch::family::{LeafFamily, PARAMETER_ROUNDING};
+use crate::branch::points::BranchDirection;
+use crate::branch::points::EquilibriumPoint;
 use crate::branch::refine::{refine_critical, verify_regular_point};
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::numbers::larger;
@@ -22,28 +22,39 @@ use crate::relax::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// The finest grid to follow a branch on, in segments and in nodes.
-const FINEST_CONTINUATION_GRID: usize = 512;
+/// How much work a verified branch may take.
+struct VerifiedBranchBudget {
+    /// Largest number of segments of the grid on which the branch is followed, and of its nodes:
+    /// each doubling makes verification, on still finer grids, as much more expensive.
+    finest_segments: usize,
+    most_nodes: usize,
+    /// Least and largest number of points computed before they are verified in parallel: points
+    /// after the first that is not verified are lost.
+    least_batch: usize,
+    largest_batch: usize,
+    /// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
+    finest_grid_attempts: usize,
+    finest_grid_step_factor: f64,
+    /// Largest number of consecutive points dropped next to a critical point: the critical point
+    /// lies elsewhere on every grid, so that a point may be before it on one and beyond it on
+    /// another.
+    consecutive_dropped_points: usize,
+}
 
-const MOST_NODES: usize = 20_000;
+const BUDGET: VerifiedBranchBudget = VerifiedBranchBudget {
+    finest_segments: 512,
+    most_nodes: 20_000,
+    least_batch: 2,
+    largest_batch: 16,
+    finest_grid_attempts: 4,
+    finest_grid_step_factor: 0.4,
+    consecutive_dropped_points: 4,
+};
 
-/// Least and largest number of points computed before they are verified in parallel.
-const MIN_VERIFICATION_BATCH: usize = 2;
-
-const MAX_VERIFICATION_BATCH: usize = 16;
-
-/// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
-const MAX_FINEST_GRID_ATTEMPTS: usize = 4;
-
-const FINEST_GRID_STEP_FACTOR: f64 = 0.4;
-
-/// Largest number of consecutive points dropped next to a critical point: that lies elsewhere
-/// on every grid, so that a point may be before it on one grid and beyond it on another.
-const MAX_CONSECUTIVE_DROPPED_POINTS: usize = 4;
-
-/// From the grid on which they were found to the finest, neighbouring points move alike: the
-/// difference is at most this part of their distance plus this part of the larger displacement,
-/// plus `SMALL`. The part is large, since they are sought in different planes.
+/// From the grid on which they were found to the finest, neighboring points move alike: their
+/// displacements differ by at most this part of the distance of the points, plus this part of the
+/// larger displacement, plus `NEGLIGIBLE_DISPLACEMENT_DIFFERENCE` (lengths). The part is large,
+/// since the points are sought in different planes.
 const SIMILAR_DISPLACEMENT_FRACTION: f64 = 0.8;
 
 const NEGLIGIBLE_DISPLACEMENT_DIFFERENCE: f64 = 1e-6;
@@ -54,22 +65,22 @@ pub struct NestedBranchEquations<'a> {
     equations: Vec<BranchEquations<'a>>,
 }
 
-/// A branch with only verified points.
+/// A branch of which every point is verified on finer grids.
 pub struct VerifiedBranch {
     /// The branch as found on its grids.
     pub branch: Branch,
-    /// How it ended.
+    /// Why the branch ends.
     pub end: BranchEnd,
-    /// Its points, extrapolated over grids.
+    /// The points of the branch, extrapolated over grids.
     pub points: Vec<ExtrapolatedPoint>,
-    /// Its critical points, likewise.
+    /// The critical points of the branch, extrapolated over grids.
     pub critical: Vec<ExtrapolatedPoint>,
     /// What was found of critical points beyond the last point.
     beyond: Vec<Result<ExtrapolatedPoint, VerificationFailure>>,
 }
 
 impl<'a> NestedBranchEquations<'a> {
-    /// Starts with one grid.
+    /// The equations on the first grid alone; finer ones follow where they are needed.
     pub fn new(family: &'a LeafFamily<'a>, grid: Grid) -> Self {
         NestedBranchEquations {
             equations: vec![BranchEquations::new(family, grid)],
@@ -85,7 +96,7 @@ impl<'a> NestedBranchEquations<'a> {
     /// Creates the next finer grid if needed; false if that is too fine.
     fn refine(&mut self, state: &State) -> bool {
         let finer = 2 * state.segments();
-        if finer > FINEST_CONTINUATION_GRID || finer * state.rods() > MOST_NODES {
+        if finer > BUDGET.finest_segments || finer * state.rods() > BUDGET.most_nodes {
             return false;
         }
         let last = &self.equations[self.equations.len() - 1];
@@ -96,7 +107,7 @@ impl<'a> NestedBranchEquations<'a> {
         true
     }
 
-    /// Number of matrices factorised so far.
+    /// Number of matrices factorized so far.
     pub fn factorizations(&self) -> usize {
         self.equations.iter().map(|it| it.factorizations).sum()
     }
@@ -119,14 +130,14 @@ impl<'a> NestedBranchEquations<'a> {
             critical: Vec::new(),
             beyond: Vec::new(),
         };
-        let (mut ahead, mut tries) = (MAX_VERIFICATION_BATCH / 2, 0);
+        let (mut ahead, mut tries) = (BUDGET.largest_batch / 2, 0);
         loop {
             let now = &known.branch.points[known.branch.points.len() - 1];
             let (before, now) = (known.points.len(), now.state.clone());
             let equations = self.on_grid_of(&now);
             (known.branch).extend_to(equations, how, before + ahead, progress);
             let leaves = &equations.leaves;
-            let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
+            let doubt = known.verify(leaves.family, &leaves.grid, accuracy, how.critical_grids);
             if known.points.len() > before {
                 tries = 0;
             }
@@ -138,7 +149,7 @@ impl<'a> NestedBranchEquations<'a> {
             }
             match (doubt, &known.branch.end) {
                 (None, None) => {
-                    ahead = (2 * ahead).min(MAX_VERIFICATION_BATCH);
+                    ahead = (2 * ahead).min(BUDGET.largest_batch);
                     continue;
                 }
                 (Some(_), _)
@@ -154,7 +165,7 @@ impl<'a> NestedBranchEquations<'a> {
                 }
             }
             let end = known.branch.end.clone();
-            ahead = MIN_VERIFICATION_BATCH;
+            ahead = BUDGET.least_batch;
             tries += 1;
             let last = known.points.len().saturating_sub(1);
             known.branch.truncate_at(last);
@@ -163,10 +174,12 @@ impl<'a> NestedBranchEquations<'a> {
             known.branch.shorten(if refined {
                 1.0
             } else {
-                FINEST_GRID_STEP_FACTOR
+                BUDGET.finest_grid_step_factor
             });
             if !refined
-                && (tries > MAX_FINEST_GRID_ATTEMPTS || known.points.is_empty() || doubt.is_none())
+                && (tries > BUDGET.finest_grid_attempts
+                    || known.points.is_empty()
+                    || doubt.is_none())
             {
                 known.end = match (doubt, end) {
                     (None, Some(end)) => end,
@@ -187,7 +200,8 @@ impl VerifiedBranch {
         &mut self,
         family: &LeafFamily,
         grid: &Grid,
-        (accuracy, grids): (f64, usize),
+        accuracy: f64,
+        grids: usize,
     ) -> Option<VerificationFailure> {
         let mut singular = std::mem::take(&mut self.beyond);
         let critical = &self.branch.critical[self.critical.len() + singular.len()..];
@@ -212,7 +226,7 @@ impl VerifiedBranch {
             let number = self.points.len();
             let near = number > 0 && self.branch.is_near_critical(number);
             let near = near && matches!(point, Err(VerificationFailure::OtherIndex));
-            if near && dropped < MAX_CONSECUTIVE_DROPPED_POINTS {
+            if near && dropped < BUDGET.consecutive_dropped_points {
                 if number + 1 < self.branch.points.len() {
                     self.branch.drop_point(number);
                     dropped += 1;
@@ -325,14 +339,11 @@ const COARSEST_RELAXATION_GRID: usize = 8;
 /// Distances from the branch point at which the other branch is sought, in this order.
 const BRANCH_SWITCHING_DISTANCES: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
-/// Where the first of these distances leads out of the range of the parameter, it is shortened by
-/// this factor, fewer times than that.
+/// Where the first of `BRANCH_SWITCHING_DISTANCES` leads out of the range of the parameter, it is
+/// shortened by this factor, at most `MAX_SWITCHING_REDUCTIONS` - 1 times.
 const SWITCHING_DISTANCE_FACTOR: f64 = 0.3;
 
 const MAX_SWITCHING_REDUCTIONS: i32 = 8;
-
-/// Fractions of the range by which a point may be beyond an end of it, due to rounding.
-const RANGE_END_ROUNDING: f64 = 1e-12;
 
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
@@ -349,8 +360,7 @@ pub fn begin_branch<'a>(
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST_RELAXATION_GRID);
     let least = segments.unwrap_or(2 * coarsest);
-    let rest_at = (rest, fraction);
-    find_first_point(family, rest_at, least, segments.is_some()).or_else(|stuck| {
+    find_first_point(family, rest, fraction, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();
@@ -365,12 +375,10 @@ pub fn begin_branch<'a>(
         let mut tips = rest.tips.iter().zip(&alone.tips);
         let near = SAME_TIPS_TOLERANCE * family.scale().length;
         match tips.all(|(a, b)| a.distance(*b) < near) {
-            true => find_first_point(
-                family,
-                (&alone, fraction),
-                alone.shape.stations.len() - 1,
-                true,
-            ),
+            true => {
+                let least = alone.shape.stations.len() - 1;
+                find_first_point(family, &alone, fraction, least, true)
+            }
             false => Err(stuck),
         }
     })
@@ -380,7 +388,8 @@ pub fn begin_branch<'a>(
 /// with the index of `rest`.
 fn find_first_point<'a>(
     family: &'a LeafFamily<'a>,
-    (rest, fraction): (&Equilibrium, f64),
+    rest: &Equilibrium,
+    fraction: f64,
     least: usize,
     any_index: bool,
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
@@ -455,7 +464,7 @@ fn first_point_off_branch(
             .equilibrium_along_direction(equations, direction, away)
             .ok()?;
         let beyond = larger(-point.fraction, point.fraction - 1.0);
-        (beyond <= RANGE_END_ROUNDING).then_some(point)
+        (beyond <= PARAMETER_ROUNDING).then_some(point)
     };
     let mut nearest = None;
     for (k, away) in BRANCH_SWITCHING_DISTANCES.into_iter().enumerate() {

@@ -248,7 +248,7 @@ struct GroupRods<'a> {
     q: [&'a [DQuat]; GROUP],
     n: [&'a [DVec3]; GROUP],
     /// Positions of the previous and the next rods, or their own if there is none.
-    neighbour_positions: [[&'a [DVec3]; GROUP]; 2],
+    neighbor_positions: [[&'a [DVec3]; GROUP]; 2],
     loads: GroupLoads,
 }
 
@@ -264,7 +264,7 @@ impl<'a> GroupRods<'a> {
             x: rods.map(x),
             q: rods.map(|j| &state.q[state.base(j)..][..=n]),
             n: rods.map(|j| &state.n[j * n..][..n]),
-            neighbour_positions: [
+            neighbor_positions: [
                 rods.map(|j| x(j.saturating_sub(1))),
                 rods.map(|j| x((j + 1).min(last))),
             ],
@@ -278,10 +278,10 @@ impl<'a> GroupRods<'a> {
         let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
         let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
         let vectors = [vector(a), vector(b), vector(c), vector(d)];
-        (
-            Vectors::from_group(simd, vectors, part),
-            Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
-        )
+        Quaternions {
+            vector: Vectors::from_group(simd, vectors, part),
+            scalar: Lanes::load_group(simd, &NumberGroup([a.w, b.w, c.w, d.w]), part),
+        }
     }
 
     #[inline(always)]
@@ -379,7 +379,7 @@ impl<const MATRIX: bool> GroupKernel for AssemblyKernel<'_, MATRIX> {
             }
             let tip = i + 1 == n;
             let weights = rods.leaf.node_weights(i + 1);
-            let [previous, next] = rods.neighbour_positions;
+            let [previous, next] = rods.neighbor_positions;
             let x = [
                 lane_vectors(simd, previous, i + 1, part),
                 lane_vectors(simd, rods.x, i + 1, part),
@@ -486,7 +486,8 @@ impl GroupKernel for StateAdvanceKernel<'_> {
             let n = change.mul_add(step, lane_vectors(simd, rods.n, i, part));
             let x = shift_after.mul_add(step, lane_vectors(simd, rods.x, i + 1, part));
             let turned = exp_each(turn_after.scale(step));
-            let (q, qw) = multiply_each(turned, rods.rotations(simd, i + 1, part));
+            let turned = multiply_each(turned, rods.rotations(simd, i + 1, part));
+            let (q, qw) = (turned.vector, turned.scalar);
             let mut numbers = [NumberGroup::default(); 10];
             let [n, x, q] = [n, x, q].map(Vectors::array);
             for c in 0..3 {
@@ -512,7 +513,8 @@ impl StateAdvanceKernel<'_> {
     #[inline(always)]
     fn turn_bases<S: Simd>(&mut self, turn: Vectors<S>, lanes: Range<usize>, part: usize) {
         let simd = turn.x.simd;
-        let (q, qw) = multiply_each(exp_each(turn), self.rods.rotations(simd, 0, part));
+        let turned = multiply_each(exp_each(turn), self.rods.rotations(simd, 0, part));
+        let (q, qw) = (turned.vector, turned.scalar);
         let mut numbers = [NumberGroup::default(); 4];
         let [x, y, z] = q.array();
         for (number, four) in [x, y, z, qw].into_iter().zip(&mut numbers) {

@@ -105,6 +105,15 @@ impl BlockTridiagonal {
         self.matrix.len()
     }
 
+    /// Number of eliminated unknowns of node `i` (from 0).
+    #[inline(always)]
+    fn eliminated_unknowns(&self, i: usize) -> usize {
+        match i + 1 < self.nodes() {
+            true => UNKNOWNS,
+            false => self.last_node_unknowns,
+        }
+    }
+
     /// Writes the upper triangle of the block of node `i` (from 0), and the block
     /// between it and the next if there is one; identities in lanes without a rod.
     #[inline(always)]
@@ -287,6 +296,7 @@ impl GroupKernel for FactorizationKernel<'_> {
         let n = self.chain.nodes();
         let mut schur = [[zero; UNKNOWNS]; UNKNOWNS];
         for i in 0..n {
+            let count = self.chain.eliminated_unknowns(i);
             let node = &self.chain.matrix[i];
             let factor = &mut self.chain.factor[i];
             let weight = Lanes::splat(simd, self.masses.weights[i]);
@@ -301,11 +311,6 @@ impl GroupKernel for FactorizationKernel<'_> {
                 a[k][k] = masses[k / ROTATION_UNKNOWNS].mul_add(weight, a[k][k]);
             }
             // Rows above the diagonal become L^T, the diagonal 1/d.
-            let count = if i + 1 < n {
-                UNKNOWNS
-            } else {
-                self.chain.last_node_unknowns
-            };
             let mut definite = one;
             for k in 0..UNKNOWNS {
                 if k < count {
@@ -405,11 +410,7 @@ impl GroupKernel for ForwardKernel<'_> {
                 }
             }
             let own = &self.chain.factor[i];
-            let count = if i + 1 < n {
-                UNKNOWNS
-            } else {
-                self.chain.last_node_unknowns
-            };
+            let count = self.chain.eliminated_unknowns(i);
             for k in 0..UNKNOWNS {
                 if k < count {
                     for r in k + 1..UNKNOWNS {
@@ -453,11 +454,7 @@ impl GroupKernel for BackwardKernel<'_> {
                     }
                 }
             }
-            let count = if i + 1 < n {
-                UNKNOWNS
-            } else {
-                self.chain.last_node_unknowns
-            };
+            let count = self.chain.eliminated_unknowns(i);
             for k in (0..UNKNOWNS).rev() {
                 if k < count {
                     y[k] = y[k] * Lanes::load_group(simd, &own[triangle_index(k, k)], part);

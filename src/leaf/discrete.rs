@@ -16,7 +16,7 @@ use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip};
 use crate::rotation;
 use crate::scenario::Profile;
-use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
+use crate::simd::{GROUP, Lanes, NumberGroup, Vectors, group_components};
 use glam::DVec3;
 use pulp::{Scalar, Simd};
 use std::ops::Range;
@@ -120,7 +120,7 @@ impl DiscreteLeaf {
         DiscreteLeaf::with_sections(leaf, grid, sections)
     }
 
-    /// Another leaf on the same grid, if its rods are the same: their sections are copied, since
+    /// Discretizes `leaf` on this grid with the sections of this leaf, if both have the same rods:
     /// evaluating profiles takes as long as assembling a small leaf.
     pub fn with_same_rods(&self, leaf: &Leaf) -> Option<Self> {
         let same = self.leaf.has_same_rods(leaf);
@@ -270,7 +270,7 @@ impl DiscreteLeaf {
         f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
     }
 
-    /// The first node of a rod that has equations: its base if a hinge lets it turn, else the next.
+    /// The first node of a rod that has equations: the base if a hinge lets it turn, else the next node.
     /// Fields of increments and of nodal forces begin with it.
     #[inline]
     pub fn first_node(&self) -> usize {
@@ -300,7 +300,7 @@ impl DiscreteLeaf {
         (0..self.rods()).flat_map(move |j| of.clone().map(move |i| (j, i)))
     }
 
-    /// Whether neighbouring rods are coupled.
+    /// Whether neighboring rods are coupled.
     pub fn coupled(&self) -> bool {
         let between = self.coupling.iter().take(self.rods() - 1);
         between.into_iter().any(|&k| k != DVec3::ZERO)
@@ -674,14 +674,7 @@ pub struct GroupLoads {
 /// Arranges the loads of the rods of a group by components.
 #[inline(always)]
 pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
-    let vectors = |of_load: fn(&RodLoad) -> DVec3| {
-        let [a, b, c, d] = of.each_ref().map(of_load);
-        [
-            NumberGroup([a.x, b.x, c.x, d.x]),
-            NumberGroup([a.y, b.y, c.y, d.y]),
-            NumberGroup([a.z, b.z, c.z, d.z]),
-        ]
-    };
+    let vectors = |load: fn(&RodLoad) -> DVec3| group_components(of.each_ref().map(load));
     GroupLoads {
         dead: vectors(|load| load.dead),
         tip: vectors(|load| load.tip),
@@ -713,10 +706,7 @@ impl<S: Simd> LaneRodLoads<S> {
     /// The loads on the lanes from `part` on.
     #[inline(always)]
     pub fn load_group(simd: S, group: &GroupLoads, part: usize) -> Self {
-        let vectors = |load: &[NumberGroup; 3]| {
-            let [x, y, z] = [0, 1, 2].map(|c| Lanes::load_group(simd, &load[c], part));
-            Vectors::new(x, y, z)
-        };
+        let vectors = |load: &[NumberGroup; 3]| Vectors::load_group(simd, load, part);
         LaneRodLoads {
             dead: vectors(&group.dead),
             tip: vectors(&group.tip),

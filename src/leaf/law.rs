@@ -1,18 +1,18 @@
 //! The constitutive law of nearly rigid segments in linear equations.
 //!
 //! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
-//! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
-//! that is limited, as larger ones lose the soft modes to rounding
-//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::limit_condensing_stiffness)): of a segment that is stiffer, C < 1/k,
-//! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
-//! determine the force that is next to nothing; where holders, or other rods, determine the strain,
-//! each solution gains only the part k/H of the force.
+//! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a limited stiffness
+//! k, as a larger one loses the soft modes to rounding
+//! ([`Section::limit_condensing_stiffness`](crate::rod::Section::limit_condensing_stiffness)). For a
+//! stiffer segment, C < 1/k, the solution misses the length (1 - C k) (B^T dx - C dn) of the law
+//! v = v0 + n/H. Where loads determine the force that is next to nothing; where holders, or other rods,
+//! determine the strain, each solution gains only the fraction k/H of the force.
 //!
-//! So the missing lengths e are unknowns of their own: with them as additional gaps, a solution
-//! leaves G e missing in addition, and e = e0 + G e is solved by [`solve_minimal_residual`]. But for the
-//! rods whose strain is determined G is small, so that few solutions are enough at any stiffness.
+//! So the missing lengths e are unknowns, too: with them as additional gaps, a solution misses G e in
+//! addition, and e = e0 + G e is solved by [`solve_minimal_residual`]. G is small but for the rods whose
+//! strain is determined, so that few solutions are enough at any stiffness.
 
-use crate::krylov::{KrylovLimits, solve_minimal_residual};
+use crate::krylov::{KrylovLimits, StagnationLimit, solve_minimal_residual};
 use crate::leaf::derivative::parameter::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
@@ -31,7 +31,10 @@ const LAW_COMPLETION_LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-9,
     most: 40,
     singular_value_limit: 1e-8,
-    stagnation_limit: Some((3, 0.99)),
+    stagnation: Some(StagnationLimit {
+        directions: 3,
+        remainder: 0.99,
+    }),
 };
 
 impl DiscreteLeaf {

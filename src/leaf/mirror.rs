@@ -23,7 +23,7 @@ impl Leaf {
     }
 }
 
-/// Whether every rod, coupling and load is its own mirror image, or another's.
+/// Whether every rod, coupling and load is its own mirror image or that of another one.
 pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
@@ -95,8 +95,8 @@ pub fn are_mirror_symmetric(rods: &[RodShape], distance: f64, angle: f64) -> boo
         .all(images)
 }
 
-/// The state of half of a leaf that is in the state `whole`. What the mirror's plane cuts is put
-/// into it: no force of the half leaf would bring it back.
+/// The state of half of a leaf that is in the state `whole`. The midrib and a joint tip are put into the
+/// mirror plane: no force of the half leaf would bring them back.
 pub fn half_state(half: &Leaf, whole: &State) -> State {
     if !half.mirrored {
         return whole.clone();
@@ -189,7 +189,7 @@ fn whole_rods<T>(half: &Leaf, rods: Vec<Vec<T>>, node: impl Fn(&T, bool, f64) ->
     (0..count).map(rod).collect()
 }
 
-/// A rotation axis changes sign in the mirror, except its normal component.
+/// The image of a rotation: its axis changes sign in the mirror, except the normal component.
 fn mirrored_rotation(q: DQuat, image: bool) -> DQuat {
     match image {
         true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),

@@ -48,7 +48,7 @@ pub use crate::leaf::system::{
 pub use crate::leaf::tissue::HalfTurn;
 use crate::numbers::sorted_distinct;
 use crate::rod::Section;
-use crate::rotation;
+use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation};
 use glam::{DQuat, DVec3};
@@ -88,13 +88,6 @@ pub struct Leaf {
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest_couple_stiffness: f64,
-}
-
-/// Position and rotation of the base of a rod.
-#[derive(Clone, Copy, Debug)]
-pub struct BasePose {
-    pub position: DVec3,
-    pub rotation: DQuat,
 }
 
 /// The holder of the tips.
@@ -335,13 +328,13 @@ impl Leaf {
     }
 
     /// Where the base of rod `j` is held (paper, section 2.4 (a) and (c)).
-    pub fn base_pose(&self, j: usize) -> BasePose {
+    pub fn base_pose(&self, j: usize) -> Pose {
         let (rod, length) = (self.rod(j), self.scale.length);
         let rotation = match rod.elevation == 0.0 && rod.roll == 0.0 {
             true => rotation::exp(rod.angle * DVec3::Z),
             false => rod.base_rotation(),
         };
-        BasePose {
+        Pose {
             position: rod.base_position() / length,
             rotation,
         }

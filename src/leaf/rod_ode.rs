@@ -16,7 +16,9 @@ use crate::leaf::discrete::{
 use crate::natural::{Natural, Pose, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::rod::{NodePair, Section, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, directors};
-use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, Vectors, run, widest_arch};
+use crate::simd::{
+    GROUP, GroupKernel, Lanes, NumberGroup, Vectors, group_components, run, widest_arch,
+};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
 
@@ -88,7 +90,7 @@ pub struct RodIntegrator<'a> {
 struct RungeKuttaStage {
     fields: Vec<GroupFields>,
     /// Positions again, contiguous for each axis, with padding before the first rod and after
-    /// the last, so that those of neighbours are adjacent.
+    /// the last, so that those of neighbors are adjacent.
     x: [Vec<f64>; 3],
 }
 
@@ -98,7 +100,7 @@ impl<'a> RodIntegrator<'a> {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);
             if leaf.leaf.is_halved_midrib(j) {
-                // The image of the neighbour pulls the midrib back into the plane.
+                // The image of the neighbor pulls the midrib back into the plane.
                 load.previous.y = 0.0;
             }
             load
@@ -239,7 +241,7 @@ impl<'a> RodIntegrator<'a> {
             slopes[at.group][ENERGY].0[at.lane] += energy;
             for (j, mut load) in [g, g + 1].into_iter().zip(on_nodes) {
                 if leaf.is_halved_midrib(j) {
-                    // The image of the neighbour pulls the midrib back into the plane.
+                    // The image of the neighbor pulls the midrib back into the plane.
                     (load.moment.x, load.moment.z, load.force.y) = (0.0, 0.0, 0.0);
                 }
                 let at = rod_lane(j);
@@ -253,7 +255,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds the loads that veins have of their own to the slopes of a stage, at `sigma`.
+    /// Adds the loads of single veins to the slopes of a stage, at `sigma`.
     fn add_own_loads(&mut self, sigma: f64, stage: usize) {
         if self.leaf.loads.rod_load_factor == 0.0 {
             return;
@@ -270,7 +272,7 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds `sign` times the forces and moments on points at `sigma` to those of the fields.
+    /// Adds `sign` times the loads on points at `sigma` to the forces and moments of the rods.
     fn add_point_loads(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
             let force = sign * self.leaf.point_force_at(j, sigma);
@@ -414,8 +416,7 @@ struct GroupLaws {
 
 /// The laws of sections whose `ds` is the length of the rod.
 fn group_laws(sections: [&Section; GROUP]) -> GroupLaws {
-    let vectors =
-        |of: fn(&Section) -> DVec3| [0, 1, 2].map(|c| NumberGroup(sections.map(|it| of(it)[c])));
+    let vectors = |of: fn(&Section) -> DVec3| group_components(sections.map(of));
     GroupLaws {
         length: NumberGroup(sections.map(|section| section.ds)),
         rest_strain: vectors(|section| section.rest_strain),
@@ -433,7 +434,10 @@ impl<S: Simd> LaneFields<S> {
         let vector = |k: usize| Vectors::new(number(k), number(k + 1), number(k + 2));
         LaneFields {
             x: vector(POSITION),
-            q: (vector(QUATERNION), number(QUATERNION_W)),
+            q: Quaternions {
+                vector: vector(QUATERNION),
+                scalar: number(QUATERNION_W),
+            },
             n: vector(FORCE),
             m: vector(MOMENT),
             energy: number(ENERGY),
@@ -445,7 +449,7 @@ impl<S: Simd> LaneFields<S> {
     fn store_group(self, group: &mut GroupFields, part: usize) {
         let vectors = [
             (POSITION, self.x),
-            (QUATERNION, self.q.0),
+            (QUATERNION, self.q.vector),
             (FORCE, self.n),
             (MOMENT, self.m),
         ];
@@ -454,23 +458,22 @@ impl<S: Simd> LaneFields<S> {
                 component.store_group(&mut group[first + k], part);
             }
         }
-        self.q.1.store_group(&mut group[QUATERNION_W], part);
+        self.q.scalar.store_group(&mut group[QUATERNION_W], part);
         self.energy.store_group(&mut group[ENERGY], part);
     }
 
     /// The derivatives of the fields with respect to sigma under a load, of the lanes from `part` on.
     #[inline(always)]
     fn slopes(&self, laws: &GroupLaws, load: LaneNodeForces<S>, part: usize) -> Self {
-        let (q, w) = self.q;
-        let number = |group: &NumberGroup| Lanes::load_group(w.simd, group, part);
-        let vector = |[x, y, z]: &[NumberGroup; 3]| Vectors::new(number(x), number(y), number(z));
+        let (q, w) = (self.q.vector, self.q.scalar);
+        let vector = |group: &[NumberGroup; 3]| Vectors::load_group(w.simd, group, part);
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
         let (n, m) = (
             self.n.director_components(frame),
             self.m.director_components(frame),
         );
-        let length = number(&laws.length);
+        let length = Lanes::load_group(w.simd, &laws.length, part);
         let strain = vector(&laws.compliance) * n;
         let bend = vector(&laws.couple_compliance) * m;
         let v = vector(&laws.rest_strain) + strain;
@@ -479,7 +482,10 @@ impl<S: Simd> LaneFields<S> {
         let turn = u.from_director_components(frame).scale(length * half);
         LaneFields {
             x: tangent,
-            q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
+            q: Quaternions {
+                vector: turn.scale(w) + turn.cross(q),
+                scalar: -turn.dot(q),
+            },
             n: -load.force,
             m: self.n.cross(tangent),
             energy: half * length * (n.dot(strain) + m.dot(bend)) + load.energy,

@@ -154,7 +154,7 @@ impl System {
         LinearSolveOutcome::Converged(iterations)
     }
 
-    /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
+    /// Sets the residual to the right-hand side plus `inertia`; returns the residual of a joint tip.
     fn set_residual(&mut self, inertia: Option<MassLoad>) -> DVec3 {
         let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
         each_group(self.parallel, &mut self.groups, |g, group| {

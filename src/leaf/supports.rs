@@ -48,8 +48,8 @@ pub(super) struct UnbalancedSize {
 }
 
 impl DiscreteLeaf {
-    /// The nodes that grips hold, where they are in the `natural` leaf and moved by their
-    /// displacements.
+    /// The nodes that grips hold: where they are in the stress-free state `natural`, moved by the
+    /// displacements of the grips.
     pub(super) fn find_gripped_nodes(&self, natural: &State) -> Vec<GrippedNode> {
         let length = self.leaf.scale.length;
         let each = self.leaf.scenario().grips.iter().enumerate();
@@ -164,7 +164,7 @@ impl DiscreteLeaf {
         reactions
     }
 
-    /// The forces on all holders: on that of held tips, if they are, and on every grip.
+    /// The forces on all supports that are placed: on the holder of the tips, if any, and on every grip.
     pub fn support_forces(&self, state: &State) -> Vec<DVec3> {
         let tips = self
             .leaf
@@ -179,7 +179,7 @@ impl DiscreteLeaf {
         tips.into_iter().chain(grips).collect()
     }
 
-    /// Moment and force on a node by its segments, loads and neighbours.
+    /// Moment and force on node `i` of rod `j` by its segments, loads and neighbors.
     pub(super) fn unbalanced_node_load(&self, state: &State, j: usize, i: usize) -> Wrench {
         let n = self.segments();
         let gradient = |i: usize| {
@@ -294,7 +294,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Sets the entries of held components between neighbouring rods to zero.
+    /// Sets the entries of held components between neighboring rods to zero.
     pub(super) fn clear_held_gap_blocks(&self, system: &mut System) {
         for (g, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             if g + 1 < self.rods() {

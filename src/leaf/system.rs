@@ -1,7 +1,7 @@
 //! Newton's equations of a leaf, in groups of four rods, one in each lane of an instruction.
 //!
-//! K = B + E, where B has the block-tridiagonal matrix of each rod (with its neighbours fixed) and the
-//! joint tip, and E is the coupling between neighbours. B is factorized in linear time and preconditions
+//! K = B + E, where B has the block-tridiagonal matrix of each rod (with its neighbors fixed) and the
+//! joint tip, and E is the coupling between neighbors. B is factorized in linear time and preconditions
 //! conjugate gradients for K (`solve`), whose vectors and products with E are here.
 //!
 //! A dead moment M on a single rod is not conservative in three dimensions: the derivative of its
@@ -140,7 +140,7 @@ pub struct System {
     pub(super) tip: Option<TipFactor>,
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
     pub(super) gaps: Vec<DVec3>,
-    /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without
+    /// The blocks between neighboring rods, gap after gap, all nodes with equations; empty without
     /// tissue.
     pub(super) gap_blocks: Vec<NodeBlock>,
     /// What hinges and grips hold, nodes from the first with equations: these components have no
@@ -250,8 +250,8 @@ impl System {
         }
     }
 
-    /// Updates the coupling between rods, if there is any, from a leaf that otherwise differs
-    /// from that of [`System::new`] only in what is assembled.
+    /// Updates the coupling between rods, if there is any, from a leaf that differs from the leaf of
+    /// [`System::new`] only in its coupling and in what is assembled.
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
         if !self.gaps.is_empty() {
             self.gaps.clear();
@@ -297,7 +297,7 @@ impl System {
         self.weights.len()
     }
 
-    /// Whether neighbours are coupled, so that conjugate gradients are needed.
+    /// Whether neighbors are coupled, so that conjugate gradients are needed.
     pub fn coupled(&self) -> bool {
         self.coupled
     }

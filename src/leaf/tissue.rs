@@ -1,5 +1,5 @@
-//! Tissue between neighbouring veins: the law of a strip ([`TissueStrip`]) at every node of every gap,
-//! in the sums over the leaf, and the blocks between nodes of neighbouring rods, which strips tie by
+//! Tissue between neighboring veins: the law of a strip ([`TissueStrip`]) at every node of every gap,
+//! in the sums over the leaf, and the blocks between nodes of neighboring rods, which strips tie by
 //! forces and moments.
 
 use crate::leaf::block_tridiagonal::{RodLane, rod_lane};
@@ -11,13 +11,13 @@ use crate::rod::{NodeBlock, NodePair, StripLoads, TissueStrip, Wrench};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
-/// Sections of two neighbouring veins that tissue ties, turned against each other by half a turn.
+/// Sections of two neighboring veins that tissue ties, turned against each other by half a turn.
 /// The law of the tissue depends on the shorter one of both rotations between them, and jumps there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfTurn {
     /// The first of both veins, from 0.
     pub gap: usize,
-    /// Where they are, as a fraction of the length.
+    /// Place of the sections, as a fraction of the length.
     pub sigma: f64,
 }
 
@@ -99,7 +99,7 @@ impl DiscreteLeaf {
         passed.map(|(it, _)| self.half_turn(it))
     }
 
-    /// The place where sections are turned against each other by half a turn, nearly.
+    /// The place where sections are turned against each other by nearly half a turn, if any are.
     pub fn half_turn_near(&self, state: &State) -> Option<HalfTurn> {
         let acting = self.each_strip().filter(|it| it.strip.has_stiffness());
         let cosine = |it: &PlacedStrip| it.cosine_of_half_angle(state).abs();
@@ -114,9 +114,9 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
-    /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
-    /// joint tip, where they resist rotations.
+    /// The strips of this leaf on its grid, gap after gap, base to tip, without force in the stress-free
+    /// state `natural`. Their weights are those of the coupling, but for a joint tip, where strips
+    /// resist rotations.
     pub(super) fn tissue_strips(&self, natural: &State) -> Vec<TissueStrip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
@@ -132,13 +132,14 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// Whether tissue ties neighbouring rods.
+    /// Whether tissue ties neighboring rods.
     pub fn has_tissue(&self) -> bool {
         !self.strips.is_empty()
     }
 
-    /// The exponent by which perturbations of one vein grow over a part `width` of its length where
-    /// the tissue on both sides resists them, in its middle: it bends, as on a foundation, or stretches.
+    /// The exponent of the growth of a perturbation along a vein over the fraction `width` of its length,
+    /// with the properties in its middle: the vein bends or stretches against the tissue on both sides,
+    /// as on an elastic foundation.
     pub fn tissue_growth_exponent(&self, width: f64) -> f64 {
         if !self.has_tissue() {
             return 0.0;
@@ -360,13 +361,13 @@ fn strip_ends(state: &State, g: usize, i: usize) -> NodePair {
 }
 
 impl System {
-    /// Whether tissue ties neighbours, also by moments: then the matrix must be factorized as a
+    /// Whether tissue ties neighbors, also by moments: then the matrix must be factorized as a
     /// whole, as rod by rod conjugate gradients take too many iterations.
     pub fn has_tissue(&self) -> bool {
         !self.gap_blocks.is_empty()
     }
 
-    /// The unknowns of a node (rotation, displacement) that are coupled with those of neighbours.
+    /// The unknowns of a node (rotation, displacement) that are coupled with those of neighbors.
     pub(super) fn coupled_unknowns(&self) -> [bool; 6] {
         let along = |c: usize| self.gaps.iter().any(|gap| gap[c] != 0.0);
         std::array::from_fn(|c| self.has_tissue() || c >= 3 && along(c - 3))

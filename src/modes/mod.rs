@@ -12,13 +12,8 @@
 //! the signs of the pivots of a second factorization there (Sylvester's law): missing ones,
 //! such as the second one of a double eigenvalue, are
 //! searched for until the numbers agree. A list whose completeness cannot
-//! be proved is not returned.
-//!
-//! The mass matrix: for every node an inertia tensor and a mass.
-//!
-//! Rayleigh quotients of shapes.
-//!
-//! Modes for the derivatives of eigenvalues.
+//! be proved is not returned. Eigenvalues themselves are Rayleigh quotients of the shapes in mixed form,
+//! in which no large stiffness enters.
 
 mod lanczos;
 
@@ -32,53 +27,72 @@ use crate::rod::{Section, Segment, Wrench};
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
 
-/// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, since a
-/// larger one loses digits. The eigenvalues do not change to first order.
-const STIFFNESS_CAP_IN_MATRIX: f64 = 1e6;
+/// How stiff rods are softened in the matrix, since a large stiffness loses digits.
+struct MatrixSoftening {
+    /// Stiffness, in A/L^2, to which stiffer rods are softened. The eigenvalues do not change to first
+    /// order.
+    stiffness: f64,
+    /// Least ratio of [`MatrixSoftening::stiffness`] to the largest force carried.
+    force_ratio: f64,
+    /// Ratio of the softenings from which the first-order effect on modes is computed.
+    comparison_ratio: f64,
+    /// Cosine of the angle between two shapes above which they are the same mode.
+    same_mode_cosine: f64,
+}
 
-/// That stiffness is at least this multiple of the largest force carried.
-const STIFFNESS_FORCE_RATIO: f64 = 1e4;
+const SOFTENING: MatrixSoftening = MatrixSoftening {
+    stiffness: 1e6,
+    force_ratio: 1e4,
+    comparison_ratio: 4.0,
+    same_mode_cosine: 0.99,
+};
 
-/// The first negative shift tried for an unstable leaf, in
-/// A/(rho L^4), and the factor to the next.
-const FIRST_SHIFT: f64 = 1e-3;
+/// Shifts of the matrix, and how many searches there are.
+struct ModeSearch {
+    /// The first negative shift tried for an unstable leaf, in A/(rho L^4), and the factor to the next.
+    first_shift: f64,
+    next_shift: f64,
+    /// Factor to the next shift below the eigenvalues that are wanted, if they are not the lowest.
+    lower_shift: f64,
+    /// Eigenvalues are counted below the last one minus this part of its distance from the lower
+    /// shift; the first of these at which the matrix is not singular, and the next where one that is
+    /// missing is not found: in a stiff matrix rounding moves eigenvalues by as much.
+    counting_offsets: [f64; 3],
+    /// Eigenvalues are counted at least so many times the error of one below the last one.
+    counting_errors: f64,
+    /// Distance of a closer shift from clustered eigenvalues, as a part of that to the last shift, and
+    /// the factor of this distance for the next attempt.
+    closer_shift: f64,
+    closer_shift_growth: f64,
+    /// Least distance of a closer shift over the error of the bound on clustered eigenvalues.
+    closer_shift_errors: f64,
+    /// Eigenvectors of this accuracy or less are found with solutions that are not refined.
+    unrefined_accuracy: f64,
+    /// Number of searches that start with approximate modes.
+    approximate_starts: usize,
+    /// Largest number of searches in excess of one for every mode wanted: each finds only one
+    /// of equal eigenvalues.
+    extra_searches: usize,
+}
 
-const NEXT_SHIFT: f64 = 8.0;
-
-/// Eigenvalues are counted below the last one minus this part of its distance from
-/// the lower shift, or minus so many times the error of an eigenvalue; the first of these at
-/// which the matrix is not singular, and the next where one that is missing is not found: in a
-/// stiff matrix rounding moves eigenvalues by as much.
-const COUNTING_OFFSETS: [f64; 3] = [1e-7, 1e-6, 1e-5];
-
-const COUNTING_ERROR_MULTIPLE: f64 = 40.0;
-
-/// Factor to the next shift below those eigenvalues that are wanted, if they are not the lowest.
-const LOWER_SHIFT_FACTOR: f64 = 4.0;
-
-/// Shifts closer to clustered eigenvalues: the distance from them as a part of that to
-/// the last shift, at least so many times the error of the bound on them, and its factor for the
-/// next attempt.
-const CLOSER_SHIFT_FRACTION: f64 = 2e-3;
-
-const CLOSER_SHIFT_ERRORS: f64 = 0.5;
-
-const CLOSER_SHIFT_GROWTH: f64 = 6.0;
-
-/// Eigenvectors of this accuracy or less are found with solutions that are not refined.
-const UNREFINED_ACCURACY: f64 = 1e-6;
-
-/// Number of searches that start with approximate modes.
-const APPROXIMATE_MODE_STARTS: usize = 2;
-
-/// Largest number of searches in excess of one for every mode wanted: each finds only one
-/// of equal eigenvalues.
-const MAX_EXTRA_SEARCHES: usize = 16;
+const SEARCH: ModeSearch = ModeSearch {
+    first_shift: 1e-3,
+    next_shift: 8.0,
+    lower_shift: 4.0,
+    counting_offsets: [1e-7, 1e-6, 1e-5],
+    counting_errors: 40.0,
+    closer_shift: 2e-3,
+    closer_shift_growth: 6.0,
+    closer_shift_errors: 0.5,
+    unrefined_accuracy: 1e-6,
+    approximate_starts: 2,
+    extra_searches: 16,
+};
 
 /// A mode and its eigenvalue.
 #[derive(Clone, Debug)]
 pub struct Eigenpair {
-    /// Lambda.
+    /// Eigenvalue lambda, in A/(rho L^4).
     pub eigenvalue: f64,
     /// Turns and shifts of all nodes, rod after rod, base to tip.
     pub shape: Vec<Increment>,
@@ -91,9 +105,8 @@ pub struct Eigenpair {
 pub struct ModeRequest<'a> {
     /// Number of the lowest modes.
     pub count: usize,
-    /// Those next above so many others, which are not computed, and a negative shift to begin
-    /// with at which these are below it and the wanted ones above.
-    pub modes_below: Option<(usize, f64)>,
+    /// The modes below the wanted ones, if these are not the lowest: they are not computed.
+    pub modes_below: Option<ModesBelow>,
     /// Accuracy of eigenvectors; the error of an eigenvalue is its square.
     pub accuracy: f64,
     /// Shapes of approximate modes, from the same grid in a shape nearby or interpolated from
@@ -103,13 +116,36 @@ pub struct ModeRequest<'a> {
     pub time: &'a Limit,
 }
 
+/// Eigenvalues below a shift.
+#[derive(Clone, Copy, Debug)]
+pub struct ModesBelow {
+    /// Number of eigenvalues.
+    pub count: usize,
+    /// The shift; in a request negative and only to begin with.
+    pub shift: f64,
+}
+
+/// K - shift M, factorized.
+struct ShiftedMatrix {
+    shift: f64,
+    factors: MatrixFactors,
+}
+
+/// Eigenvalues that were not found.
+struct MissingModes {
+    count: usize,
+    /// They are below this value.
+    limit: f64,
+}
+
+/// The search for the modes of a leaf in one state.
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
     direct_solver: DirectSolver,
     masses: MassMatrix,
     wanted: ModeRequest<'a>,
-    /// [`ModeRequest::near`] as vectors.
+    /// [`ModeRequest::approximate_modes`] as vectors.
     approximate_modes: Vec<Vec<f64>>,
     /// The turns of veins without resistance.
     zero_energy_rotations: Vec<Vec<f64>>,
@@ -185,9 +221,8 @@ fn soften_leaf(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
-        *section = section.limit_condensing_stiffness(
-            STIFFNESS_CAP_IN_MATRIX.max(STIFFNESS_FORCE_RATIO * tension),
-        );
+        *section = section
+            .limit_condensing_stiffness(SOFTENING.stiffness.max(SOFTENING.force_ratio * tension));
         let added = section.condensing.recip() - section.compliance;
         section.condensing = (section.compliance + times * added).recip();
     }
@@ -202,23 +237,24 @@ impl Vibration<'_> {
     }
 
     /// K - shift M, factorized.
-    fn factorize(&self, system: &mut System, shift: f64) -> Option<MatrixFactors> {
+    fn factorize(&self, system: &mut System, shift: f64) -> Option<ShiftedMatrix> {
         self.assemble(system, shift);
-        self.direct_solver.factorize(system, 0.0).ok()
+        let factors = self.direct_solver.factorize(system, 0.0).ok()?;
+        Some(ShiftedMatrix { shift, factors })
     }
 
-    /// A shift below all eigenvalues that are wanted, as close to them as necessary.
-    fn shift_below_all(&self, system: &mut System) -> Option<(f64, MatrixFactors)> {
+    /// The matrix at a shift below all eigenvalues that are wanted, as close to them as necessary.
+    fn shift_below_all(&self, system: &mut System) -> Option<ShiftedMatrix> {
         let (others, mut shift, next) = match self.wanted.modes_below {
-            Some((others, shift)) => (others, shift, LOWER_SHIFT_FACTOR),
-            None => (0, -self.leaf.neutral_shift(), NEXT_SHIFT),
+            Some(below) => (below.count, below.shift, SEARCH.lower_shift),
+            None => (0, -self.leaf.neutral_shift(), SEARCH.next_shift),
         };
         loop {
-            let factor = self.factorize(system, shift)?;
-            if factor.negative_eigenvalue_count() <= others {
-                return Some((shift, factor));
+            let matrix = self.factorize(system, shift)?;
+            if matrix.factors.negative_eigenvalue_count() <= others {
+                return Some(matrix);
             }
-            shift = (next * shift).min(-FIRST_SHIFT);
+            shift = (next * shift).min(-SEARCH.first_shift);
             if !shift.is_finite() {
                 return None;
             }
@@ -253,76 +289,77 @@ impl Vibration<'_> {
         }
         let mut found = self.zero_energy_modes();
         let wanted = self.wanted.count;
-        let (lowest, mut factor) = self.shift_below_all(system)?;
-        let below = factor.negative_eigenvalue_count();
+        let mut matrix = self.shift_below_all(system)?;
+        let below = ModesBelow {
+            count: matrix.factors.negative_eigenvalue_count(),
+            shift: matrix.shift,
+        };
         // Some of the others may be above the shift.
         let others = self
             .wanted
             .modes_below
-            .map_or(0, |(others, _)| others - below);
+            .map_or(0, |others| others.count - below.count);
         // Beside turns as many more, so that the last one is not zero: the eigenvalues below it
         // are counted.
-        let count = (others + wanted + found.len()).min(self.direct_solver.size() - below);
-        let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count - found.len());
+        let count = (others + wanted + found.len()).min(self.direct_solver.size() - below.count);
+        let (mut limit, mut sought) = (f64::INFINITY, count - found.len());
         let under = |found: &[NormalizedEigenvector], limit| {
             found.iter().filter(|f| f.eigenvalue < limit).count()
         };
         let mut part = 0;
-        for search in 0..MAX_EXTRA_SEARCHES + count {
+        for search in 0..SEARCH.extra_searches + count {
             if self.wanted.time.reached() {
                 return None;
             }
             let before = under(&found, limit);
-            let bound = self.search(shift, &mut factor, sought, limit, search, &mut found);
+            let bound = self.search(&mut matrix, sought, limit, search, &mut found);
             if limit.is_finite() && under(&found, limit) == before {
-                part = (part + 1).min(COUNTING_OFFSETS.len() - 1);
+                part = (part + 1).min(SEARCH.counting_offsets.len() - 1);
             }
             if found.len() < count {
                 sought = count - found.len();
                 if let Some(bound) = bound
                     && let Some(closer) =
-                        self.closer_shift(system, shift, bound, below + found.len())?
+                        self.closer_shift(system, matrix.shift, bound, below.count + found.len())?
                 {
-                    (shift, factor) = closer;
+                    matrix = closer;
                 }
                 continue;
             }
-            let beyond = (lowest, below);
-            let (missing, next) =
-                self.count_missing(system, &found, count, beyond, &COUNTING_OFFSETS[part..])?;
-            if missing == 0 {
+            let parts = &SEARCH.counting_offsets[part..];
+            let missing = self.count_missing(system, &found, count, below, parts)?;
+            if missing.count == 0 {
                 let wanted = found.into_iter().take(count).skip(others).take(wanted);
                 return Some(wanted.collect());
             }
-            (sought, limit) = (missing.min(count), next);
-            if shift != lowest {
-                (shift, factor) = (lowest, self.factorize(system, lowest)?);
+            (sought, limit) = (missing.count.min(count), missing.limit);
+            if matrix.shift != below.shift {
+                matrix = self.factorize(system, below.shift)?;
             }
         }
         None
     }
 
-    /// Number of missing eigenvalues, and the value below which they are: just below the
-    /// `count`-th of those found, by one of these `parts`, as it may have further equal ones. So
-    /// many others are below the lowest shift.
+    /// The eigenvalues that are missing below a value just below the `count`-th of those found, by one
+    /// of these `parts`, as it may have further equal ones; `others` are below the lowest shift.
     fn count_missing(
         &self,
         system: &mut System,
         found: &[NormalizedEigenvector],
         count: usize,
-        (lowest, others): (f64, usize),
+        others: ModesBelow,
         parts: &[f64],
-    ) -> Option<(usize, f64)> {
+    ) -> Option<MissingModes> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.eigenvalue_rounding();
-        let least = COUNTING_ERROR_MULTIPLE * self.wanted.accuracy.powi(2);
+        let least = SEARCH.counting_errors * self.wanted.accuracy.powi(2);
         for &part in parts {
-            let part = part.max(least * part / COUNTING_OFFSETS[0]);
-            let below = last - (part * (last - lowest)).max(4.0 * rounding);
+            let part = part.max(least * part / SEARCH.counting_offsets[0]);
+            let below = last - (part * (last - others.shift)).max(4.0 * rounding);
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
             self.assemble(system, below);
             let mut there = self.direct_solver.count_negative(system, 0.0).ok()?;
-            if there != others + here {
+            if there != others.count + here {
                 // So close to an eigenvalue, quick factors may tell a wrong sign.
                 there = self
                     .direct_solver
@@ -331,30 +368,36 @@ impl Vibration<'_> {
                     .negative_eigenvalue_count();
             }
             // Too many: one is equal to the limit up to rounding.
-            if let Some(count) = there.checked_sub(others + here) {
-                return Some((count, below));
+            if let Some(count) = there.checked_sub(others.count + here) {
+                return Some(MissingModes {
+                    count,
+                    limit: below,
+                });
             }
         }
         None
     }
 
-    /// A shift closer to the next eigenvalues, if many are close together:
-    /// somewhat below `bound`, but above no eigenvalue that is not found yet.
+    /// The matrix at a shift closer to the next eigenvalues, if many are close together:
+    /// somewhat below `bound`, but above no eigenvalue that is not found yet. `Some(None)` if there is no
+    /// such shift, `None` if memory is short.
     fn closer_shift(
         &self,
         system: &mut System,
         shift: f64,
         bound: RitzBound,
         found: usize,
-    ) -> Option<Option<(f64, MatrixFactors)>> {
-        let mut part = CLOSER_SHIFT_FRACTION.max(CLOSER_SHIFT_ERRORS * bound.error);
+    ) -> Option<Option<ShiftedMatrix>> {
+        let mut part = SEARCH
+            .closer_shift
+            .max(SEARCH.closer_shift_errors * bound.error);
         while part < 1.0 {
             let closer = bound.eigenvalue - part * (bound.eigenvalue - shift);
-            let factor = self.factorize(system, closer)?;
-            if factor.negative_eigenvalue_count() <= found {
-                return Some(Some((closer, factor)));
+            let matrix = self.factorize(system, closer)?;
+            if matrix.factors.negative_eigenvalue_count() <= found {
+                return Some(Some(matrix));
             }
-            part *= CLOSER_SHIFT_GROWTH;
+            part *= SEARCH.closer_shift_growth;
         }
         Some(None)
     }
@@ -363,36 +406,61 @@ impl Vibration<'_> {
     /// fewer if there are no more below a limit; see [`Lanczos::run`].
     fn search(
         &self,
-        shift: f64,
-        factor: &mut MatrixFactors,
+        matrix: &mut ShiftedMatrix,
         sought: usize,
         limit: f64,
         search: usize,
         found: &mut Vec<NormalizedEigenvector>,
     ) -> Option<RitzBound> {
         let from_near =
-            search < APPROXIMATE_MODE_STARTS && found.len() < self.approximate_modes.len();
+            search < SEARCH.approximate_starts && found.len() < self.approximate_modes.len();
         let (start, check_every) = match from_near {
             true => (self.start_from_modes(found.len()), 2),
             false => (self.asymmetric_start(search), 4),
         };
-        let quick = self.wanted.accuracy >= UNREFINED_ACCURACY;
+        let quick = self.wanted.accuracy >= SEARCH.unrefined_accuracy;
+        let ShiftedMatrix { shift, factors } = matrix;
         let mut lanczos = Lanczos {
-            masses: &self.masses,
-            shift,
+            mass_product: &|v| self.masses.times(v),
+            shift: *shift,
             solve: &mut |b| match quick {
-                true => factor.solve_unrefined(b),
-                false => factor.solve_vector(b),
+                true => factors.solve_unrefined(b),
+                false => factors.solve_vector(b),
             },
             known_modes: found,
             accuracy: self.wanted.accuracy,
             check_every,
             time: self.wanted.time,
         };
-        let (more, bound) = lanczos.run(start, sought, limit);
-        found.extend(more);
+        let more = lanczos.run(start, sought, limit);
+        found.extend(more.modes);
         found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
-        bound
+        more.bound
+    }
+
+    /// A load that excites all approximate modes not found yet.
+    fn start_from_modes(&self, found: usize) -> Vec<f64> {
+        let mut load = vec![0.0; self.direct_solver.size()];
+        for near in &self.approximate_modes[found..] {
+            (load.iter_mut().zip(near)).for_each(|(load, near)| *load += near);
+        }
+        self.masses.times(&load)
+    }
+
+    /// A load without any symmetry, different in every search.
+    fn asymmetric_start(&self, search: usize) -> Vec<f64> {
+        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let mut load = vec![0.0; self.direct_solver.size()];
+        for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
+            let sigma = self.leaf.grid.sigma()[i];
+            let wave = (7.0 * search as f64 * sigma).sin();
+            for (c, at) in self.direct_solver.unknowns(j, i).into_iter().enumerate() {
+                let k = 18 * (j + 97 * search) + c;
+                load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
+            }
+        }
+        self.masses.times(&load)
     }
 
     /// A vector as turns and shifts of all nodes.
@@ -417,10 +485,11 @@ impl Vibration<'_> {
     }
 }
 
-/// Inertia of a node.
+/// Block of a node in the mass matrix.
 struct NodeMassBlock {
-    /// Rod, and number of the node.
-    index: (usize, usize),
+    rod: usize,
+    /// Number of the node on its rod.
+    node: usize,
     unknowns: [usize; 6],
     tensor: DMat3,
     mass: f64,
@@ -446,7 +515,8 @@ impl MassMatrix {
             // Fixed components have no mass.
             let free = leaf.node_freedom(j, i);
             NodeMassBlock {
-                index: (j, i),
+                rod: j,
+                node: i,
                 unknowns: pattern.unknowns(j, i),
                 tensor: if free.rotation { tensor } else { DMat3::ZERO },
                 mass: if free.displacement { inertia.mass } else { 0.0 },
@@ -459,7 +529,7 @@ impl MassMatrix {
         MassMatrix { nodes }
     }
 
-    /// M v.
+    /// The mass matrix times a vector.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; v.len()];
         for node in &self.nodes {
@@ -478,12 +548,11 @@ impl MassMatrix {
     /// Adds `factor` M to the matrix of a system.
     pub fn add_to_system(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let (j, i) = node.index;
             let stiffness = DiagonalBlocks {
                 rotary: node.tensor * factor,
                 translational: node.mass * factor,
             };
-            system.add_to_node(j, i, stiffness, Wrench::default());
+            system.add_to_node(node.rod, node.node, stiffness, Wrench::default());
         }
     }
 }
@@ -564,13 +633,7 @@ fn rotational_second_variation(segment: &Segment, section: &Section, a: DVec3, b
 /// Accuracy of eigenvectors for the derivatives of eigenvalues.
 const DERIVATIVE_ACCURACY: f64 = 1e-9;
 
-/// Ratio of the softenings from which the first-order effect of softening is computed.
-const SOFTENING_RATIO: f64 = 4.0;
-
-/// Cosine of the angle between two shapes above which they are the same mode.
-const SAME_MODE_COSINE: f64 = 0.99;
-
-/// As [`lowest`](crate::modes::lowest), with the shapes and forces of the leaf without softening:
+/// The modes of [`lowest`](crate::modes::lowest), with the shapes and forces of the leaf without softening:
 /// derivatives of an eigenvalue, unlike the eigenvalue itself, depend on errors of these
 /// in first order. The effect of softening is removed by means of the modes of a softer leaf.
 pub fn unsoftened_modes(
@@ -594,7 +657,7 @@ pub fn unsoftened_modes(
     let changed = |(soft, stiff): (&Section, &Section)| soft.condensing != stiff.condensing;
     if soft.sections.iter().zip(&leaf.sections).any(changed) {
         let near: Vec<_> = modes.iter().map(|mode| mode.shape.clone()).collect();
-        let softer = of(&soften_leaf(leaf, state, SOFTENING_RATIO), &near)?;
+        let softer = of(&soften_leaf(leaf, state, SOFTENING.comparison_ratio), &near)?;
         for (mode, softer) in modes.iter_mut().zip(&softer) {
             mode.remove_softening(softer);
         }
@@ -621,11 +684,11 @@ impl Eigenpair {
         };
         let (a, b) = (&self.shape, &softer.shape);
         let product = dot(a, b);
-        if product.abs() < SAME_MODE_COSINE * (dot(a, a) * dot(b, b)).sqrt() {
+        if product.abs() < SOFTENING.same_mode_cosine * (dot(a, a) * dot(b, b)).sqrt() {
             return;
         }
         let sign = product.signum();
-        let part = 1.0 / (SOFTENING_RATIO - 1.0);
+        let part = 1.0 / (SOFTENING.comparison_ratio - 1.0);
         let both = (self.shape.iter_mut().flatten()).zip(softer.shape.iter().flatten());
         both.for_each(|(value, softer)| *value += part * (*value - sign * softer));
         for (force, softer) in self.forces.iter_mut().zip(&softer.forces) {

@@ -65,7 +65,7 @@ pub struct Physics {
     density_unit: f64,
     /// External damping: every velocity decays at this rate.
     pub damping: f64,
-    /// Internal damping: retardation time.
+    /// Retardation time of internal damping: stresses follow strain plus this times its rate.
     pub retardation: f64,
     /// Part of the loads of single veins, and of the dead moments on points.
     rod_load_factor: f64,
@@ -199,7 +199,7 @@ impl Physics {
         }
     }
 
-    /// Whether there is wind.
+    /// Whether the scenario has wind.
     pub fn is_windy(&self) -> bool {
         self.air.is_some()
     }
@@ -369,7 +369,7 @@ impl SegmentDrag {
 }
 
 impl WindDrag {
-    /// On this leaf; `None` if its scenario has no wind.
+    /// The wind on a leaf; `None` if its scenario has none.
     pub fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
         let drag = |(j, i)| physics.drag(leaf, j, i);

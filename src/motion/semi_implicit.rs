@@ -117,8 +117,8 @@ const SHORT_STEP_ADVICE: &str = "use more segments a rod, or slower changes of t
 const SHORT_FIRST_STEP_ADVICE: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
     use dynamics.start = \"at-rest\", or a lower stiffness";
 
-/// Weights of the method.
 #[derive(Clone, Copy, Debug)]
+/// Weights of the generalized-alpha method.
 struct GeneralizedAlphaWeights {
     alpha_m: f64,
     alpha_f: f64,
@@ -127,7 +127,7 @@ struct GeneralizedAlphaWeights {
 }
 
 impl GeneralizedAlphaWeights {
-    /// For a spectral radius `rho_inf` at infinite frequency.
+    /// The weights with which the spectral radius at infinite frequency is `rho_inf`.
     fn from_spectral_radius(rho_inf: f64) -> Self {
         let alpha_m = (2.0 * rho_inf - 1.0) / (rho_inf + 1.0);
         let alpha_f = rho_inf / (rho_inf + 1.0);
@@ -164,14 +164,12 @@ impl StepControl {
     }
 }
 
-/// Motion of a node: pairs of an angular and a linear vector.
+/// Motion of a node: velocity v, auxiliary acceleration a and acceleration w of the method, each an angular
+/// and a linear vector.
 #[derive(Clone, Copy, Debug, Default)]
 struct NodeMotion {
-    /// Velocity.
     v: [DVec3; 2],
-    /// Auxiliary acceleration.
     a: [DVec3; 2],
-    /// Acceleration.
     w: [DVec3; 2],
 }
 

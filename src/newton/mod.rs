@@ -1,44 +1,65 @@
-//! Newton's method for the equilibrium of a discrete leaf: the iteration, its
-//! convergence test, and the solution of its linear equations.
-//!
-//! Convergence tests of Newton's method.
-//!
-//! Forces that follow a leaf and have no potential, in Newton's method: their derivative makes the
+//! Newton's method for the equilibrium of a discrete leaf: the iteration and the solution of its linear
+//! equations, also with forces that follow the leaf and have no potential, whose derivative makes the
 //! matrix unsymmetric.
 //!
-//! With the symmetric matrix K without them and the derivative W of them, (1 - K^-1 W) d = K^-1 r
+//! With the symmetric matrix K without these forces and their derivative W, (1 - K^-1 W) d = K^-1 r
 //! is solved by GMRES ([`solve_minimal_residual`]). K is
 //! factorized once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
-mod force_progress;
+mod convergence;
 
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
 use crate::leaf::{
     DirectError, DirectSolver, DiscreteLeaf, Increment, LinearSolveOutcome, MassLoad,
     MatrixFactors, NodalField, State, System,
 };
-pub use crate::newton::force_progress::ForceConvergence;
-use crate::numbers::larger;
+use crate::newton::convergence::INCREMENTS;
+pub use crate::newton::convergence::{
+    Contraction, ForceConvergence, RequiredAccuracy, StallCounter, is_at_saddle, remaining_error,
+    satisfies_lengths,
+};
 use crate::rod::RESOLVED_TURN;
 use serde::Serialize;
 use std::ops::Add;
 
 /// Shift of the matrix (times the mass matrix, in squared frequencies; the lowest of a clamped
 /// rod is 12) that lets Newton's method of a stiff leaf cross a region where its energy is not
-/// convex: the first tried, the one below which it is set to zero, the one above which the
-/// iteration fails.
-const FIRST_SHIFT: f64 = 30.0;
+/// convex.
+struct ConvexityShifts {
+    /// The first shift tried.
+    first: f64,
+    /// The shift below which it is set to zero.
+    least: f64,
+    /// The shift above which the iteration fails.
+    largest: f64,
+}
 
-const LEAST_SHIFT: f64 = 1.0;
+const SHIFTS: ConvexityShifts = ConvexityShifts {
+    first: 30.0,
+    least: 1.0,
+    largest: 1e6,
+};
 
-const LARGEST_SHIFT: f64 = 1e6;
+/// Relative accuracies of the conjugate gradients, in the energy norm. Ten times as accurate they take a
+/// few iterations more.
+struct CgAccuracies {
+    /// Accuracy for an increment over the size of the one before.
+    per_increment: f64,
+    /// Best accuracy asked for.
+    best: f64,
+    /// Accuracy for a proximal step.
+    proximal: f64,
+    /// Accuracy for further right-hand sides.
+    repeated: f64,
+}
 
-/// Relative accuracy of the conjugate gradients for a proximal step.
-const PROXIMAL_ACCURACY: f64 = 1e-6;
-
-/// Relative accuracy of the conjugate gradients for further right-hand sides.
-const REPEATED_SOLVE_ACCURACY: f64 = 1e-10;
+const CG: CgAccuracies = CgAccuracies {
+    per_increment: 3e-3,
+    best: 1e-10,
+    proximal: 1e-6,
+    repeated: 1e-10,
+};
 
 /// Work done by a solver; deterministic, so that tests can check it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -69,7 +90,7 @@ impl Add for SolverCounts {
 /// Why an iteration or a motion on one grid did not reach a stable equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EquilibriumFailure {
-    /// At rest although the energy has a direction of descent there.
+    /// The leaf is at rest although its energy has a direction of descent there.
     Saddle,
     /// A segment bends by more than the grid can resolve.
     Unresolved,
@@ -86,7 +107,7 @@ pub enum EquilibriumFailure {
 pub enum LinearSolveFailure {
     /// The matrix is not positive definite.
     Indefinite,
-    /// It does not fit into the memory that is allowed.
+    /// The matrix does not fit into the memory that is allowed.
     Memory,
 }
 
@@ -113,7 +134,7 @@ impl From<DirectError> for EquilibriumFailure {
 /// iterations are cheap compared with an assembly, so that their error should not limit the
 /// next step.
 pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
-    (3e-3 * previous).clamp(1e-10, loosest)
+    (CG.per_increment * previous).clamp(CG.best, loosest)
 }
 
 /// Solver for matrices that must be positive definite: by conjugate gradients preconditioned
@@ -128,7 +149,7 @@ pub struct DefiniteSolver {
 }
 
 impl DefiniteSolver {
-    /// With the convergence of Newton's method observed before.
+    /// A solver with the convergence of Newton's method observed before.
     pub fn with_contraction(contraction: Contraction) -> Self {
         DefiniteSolver {
             contraction,
@@ -181,7 +202,7 @@ impl DefiniteSolver {
             Some(factors) => Some(factors.solve_bordered(forces, &[]).increments),
             None => {
                 system.set_rhs(forces);
-                let solved = system.solve(None, REPEATED_SOLVE_ACCURACY);
+                let solved = system.solve(None, CG.repeated);
                 matches!(solved, LinearSolveOutcome::Converged(_)).then(|| system.solution())
             }
         }
@@ -190,20 +211,20 @@ impl DefiniteSolver {
 
 /// The linear equations of an iteration, and its limits on increments.
 pub enum NewtonEquations<'s> {
-    /// With pivots of any sign, by a sparse factorization whose pattern is reused; increments
+    /// Equations with pivots of any sign, by a sparse factorization whose pattern is reused; increments
     /// are shortened to the given size. Converges to an equilibrium nearby, stable or not,
     /// like a solver of boundary-value problems.
     Indefinite { largest: f64 },
-    /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
+    /// Equations of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
-    /// Of a leaf on which forces act that have no potential, with their derivatives: the matrix is
+    /// Equations of a leaf on which forces act that have no potential, with their derivatives: the matrix is
     /// unsymmetric, and pivots without them have any sign. An increment above the given size ends
     /// the iteration.
     Following {
         forces: &'s dyn FollowerForces,
         largest: f64,
     },
-    /// With a positive definite matrix, shifted where necessary if it may be; an increment above
+    /// Equations with a positive definite matrix, shifted where necessary if it may be; an increment above
     /// the given size ends the iteration.
     Definite {
         solver: &'s mut DefiniteSolver,
@@ -213,7 +234,7 @@ pub enum NewtonEquations<'s> {
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
     },
-    /// With springs of `rate` times the masses that hold the nodes at their places in `at`: a
+    /// Equations with springs of `rate` times the masses that hold the nodes at their places in `at`: a
     /// step of implicit Euler without inertia, or of the proximal point method. The matrix
     /// must be positive definite; an increment above the given size ends the iteration.
     Proximal {
@@ -224,23 +245,37 @@ pub enum NewtonEquations<'s> {
     },
 }
 
+/// Limits on the sizes of increments (radians, lengths).
+struct IncrementLimits {
+    /// Size to which an increment is shortened.
+    longest: f64,
+    /// Size above which an increment is rejected.
+    refused: f64,
+}
+
 impl NewtonEquations<'_> {
-    /// The size to which an increment is shortened, and that above which it is rejected.
-    fn limits(&self) -> (f64, f64) {
+    /// The limits on the sizes of increments.
+    fn limits(&self) -> IncrementLimits {
+        let mut limits = IncrementLimits {
+            longest: f64::INFINITY,
+            refused: f64::INFINITY,
+        };
         match self {
-            NewtonEquations::Indefinite { largest } => (*largest, f64::INFINITY),
-            NewtonEquations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
+            NewtonEquations::Indefinite { largest } => limits.longest = *largest,
+            NewtonEquations::Unsymmetric => {}
             NewtonEquations::Definite { largest, .. }
             | NewtonEquations::Proximal { largest, .. }
-            | NewtonEquations::Following { largest, .. } => (f64::INFINITY, *largest),
+            | NewtonEquations::Following { largest, .. } => limits.refused = *largest,
         }
+        limits
     }
 }
 
 /// The parameters of a Newton iteration.
 pub struct NewtonIteration<'a> {
-    /// Of positions and rotations.
+    /// Accuracy of positions and rotations (lengths, radians).
     pub accuracy: f64,
+    /// Largest number of iterations.
     pub iterations: usize,
     pub work: &'a mut SolverCounts,
     /// Receives the size of every step.
@@ -271,7 +306,7 @@ impl NewtonIteration<'_> {
         system: &mut System,
         equations: NewtonEquations,
     ) -> Result<f64, EquilibriumFailure> {
-        let (longest, refused) = equations.limits();
+        let IncrementLimits { longest, refused } = equations.limits();
         let any_sign = matches!(equations, NewtonEquations::Indefinite { .. });
         let mut linear = NewtonLinearSolver {
             equations,
@@ -319,9 +354,9 @@ impl NewtonIteration<'_> {
             (self.progress)(step, size);
             let at_rest = forces.has_converged(self.accuracy);
             if any_sign
-                && size < NEUTRAL_STEP
+                && size < INCREMENTS.neutral_step
                 && at_rest
-                && leaf.residual(state) < BALANCED_RESIDUAL
+                && leaf.residual(state) < INCREMENTS.balanced_residual
             {
                 return Ok(size.min(self.accuracy));
             }
@@ -339,8 +374,11 @@ impl NewtonIteration<'_> {
                     _ => Contraction::default().error_after_first(size, 0.0),
                 };
                 let tolerances = [previous_tolerance, tolerance];
-                let accuracy = (self.accuracy, INCREMENT_ROUNDING);
-                let remaining = remaining_error(size, previous, tolerances, accuracy, first);
+                let required = RequiredAccuracy {
+                    accuracy: self.accuracy,
+                    rounding: INCREMENTS.rounding,
+                };
+                let remaining = remaining_error(size, previous, tolerances, required, first);
                 if let Some(remaining) = remaining
                     && at_rest
                     && satisfies_lengths(leaf, state, self.accuracy)
@@ -349,7 +387,7 @@ impl NewtonIteration<'_> {
                 }
             }
             linear.shift /= 10.0;
-            if linear.shift < LEAST_SHIFT {
+            if linear.shift < SHIFTS.least {
                 linear.shift = 0.0;
             }
             previous = size;
@@ -393,7 +431,7 @@ impl NewtonLinearSolver<'_> {
                 Some(factors.solve_bordered(forces, &[]).increments)
             }
             NewtonEquations::Following { forces: follow, .. } => {
-                solve_with_follower_forces(self.factors.as_mut()?, forces, (*follow, state))
+                solve_with_follower_forces(self.factors.as_mut()?, forces, *follow, state)
             }
         }
     }
@@ -433,7 +471,7 @@ impl NewtonLinearSolver<'_> {
                 let pattern = self.direct_solver.insert(pattern);
                 let mut factors = pattern.factorize(system, self.neutral)?;
                 let rhs = system.rhs();
-                let found = solve_with_follower_forces(&mut factors, &rhs, (*forces, state));
+                let found = solve_with_follower_forces(&mut factors, &rhs, *forces, state);
                 system.set_solution(&found.ok_or(EquilibriumFailure::NoDescent)?);
                 self.factors = Some(factors);
                 Ok(0.0)
@@ -457,8 +495,8 @@ impl NewtonLinearSolver<'_> {
                     factor: *rate,
                 });
                 let shift = self.neutral + *rate;
-                match solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work) {
-                    Ok(()) => Ok(PROXIMAL_ACCURACY),
+                match solver.solve(system, shift, springs, CG.proximal, work) {
+                    Ok(()) => Ok(CG.proximal),
                     Err(LinearSolveFailure::Indefinite) => Err(EquilibriumFailure::NoDescent),
                     Err(LinearSolveFailure::Memory) => Err(EquilibriumFailure::Memory),
                 }
@@ -477,8 +515,8 @@ impl NewtonLinearSolver<'_> {
                         Err(LinearSolveFailure::Memory) => return Err(EquilibriumFailure::Memory),
                         Err(LinearSolveFailure::Indefinite) => {}
                     }
-                    self.shift = (4.0 * self.shift).max(FIRST_SHIFT);
-                    if !*shifted || self.shift > LARGEST_SHIFT {
+                    self.shift = (4.0 * self.shift).max(SHIFTS.first);
+                    if !*shifted || self.shift > SHIFTS.largest {
                         return Err(EquilibriumFailure::NoDescent);
                     }
                 }
@@ -487,133 +525,12 @@ impl NewtonLinearSolver<'_> {
     }
 }
 
-/// An increment (radians, lengths) below this that does not decrease is due to rounding.
-pub const INCREMENT_ROUNDING: f64 = 1e-9;
-
-/// Increments below this (radians, lengths) are attributed to rounding in a neutral mode if no
-/// force or moment above the second number (A/L^2, A/L) is unbalanced.
-pub const NEUTRAL_STEP: f64 = 1e-5;
-
-pub const BALANCED_RESIDUAL: f64 = 1e-9;
-
-/// So many such increments in a row are no convergence.
-const MAX_STALLED_INCREMENTS: usize = 20;
-
-/// Increments below this (radians, lengths) are used to measure quadratic convergence.
-const ASYMPTOTIC_INCREMENT: f64 = 0.05;
-
-/// Safety factor on the error after a first increment. Of some 1500 first increments from
-/// predicted states one in a hundred left more than three times the error expected.
-const FIRST_SAFETY: f64 = 10.0;
-
-/// An increment counts as decreasing if it is at most this part of the one before.
-const DECREASING: f64 = 0.3;
-
-/// Bound on the error left by the conjugate gradients, in units of the accuracy: far more than
-/// they usually leave.
-const CG_ERROR_BOUND: f64 = 5.0;
-
-/// A leaf whose matrix without inertia is not positive definite is at a saddle if a step moves
-/// it by less than this (radians, lengths) and no force or moment above the second number
-/// (A/L^2, A/L) is unbalanced.
-const SADDLE_STEP: f64 = 1e-7;
-
-const SADDLE_RESIDUAL: f64 = 1e-6;
-
-/// Length error of a nearly rigid rod that is attributed to rounding.
-const LENGTH_ROUNDING: f64 = 1e-11;
-
-/// The constant of quadratic convergence of Newton's method: the largest ratio of an increment
-/// to the square of the one before it. It is shared by all grids of a leaf.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Contraction(f64);
-
-impl Contraction {
-    /// Updates the constant with an increment after one of size `previous`.
-    pub fn update(&mut self, size: f64, previous: f64) {
-        if previous < ASYMPTOTIC_INCREMENT {
-            self.0 = larger(self.0, size / (previous * previous));
-        }
-    }
-
-    /// Whether an increment has followed another one.
-    pub fn is_measured(&self) -> bool {
-        self.0 > 0.0
-    }
-
-    /// The error after a first increment with which the largest change of a force (A/L^2) is
-    /// `force`; the force is ignored before any convergence has been measured.
-    pub fn error_after_first(&self, size: f64, force: f64) -> f64 {
-        let force = if self.0 > 0.0 { force } else { 0.0 };
-        FIRST_SAFETY * self.0.max(1.0) * size * size.max(force)
-    }
-}
-
-/// The remaining error after an increment of this `size`, which follows one of size
-/// `previous`: of second order at best, and never less than the error of the conjugate
-/// gradients. Their accuracies, of the previous increment and of this one, are in the energy
-/// norm, to which soft modes contribute little; as this increment contains their error in the
-/// previous one, it bounds the factor by which they may be worse (an infinite accuracy: not
-/// used, as rods are not coupled). After a first increment (`previous` infinite) the error is
-/// `first`, from [`Contraction`]. `None` if the error exceeds `accuracy` or that bound exceeds
-/// [`BOUND`] times as much, unless the increment is below `rounding` and does not decrease.
-pub fn remaining_error(
-    size: f64,
-    previous: f64,
-    cg_tolerances: [f64; 2],
-    (accuracy, rounding): (f64, f64),
-    first: f64,
-) -> Option<f64> {
-    let rate = (size / previous).min(1.0);
-    let quadratic = match previous.is_finite() {
-        true => size * (rate * rate),
-        false => first,
-    };
-    let [before, now] = cg_tolerances;
-    let remaining = larger(quadratic, now * size);
-    let bounded = rate * now * size <= CG_ERROR_BOUND * accuracy * before;
-    match size < rounding && rate > DECREASING {
-        true => Some(size),
-        false => (remaining <= accuracy && bounded).then_some(remaining),
-    }
-}
-
-/// Counts increments in a row that very soft veins owe to rounding: they turn by more than
-/// [`ROUNDING`] where all forces are balanced.
-#[derive(Default)]
-pub struct StallCounter(usize);
-
-impl StallCounter {
-    /// The size of increments that are due to rounding if they do not decrease, at a `state`
-    /// after an increment of this `size`.
-    pub fn increment_rounding(&mut self, leaf: &DiscreteLeaf, state: &State, size: f64) -> f64 {
-        let turns = (INCREMENT_ROUNDING..NEUTRAL_STEP).contains(&size)
-            && leaf.residual(state) < BALANCED_RESIDUAL;
-        self.0 = if turns { self.0 + 1 } else { 0 };
-        match self.0 > MAX_STALLED_INCREMENTS {
-            true => NEUTRAL_STEP,
-            false => INCREMENT_ROUNDING,
-        }
-    }
-}
-
-/// Whether nearly rigid segments of a converged leaf have their lengths.
-pub fn satisfies_lengths(leaf: &DiscreteLeaf, state: &State, accuracy: f64) -> bool {
-    leaf.satisfies_lengths(state, accuracy.max(LENGTH_ROUNDING))
-}
-
-/// Whether a leaf whose matrix without inertia is not positive definite rests at
-/// a saddle, after an increment of this size.
-pub fn is_at_saddle(leaf: &DiscreteLeaf, state: &State, size: f64) -> bool {
-    size < SADDLE_STEP && leaf.residual(state) < SADDLE_RESIDUAL
-}
-
-/// Accuracy of the solution. No direction is left out: none is undetermined.
+/// Limits of GMRES with follower forces. No direction is left out: none is undetermined.
 const FOLLOWER_KRYLOV_LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-10,
     most: 100,
     singular_value_limit: 0.0,
-    stagnation_limit: None,
+    stagnation: None,
 };
 
 /// Forces on the nodes of a leaf that are not the derivatives of an energy.
@@ -625,12 +542,13 @@ pub trait FollowerForces {
     fn add_derivative(&self, state: &State, increments: &NodalField, forces: &mut NodalField);
 }
 
-/// Solves for the increments under these forces with the factors of K; `None` if too many
-/// directions would be needed.
-pub fn solve_with_follower_forces(
+/// Solves for the increments under `forces`, with the derivative of the `following` ones, from the factors
+/// of K; `None` if too many directions would be needed.
+fn solve_with_follower_forces(
     factors: &mut MatrixFactors,
     forces: &NodalField,
-    (following, state): (&dyn FollowerForces, &State),
+    following: &dyn FollowerForces,
+    state: &State,
 ) -> Option<NodalField> {
     let mut solved = |forces: &NodalField| factors.solve_bordered(forces, &[]).increments;
     let start = solved(forces);
@@ -656,7 +574,7 @@ fn flattened(field: &NodalField) -> Vec<f64> {
     field.iter().flatten().flatten().copied().collect()
 }
 
-/// The increments again, of rods of so many nodes.
+/// The field of these numbers, of rods of so many nodes.
 fn unflattened(numbers: &[f64], nodes: usize) -> NodalField {
     let increments: Vec<Increment> = (numbers.chunks_exact(6))
         .map(|six| std::array::from_fn(|c| six[c]))

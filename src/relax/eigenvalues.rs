@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
 use crate::modes;
-use crate::modes::{Eigenpair, ModeRequest};
+use crate::modes::{Eigenpair, ModeRequest, ModesBelow};
 use crate::motion::Physics;
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
@@ -149,7 +149,10 @@ pub fn lowest(
     let on = |level: &GridLevel, near: &[Vec<Increment>]| {
         let wanted = ModeRequest {
             count,
-            modes_below: omitted.map(|omitted| (omitted.count, omitted.shift)),
+            modes_below: omitted.map(|omitted| ModesBelow {
+                count: omitted.count,
+                shift: omitted.shift,
+            }),
             accuracy: (EIGENVALUES.vectors * tolerance.sqrt())
                 .clamp(EIGENVALUES.best_vectors, EIGENVALUES.worst_vectors),
             approximate_modes: near,

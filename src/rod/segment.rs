@@ -1,72 +1,22 @@
-//! A single segment, in scalar arithmetic.
-//!
-//! Sections: the material data of segments.
+//! A single segment, in scalar arithmetic: its strains, energy and derivatives.
 
-use crate::rod::{Element, LaneNodes};
-use crate::rotation;
+use crate::rod::element::{Element, FirstDerivatives};
+use crate::rod::section::{NodePair, Section, SectionParameterDerivative};
 use crate::rotation::RelativeRotation;
-use crate::simd::{GROUP, Lanes, NumberGroup, Vectors};
-use glam::{DMat3, DQuat, DVec3};
-use pulp::{Scalar, Simd};
-
-/// Moment and force on a node.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wrench {
-    pub moment: DVec3,
-    pub force: DVec3,
-}
-
-impl Wrench {
-    /// A force without a moment.
-    pub fn from_force(force: DVec3) -> Self {
-        let moment = DVec3::ZERO;
-        Wrench { moment, force }
-    }
-}
-
-/// The two nodes of a segment.
-#[derive(Clone, Copy, Debug)]
-pub struct NodePair {
-    /// Positions of the nodes.
-    pub x: [DVec3; 2],
-    /// Rotations of the nodes.
-    pub q: [DQuat; 2],
-}
-
-impl From<&NodePair> for LaneNodes<Scalar> {
-    fn from(ends: &NodePair) -> Self {
-        LaneNodes {
-            x: ends.x.map(Vectors::from),
-            q: ends.q.map(rotation::from_quaternion),
-        }
-    }
-}
-
-/// The derivative of a section with respect to a parameter.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SectionParameterDerivative {
-    /// Of its reference length.
-    pub ds: f64,
-    /// Of its couple stiffness.
-    pub couple_stiffness: DVec3,
-    /// Of its rest curvature.
-    pub rest_curvature: DVec3,
-    /// Of its rest strain.
-    pub rest_strain: DVec3,
-    /// Of its compliance.
-    pub compliance: DVec3,
-}
+use crate::simd::Vectors;
+use glam::{DMat3, DVec3};
+use pulp::Scalar;
 
 /// The derivative of a segment with respect to a parameter of its section, with nodes and
 /// force fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentParameterDerivative {
-    /// Of the derivatives of Pi with respect to the rotations of its nodes; that with
+    /// Derivative of the derivatives of Pi with respect to the rotations of its nodes; that with
     /// respect to their positions does not change.
     pub gradient: [DVec3; 2],
-    /// Of its gap, the residual of the constitutive law.
+    /// Derivative of the gap, the residual of the constitutive law.
     pub gap: DVec3,
-    /// Of Pi itself, the elastic energy at rest.
+    /// Derivative of Pi itself, the elastic energy at rest.
     pub energy: f64,
 }
 
@@ -97,9 +47,13 @@ pub struct SegmentGradient {
     pub b: DVec3,
 }
 
-impl From<[DVec3; 3]> for SegmentGradient {
-    fn from([x, a, b]: [DVec3; 3]) -> Self {
-        SegmentGradient { x, a, b }
+impl From<FirstDerivatives<Scalar>> for SegmentGradient {
+    fn from(first: FirstDerivatives<Scalar>) -> Self {
+        SegmentGradient {
+            x: first.x.into(),
+            a: first.a.into(),
+            b: first.b.into(),
+        }
     }
 }
 
@@ -212,17 +166,13 @@ impl Segment {
 
     /// First derivatives of Pi at fixed force.
     pub fn gradient(&self, section: &Section) -> SegmentGradient {
-        self.element()
-            .gradient(&section.into())
-            .map(DVec3::from)
-            .into()
+        self.element().gradient(&section.into()).into()
     }
 
-    /// As [`Segment::gradient`], with the force condensed out: the right-hand side for
+    /// First derivatives as [`Segment::gradient`], with the force condensed out: the right-hand side for
     /// [`Segment::hessian`].
     pub fn condensed_gradient(&self, section: &Section) -> SegmentGradient {
-        let gradient = self.element().condensed(&section.into());
-        gradient.map(DVec3::from).into()
+        self.element().condensed(&section.into()).into()
     }
 
     /// Second derivatives, the force condensed out.
@@ -304,78 +254,10 @@ impl Segment {
     }
 }
 
-/// The material data of a segment, at its midpoint.
-#[derive(Clone, Copy, Debug)]
-pub struct Section {
-    /// Reference length of the segment.
-    pub ds: f64,
-    /// Couple stiffness A: torsion, bending about d2, about d3.
-    pub couple_stiffness: DVec3,
-    /// Rest curvature u0.
-    pub rest_curvature: DVec3,
-    /// Rest strain v0; (1, 0, 0) without growth or shear.
-    pub rest_strain: DVec3,
-    /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
-    pub compliance: DVec3,
-    /// Stiffness with which the force is condensed out: H, or an upper limit if H is larger
-    /// (see [`Section::limit_condensing_stiffness`]).
-    pub condensing: DVec3,
-}
-
-impl Section {
-    /// Limits the stiffness with which the force is condensed out to `largest`. Beyond it the
-    /// matrix is that of a softer rod while the residual stays exact: a proximal step in the
-    /// force, which leaves solutions unchanged, adds linear convergence with a factor of the
-    /// order of 1/`largest`, and keeps the pivots within double precision.
-    pub fn limit_condensing_stiffness(mut self, largest: f64) -> Self {
-        self.condensing = self.compliance.recip().min(DVec3::splat(largest));
-        self
-    }
-}
-
-/// Sections of several segments.
-#[derive(Clone, Copy)]
-pub struct LaneSections<S: Simd> {
-    pub(crate) ds: Lanes<S>,
-    pub(crate) per_ds: Lanes<S>,
-    pub(crate) couple_stiffness: Vectors<S>,
-    pub(crate) rest_curvature: Vectors<S>,
-    pub(crate) rest_strain: Vectors<S>,
-    pub(crate) compliance: Vectors<S>,
-    pub(crate) condensing: Vectors<S>,
-}
-
-impl<S: Simd> LaneSections<S> {
-    /// The sections of a group, one in every lane, from the lane `part` on.
-    #[inline(always)]
-    pub fn from_group_sections(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
-        let ds = NumberGroup([a.ds, b.ds, c.ds, d.ds]);
-        let ds = Lanes::load_group(simd, &ds, part);
-        let vectors = |of: fn(&Section) -> DVec3| {
-            Vectors::from_group(simd, [of(a), of(b), of(c), of(d)], part)
-        };
-        LaneSections {
-            ds,
-            per_ds: ds.recip(),
-            couple_stiffness: vectors(|s| s.couple_stiffness),
-            rest_curvature: vectors(|s| s.rest_curvature),
-            rest_strain: vectors(|s| s.rest_strain),
-            compliance: vectors(|s| s.compliance),
-            condensing: vectors(|s| s.condensing),
-        }
-    }
-}
-
-impl From<&Section> for LaneSections<Scalar> {
-    #[inline]
-    fn from(section: &Section) -> Self {
-        LaneSections::from_group_sections(Scalar, [section; GROUP], 0)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
 
     /// For a compressed segment the excess is that of the neutral wave; for a pulled one it is
     /// zero.

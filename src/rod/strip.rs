@@ -13,8 +13,8 @@
 //! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
 //! direction, in which it then carries no force.
 
-use crate::rod::segment::{LaneSections, NodePair, Section, Wrench};
-use crate::rod::{Element, FirstDerivatives, LaneNodes, UNKNOWNS, nodal_gradient};
+use crate::rod::element::{Element, FirstDerivatives, UNKNOWNS, nodal_gradient};
+use crate::rod::section::{LaneNodes, LaneSections, NodePair, Section, Wrench};
 use crate::rotation;
 use crate::simd::Vectors;
 use glam::DVec3;
@@ -53,6 +53,18 @@ pub struct StripLoads {
     pub on_nodes: [Wrench; 2],
 }
 
+/// A strip as an element between its ends.
+struct StripElement {
+    element: Element<Scalar>,
+    sections: LaneSections<Scalar>,
+}
+
+/// The strains e along the directors, and the fold theta_1.
+struct StripStrains {
+    e: DVec3,
+    theta: f64,
+}
+
 impl TissueStrip {
     /// A strip that is without force between these ends.
     pub fn stress_free_between(stiffness: DVec3, fold: f64, ends: &NodePair) -> TissueStrip {
@@ -65,12 +77,12 @@ impl TissueStrip {
         }
     }
 
-    /// Whether it resists anything.
+    /// Whether the strip resists any strain.
     pub fn has_stiffness(&self) -> bool {
         self.stiffness != DVec3::ZERO || self.fold_stiffness != 0.0
     }
 
-    /// The difference from another strip.
+    /// The difference of the data from those of another strip.
     pub fn difference_from(&self, other: &TissueStrip) -> TissueStrip {
         TissueStrip {
             stiffness: self.stiffness - other.stiffness,
@@ -80,7 +92,7 @@ impl TissueStrip {
         }
     }
 
-    /// Adds `times` another strip.
+    /// Adds `times` the data of another strip.
     pub fn add(&mut self, times: f64, other: &TissueStrip) {
         self.stiffness += times * other.stiffness;
         self.fold_stiffness += times * other.fold_stiffness;
@@ -88,8 +100,8 @@ impl TissueStrip {
         self.stress_free_rotation += times * other.stress_free_rotation;
     }
 
-    /// Between these ends, carrying the force of its strains.
-    fn strained_element(&self, ends: &NodePair) -> (Element<Scalar>, LaneSections<Scalar>) {
+    /// The strip between these ends, carrying the force of its strains.
+    fn strained_element(&self, ends: &NodePair) -> StripElement {
         let sections = LaneSections::from(&Section {
             ds: 1.0,
             couple_stiffness: self.fold_stiffness * DVec3::X,
@@ -98,39 +110,38 @@ impl TissueStrip {
             compliance: DVec3::ZERO,
             condensing: self.stiffness,
         });
-        (
-            Element::with_strain_forces(&sections, &LaneNodes::from(ends)),
+        StripElement {
+            element: Element::with_strain_forces(&sections, &LaneNodes::from(ends)),
             sections,
-        )
+        }
     }
 
-    /// Between these ends, carrying the spatial `force`. In directions without stiffness it carries
-    /// none.
-    fn element_with_force(
-        &self,
-        ends: &NodePair,
-        force: DVec3,
-    ) -> (Element<Scalar>, LaneSections<Scalar>) {
-        let (mut element, sections) = self.strained_element(ends);
+    /// The strip between these ends, carrying the spatial `force`. In directions without stiffness it
+    /// carries none.
+    fn element_with_force(&self, ends: &NodePair, force: DVec3) -> StripElement {
+        let StripElement {
+            mut element,
+            sections,
+        } = self.strained_element(ends);
         let dx = DVec3::from(element.w);
         let stiff = self.stiffness.cmpgt(DVec3::ZERO);
         let carried = DVec3::from(Vectors::from(force).director_components(element.frame));
         let nu = DVec3::select(stiff, carried, DVec3::ZERO);
         let w = DVec3::select(stiff, self.stress_free_gap + nu / self.stiffness, dx);
         (element.nu, element.w, element.gap) = (nu.into(), w.into(), (dx - w).into());
-        (element, sections)
+        StripElement { element, sections }
     }
 
     /// The spatial force of its strains between these ends.
     pub fn force(&self, ends: &NodePair) -> DVec3 {
-        let (element, _) = self.strained_element(ends);
+        let element = self.strained_element(ends).element;
         element.nu.from_director_components(element.frame).into()
     }
 
     /// The right-hand side for [`TissueStrip::hessian`] if it carries this spatial force, which is condensed
     /// out.
     pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [Wrench; 2] {
-        let (element, _) = self.element_with_force(ends, force);
+        let element = self.element_with_force(ends, force).element;
         let Element { nu, w, gap, .. } = element;
         let correction = Vectors::from(self.stiffness) * gap;
         let g_mu = nu.cross(w + gap) - w.cross(correction);
@@ -146,7 +157,7 @@ impl TissueStrip {
         dx: DVec3,
         turns: [DVec3; 2],
     ) -> DVec3 {
-        let (element, _) = self.element_with_force(ends, force);
+        let element = self.element_with_force(ends, force).element;
         let onto = |v: DVec3| DVec3::from(Vectors::from(v).director_components(element.frame));
         let [alpha, beta] = turns.map(onto);
         let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
@@ -158,16 +169,19 @@ impl TissueStrip {
             .into()
     }
 
-    /// The strains e and theta_1 between these ends.
-    fn strains(&self, element: &Element<Scalar>) -> (DVec3, f64) {
+    /// The strains of an element.
+    fn strains(&self, element: &Element<Scalar>) -> StripStrains {
         let [w, u] = [element.w, element.u].map(DVec3::from);
-        (w - self.stress_free_gap, u.x - self.stress_free_rotation.x)
+        StripStrains {
+            e: w - self.stress_free_gap,
+            theta: u.x - self.stress_free_rotation.x,
+        }
     }
 
-    /// Its energy, and the moment and force that it exerts on either node.
+    /// The energy of the strip, and the moment and force that it exerts on either node.
     pub fn loads(&self, ends: &NodePair) -> StripLoads {
-        let (element, sections) = self.strained_element(ends);
-        let (e, theta) = self.strains(&element);
+        let StripElement { element, sections } = self.strained_element(ends);
+        let StripStrains { e, theta } = self.strains(&element);
         let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold_stiffness * theta * theta);
         StripLoads {
             energy,
@@ -175,10 +189,13 @@ impl TissueStrip {
         }
     }
 
-    /// The change of its energy and of its loads by a change of the strip.
+    /// The change of the strip's energy and loads with its data, at the given `rate`.
     pub fn parameter_derivative(&self, ends: &NodePair, rate: &TissueStrip) -> StripLoads {
-        let (mut element, sections) = self.strained_element(ends);
-        let (e, theta) = self.strains(&element);
+        let StripElement {
+            mut element,
+            sections,
+        } = self.strained_element(ends);
+        let StripStrains { e, theta } = self.strains(&element);
         let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.stress_free_gap).dot(e)
             + (0.5 * rate.fold_stiffness * theta
                 - self.fold_stiffness * rate.stress_free_rotation.x)
@@ -194,7 +211,7 @@ impl TissueStrip {
         }
     }
 
-    /// The second derivatives of its energy.
+    /// The second derivatives of the strip's energy.
     pub fn hessian(&self, ends: &NodePair) -> StripHessian {
         let force = self.force(ends);
         self.condensed_hessian(ends, force)
@@ -203,7 +220,7 @@ impl TissueStrip {
     /// Second derivatives if it carries this spatial force, which is condensed out: those of its
     /// energy where the force is that of its strains.
     pub fn condensed_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
-        let (element, sections) = self.element_with_force(ends, force);
+        let StripElement { element, sections } = self.element_with_force(ends, force);
         let hessian = element.second_strained(&sections).nodal_hessian();
         StripHessian {
             diagonal_blocks: hessian

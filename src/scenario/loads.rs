@@ -189,8 +189,9 @@ const DEFAULT_MOTION: DefaultMotion = DefaultMotion {
     outputs: 100.0,
 };
 
-/// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
-const LOWEST_FREQUENCY: f64 = 3.516;
+/// Angular frequency of the lowest bending mode of a clamped-free rod, in units of sqrt(A/(rho L^4)):
+/// beta_1^2 of the beam.
+pub(crate) const CLAMPED_ROD_FREQUENCY: f64 = 3.516;
 
 words! {
     /// Where a motion begins, at time 0 and without velocity.
@@ -329,7 +330,7 @@ impl Dynamics {
 
 /// The external damping that is critical for the lowest mode of a clamped rod of the mean density.
 fn critical_damping(density: &[Profile], time: f64) -> f64 {
-    2.0 * LOWEST_FREQUENCY * mean_mid_rod_value(density) / time
+    2.0 * CLAMPED_ROD_FREQUENCY * mean_mid_rod_value(density) / time
 }
 
 /// Mean of the values of profiles mid-rod; exact if all are equal.

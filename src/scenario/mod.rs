@@ -39,6 +39,7 @@ pub use crate::scenario::format::path::EntryPath;
 pub use crate::scenario::format::schema::schema;
 pub(crate) use crate::scenario::format::source::intended_number;
 pub use crate::scenario::format::units::{self, Units};
+pub(crate) use crate::scenario::loads::CLAMPED_ROD_FREQUENCY;
 pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, Weight, Wind};
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;

@@ -74,10 +74,10 @@ pub struct BoundaryValueProblem<'a> {
 /// Fractions of the length that are closer to each other than this are the same station.
 pub(super) const FRACTION_TOLERANCE: f64 = 1e-11;
 
-/// Constraint on the tips.
+/// What holds the tips of all rods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TipConstraint {
-    /// None.
+    /// Nothing.
     Free,
     /// A common position.
     Joint,
@@ -584,9 +584,9 @@ pub const PERTURBATION_SIZE: usize = 12;
 /// One rod at one sigma.
 #[derive(Clone, Copy, Debug)]
 pub struct RodState {
-    /// Centerline.
+    /// Position of the centerline.
     pub r: DVec3,
-    /// Directors.
+    /// Rotation of the directors.
     pub q: DQuat,
     /// Force along the lab axes.
     pub n: DVec3,

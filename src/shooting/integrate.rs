@@ -267,7 +267,7 @@ fn norm(
 pub struct ShootingNodes {
     /// K + 1 fractions of the length.
     pub sigma: Vec<f64>,
-    /// K flat states.
+    /// Flat states at the K beginnings of intervals.
     pub states: Vec<Vec<f64>>,
 }
 

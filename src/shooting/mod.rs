@@ -82,8 +82,8 @@ impl AddAssign for ShootingCounts {
 /// Progress of a shooting.
 #[derive(Clone, Copy, Debug)]
 pub struct CorrectionProgress {
-    /// From arcs: the part of the present change towards the scenario's leaf (of its
-    /// loads, or of its stiffness) that is done, from 0 to 1; 1 for a start near the leaf.
+    /// Part of the present change from the leaf of arcs to the scenario's (of its loads, or of its
+    /// stiffness) that is done, from 0 to 1; 1 for a start near the leaf.
     pub lambda: f64,
     /// Number of corrections for the present solution.
     pub iteration: usize,
@@ -111,9 +111,9 @@ const MENTIONED_DISPLACEMENT_FRACTION: f64 = 0.2;
 /// The start of a solution.
 #[derive(Clone, Copy, Debug)]
 pub enum ShootingStart<'s> {
-    /// Without a given start: from arcs by continuation.
+    /// No given start: the leaf of arcs, followed by continuation.
     Arcs,
-    /// From the shape of the leaf at some stations, in the scenario's units.
+    /// The shape of the leaf at some stations, in the scenario's units.
     Leaf {
         /// Fractions of the length, from 0 to 1.
         stations: &'s [f64],
@@ -145,13 +145,13 @@ pub struct ShootingOptions<'s> {
     pub intervals: Option<usize>,
     /// Time limit of Newton's method.
     pub limit: Limit,
-    /// Whether it gives up where Newton's method does not converge as it does near a solution: for a
-    /// start that is one.
+    /// Whether shooting gives up where Newton's method does not converge as it does near a solution: for
+    /// a start that is one.
     pub gives_up: bool,
 }
 
 impl<'s> ShootingOptions<'s> {
-    /// With automatic intervals and without a time limit.
+    /// Options with automatic intervals and without a time limit.
     pub fn new(
         start: ShootingStart<'s>,
         stations: &'s [f64],
@@ -218,7 +218,7 @@ const TOO_MUCH_GROWTH: f64 = 5.0;
 pub enum ShootingFailureReason {
     /// An initial-value problem grows without bound before its interval ends.
     Unbounded {
-        /// The sigma it reached.
+        /// Fraction of the length that the solution reached.
         sigma: f64,
         /// Whether the number of intervals was given.
         fixed: bool,
@@ -227,7 +227,7 @@ pub enum ShootingFailureReason {
     },
     /// Newton's method does not converge.
     NoConvergence {
-        /// The last correction, relative.
+        /// Size of the last correction, in the units of the unknowns.
         correction: f64,
         /// Decimal logarithm of the largest growth over one interval.
         growth: f64,
@@ -236,10 +236,10 @@ pub enum ShootingFailureReason {
         /// Whether the start was a leaf at rest.
         from_leaf: bool,
     },
-    /// From a leaf at rest corrections do not decrease as they do near a solution: rounding, in
+    /// Corrections from a leaf at rest do not decrease as they do near a solution: rounding, in
     /// perturbations that grow, leaves no smaller ones.
     Rounding {
-        /// The last correction, relative.
+        /// Size of the last correction, in the units of the unknowns.
         correction: f64,
         /// Decimal logarithm of the growth of perturbations from base to tip.
         growth: f64,
@@ -291,7 +291,7 @@ impl ShootingFailureReason {
         self
     }
 
-    /// What to change.
+    /// What a user may change, in words.
     fn advice(&self) -> &'static str {
         match *self {
             ShootingFailureReason::Unbounded { fixed: true, .. } => "use more intervals",

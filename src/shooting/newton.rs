@@ -116,15 +116,15 @@ pub struct ShootingNewton<'e, 'a, 'p> {
     pub nodes: ShootingNodes,
     /// Whether to solve without damping, only if the start is near the solution.
     pub requires_near_start: bool,
-    /// Whether it gives up where it does not converge as it does near a solution.
+    /// Whether the run gives up where Newton's method does not converge as it does near a solution.
     pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
-    /// Cost of all linearizations.
+    /// Cost of all linearizations, in rods times steps.
     linearization_cost_sum: usize,
     /// Which of the turns without resistance move something.
     effective_rotations: Vec<bool>,
-    /// The last linearization.
+    /// The last linearization, condensed to the tip; none before the first.
     pub condensed: Option<CondensedEquations>,
     /// Growth of perturbations over each interval, at that linearization.
     pub growth: Vec<f64>,

@@ -51,7 +51,7 @@ impl LinearStep {
 #[derive(Clone, Debug)]
 pub struct Perturbations<const W: usize> {
     pub rods: Range<usize>,
-    /// Row after row.
+    /// The rows of all rods, one after the other.
     pub entries: Vec<f64>,
     stage: Vec<f64>,
     slopes: Vec<Vec<f64>>,

@@ -31,20 +31,20 @@ words! {
 
 /// The method of a motion, and why. Displayed, it is a short explanation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
+pub struct SchemeChoice {
     /// The method.
     pub scheme: Scheme,
     /// Why.
     pub reason: SchemeReason,
     /// The costs that were compared, if any were: of the explicit and of the semi-implicit
     /// method.
-    pub costs: Option<[Cost; 2]>,
+    pub costs: Option<[MotionCost; 2]>,
 }
 
-impl Choice {
+impl SchemeChoice {
     /// The choice that does not depend on costs, if there is one.
     pub(super) fn forced_choice(options: &Options, physics: &Physics, rigid: bool) -> Option<Self> {
-        let of = |scheme, reason| Choice {
+        let of = |scheme, reason| SchemeChoice {
             scheme,
             reason,
             costs: None,
@@ -68,8 +68,8 @@ impl Choice {
     }
 
     /// The cheaper method.
-    pub(super) fn cheaper_method(explicit: Cost, semi_implicit: Cost) -> Self {
-        Choice {
+    pub(super) fn cheaper_method(explicit: MotionCost, semi_implicit: MotionCost) -> Self {
+        SchemeChoice {
             scheme: match explicit.seconds <= semi_implicit.seconds {
                 true => Scheme::Explicit,
                 false => Scheme::SemiImplicit,
@@ -80,7 +80,7 @@ impl Choice {
     }
 }
 
-impl fmt::Display for Choice {
+impl fmt::Display for SchemeChoice {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self.reason {
             SchemeReason::Requested => "as requested",
@@ -104,7 +104,7 @@ impl fmt::Display for Choice {
     }
 }
 
-impl fmt::Display for Cost {
+impl fmt::Display for MotionCost {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let about = if self.at_least { "more than" } else { "some" };
         let [steps, seconds] = [self.steps, self.seconds].map(format_two_digits);
@@ -112,14 +112,14 @@ impl fmt::Display for Cost {
     }
 }
 
-impl Serialize for Choice {
+impl Serialize for SchemeChoice {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys {
             reason: SchemeReason,
             explanation: String,
-            explicit: Option<Cost>,
-            semi_implicit: Option<Cost>,
+            explicit: Option<MotionCost>,
+            semi_implicit: Option<MotionCost>,
         }
         let of = |method: usize| self.costs.map(|costs| costs[method]);
         let keys = Keys {
@@ -184,7 +184,7 @@ const PILOT: PilotRun = PilotRun {
 
 /// The cost of a motion by a method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Cost {
+pub struct MotionCost {
     /// Number of time steps; of the semi-implicit method an estimate.
     pub steps: f64,
     /// Seconds that they take on one core of a machine of 2020, approximately.
@@ -205,10 +205,14 @@ pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
 }
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
-pub(super) fn explicit_cost(leaf: &DiscreteLeaf, physics: &Physics, method: &Explicit) -> Cost {
+pub(super) fn explicit_cost(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    method: &Explicit,
+) -> MotionCost {
     let duration = physics.times().duration;
     let steps = duration / method.longest_step();
-    Cost {
+    MotionCost {
         steps,
         seconds: steps * explicit_step(leaf.rods(), leaf.segments()),
         at_least: false,
@@ -226,14 +230,14 @@ pub(super) fn semi_implicit_cost(
     state: &State,
     tolerance: f64,
     most: f64,
-) -> Cost {
+) -> MotionCost {
     let MotionTimes { duration, interval } = physics.times();
     let error = (PILOT.error_ratio * tolerance)
         .min(PILOT.largest_error)
         .max(tolerance);
     let of_step = (error / tolerance).powf(PILOT.step_exponent);
     let seconds = semi_implicit_step(leaf.rods(), leaf.segments());
-    let cost = |steps: f64, at_least: bool| Cost {
+    let cost = |steps: f64, at_least: bool| MotionCost {
         steps,
         seconds: steps * seconds,
         at_least,

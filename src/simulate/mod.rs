@@ -42,11 +42,11 @@ use crate::relax::{
 };
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{MotionStart, Scenario, Schedule, plausibility_warnings};
-pub use crate::simulate::choice::{Choice, Cost, SchemeReason};
+pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub use crate::simulate::record::{
     Frame, OutputSample, Record, ShapeSnapshot, film_indices, snapshot_indices,
 };
-use crate::simulate::refinement::{Comparison, Trajectory, compared_points};
+use crate::simulate::refinement::{MotionComparison, Trajectory, compared_points};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
 pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
 use crate::{relax, words};
@@ -73,7 +73,7 @@ words! {
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method; `None`: the one that costs less, as [`Choice`] says.
+    /// The method; `None`: the one that costs less, as [`SchemeChoice`] says.
     pub scheme: Option<Scheme>,
     /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
@@ -94,7 +94,7 @@ pub struct Simulation {
     leaf: Leaf,
     grid: Grid,
     physics: Physics,
-    choice: Choice,
+    choice: SchemeChoice,
     doubts: Vec<MotionDoubt>,
     stable: Option<StableStep>,
     step: Option<f64>,
@@ -104,7 +104,7 @@ pub struct Simulation {
     made: usize,
     moving: Duration,
     /// The run that this one is compared with, and the bar that is aimed at.
-    comparison: Option<Comparison>,
+    comparison: Option<MotionComparison>,
     aim: Option<f64>,
     /// The last output whose error is known.
     known_until: Option<f64>,
@@ -118,7 +118,8 @@ impl Simulation {
     /// The leaf at time 0.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let from = |leaf: &Leaf, grid: &Grid| state(leaf, grid, tolerance, options.limit.clone());
+        let from =
+            |leaf: &Leaf, grid: &Grid| start_state(leaf, grid, tolerance, options.limit.clone());
         Simulation::with_initial_state(scenario, options, &from)
     }
 
@@ -173,7 +174,7 @@ impl Simulation {
         let doubt = unstable_start_doubt(&discrete, &physics, &state);
         let rigid = discrete.least_compliance() == 0.0;
         let mut begun = None;
-        let choice = match Choice::forced_choice(options, &physics, rigid) {
+        let choice = match SchemeChoice::forced_choice(options, &physics, rigid) {
             Some(choice) => choice,
             None => {
                 let explicit = &begun
@@ -187,7 +188,7 @@ impl Simulation {
                     tolerance,
                     cost.seconds,
                 );
-                Choice::cheaper_method(cost, other)
+                SchemeChoice::cheaper_method(cost, other)
             }
         };
         if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
@@ -291,21 +292,21 @@ impl Simulation {
 
     /// Compares this run, which has not begun, with another from now on; `keep`s what a finer
     /// run is compared with.
-    fn compare_with(&mut self, comparison: Option<Comparison>, keep: bool) {
+    fn compare_with(&mut self, comparison: Option<MotionComparison>, keep: bool) {
         self.comparison = comparison;
         self.trajectory = keep.then(Trajectory::default);
         let mut frame = self.frame();
-        self.compare(&mut frame);
+        self.compare_frame(&mut frame);
     }
 
     /// Compares the output just made, and keeps its points.
-    fn compare(&mut self, frame: &mut Frame) {
+    fn compare_frame(&mut self, frame: &mut Frame) {
         if self.comparison.is_none() && self.trajectory.is_none() {
             return;
         }
         let points = compared_points(frame, self.grid.sigma(), self.leaf.joined());
         if let Some(comparison) = &mut self.comparison {
-            comparison.compare(self.made, &points);
+            comparison.compare_output(self.made, &points);
             frame.error = comparison.error_bar;
             self.known_until = comparison
                 .error_bar
@@ -365,7 +366,7 @@ impl Simulation {
     }
 
     /// Why it is this method.
-    pub fn choice(&self) -> Choice {
+    pub fn choice(&self) -> SchemeChoice {
         self.choice
     }
 
@@ -458,7 +459,7 @@ impl Simulation {
             });
         self.moving += clock.elapsed();
         frame.map(|mut frame| {
-            self.compare(&mut frame);
+            self.compare_frame(&mut frame);
             frame
         })
     }
@@ -516,7 +517,7 @@ fn explicit_motion(
 const LARGEST_FORCE: f64 = 256.0 * PI * PI;
 
 /// The positions and rotations at time 0.
-pub(super) fn state(
+pub(super) fn start_state(
     leaf: &Leaf,
     grid: &Grid,
     tolerance: f64,
@@ -524,18 +525,18 @@ pub(super) fn state(
 ) -> Result<State, SimulationError> {
     match leaf.scenario().dynamics.start {
         MotionStart::Released if !leaf.has_placed_supports() => {
-            Ok(released(&DiscreteLeaf::new(leaf, grid.clone())))
+            Ok(released_state(&DiscreteLeaf::new(leaf, grid.clone())))
         }
         // Held tips and grips are moved to their positions by the relaxation.
         MotionStart::Released | MotionStart::ConfirmedEquilibrium => {
-            at_rest(leaf, grid, tolerance, limit)
+            state_at_rest(leaf, grid, tolerance, limit)
         }
     }
 }
 
 /// The initial state of a relaxation or, where its arcs would strain rods that hardly yield, a
 /// state near it without such strains: otherwise the energy of these would drive the motion.
-fn released(leaf: &DiscreteLeaf) -> State {
+fn released_state(leaf: &DiscreteLeaf) -> State {
     let mut arcs = relax::initial_state(leaf);
     leaf.strain_forces(&mut arcs);
     let strained = leaf.rod_index_pairs(0..leaf.segments()).any(|(j, i)| {
@@ -548,7 +549,7 @@ fn released(leaf: &DiscreteLeaf) -> State {
 }
 
 /// The equilibrium under the loads, in the wind and with the rest shape at time 0.
-fn at_rest(
+fn state_at_rest(
     leaf: &Leaf,
     grid: &Grid,
     tolerance: f64,
@@ -718,7 +719,7 @@ pub(super) fn unstable_start_doubt(
     modes.retain(|mode| mode.eigenvalue < 0.0);
     let fastest = -modes.first()?.eigenvalue;
     let deviates = |mode: &Eigenpair| {
-        deviation(&leaf, physics, (&exact, start), &mode.shape)
+        mode_deviation(&leaf, physics, (&exact, start), &mode.shape)
             > UNSTABLE_START.negligible_deviation
     };
     if modes.iter().any(deviates) {
@@ -746,7 +747,7 @@ fn may_be_near(leaf: &DiscreteLeaf, start: &State, system: &mut System) -> bool 
 
 /// The largest rotation or displacement in the part along a mode of what leads from one state to
 /// another. Modes are orthonormal in the mass product.
-fn deviation(
+fn mode_deviation(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     (from, to): (&State, &State),
@@ -771,6 +772,8 @@ fn deviation(
 }
 
 crate::renamed! {
+    Choice => SchemeChoice,
+    Cost => MotionCost,
     Moment => OutputSample,
     Refused => SimulationError,
     Still => ShapeSnapshot,

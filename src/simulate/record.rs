@@ -4,9 +4,9 @@
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
 use crate::scenario;
-use crate::shape::{interpolation_weights, serialize_tips};
+use crate::shape::{InterpolationWeights, interpolation_weights, serialize_tips};
 use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
-use crate::simulate::{Choice, Scheme, Simulation, Stopped};
+use crate::simulate::{Scheme, SchemeChoice, Simulation, Stopped};
 use glam::{DQuat, DVec3};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -91,7 +91,7 @@ pub struct Record {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<MotionDoubt>,
     /// Why it has this method.
-    pub choice: Choice,
+    pub choice: SchemeChoice,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -302,7 +302,7 @@ impl Frame {
             ..self.clone()
         };
         for base in (0..self.rods).map(|rod| rod * from.len()) {
-            for (first, weights) in &weights {
+            for InterpolationWeights { first, weights } in &weights {
                 let near = || (base + first..).zip(weights.iter().copied());
                 let sum = |of: &dyn Fn(usize) -> DVec3| near().map(|(i, w)| w * of(i)).sum();
                 // Quaternions of equal rotations may differ in sign: align them.

@@ -13,11 +13,11 @@ use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
 use crate::numbers::{larger, largest};
 use crate::scenario::Scenario;
-use crate::shape::interpolation_weights;
+use crate::shape::{InterpolationWeights, interpolation_weights};
 use crate::simulate::record::CUBIC;
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::{
-    Choice, DEFAULT_TIP_ERROR, Frame, Options, Scheme, Simulation, SimulationError,
+    DEFAULT_TIP_ERROR, Frame, Options, Scheme, SchemeChoice, Simulation, SimulationError,
 };
 use crate::{relax, scenario, simulate};
 use glam::DVec3;
@@ -97,7 +97,7 @@ pub struct Refinement {
     /// The error of tips that is aimed at, if one is.
     aim: Option<f64>,
     length: f64,
-    choice: Choice,
+    choice: SchemeChoice,
     /// The next run and the one before, as they were or will be.
     resolution: Resolution,
     before: Option<Resolution>,
@@ -200,7 +200,7 @@ impl Refinement {
             .aim
             .is_some_and(|aim| bar.is_some_and(|bar| bar <= aim));
         if !met && self.refines() && !self.last {
-            self.refine(simulation, stopped);
+            self.prepare_refined_run(simulation, stopped);
         }
         if self.next.is_some() {
             let others = RunTrajectory {
@@ -236,7 +236,7 @@ impl Refinement {
     }
 
     /// Builds the next run, if there is one.
-    fn refine(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
+    fn prepare_refined_run(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
         if matches!(stopped, Some(Stopped::Interrupted { .. })) {
             return;
         }
@@ -244,7 +244,7 @@ impl Refinement {
             // The finer grid fails: what the coarser one found is the result.
             if let Some(before) = self.before {
                 self.last = true;
-                self.next = self.build(before).ok();
+                self.next = self.build_run(before).ok();
             }
             return;
         }
@@ -293,7 +293,7 @@ impl Refinement {
         }
     }
 
-    fn build(&self, at: Resolution) -> Result<Simulation, SimulationError> {
+    fn build_run(&self, at: Resolution) -> Result<Simulation, SimulationError> {
         let start_tolerance = self.options.tolerance.unwrap_or(self.scenario.tolerance);
         let options = Options {
             scheme: Some(self.choice.scheme),
@@ -303,7 +303,7 @@ impl Refinement {
             limit: self.options.limit.clone(),
         };
         let from = |leaf: &Leaf, grid: &Grid| {
-            simulate::state(leaf, grid, start_tolerance, options.limit.clone())
+            simulate::start_state(leaf, grid, start_tolerance, options.limit.clone())
         };
         Simulation::with_initial_state(&self.scenario, &options, &from)
     }
@@ -311,9 +311,11 @@ impl Refinement {
     /// With steps of this length or, by the explicit method, the longest stable ones if they are
     /// hardly longer, or shorter.
     fn build_with_steps(&self, at: Resolution) -> Result<Simulation, SimulationError> {
-        let stable = self.build(Resolution { step: None, ..at })?;
+        let stable = self.build_run(Resolution { step: None, ..at })?;
         match (at.step, stable.longest_step()) {
-            (Some(step), Some(longest)) if longest > REFINEMENT.equal_step * step => self.build(at),
+            (Some(step), Some(longest)) if longest > REFINEMENT.equal_step * step => {
+                self.build_run(at)
+            }
             _ => Ok(stable),
         }
     }
@@ -344,7 +346,7 @@ impl Refinement {
         &mut self,
         first: &mut Simulation,
         watch: &mut RunObserver,
-    ) -> Option<Option<Comparison>> {
+    ) -> Option<Option<MotionComparison>> {
         let own = self.resolution;
         let coarser = own.segments.div_ceil(2);
         let (segments, factor) =
@@ -364,13 +366,14 @@ impl Refinement {
         if let Some(step) = self.options.step {
             // Given steps are taken on the other grid, too, and steps half as long there tell what
             // they cost.
-            let runs = [step, 0.5 * step].map(|step| self.build(with(Some(step))).ok());
+            let runs = [step, 0.5 * step].map(|step| self.build_run(with(Some(step))).ok());
             let [Some(same), Some(halved)] = runs else {
                 return Some(None);
             };
             let same = self.run_unrecorded(same, watch)?;
             let halved = self.run_unrecorded(halved, watch)?;
-            let comparison = Comparison::new(own.segments, with_trajectory(same), self.length);
+            let comparison =
+                MotionComparison::new(own.segments, with_trajectory(same), self.length);
             return Some(Some(comparison.with_half_steps(&halved)));
         }
         let longer = own.step.map(|step| factor * step);
@@ -383,7 +386,7 @@ impl Refinement {
         {
             // The coarser grid does not allow explicit steps twice as long.
             self.resolution.step = Some(0.5 * step);
-            match self.build(self.resolution) {
+            match self.build_run(self.resolution) {
                 Ok(shorter) => *first = shorter,
                 // Unreachable: the run was accepted with longer steps.
                 Err(_) => return Some(None),
@@ -398,7 +401,11 @@ impl Refinement {
             self.coarser = Some(with_trajectory(trajectory.clone()));
         }
         let other = with_trajectory(trajectory);
-        Some(Some(Comparison::new(own.segments, other, self.length)))
+        Some(Some(MotionComparison::new(
+            own.segments,
+            other,
+            self.length,
+        )))
     }
 
     /// Whether the leaf has a grid of so many segments.
@@ -407,10 +414,10 @@ impl Refinement {
     }
 
     /// The comparison of a later run with the one before.
-    fn compare_next(&self, next: &mut Simulation) -> Option<Comparison> {
+    fn compare_next(&self, next: &mut Simulation) -> Option<MotionComparison> {
         let coarser = self.coarser.clone()?;
         next.halve_coarser_steps(&coarser.trajectory);
-        Some(Comparison::new(next.segments(), coarser, self.length))
+        Some(MotionComparison::new(next.segments(), coarser, self.length))
     }
 }
 
@@ -494,7 +501,7 @@ fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
 /// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
 /// held.
 pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
-    let (first, weights) = interpolation_weights(stations, 0.5, CUBIC);
+    let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC);
     let mut points = frame.tips(joined);
     for rod in 0..frame.rods {
         let near = frame.centerline(rod)[first..].iter().zip(&weights);
@@ -512,7 +519,7 @@ pub(super) struct RunTrajectory {
 
 /// A run compared with others, output after output.
 #[derive(Clone, Debug)]
-pub(super) struct Comparison {
+pub(super) struct MotionComparison {
     other: Trajectory,
     /// Segments of the other run.
     pub segments: usize,
@@ -530,7 +537,7 @@ pub(super) struct Comparison {
     pub error_bar: Option<f64>,
 }
 
-impl Comparison {
+impl MotionComparison {
     /// Compares a run on a grid of so many segments with `other`, one on another grid, for a leaf whose
     /// longest rod has this length.
     pub fn new(segments: usize, other: RunTrajectory, length: f64) -> Self {
@@ -539,7 +546,7 @@ impl Comparison {
             trajectory: other,
         } = other;
         let [own, its] = [segments, others].map(|count| (count as f64).powi(-2));
-        Comparison {
+        MotionComparison {
             factor: COMPARISON.safety * own / (its - own).abs(),
             segments: others,
             of_steps: None,
@@ -565,7 +572,7 @@ impl Comparison {
     }
 
     /// Compares the points of an output, behind all before it.
-    pub fn compare(&mut self, output: usize, points: &[DVec3]) {
+    pub fn compare_output(&mut self, output: usize, points: &[DVec3]) {
         let of_steps = match &self.of_steps {
             None => Some(0.0),
             Some(bars) => bars.get(output).copied().filter(|bar| bar.is_finite()),

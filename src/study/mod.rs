@@ -58,6 +58,9 @@ pub use crate::study::vary::{
     VariableTarget, VariedScenario, VaryError,
 };
 
+/// Names of the lab axes in the words for quantities.
+const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
+
 crate::renamed! {
     Base => BaseScenario,
     Boundary => StabilityBoundary,

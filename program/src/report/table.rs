@@ -5,7 +5,7 @@
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
 use leafdyn::scenario::Stress;
-use leafdyn::shape::interpolation_weights;
+use leafdyn::shape::{InterpolationWeights, interpolation_weights};
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::borrow::Cow;
@@ -270,7 +270,7 @@ pub fn write_modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::
         let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
         let rods = mode.displacement.iter().zip(&mode.rotation);
         for (rod, (displacement, rotation)) in rods.enumerate() {
-            for (sigma, (first, weights)) in &places {
+            for (sigma, InterpolationWeights { first, weights }) in &places {
                 let at = |nodes: &[DVec3]| -> DVec3 {
                     let near = weights.iter().zip(&nodes[*first..]);
                     near.map(|(weight, node)| *weight * *node).sum()

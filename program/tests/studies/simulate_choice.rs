@@ -1,17 +1,17 @@
 //! `simulate` takes the method that costs less, whose steps it knows or estimates beforehand, unless
 //! one is requested or only one can move the leaf; and it says which and why.
 
-use leafdyn::simulate::{Choice, Options, SchemeReason, Simulation};
+use leafdyn::simulate::{Options, SchemeChoice, SchemeReason, Simulation};
 use leafdyn_testing::motion::{SLENDER_VEINS, Scheme, moving, run};
 use leafdyn_testing::workplace::{Json, Workplace, contains};
 use leafdyn_testing::*;
 use serde_json::Value;
 
-fn chosen(scenario: &Scenario, options: &Options) -> Choice {
+fn chosen(scenario: &Scenario, options: &Options) -> SchemeChoice {
     Simulation::new(scenario, options).unwrap().choice()
 }
 
-fn by_default(scenario: &Scenario) -> Choice {
+fn by_default(scenario: &Scenario) -> SchemeChoice {
     chosen(scenario, &Options::default())
 }
 
@@ -141,7 +141,7 @@ fn what_decides_before_costs() {
         ("", step(1e-3), Scheme::Explicit, SchemeReason::GivenStep),
     ] {
         let choice = chosen(&leaf(overrides), &options);
-        let expected = Choice {
+        let expected = SchemeChoice {
             scheme,
             reason,
             costs: None,

@@ -1,32 +1,42 @@
 //! Special points of a boundary: cusps, and crossings with another boundary.
+//!
+//! A test function vanishes there, the speed of the fold in the parameter plane or another
+//! eigenvalue of H; its zero along the boundary is found by a secant method.
 
-use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
-use crate::branch::critical::CriticalKind;
+use crate::branch::boundary::point_search::{BoundarySearchTolerance, TwoParameterEquations};
+use crate::branch::boundary::singular_point::{COINCIDENT_EIGENVALUE_TOLERANCE, SingularPoint};
+use crate::branch::critical::{CriticalKind, SecantLimits};
 use crate::branch::equations::CorrectorFailure;
 
-/// Largest number of evaluations in the search along the boundary.
-const EVALUATIONS: usize = 25;
+/// The search along the boundary: at a cusp the parameters are accurate to the square of the
+/// accuracy; at a crossing they are as accurate.
+const SECANT: SecantLimits = SecantLimits {
+    evaluations: 25,
+    accuracy: 1e-11,
+    shortest_slope_difference: 1e-7,
+};
 
-/// Accuracy along the boundary: at a cusp the parameters are accurate to its square; at a
-/// crossing it is that of the parameters.
-const CODIMENSION_TWO_ACCURACY: f64 = 1e-11;
-
-/// Differences over less than this do not give a reliable slope.
-const SHORTEST_SLOPE_DIFFERENCE: f64 = 1e-7;
-
-/// Largest distance of the point from its initial guess, along the boundary.
+/// Largest distance of the special point from its initial guess, along the boundary; and that of
+/// a point of the boundary from its prediction, across it.
 const LARGEST_SEARCH_DISTANCE: f64 = 0.3;
 
-/// Modes of which the eigenvalues are below this, relative to their derivative along the boundary,
-/// become neutral at one crossing.
-const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
+/// The search for points of the boundary at which the test function is evaluated.
+const SEARCH_POINT_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
+    accuracy: 1e-13,
+    largest_distance: LARGEST_SEARCH_DISTANCE,
+};
 
-/// Accuracy of the boundary points during the search.
-const SEARCH_POINT_ACCURACY: f64 = 1e-13;
+/// The search for a point of the boundary at a value of one parameter, from its prediction.
+const GIVEN_PARAMETER_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
+    accuracy: 1e-12,
+    largest_distance: 0.5,
+};
 
-/// Accuracy of points at a given parameter.
-const GIVEN_PARAMETER_ACCURACY: f64 = 1e-12;
+/// Distance along the boundary from the special point's approximation to the point with which the
+/// first slope is differenced.
+const FIRST_SLOPE_DISTANCE: f64 = 1e-2;
 
+/// Why a point of a boundary is special.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CodimensionTwoKind {
     /// A curve of folds turns back: two folds meet and vanish.
@@ -49,45 +59,51 @@ impl CodimensionTwoKind {
     }
 }
 
+/// A point of a boundary at which a test function along the boundary vanishes.
+pub struct CodimensionTwoPoint {
+    pub kind: CodimensionTwoKind,
+    pub point: SingularPoint,
+    /// Derivative of the test function with respect to arclength along the boundary.
+    pub slope: f64,
+}
+
+/// A point of a boundary found from a prediction along the tangent.
+pub struct PredictedBoundaryPoint {
+    pub point: SingularPoint,
+    /// Distance of the point from the prediction.
+    pub prediction_error: f64,
+}
+
 /// The point of the boundary in the plane normal to its tangent at a distance `step` along it.
 pub fn boundary_point_at_distance(
     manifold: &mut TwoParameterEquations,
     now: &SingularPoint,
     step: f64,
-    accuracy: f64,
-    furthest: f64,
-) -> Result<(SingularPoint, f64), CorrectorFailure> {
+    tolerance: BoundarySearchTolerance,
+) -> Result<PredictedBoundaryPoint, CorrectorFailure> {
     let solution = manifold.displace_along_direction(&now.solution, &now.tangent, step)?;
-    let search = now.search(manifold, None, solution, (accuracy, furthest));
+    let search = now.search(manifold, None, solution, tolerance);
     let found = search.secant(manifold)?;
-    let off = found.distance.abs();
-    Ok((now.with_own_directions(manifold, found)?, off))
+    let prediction_error = found.distance.abs();
+    Ok(PredictedBoundaryPoint {
+        point: now.with_own_directions(manifold, found)?,
+        prediction_error,
+    })
 }
 
-/// The special point near an approximation to it, and the derivative of the vanishing function
-/// along the boundary.
+/// The special point near an approximation to it.
 pub fn locate_codimension_two(
     manifold: &mut TwoParameterEquations,
     near: &SingularPoint,
     special: CodimensionTwoKind,
-) -> Result<(SingularPoint, f64), CorrectorFailure> {
-    let first = boundary_point_at_distance(
-        manifold,
-        near,
-        0.0,
-        SEARCH_POINT_ACCURACY,
-        LARGEST_SEARCH_DISTANCE,
-    )?
-    .0;
-    let away = 1e-2;
-    let second = boundary_point_at_distance(
-        manifold,
-        &first,
-        away,
-        SEARCH_POINT_ACCURACY,
-        LARGEST_SEARCH_DISTANCE,
-    )?
-    .0;
+) -> Result<CodimensionTwoPoint, CorrectorFailure> {
+    let mut at = |from: &SingularPoint, step: f64| {
+        boundary_point_at_distance(manifold, from, step, SEARCH_POINT_TOLERANCE)
+            .map(|found| found.point)
+    };
+    let away = FIRST_SLOPE_DISTANCE;
+    let first = at(near, 0.0)?;
+    let second = at(&first, away)?;
     let slope = (special.test_function(&second) - special.test_function(&first)) / away;
     secant_codimension_two(
         manifold,
@@ -105,24 +121,19 @@ fn secant_codimension_two(
     special: CodimensionTwoKind,
     mut slope: f64,
     [least, most]: [f64; 2],
-) -> Result<(SingularPoint, f64), CorrectorFailure> {
+) -> Result<CodimensionTwoPoint, CorrectorFailure> {
     let mut best = now.clone();
     let (mut at, mut value) = (0.0, special.test_function(now));
     let mut worse = 0;
-    for _ in 0..EVALUATIONS {
+    for _ in 0..SECANT.evaluations {
         let step = -value / slope;
         if !step.is_finite() || !(least..=most).contains(&(at + step)) {
             return Err(CorrectorFailure::NotConverged);
         }
-        let (next, _) = boundary_point_at_distance(
-            manifold,
-            now,
-            at + step,
-            SEARCH_POINT_ACCURACY,
-            LARGEST_SEARCH_DISTANCE,
-        )?;
+        let next = boundary_point_at_distance(manifold, now, at + step, SEARCH_POINT_TOLERANCE)?;
+        let next = next.point;
         let after = special.test_function(&next);
-        if step.abs() > SHORTEST_SLOPE_DIFFERENCE {
+        if step.abs() > SECANT.shortest_slope_difference {
             slope = (after - value) / step;
         }
         (at, value) = (at + step, after);
@@ -130,8 +141,12 @@ fn secant_codimension_two(
             true => best = next,
             false => worse += 1,
         }
-        if step.abs() < CODIMENSION_TWO_ACCURACY || worse > 1 {
-            return Ok((best, slope));
+        if step.abs() < SECANT.accuracy || worse > 1 {
+            return Ok(CodimensionTwoPoint {
+                kind: special,
+                point: best,
+                slope,
+            });
         }
     }
     Err(CorrectorFailure::NotConverged)
@@ -148,12 +163,7 @@ pub fn boundary_point_at_parameter(
 ) -> Result<SingularPoint, CorrectorFailure> {
     let mut solution = manifold.displace_along_direction(&now.solution, &now.tangent, step)?;
     solution.params[which] = value;
-    let search = now.search(
-        manifold,
-        Some(which),
-        solution,
-        (GIVEN_PARAMETER_ACCURACY, 0.5),
-    );
+    let search = now.search(manifold, Some(which), solution, GIVEN_PARAMETER_TOLERANCE);
     let found = search.secant(manifold)?;
     let mut point = now.with_own_directions(manifold, found)?;
     point.solution.params[which] = value;
@@ -167,7 +177,7 @@ pub fn codimension_two_between(
     manifold: &mut TwoParameterEquations,
     [now, next]: [&SingularPoint; 2],
     step: f64,
-) -> Result<Option<(CodimensionTwoKind, SingularPoint)>, CorrectorFailure> {
+) -> Result<Option<CodimensionTwoPoint>, CorrectorFailure> {
     let cusp = now.kind == CriticalKind::Fold && now.fold_speed * next.fold_speed < 0.0;
     let special = match (cusp, now.index.abs_diff(next.index)) {
         (false, 0) => return Ok(None),
@@ -176,15 +186,13 @@ pub fn codimension_two_between(
         _ => return Err(CorrectorFailure::NotConverged),
     };
     let slope = (special.test_function(next) - special.test_function(now)) / step;
-    let (point, slope) =
-        secant_codimension_two(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
-    let vanishing = point
-        .others
-        .iter()
-        .filter(|it| it.abs() < COINCIDENT_EIGENVALUE_TOLERANCE * slope.abs());
+    let found = secant_codimension_two(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
+    let others = found.point.others.iter();
+    let vanishing =
+        others.filter(|it| it.abs() < COINCIDENT_EIGENVALUE_TOLERANCE * found.slope.abs());
     match special == CodimensionTwoKind::Cusp || vanishing.count() == now.index.abs_diff(next.index)
     {
-        true => Ok(Some((special, point))),
+        true => Ok(Some(found)),
         false => Err(CorrectorFailure::NotConverged),
     }
 }

@@ -1,47 +1,46 @@
-//! Following a boundary in one direction, step by step.
+//! Following a boundary through the plane of two parameters, in both directions in parallel.
 //!
-//! Following a boundary through the plane of two parameters, in both directions.
+//! In each direction it is followed on one grid, step by step; points are computed ahead while
+//! those before are verified. Where a point is not verified, or no step succeeds, the boundary is
+//! continued on a finer grid from the last point that is. It ends at an end of a range, or where
+//! it closes.
 
-use crate::branch::boundary::boundary_point_on_finer;
 use crate::branch::boundary::codimension_two::{
-    boundary_point_at_distance, boundary_point_at_parameter, codimension_two_between,
+    CodimensionTwoPoint, boundary_point_at_distance, boundary_point_at_parameter,
+    codimension_two_between,
+};
+use crate::branch::boundary::grid_transfer::{FinerBoundaryPoint, boundary_point_on_finer};
+use crate::branch::boundary::point_search::{
+    BoundarySearchTolerance, TwoParameterEquations, TwoParameterProblem,
 };
 use crate::branch::boundary::refine::{
-    BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, refine,
+    BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, verify_boundary_point,
 };
-use crate::branch::boundary::singular_point::{
-    BoundarySeed, SingularPoint, TwoParameterEquations, TwoParameterProblem,
-};
-use crate::branch::continuation::BranchEnd;
+use crate::branch::boundary::singular_point::{BoundarySeed, SingularPoint};
+use crate::branch::continuation::{BranchEnd, StepControl};
 use crate::branch::convergence::VerificationFailure;
 use crate::branch::critical::CriticalKind;
 use crate::branch::equations::CorrectorFailure;
+use crate::branch::family::PARAMETER_ROUNDING;
 use crate::leaf::Grid;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// First step and shortest step, as parts of the longest.
-const FIRST: f64 = 0.25;
+/// Steps along a boundary: the turn is that of the boundary, and for `smallest_cosine` also that
+/// of the normal to it.
+const STEPS: StepControl = StepControl {
+    first: 0.25,
+    shortest: 1e-4,
+    growth: 1.5,
+    growth_cosine: 0.97,
+    smallest_cosine: 0.85,
+    largest_prediction_error: 0.3,
+};
 
-const SHORTEST: f64 = 1e-4;
-
-/// Growth factor of the step, where the cosine of the boundary's turn exceeds the other.
-const GROWTH: f64 = 1.5;
-
-const STEP_GROWTH_COSINE: f64 = 0.97;
-
-/// A step in which the boundary, or the normal to it, turns by more than this (cosine) is
-/// rejected.
-const SMALLEST_ACCEPTED_COSINE: f64 = 0.85;
-
-/// Largest distance of a point from its prediction, as a part of the step.
-const LARGEST_PREDICTION_ERROR: f64 = 0.3;
-
-/// Accuracy of ordinary points, and of those at a given parameter.
+/// Accuracy of points that are not at a given parameter (arclength on the manifold): extrapolation
+/// over grids locates them again.
 const ACCURACY: f64 = 1e-8;
-
-const EXACT: f64 = 1e-12;
 
 /// Points computed ahead while earlier ones are verified in parallel.
 const POINTS_COMPUTED_AHEAD: usize = 8;
@@ -62,24 +61,41 @@ pub struct BoundaryContinuationOptions {
     pub accuracy: BoundaryAccuracy,
 }
 
-/// A boundary followed in one direction.
+/// What a step along a boundary has led to.
+struct BoundaryStep {
+    /// Special points in between, and the point of the step itself.
+    points: Vec<UnverifiedBoundaryPoint>,
+    end: Option<BranchEnd>,
+}
+
+/// A value of one of the parameters at which a step ends.
+struct ParameterLimit {
+    /// The first parameter, 0, or the second, 1.
+    which: usize,
+    value: f64,
+    /// Arclength of the step to this value.
+    distance: f64,
+}
+
+/// A boundary that is followed in one direction: all points so far, the first of which are
+/// verified.
 pub struct BoundaryContinuation<'a, 'h> {
     plane: &'a TwoParameterProblem<'a>,
     options: &'h BoundaryContinuationOptions,
     /// The second parameter at the starting point.
     initial_second_parameter: f64,
     first: SingularPoint,
-    /// Length of the next step.
+    /// Arclength of the next step on the manifold.
     step: f64,
     steps: Vec<UnverifiedBoundaryPoint>,
     verified: Vec<VerifiedBoundaryPoint>,
     end: Option<BranchEnd>,
-    /// Matrices factorised on earlier grids, and to verify points.
+    /// Matrices factorized on earlier grids, and to verify points.
     pub factorizations: usize,
 }
 
 impl<'a, 'h> BoundaryContinuation<'a, 'h> {
-    /// From its first point, at which one of the parameters may be given.
+    /// Begins at the first point of a boundary, at which one of the parameters may be given.
     pub fn new(
         plane: &'a TwoParameterProblem<'a>,
         how: &'h BoundaryContinuationOptions,
@@ -91,7 +107,7 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             options: how,
             initial_second_parameter: first.solution.params[1],
             first: first.clone(),
-            step: FIRST * how.longest_step,
+            step: STEPS.first * how.longest_step,
             steps: vec![UnverifiedBoundaryPoint {
                 point: first,
                 special: None,
@@ -127,7 +143,9 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             rayon::in_place_scope(|scope| {
                 scope.spawn(|_| {
                     let each = new.par_iter();
-                    found = each.map(|it| refine(plane, &grid, it, accuracy)).collect();
+                    found = each
+                        .map(|it| verify_boundary_point(plane, &grid, it, accuracy))
+                        .collect();
                 });
                 self.extend(&mut manifold, POINTS_COMPUTED_AHEAD, progress);
             });
@@ -225,7 +243,10 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             return false;
         }
         let mut on_finer = |point: &SingularPoint, given| {
-            let (mut finer, near) = boundary_point_on_finer(manifold, point).ok()?;
+            let FinerBoundaryPoint {
+                manifold: mut finer,
+                point: near,
+            } = boundary_point_on_finer(manifold, point).ok()?;
             let point = match given {
                 Some(which) => boundary_point_at_parameter(
                     &mut finer,
@@ -234,24 +255,33 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
                     which,
                     near.solution.params[which],
                 ),
-                None => boundary_point_at_distance(&mut finer, &near, 0.0, ACCURACY, 1.0)
-                    .map(|(point, _)| point),
+                None => {
+                    let tolerance = BoundarySearchTolerance {
+                        accuracy: ACCURACY,
+                        largest_distance: 1.0,
+                    };
+                    boundary_point_at_distance(&mut finer, &near, 0.0, tolerance)
+                        .map(|found| found.point)
+                }
             };
-            Some((finer, point.ok()?))
+            Some(FinerBoundaryPoint {
+                manifold: finer,
+                point: point.ok()?,
+            })
         };
         let Some(last) = self.steps.last_mut() else {
             return false;
         };
-        let (Some((_, first)), Some((finer, point))) = (
+        let (Some(first), Some(finer)) = (
             on_finer(&self.first, Some(1)),
             on_finer(&last.point, last.fixed_parameter),
         ) else {
             return false;
         };
-        (self.first, last.point) = (first, point);
+        (self.first, last.point) = (first.point, finer.point);
         self.step *= 0.5;
         self.end = None;
-        *manifold = finer;
+        *manifold = finer.manifold;
         true
     }
 
@@ -260,11 +290,13 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
     fn try_step(&mut self, manifold: &mut TwoParameterEquations) {
         let now = self.steps[self.steps.len() - 1].point.clone();
         match self.advance(manifold, &now) {
-            Ok((next, end)) => {
-                self.steps.extend(next);
-                self.end = end;
+            Ok(next) => {
+                self.steps.extend(next.points);
+                self.end = next.end;
             }
-            Err(_) if 0.5 * self.step >= SHORTEST * self.options.longest_step => self.step *= 0.5,
+            Err(_) if 0.5 * self.step >= STEPS.shortest * self.options.longest_step => {
+                self.step *= 0.5
+            }
             Err(stuck) => self.end = Some(end_after_failure(stuck)),
         }
     }
@@ -274,28 +306,29 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
         &mut self,
         manifold: &mut TwoParameterEquations,
         now: &SingularPoint,
-    ) -> Result<(Vec<UnverifiedBoundaryPoint>, Option<BranchEnd>), CorrectorFailure> {
-        let not_converged = || CorrectorFailure::NotConverged;
+    ) -> Result<BoundaryStep, CorrectorFailure> {
         if leaves_parameter_range(now) {
-            return Ok((Vec::new(), Some(BranchEnd::RangeEndReached)));
+            return Ok(BoundaryStep {
+                points: Vec::new(),
+                end: Some(BranchEnd::RangeEndReached),
+            });
         }
         let mut step = self.step;
         let mut given = self.first_parameter_limit(now, step, |which| {
             now.solution.params[which] + step * now.tangent.params[which]
         });
         if given.is_none() {
-            let (next, off) = boundary_point_at_distance(
-                manifold,
-                now,
-                step,
-                ACCURACY,
-                LARGEST_PREDICTION_ERROR * step,
-            )?;
+            let tolerance = BoundarySearchTolerance {
+                accuracy: ACCURACY,
+                largest_distance: STEPS.largest_prediction_error * step,
+            };
+            let found = boundary_point_at_distance(manifold, now, step, tolerance)?;
+            let (next, off) = (found.point, found.prediction_error);
             given = self.first_parameter_limit(now, step, |which| next.solution.params[which]);
             if given.is_none() {
                 let turn = self.accepts(manifold, [now, &next], off, step)?;
-                if turn > STEP_GROWTH_COSINE {
-                    self.step = (GROWTH * step).min(self.options.longest_step);
+                if turn > STEPS.growth_cosine {
+                    self.step = (STEPS.growth * step).min(self.options.longest_step);
                 }
                 let mut steps = self.codimension_two_points(manifold, [now, &next], step)?;
                 steps.push(UnverifiedBoundaryPoint {
@@ -303,13 +336,21 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
                     special: None,
                     fixed_parameter: None,
                 });
-                return Ok((steps, None));
+                return Ok(BoundaryStep {
+                    points: steps,
+                    end: None,
+                });
             }
         }
-        let Some((which, value, part)) = given else {
-            return Err(not_converged());
+        let Some(ParameterLimit {
+            which,
+            value,
+            distance,
+        }) = given
+        else {
+            return Err(CorrectorFailure::NotConverged);
         };
-        step = part;
+        step = distance;
         let next = boundary_point_at_parameter(manifold, now, step, which, value)?;
         let off = manifold.difference(&now.solution, &next.solution);
         let along = manifold.direction_product(&off, &now.tangent);
@@ -329,17 +370,16 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             special: None,
             fixed_parameter: Some(which),
         });
-        Ok((steps, end))
+        Ok(BoundaryStep { points: steps, end })
     }
 
-    /// Where the step first leaves a range, or passes the initial value of the second parameter:
-    /// which parameter, its value, and the length of the step to it.
+    /// Where the step first leaves a range, or passes the initial value of the second parameter.
     fn first_parameter_limit(
         &self,
         now: &SingularPoint,
         step: f64,
         next: impl Fn(usize) -> f64,
-    ) -> Option<(usize, f64, f64)> {
+    ) -> Option<ParameterLimit> {
         let marks = [
             (0, 0.0),
             (0, 1.0),
@@ -352,12 +392,19 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             let part = (value - before) / (after - before);
             let inside = value == self.initial_second_parameter && which == 1;
             let passed = match inside {
-                true => (before - value).abs() > EXACT && (before < value) != (after < value),
+                true => {
+                    (before - value).abs() > PARAMETER_ROUNDING
+                        && (before < value) != (after < value)
+                }
                 false => (value == 0.0 && after < value) || (value == 1.0 && after > value),
             };
-            passed.then_some((which, value, part.clamp(0.0, 1.0) * step))
+            passed.then_some(ParameterLimit {
+                which,
+                value,
+                distance: part.clamp(0.0, 1.0) * step,
+            })
         });
-        passed.min_by(|a, b| a.2.total_cmp(&b.2))
+        passed.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
     /// Checks that a step has stayed on the boundary; returns the cosine of its turn.
@@ -370,9 +417,9 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
     ) -> Result<f64, CorrectorFailure> {
         let turn = manifold.direction_product(&now.tangent, &next.tangent);
         let tilt = manifold.direction_product(&now.normal, &next.normal);
-        match off <= LARGEST_PREDICTION_ERROR * step
-            && turn > SMALLEST_ACCEPTED_COSINE
-            && tilt > SMALLEST_ACCEPTED_COSINE
+        match off <= STEPS.largest_prediction_error * step
+            && turn > STEPS.smallest_cosine
+            && tilt > STEPS.smallest_cosine
         {
             true => Ok(turn),
             false => Err(CorrectorFailure::NotConverged),
@@ -387,9 +434,9 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
         step: f64,
     ) -> Result<Vec<UnverifiedBoundaryPoint>, CorrectorFailure> {
         let special = codimension_two_between(manifold, pair, step)?;
-        let step = |(special, point)| UnverifiedBoundaryPoint {
-            point,
-            special: Some(special),
+        let step = |found: CodimensionTwoPoint| UnverifiedBoundaryPoint {
+            point: found.point,
+            special: Some(found.kind),
             fixed_parameter: None,
         };
         Ok(special.into_iter().map(step).collect())
@@ -407,7 +454,7 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
                 .state
                 .largest_displacement_to(&point.solution.state)
                 < CLOSURE_TOLERANCES[1]
-            && manifold.direction_product(&first.tangent, &point.tangent) > SMALLEST_ACCEPTED_COSINE
+            && manifold.direction_product(&first.tangent, &point.tangent) > STEPS.smallest_cosine
     }
 }
 
@@ -437,7 +484,7 @@ fn order_reversed(
 fn leaves_parameter_range(now: &SingularPoint) -> bool {
     (0..2).any(|k| {
         let (at, way) = (now.solution.params[k], now.tangent.params[k]);
-        at <= EXACT && way < 0.0 || at >= 1.0 - EXACT && way > 0.0
+        at <= PARAMETER_ROUNDING && way < 0.0 || at >= 1.0 - PARAMETER_ROUNDING && way > 0.0
     })
 }
 
@@ -450,7 +497,7 @@ pub struct ContinuedBoundary {
     pub points: Vec<VerifiedBoundaryPoint>,
     /// How it ended at its first point and at its last.
     pub ends: [BranchEnd; 2],
-    /// Matrices factorised for it, without those of softened leaves.
+    /// Matrices factorized for it, without those of softened leaves.
     pub factorizations: usize,
 }
 
@@ -484,8 +531,9 @@ pub fn follow_boundary(
         }
     };
     let (closed, reported) = (AtomicBool::new(false), Mutex::new(([0; 2], progress)));
-    let walk = |side: usize, first: SingularPoint| {
-        let mut walk = BoundaryContinuation::new(plane, how, first, seed.constant_parameter());
+    let follow = |side: usize, first: SingularPoint| {
+        let mut side_followed =
+            BoundaryContinuation::new(plane, how, first, seed.constant_parameter());
         let mut report = |points: usize, params| {
             let mut reported = reported.lock().unwrap_or_else(PoisonError::into_inner);
             reported.0[side] = points;
@@ -494,12 +542,12 @@ pub fn follow_boundary(
         };
         // If one direction leads back to the start, the other is not needed.
         let cancelled = || side == 0 && closed.load(Ordering::Relaxed);
-        let end = walk.run(grid.clone(), &cancelled, &mut report);
+        let end = side_followed.run(grid.clone(), &cancelled, &mut report);
         closed.fetch_or(side == 1 && end == BranchEnd::LoopClosed, Ordering::Relaxed);
-        (walk, end)
+        (side_followed, end)
     };
     let ((forward, end), (backward, beginning)) =
-        rayon::join(|| walk(1, first.clone()), || walk(0, first.reversed()));
+        rayon::join(|| follow(1, first.clone()), || follow(0, first.reversed()));
     boundary.factorizations += forward.factorizations;
     let is_closed = end == BranchEnd::LoopClosed;
     boundary.ends = [if is_closed { end.clone() } else { beginning }, end];

@@ -27,14 +27,14 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 //!
-//! Equilibria at points of the parameter plane, each continued from a neighbouring one.
-//!
-//! Leaves on either side of a stability boundary.
-//!
-//! Transfer of boundary points to finer and coarser grids.
+//! This file has what surrounds a boundary: equilibria at points of the parameter plane, each
+//! continued along a straight path from another, and leaves on either side of a boundary, for
+//! pictures.
 
 mod codimension_two;
 mod continuation;
+mod grid_transfer;
+mod point_search;
 mod refine;
 mod singular_point;
 
@@ -42,28 +42,29 @@ pub use crate::branch::boundary::codimension_two::CodimensionTwoKind;
 pub use crate::branch::boundary::continuation::{
     BoundaryContinuationOptions, ContinuedBoundary, follow_boundary,
 };
+pub use crate::branch::boundary::grid_transfer::coarsened;
+use crate::branch::boundary::grid_transfer::{GridBoundaryPoint, coarser_grid};
+pub(crate) use crate::branch::boundary::point_search::TwoParameterDirection;
+use crate::branch::boundary::point_search::TwoParameterEquations;
+pub use crate::branch::boundary::point_search::{TwoParameterProblem, TwoParameterState};
 pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
-pub(crate) use crate::branch::boundary::singular_point::TwoParameterDirection;
-pub use crate::branch::boundary::singular_point::{
-    BoundarySeed, TwoParameterProblem, TwoParameterState,
-};
-use crate::branch::boundary::singular_point::{SingularPoint, TwoParameterEquations};
-use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
+pub use crate::branch::boundary::singular_point::BoundarySeed;
+use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions, follow_branch};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};
-use crate::branch::equations::{BranchEquations, CorrectorFailure};
-use crate::branch::refine::{index_at, on_finer, refine_critical};
-use crate::branch::{EquilibriumPoint, prolong_field, restrict_field};
-use crate::leaf::{Grid, NodalField, State};
-use crate::relax::accuracy::transfer::{prolong, restrict};
+use crate::branch::equations::BranchEquations;
+use crate::branch::points::{EquilibriumPoint, restrict_field};
+use crate::branch::refine::{confirmed_index, on_finer, refine_critical};
+use crate::leaf::{Grid, State};
+use crate::relax::accuracy::transfer::restrict;
 use crate::relax::solve_on_grid::relax_from_state;
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// The longest step, as a part of the path, and the largest number of points on it.
-const LONGEST: f64 = 1.0;
+/// The longest step on a path, as a part of it, and the largest number of points.
+const LONGEST_PATH_STEP: f64 = 1.0;
 
 const MAX_PATH_POINTS: usize = 100;
 
@@ -73,16 +74,13 @@ const FINEST_PATH_GRID: usize = 1024;
 /// Segments of the coarsest grid for counting an index again.
 const COARSEST_INDEX_GRID: usize = 256;
 
-/// Least number of grids for a critical point.
-const CRITICAL_GRIDS: usize = 4;
-
 /// An equilibrium at a point of the parameter plane.
 #[derive(Clone, Debug)]
 pub struct ConfirmedEquilibrium {
     /// State and parameters on a grid, and that grid.
     pub solution: TwoParameterState,
     pub grid: Grid,
-    /// Morse index, confirmed on finer grids.
+    /// Morse index, on which three grids in a row agree.
     pub index: usize,
 }
 
@@ -145,7 +143,7 @@ pub fn follow_path(
         let last = follow_on_grid(&mut equations, &first, &mut path);
         let index = last
             .as_ref()
-            .and_then(|it| index_at(&mut equations, it).ok());
+            .and_then(|it| confirmed_index(&mut equations, it).ok());
         let finer = 2 * first.state.segments() <= FINEST_PATH_GRID;
         if let (Some(last), Some(index)) = (last, index)
             && (index == last.index || !finer)
@@ -177,7 +175,7 @@ pub fn recount_index(plane: &TwoParameterProblem, at: &ConfirmedEquilibrium) -> 
     while point.state.segments() < COARSEST_INDEX_GRID {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }
-    index_at(&mut equations, &point).ok()
+    confirmed_index(&mut equations, &point).ok()
 }
 
 /// The point at the end of the path on this grid, if the branch reaches it.
@@ -191,7 +189,7 @@ fn follow_on_grid(
     let turned = |points: &[EquilibriumPoint]| points[points.len() - 1].tangent.params[0] < 0.0;
     let how = ContinuationOptions {
         stop_criterion: Some(&turned),
-        ..ContinuationOptions::new(LONGEST, MAX_PATH_POINTS)
+        ..ContinuationOptions::new(LONGEST_PATH_STEP, MAX_PATH_POINTS)
     };
     let before = equations.factorizations;
     let branch = follow_branch(equations, first, &how, &mut |_, _| {});
@@ -225,19 +223,20 @@ pub fn refine_on_path(
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }
 
-/// Distances from the boundary at which they are sought, in this order: arclengths on the
-/// solution manifold, or fractions of the ranges.
+/// Distances from the boundary at which neighboring leaves are sought, in this order: arclengths
+/// on the solution manifold, or fractions of the ranges.
 const NEIGHBOUR_DISTANCES: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 
 /// The finest grid used for pictures, in segments.
 const FINEST_PICTURE_GRID: usize = 64;
 
-/// A leaf next to a boundary.
+/// An equilibrium next to a boundary of stability, for a picture.
 pub struct BoundaryNeighbour {
     pub solution: TwoParameterState,
     pub index: usize,
-    /// If it is where the leaf of the other, stable side comes to rest beyond the boundary, the
-    /// initial state of that fall: the unstable equilibrium at a branch point, or the fold.
+    /// The initial state of the fall, where this is the equilibrium to which the leaf of the other,
+    /// stable side falls beyond the boundary: the unstable equilibrium at a branch point, or the
+    /// fold.
     pub fallen_from: Option<State>,
 }
 
@@ -249,11 +248,12 @@ pub fn leaves_beside_boundary(
     point: &VerifiedBoundaryPoint,
     along: [f64; 2],
 ) -> Option<[BoundaryNeighbour; 2]> {
-    let (grid, point) = &point_on_picture_grid(plane, point);
+    let GridBoundaryPoint { grid, point } = &point_on_picture_grid(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
     let at = |away: f64, indices: RangeInclusive<usize>| {
-        equilibrium_across_boundary(plane, grid, point, along, (away, &indices))
+        equilibrium_across_boundary(plane, grid, point, along, away)
+            .filter(|found| indices.contains(&found.index))
     };
     let low = NEIGHBOUR_DISTANCES
         .iter()
@@ -282,28 +282,28 @@ pub fn leaves_beside_boundary(
 fn point_on_picture_grid(
     plane: &TwoParameterProblem,
     point: &VerifiedBoundaryPoint,
-) -> (Grid, VerifiedBoundaryPoint) {
+) -> GridBoundaryPoint<VerifiedBoundaryPoint> {
     let mut grid = Grid::from_stations(&point.stations, plane.first_leaf().kinks());
     let mut point = point.clone();
     while grid.segments() > FINEST_PICTURE_GRID
-        && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
+        && let Some(coarse) = coarser_grid(plane, &grid)
     {
         point.across.increments = restrict_field(
             &point.across.increments,
             usize::from(!plane.first_leaf().hinged()),
         );
-        (grid, point.state) = (coarse, state);
+        (grid, point.state) = (coarse, restrict(&point.state));
     }
-    (grid, point)
+    GridBoundaryPoint { grid, point }
 }
 
-/// The equilibrium at a distance across the boundary, if its index is one of these.
+/// The equilibrium at a distance `away` from the boundary, across it, if it is in the ranges.
 fn equilibrium_across_boundary(
     plane: &TwoParameterProblem,
     grid: &Grid,
     point: &VerifiedBoundaryPoint,
     along: [f64; 2],
-    (away, indices): (f64, &RangeInclusive<usize>),
+    away: f64,
 ) -> Option<BoundaryNeighbour> {
     let mut manifold = TwoParameterEquations::new(plane, grid.clone());
     let along = TwoParameterDirection {
@@ -322,13 +322,11 @@ fn equilibrium_across_boundary(
     let found = manifold.correct_bordered(start, normals, &[], Some(&rates), false);
     let found = found.ok()?;
     let index = found.solved.negative;
-    (indices.contains(&index) && is_in_parameter_range(found.solution.params)).then_some(
-        BoundaryNeighbour {
-            solution: found.solution,
-            index,
-            fallen_from: None,
-        },
-    )
+    is_in_parameter_range(found.solution.params).then_some(BoundaryNeighbour {
+        solution: found.solution,
+        index,
+        fallen_from: None,
+    })
 }
 
 /// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with
@@ -374,85 +372,4 @@ fn relaxed_neighbour(
 
 fn is_in_parameter_range(params: [f64; 2]) -> bool {
     params.iter().all(|part| (0.0..=1.0).contains(part))
-}
-
-/// Segments of the coarsest.
-const COARSEST_BOUNDARY_GRID: usize = 8;
-
-/// Initial guess for a boundary point on the grid with all segments halved, with its
-/// directions.
-pub fn boundary_point_on_finer<'a>(
-    manifold: &mut TwoParameterEquations<'a>,
-    point: &SingularPoint,
-) -> Result<(TwoParameterEquations<'a>, SingularPoint), CorrectorFailure> {
-    let state = prolong(
-        manifold.leaves.leaf_at(point.solution.params)?,
-        &point.solution.state,
-    );
-    let finer = manifold.refined();
-    let point = transferred(point, state, |field| {
-        prolong_field(field, manifold.first_node())
-    });
-    let point = SingularPoint {
-        tangent: finer.normalize_direction(point.tangent),
-        normal: finer.normalize_direction(point.normal),
-        ..point
-    };
-    Ok((finer, point))
-}
-
-/// Initial guess for the point on the grid with every second node.
-pub fn boundary_point_on_coarser(
-    plane: &TwoParameterProblem,
-    grid: &Grid,
-    point: &SingularPoint,
-) -> Option<(Grid, SingularPoint)> {
-    let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
-    let first = usize::from(!plane.first_leaf().hinged());
-    let point = transferred(point, state, |field| restrict_field(field, first));
-    Some((coarse, point))
-}
-
-/// The point on the grid of this state, to which `field` transfers increments.
-fn transferred(
-    point: &SingularPoint,
-    state: State,
-    field: impl Fn(&NodalField) -> NodalField,
-) -> SingularPoint {
-    let direction = |it: &TwoParameterDirection| TwoParameterDirection {
-        increments: field(&it.increments),
-        params: it.params,
-    };
-    SingularPoint {
-        solution: TwoParameterState {
-            state,
-            ..point.solution
-        },
-        border_modes: point.border_modes.iter().map(&field).collect(),
-        tangent: direction(&point.tangent),
-        normal: direction(&point.normal),
-        ..point.clone()
-    }
-}
-
-/// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
-/// not its refinement.
-pub fn state_on_coarser(
-    plane: &TwoParameterProblem,
-    grid: &Grid,
-    state: &State,
-) -> Option<(Grid, State)> {
-    let half = state.segments() / 2;
-    if half < COARSEST_BOUNDARY_GRID || 2 * half != state.segments() {
-        return None;
-    }
-    let coarse = coarsened(grid, half, plane.first_leaf().kinks());
-    (coarse.refined() == *grid).then(|| (coarse, restrict(state)))
-}
-
-/// The grid of so many segments that this one refines.
-pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
-    let stations = grid.sigma().iter().copied();
-    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
-    Grid::from_stations(&stations, kinks)
 }

@@ -7,11 +7,12 @@
 //! method, from coarse grids on, and their parameters are extrapolated to no softening.
 
 use crate::branch::boundary::codimension_two::{CodimensionTwoKind, locate_codimension_two};
-use crate::branch::boundary::singular_point::{
-    BoundaryPointSearch, SingularPoint, TwoParameterDirection, TwoParameterEquations,
+use crate::branch::boundary::grid_transfer::{boundary_point_on_coarser, boundary_point_on_finer};
+use crate::branch::boundary::point_search::{
+    BoundaryPointSearch, BoundarySearchTolerance, TwoParameterDirection, TwoParameterEquations,
     TwoParameterProblem, TwoParameterState,
 };
-use crate::branch::boundary::{boundary_point_on_coarser, boundary_point_on_finer};
+use crate::branch::boundary::singular_point::SingularPoint;
 use crate::branch::convergence::{
     EXACT_PARAMETER_ERROR, GridLimits, MAX_GRIDS, NestedGridPoint, Relocation, VerificationFailure,
     verify_over_grids,
@@ -47,11 +48,12 @@ const FIRST_REGULARIZATION: f64 = 1e-3;
 
 const REGULARIZATION_ERROR_RATIO: f64 = 0.5;
 
-/// Accuracy of a point on its grid, as a part of the ranges, and the largest distance from the
-/// initial guess of the previous grid.
-const ACCURACY: f64 = 1e-13;
-
-const LARGEST_GUESS_DISTANCE: f64 = 0.5;
+/// The search for a point from where it is on the previous grid: to rounding, as extrapolation
+/// over grids magnifies what remains.
+const RELOCATION_TOLERANCE: BoundarySearchTolerance = BoundarySearchTolerance {
+    accuracy: 1e-13,
+    largest_distance: 0.5,
+};
 
 /// Least angle (its sine) between the boundary and the line on which its point is sought, and the
 /// least derivative of one parameter along the boundary relative to the other.
@@ -64,7 +66,7 @@ const SMALLEST_PARAMETER_RATE_RATIO: f64 = 0.1;
 pub struct BoundaryAccuracy {
     pub tips: f64,
     pub numbers: f64,
-    /// That of the parameters for which further grids are tried.
+    /// Accuracy of the parameters for which further grids are tried.
     pub sought: f64,
 }
 
@@ -82,10 +84,9 @@ impl BoundaryAccuracy {
     }
 }
 
-/// A point to be verified.
+/// A point of a boundary found on one grid, to be verified on finer ones.
 #[derive(Clone, Debug)]
 pub struct UnverifiedBoundaryPoint {
-    /// Where it is on a grid.
     pub point: SingularPoint,
     pub special: Option<CodimensionTwoKind>,
     /// The parameter that is fixed: at an end of its range.
@@ -111,7 +112,7 @@ struct BoundaryPointCondition {
 /// Verifies a point on as many grids as necessary; they must agree on index and
 /// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
 /// coarser ones if possible.
-pub fn refine(
+pub fn verify_boundary_point(
     plane: &TwoParameterProblem,
     grid: &Grid,
     step: &UnverifiedBoundaryPoint,
@@ -120,13 +121,13 @@ pub fn refine(
     let mut manifold = TwoParameterEquations::new(plane, grid.clone());
     let leaf = manifold.leaves.leaf_at(step.point.solution.params)?;
     if is_nearly_rigid(leaf)
-        && let Some((grid, point)) = boundary_point_on_coarser(plane, grid, &step.point)
+        && let Some(coarser) = boundary_point_on_coarser(plane, grid, &step.point)
     {
         let step = UnverifiedBoundaryPoint {
-            point,
+            point: coarser.point,
             ..step.clone()
         };
-        if let Ok(verified) = refine(plane, &grid, &step, accuracy) {
+        if let Ok(verified) = verify_boundary_point(plane, &coarser.grid, &step, accuracy) {
             return Ok(verified);
         }
     }
@@ -204,18 +205,20 @@ impl<'a> NestedBoundaryPoint<'a> {
         near: &SingularPoint,
         start: TwoParameterState,
     ) -> Result<SingularPoint, CorrectorFailure> {
-        let accuracy = ITERATION_ERROR_FRACTION * self.sought_error();
+        let tolerance = BoundarySearchTolerance {
+            accuracy: ITERATION_ERROR_FRACTION * self.sought_error(),
+            ..RELOCATION_TOLERANCE
+        };
         let (manifold, given) = (&mut self.manifold, self.condition.fixed_parameter);
-        let search = near.search(manifold, given, start, (accuracy, LARGEST_GUESS_DISTANCE));
+        let search = near.search(manifold, given, start, tolerance);
         let frozen = near.kind == CriticalKind::Branching;
         let found = search.newton(manifold, frozen, &mut self.contraction);
-        let (found, left) = found.or_else(|_| {
+        let found = found.or_else(|_| {
             let search = search_from_previous_grid(manifold, near, given);
-            search.secant(manifold).map(|found| (found, 0.0))
+            search.secant(manifold)
         })?;
-        let point = near.with_search_result(manifold, found);
-        self.table.iteration_error = larger(self.table.iteration_error, left);
-        Ok(point)
+        self.table.iteration_error = larger(self.table.iteration_error, found.iteration_error);
+        Ok(near.with_search_result(manifold, found))
     }
 }
 
@@ -224,22 +227,22 @@ impl NestedGridPoint for NestedBoundaryPoint<'_> {
 
     fn locate(&mut self, level: usize) -> Result<Relocation, VerificationFailure> {
         let near = if level > 0 {
-            let (finer, near) = boundary_point_on_finer(&mut self.manifold, &self.located.point)?;
-            self.manifold = finer;
-            near
+            let finer = boundary_point_on_finer(&mut self.manifold, &self.located.point)?;
+            self.manifold = finer.manifold;
+            finer.point
         } else {
             self.located.point.clone()
         };
         let mut start = near.solution.clone();
         let believed = self.table.tips.best().map_or(0, |best| best.columns + 1);
-        predict_spot(&self.levels, &self.params, believed, &mut start);
+        predict_on_next_grid(&self.levels, &self.params, believed, &mut start);
         self.rigid = is_nearly_rigid(self.manifold.leaves.leaf_at(near.solution.params)?);
         self.located = match (self.condition.special, self.rigid) {
             (None, false) => LocatedBoundaryPoint {
                 point: self.newton_or_secant(&near, start)?,
                 slope_along: None,
             },
-            _ => relocated(&mut self.manifold, &near, self.condition)?,
+            _ => locate_by_secant(&mut self.manifold, &near, self.condition)?,
         };
         self.factorizations += self.manifold.factorizations;
         let point = &self.located.point;
@@ -311,8 +314,10 @@ impl NestedGridPoint for NestedBoundaryPoint<'_> {
 fn fixable_parameter(manifold: &TwoParameterEquations, point: &SingularPoint) -> Option<usize> {
     let [first, second] = point.tangent.params.map(f64::abs);
     let sine = |which: usize| {
-        let (across, _) = point.crossing_at_fixed_parameter(manifold, which);
-        manifold.direction_product(&across, &point.normal).abs()
+        let crossing = point.crossing(manifold, Some(which));
+        manifold
+            .direction_product(&crossing.direction, &point.normal)
+            .abs()
     };
     let order = if second >= SMALLEST_PARAMETER_RATE_RATIO * first {
         [1, 0]
@@ -329,16 +334,16 @@ fn fixable_parameter(manifold: &TwoParameterEquations, point: &SingularPoint) ->
 }
 
 /// The point on this grid, to rounding, by secant methods.
-fn relocated(
+fn locate_by_secant(
     manifold: &mut TwoParameterEquations,
     near: &SingularPoint,
     condition: BoundaryPointCondition,
 ) -> Result<LocatedBoundaryPoint, CorrectorFailure> {
     if let Some(special) = condition.special {
-        let (point, slope) = locate_codimension_two(manifold, near, special)?;
+        let found = locate_codimension_two(manifold, near, special)?;
         return Ok(LocatedBoundaryPoint {
-            point,
-            slope_along: (special == CodimensionTwoKind::Crossing).then_some(slope),
+            point: found.point,
+            slope_along: (special == CodimensionTwoKind::Crossing).then_some(found.slope),
         });
     }
     let search = search_from_previous_grid(manifold, near, condition.fixed_parameter);
@@ -351,7 +356,7 @@ fn relocated(
 
 /// Predicts the point on the next grid from those on at least two coarser ones: the last ones,
 /// as many as are taken to follow one error series.
-fn predict_spot(
+fn predict_on_next_grid(
     levels: &[GridLevel],
     params: &[[f64; 2]],
     believed: usize,
@@ -375,12 +380,7 @@ fn search_from_previous_grid(
     near: &SingularPoint,
     given: Option<usize>,
 ) -> BoundaryPointSearch {
-    near.search(
-        manifold,
-        given,
-        near.solution.clone(),
-        (ACCURACY, LARGEST_GUESS_DISTANCE),
-    )
+    near.search(manifold, given, near.solution.clone(), RELOCATION_TOLERANCE)
 }
 
 /// The parameters at a point of a nearly rigid leaf on its first grid: the softening is reduced
@@ -433,7 +433,7 @@ fn unregularized_parameters(
                     ..near.clone()
                 };
                 locate_codimension_two(&mut soft, &near, special)?
-                    .0
+                    .point
                     .solution
             }
             None => search.secant(&mut soft)?.sample.solution,
@@ -488,11 +488,12 @@ pub struct VerifiedBoundaryPoint {
     /// Morse indices where the first parameter is smaller and where it is larger; at a fold,
     /// of the two branches that meet there.
     pub indices: [usize; 2],
-    /// Matrices factorised for it, without those of softened leaves.
+    /// Matrices factorized for it, without those of softened leaves.
     pub factorizations: usize,
 }
 
-/// Both parameters at a point on a grid.
+/// Both parameters at a point on a grid; those of a softened matrix are extrapolated to no
+/// softening.
 #[derive(Default)]
 struct BoundaryParameters {
     values: [f64; 2],
@@ -503,7 +504,7 @@ struct BoundaryParameters {
 }
 
 impl BoundaryParameters {
-    /// Without softening.
+    /// Parameters of a leaf whose matrix is not softened.
     fn without_regularization(values: [f64; 2]) -> Self {
         BoundaryParameters {
             values,
@@ -520,7 +521,8 @@ struct FixedParameter {
     value: f64,
 }
 
-/// The values to be extrapolated.
+/// Tips and parameters of a point of a boundary on finer and finer grids, and what their errors
+/// consist of besides those of extrapolation.
 #[derive(Default)]
 struct BoundaryConvergenceTable {
     tips: Richardson,
@@ -533,7 +535,7 @@ struct BoundaryConvergenceTable {
     amplified: f64,
     /// Errors of the parameters due to softening.
     regularization_errors: [f64; 2],
-    /// Largest iteration error of Newton's method.
+    /// Largest iteration error of Newton's method on any grid (lengths, fractions of ranges).
     iteration_error: f64,
 }
 
@@ -556,17 +558,14 @@ impl BoundaryConvergenceTable {
         segments: f64,
     ) -> Result<[f64; 2], CorrectorFailure> {
         let point = &located.point;
-        let (across, slope) = match self.fixed_parameter {
-            Some(FixedParameter { which, .. }) => {
-                point.crossing_at_fixed_parameter(manifold, which)
-            }
-            None => (point.normal.clone(), point.slope),
-        };
+        let fixed = self.fixed_parameter.map(|fixed| fixed.which);
+        let crossing = point.crossing(manifold, fixed);
+        let slope = crossing.slope;
         let leaf = manifold.leaves.leaf_at(point.solution.params)?;
         let stiffest = stiffest_condensed(leaf).min(1.0 / softening);
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
-            let own = (rounding / slope * across.params[i]).abs();
+            let own = (rounding / slope * crossing.direction.params[i]).abs();
             let along = (located.slope_along)
                 .map_or(0.0, |slope| rounding / slope * point.tangent.params[i]);
             own + along.abs()
@@ -616,7 +615,7 @@ impl BoundaryConvergenceTable {
         given.map(|fixed| fixed.value)
     }
 
-    /// Whether the errors of both parameters are below this, or below rounding.
+    /// Whether the error of each parameter is at most `enough`, or at most its rounding error.
     fn is_exact(&self, enough: f64) -> bool {
         let mut errors = self.errors().into_iter().zip(self.rounded);
         errors.all(|(error, rounded)| error <= enough.max(rounded))
@@ -635,8 +634,8 @@ impl BoundaryConvergenceTable {
         let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral_modes));
         let forward = match point.kind {
             CriticalKind::Branching => {
-                let (across, slope) = point.crossing_at_fixed_parameter(manifold, 1);
-                slope * across.params[0] > 0.0
+                let crossing = point.crossing(manifold, Some(1));
+                crossing.slope * crossing.direction.params[0] > 0.0
             }
             CriticalKind::Fold => true,
         };

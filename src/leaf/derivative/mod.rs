@@ -30,7 +30,7 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
+    /// The forces by which a change of the number unbalances this leaf, a whole one in space, in a state
     /// with these segments.
     pub fn parameter_forces(
         &self,
@@ -39,11 +39,11 @@ impl DiscreteLeaf {
         rate: &LeafParameterDerivative,
     ) -> ParameterForces {
         let mut forces = ParameterForces::zeros(self.rods());
-        let neighbours = self.weighted_leaves_on_grid(rate);
+        let neighbors = self.weighted_leaves_on_grid(rate);
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.sections_unchanged() {
-                self.add_section_changes(segments, j, rod, &neighbours, &mut forces);
+                self.add_section_changes(segments, j, rod, &neighbors, &mut forces);
             }
             let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
             if of_all || coupling || rod.length != 0.0 {
@@ -54,8 +54,8 @@ impl DiscreteLeaf {
             }
         }
         self.add_moment_changes(rate, &mut forces);
-        self.add_tissue_and_own_load_changes(state, &neighbours, &mut forces);
-        let motion = self.support_motion_increments(rate, &neighbours);
+        self.add_tissue_and_own_load_changes(state, &neighbors, &mut forces);
+        let motion = self.support_motion_increments(rate, &neighbors);
         self.add_support_motion(state, segments, motion, &mut forces);
         forces
     }
@@ -66,7 +66,7 @@ impl DiscreteLeaf {
         segments: &[Segment],
         j: usize,
         rod: &RodParameterDerivative,
-        neighbours: &[Weighted<DiscreteLeaf>],
+        neighbors: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
         let (n, first) = (self.segments(), self.first_node());
@@ -81,7 +81,7 @@ impl DiscreteLeaf {
                 self.grid.segment_width(i),
             );
             if self.has_tissue() {
-                let rate = |of: fn(&Section) -> DVec3| section_rate(neighbours, j, i, of);
+                let rate = |of: fn(&Section) -> DVec3| section_rate(neighbors, j, i, of);
                 change.rest_strain = rate(|it| it.rest_strain);
                 change.rest_curvature = rate(|it| it.rest_curvature);
             }
@@ -210,9 +210,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl DiscreteLeaf {
     /// Adds the effect of displacing and rotating a clamped base.
     fn add_base_motion(
         &self,
@@ -341,16 +339,7 @@ impl DiscreteLeaf {
             }
         }
     }
-}
 
-impl LeafParameterDerivative<'_> {
-    /// Whether dead moments change.
-    pub fn changes_moments(&self) -> bool {
-        !self.moments.is_empty()
-    }
-}
-
-impl DiscreteLeaf {
     /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {

@@ -80,7 +80,7 @@ impl<'s> ProfileDerivative<'s> {
 }
 
 impl<'s> LeafParameterDerivative<'s> {
-    /// The derivative of `leaf` from neighbouring scenarios.
+    /// The derivative of `leaf` from neighboring scenarios.
     pub fn new(leaf: &Leaf, terms: &'s [Weighted<Scenario>]) -> Self {
         let scale = leaf.scale;
         let sum = |value: &dyn Fn(&Scenario) -> f64| value_derivative(terms, value);
@@ -151,6 +151,11 @@ impl LeafParameterDerivative<'_> {
         self.rods[j].hinge
     }
 
+    /// Whether dead moments change.
+    pub fn changes_moments(&self) -> bool {
+        !self.moments.is_empty()
+    }
+
     /// The rate of the place of the base of rod `j` if it is clamped.
     pub fn base_motion_rate(&self, j: usize) -> NodeIncrement {
         self.rods[j].base
@@ -190,8 +195,8 @@ impl RodParameterDerivative<'_> {
     }
 }
 
-/// The derivative of a number of the scenario: relative to the first, so that without changes it
-/// is exactly zero.
+/// The derivative of a value of the scenario: a weighted sum of differences from the first scenario, so
+/// that the derivative of an unchanged value is exactly zero.
 fn value_derivative(terms: &[Weighted<Scenario>], value: &dyn Fn(&Scenario) -> f64) -> f64 {
     let first = value(&terms[0].term);
     let change = |it: &Weighted<Scenario>| it.weight * (value(&it.term) - first);
@@ -215,7 +220,7 @@ pub struct ParameterForces {
     pub gaps: Vec<Vec<DVec3>>,
     /// Change of the energy.
     pub energy: f64,
-    /// Increments of held nodes. Rods on which it moves none have no entries.
+    /// Increments of held nodes. Rods on which no support moves have no entries.
     pub support_increments: NodalField,
 }
 
@@ -246,7 +251,7 @@ impl ParameterForces {
         nodes
     }
 
-    /// The effects on the gaps of rod `j`, which has `segments` of them.
+    /// The changes of the gaps of rod `j`, one for each of its `segments`.
     pub fn gap_effects_mut(&mut self, j: usize, segments: usize) -> &mut [DVec3] {
         let gaps = &mut self.gaps[j];
         gaps.resize(segments, DVec3::ZERO);
@@ -411,7 +416,7 @@ fn moment_rates(terms: &[Weighted<Scenario>], unit: f64) -> Vec<PointMoment> {
     all.filter(|it| it.moment != DVec3::ZERO).collect()
 }
 
-/// The leaves of neighbouring scenarios, in the units of `leaf`.
+/// The leaves of neighboring scenarios, in the units of `leaf`.
 fn weighted_leaves(leaf: &Leaf, terms: &[Weighted<Scenario>]) -> Vec<Weighted<Leaf>> {
     let each = terms.iter().map(|it| Weighted {
         weight: it.weight,

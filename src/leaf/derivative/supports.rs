@@ -73,7 +73,7 @@ impl DiscreteLeaf {
         forces.support_increments = motion;
     }
 
-    /// Adds what moving node `i` of rod `j` does to its segments, and to the energy.
+    /// Adds the effect of moving node `i` of rod `j` on the segments on either side, and on the energy.
     fn add_node_motion(
         &self,
         state: &State,
@@ -120,7 +120,7 @@ impl DiscreteLeaf {
     }
 
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
-    /// tip neighbours are displaced alike, and what turns there is held.
+    /// tip neighbors are displaced alike, and rotations that are prescribed there are held.
     fn add_coupling_response(
         &self,
         state: &State,

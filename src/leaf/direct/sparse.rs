@@ -1,4 +1,4 @@
-//! BunchKaufmanFactors factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
+//! Sparse factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
 //! ones, also bordered, and definite ones without a search for pivots.
 
 use crate::leaf::direct::unknowns::{

@@ -45,8 +45,8 @@ pub struct UnknownNumbering {
 }
 
 impl UnknownNumbering {
-    /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
-    /// of which these unknowns are coupled only.
+    /// Numbers the unknowns by nested dissection of the grid of rods and nodes, the joint tip last, for
+    /// rods that are coupled by the unknowns `coupled` alone.
     pub fn new(system: &System, coupled: [bool; 6]) -> Self {
         let (rods, n) = (system.rods(), system.nodes());
         let mut order = DissectionOrder {
@@ -117,9 +117,9 @@ struct DissectionOrder {
 }
 
 impl DissectionOrder {
-    /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
-    /// first, then the line between them. A rod is separated from its neighbours by the
-    /// unknowns that are coupled to theirs alone: its others precede these.
+    /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves first, then the line
+    /// between them. The coupled unknowns of a rod alone separate its neighbors: its other unknowns
+    /// precede them.
     fn dissect(&mut self, rods: Range<usize>, nodes: Range<usize>) {
         let (width, length) = (rods.len(), nodes.len());
         let axes = self.coupled.iter().filter(|&&coupled| coupled).count();
@@ -146,7 +146,7 @@ impl DissectionOrder {
         }
     }
 
-    /// Numbers the unknowns of a rod that are not coupled with neighbours, then those that are.
+    /// Numbers the unknowns of a rod that are not coupled with neighbors, then those that are.
     fn number_rod(&mut self, j: usize, nodes: Range<usize>) {
         let coupled = self.coupled;
         let is_coupled = |c: usize| coupled[c];
@@ -165,7 +165,7 @@ impl DissectionOrder {
         self.number_node(j, middle, some);
     }
 
-    /// Some components of a node; not those of the joint tip, which follows.
+    /// Numbers some components of a node, without those of the joint tip, which follows.
     fn number_node(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
         let own = match self.joined && i + 1 == self.nodes {
             true => 3,
@@ -178,8 +178,8 @@ impl DissectionOrder {
     }
 }
 
-/// Calls `add` with row, column and value of the entries of one triangle of K and its border, some
-/// of them in several parts: the same positions in the same order for all systems of a pattern.
+/// Calls `add` with row, column and value of the entries of one triangle of K and its border. Some
+/// entries come in several parts; positions and order are the same for all systems of a pattern.
 pub fn for_each_matrix_entry(
     system: &System,
     unknowns: &UnknownNumbering,

@@ -163,7 +163,7 @@ fn gap_coupling(system: &System, j: usize, own: usize) -> Vec<f64> {
     (0..own).map(spring).collect()
 }
 
-/// Completes a symmetric matrix of padded rows, given by its upper triangle.
+/// Fills the lower triangle of a symmetric matrix of padded rows.
 fn symmetrize_matrix(a: &mut [f64], width: usize) {
     let stride = padded_length(width);
     for r in 1..width {
@@ -343,7 +343,8 @@ impl CondensedRod {
         })
     }
 
-    /// Writes the blocks of its matrix, and the matrix of its displacements, upper triangle.
+    /// Writes the blocks of the matrix of vein `j`, and the upper triangle of the matrix of its
+    /// displacements.
     fn assemble(&mut self, system: &System, j: usize, shift: f64, width: usize) {
         let RodLane { group, lane } = rod_lane(j);
         let chain = &system.groups[group].matrix;
@@ -417,7 +418,7 @@ impl CondensedRod {
         }
     }
 
-    /// Subtracts from the forces on the nodes those of rotations.
+    /// Subtracts the forces by rotations of the nodes from `load`.
     #[inline(always)]
     fn subtract_rotations(&self, turns: &[[f64; 3]], load: &mut [f64]) {
         for (i, node) in self.nodes.iter().enumerate() {
@@ -478,8 +479,8 @@ impl WithSimd for RodElimination<'_> {
     }
 }
 
-/// Eliminates the rotations base to tip: the displacements of nodes up to the next one are
-/// coupled with a rotation once those before it are eliminated.
+/// Eliminates the rotations base to tip. Once the rotations before a node are eliminated, its rotation is
+/// coupled with the displacements of all nodes up to the next.
 #[inline(always)]
 fn eliminate_rotations<S: Simd>(
     simd: S,
@@ -758,8 +759,8 @@ fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
     Some(negative)
 }
 
-/// Whether the product of three columns and three rows changes no diagonal entry by too much,
-/// but for some; what is not a number does.
+/// Whether the product of three columns and three rows changes no diagonal entry by too much, but for
+/// entries that are free to change. Not-a-number is too much.
 #[inline(always)]
 fn is_growth_bounded(
     [c0, c1, c2]: [&[f64]; 3],

@@ -118,7 +118,7 @@ impl BlockForces {
 /// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
 pub struct PackStep<'a> {
     pub layout: PackLayout,
-    /// Which pack.
+    /// Number of the pack.
     pub pack: usize,
     /// Positions of the whole leaf.
     pub positions: &'a [AlignedArray; 3],
@@ -180,10 +180,7 @@ impl pulp::WithSimd for PackStep<'_> {
         let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
         self.block.begin_pack();
         for span in block_spans(layout, rods.len(), S::F64_LANES) {
-            let ArraySpan {
-                first: start,
-                count,
-            } = span;
+            let (start, count) = (span.first, span.count);
             let nodes = BlockNodes {
                 span,
                 first: layout.node_index(rods.start, start),
@@ -224,10 +221,10 @@ impl pulp::WithSimd for PackStep<'_> {
     }
 }
 
-/// Only the forces of a pack's segments, written to `forces`.
+/// Computes the forces of a pack's segments without moving its nodes, and appends them to `forces`.
 pub struct PackForces<'a> {
     pub layout: PackLayout,
-    /// Which pack.
+    /// Number of the pack.
     pub pack: usize,
     pub positions: &'a [AlignedArray; 3],
     pub motion: &'a PackMotion,
@@ -246,10 +243,7 @@ impl pulp::WithSimd for PackForces<'_> {
         let mut block = BlockForces::new();
         let sums = &mut SegmentSums::zero(simd);
         for span in block_spans(layout, rods.len(), S::F64_LANES) {
-            let ArraySpan {
-                first: start,
-                count,
-            } = span;
+            let (start, count) = (span.first, span.count);
             let nodes = BlockNodes {
                 span,
                 first: layout.node_index(rods.start, start),
@@ -316,7 +310,7 @@ impl PackStep<'_> {
         }
     }
 
-    /// Velocities and positions.
+    /// Kicks the velocities and drifts the positions of a block.
     #[inline(always)]
     fn translate_nodes<S: Simd, const COUPLED: bool, const APPLIED: bool>(
         &mut self,
@@ -324,10 +318,7 @@ impl PackStep<'_> {
         span: ArraySpan,
         coupling: [[f64; 3]; 2],
     ) -> Lanes<S> {
-        let ArraySpan {
-            first: start,
-            count: nodes,
-        } = span;
+        let (start, nodes) = (span.first, span.count);
         let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
@@ -392,17 +383,14 @@ impl PackStep<'_> {
         energy
     }
 
-    /// Angular momenta and rotations.
+    /// Kicks the angular momenta and drifts the rotations of a block.
     #[inline(always)]
     fn rotate_nodes<S: Simd, const NORMALIZE: bool>(
         &mut self,
         simd: S,
         span: ArraySpan,
     ) -> Lanes<S> {
-        let ArraySpan {
-            first: start,
-            count: nodes,
-        } = span;
+        let (start, nodes) = (span.first, span.count);
         let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
@@ -433,7 +421,8 @@ impl PackStep<'_> {
             let before = Vectors::load(simd, &p, at);
             let after = moment.mul_add(half_kick, before.scale(keep));
             after.store(&mut p, at);
-            let (r, w) = quaternion(simd, &q, at);
+            let rotation = quaternion(simd, &q, at);
+            let (r, w) = (rotation.vector, rotation.scalar);
             let (y, z) = (r.y + r.y, r.z + r.z);
             let d1 = Vectors::new(
                 r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
@@ -572,9 +561,10 @@ fn forces<S: Simd>(
 /// Smallest |s|^2: between two rods, whose segment has no stiffness, it could be zero.
 const MIN_SQUARED_NORM: f64 = 1e-8;
 
-/// Up to this delta, of a segment bent by 0.2, so many terms of B are accurate to rounding.
+/// Delta (of a segment bent by 0.2) up to which [`SERIES_TERMS`] terms of B are accurate to rounding.
 const SERIES_DELTA_LIMIT: f64 = 0.01;
 
+/// Number of terms of B for segments that bend little.
 const SERIES_TERMS: usize = 5;
 
 /// B(delta), the slope of sigma.
@@ -588,10 +578,11 @@ fn rotation_vector_series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
     }
 }
 
-/// The directors of the quaternion `s` of any length, `twice` being 2/|s|^2: with additions in
+/// The directors of the quaternion s of any length, `twice` being 2/|s|^2: with additions in
 /// place of some multiplications, of which there are more here.
 #[inline(always)]
-fn directors<S: Simd>((s, sw): Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 3] {
+fn directors<S: Simd>(quaternions: Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 3] {
+    let (s, sw) = (quaternions.vector, quaternions.scalar);
     let one = Lanes::splat(twice.simd, 1.0);
     let r = s.scale(twice);
     let (xx, yy, zz) = (s.x * r.x, s.y * r.y, s.z * r.z);
@@ -624,10 +615,7 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
         law,
         ..
     } = nodes;
-    let ArraySpan {
-        first: start,
-        count,
-    } = span;
+    let (start, count) = (span.first, span.count);
     let (x0, x1) = (
         array_chunks(nodes.x, ArraySpan::new(nodes.first, count)),
         array_chunks(nodes.x, ArraySpan::new(nodes.first + 1, count)),
@@ -669,8 +657,9 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
     );
     let mut at = 0;
     while at + S::F64_LANES <= count {
-        let (a, aw) = quaternion(simd, &q0, at);
-        let (b, bw) = quaternion(simd, &q1, at);
+        let (q0, q1) = (quaternion(simd, &q0, at), quaternion(simd, &q1, at));
+        let (a, aw) = (q0.vector, q0.scalar);
+        let (b, bw) = (q1.vector, q1.scalar);
         let (d, dw) = (b - a, bw - aw);
         let delta = d.x.mul_add(d.x, d.y * d.y) + d.z.mul_add(d.z, dw * dw);
         let inverse = (four - delta).max(least).recip();
@@ -718,7 +707,11 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
         let shear = Lanes::load(simd, shear, at);
         let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, stretch_excess[c], at));
-        let directors = directors((a + b, aw + bw), twice);
+        let sum = Quaternions {
+            vector: a + b,
+            scalar: aw + bw,
+        };
+        let directors = directors(sum, twice);
         let n = if ROUND {
             let [d1, ..] = directors;
             let rest_force = Lanes::load(simd, rest_force[0], at);
@@ -758,5 +751,8 @@ fn quaternion<S: Simd>(simd: S, q: &[impl Deref<Target = [f64]>; 4], at: usize) 
         Lanes::load(simd, &q[1], at),
         Lanes::load(simd, &q[2], at),
     );
-    (vector, Lanes::load(simd, &q[3], at))
+    Quaternions {
+        vector,
+        scalar: Lanes::load(simd, &q[3], at),
+    }
 }

@@ -106,7 +106,6 @@ impl PackLayout {
         }
     }
 
-    /// Number of packs.
     pub fn packs(&self) -> usize {
         self.rods.div_ceil(self.rods_per_pack)
     }
@@ -153,7 +152,7 @@ impl PackLayout {
 /// Place of a node in the arrays of the packs.
 #[derive(Clone, Copy, Debug)]
 pub struct PackPosition {
-    /// Which pack.
+    /// Number of the pack.
     pub pack: usize,
     /// Index in the arrays of this pack.
     pub entry: usize,

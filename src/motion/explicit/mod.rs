@@ -117,7 +117,7 @@ pub struct Explicit {
 #[derive(Clone, Copy, Debug, Default)]
 struct EqualSteps {
     time: f64,
-    /// Number of steps before.
+    /// Number of steps before that time.
     steps: usize,
 }
 
@@ -594,7 +594,6 @@ struct AppliedLoads {
     nodes_in_wind: Option<NodesInWind>,
 }
 
-/// Nodes in wind.
 struct NodesInWind {
     wind: WindDrag,
     forces: Vec<DVec3>,
@@ -604,7 +603,7 @@ struct NodesInWind {
 }
 
 impl AppliedLoads {
-    /// Of a leaf that moves from the state `start`; `None` if nothing acts on the nodes besides.
+    /// The moments and forces on a leaf that moves from `start`; `None` if there are none.
     fn new(
         leaf: &DiscreteLeaf,
         physics: &Physics,
@@ -708,7 +707,7 @@ impl AppliedLoads {
         (self.nodes_in_wind.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
     }
 
-    /// Replaces these velocities.
+    /// Replaces the velocities that further motion depends on.
     fn set_past_velocities(&mut self, past: Vec<DVec3>) {
         if let Some(blown) = &mut self.nodes_in_wind {
             blown.velocity = past;
@@ -772,7 +771,7 @@ struct VaryingWork {
     rest_curvature_factor: f64,
     /// Twice the energy of bending from the rest curvatures to none.
     twice_straightening_energy: f64,
-    /// At the last kick: half the impulse of the factor's excess, and the sum of the
+    /// Half the impulse of the factor's excess at the last kick, and the sum of the
     /// rest curvatures times the moments without them.
     half_impulse: f64,
     rest_moment_sum: f64,

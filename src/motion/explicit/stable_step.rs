@@ -42,9 +42,9 @@ use std::array::from_fn;
 /// The longest stable time step, and what limits it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StableStep {
-    /// The step.
+    /// Length of the step, dimensionless.
     pub step: f64,
-    /// The fastest motion.
+    /// The fastest motion, in words, which limits the step.
     pub limit: &'static str,
 }
 

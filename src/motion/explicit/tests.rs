@@ -114,10 +114,8 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
         explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
         for (j, i) in leaf.rod_index_pairs(1..=n) {
-            let NodeMomentum {
-                velocity: v,
-                angular: p,
-            } = explicit.momentum(j, i);
+            let momentum = explicit.momentum(j, i);
+            let (v, p) = (momentum.velocity, momentum.angular);
             let (force, moment) = expected[state.base(j) + i];
             let moment_error = (p / (0.5 * h) - moment).length();
             assert!(moment_error < allowed, "{j} {i}: {moment_error}");

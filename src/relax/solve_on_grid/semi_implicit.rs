@@ -14,11 +14,13 @@
 use crate::leaf::{AssemblyTotals, DiscreteLeaf, Increment, MassLoad, NodalField, State, System};
 use crate::newton::{
     EquilibriumFailure, ForceConvergence, LinearSolveFailure, NewtonEquations, NewtonIteration,
-    SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error, satisfies_lengths,
+    RequiredAccuracy, SolverCounts, StallCounter, cg_tolerance, is_at_saddle, remaining_error,
+    satisfies_lengths,
 };
 use crate::relax::plan::moving_compliance;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::RESOLVED_TURN;
+use crate::scenario::CLAMPED_ROD_FREQUENCY;
 
 /// Limits on the steps of the motion.
 struct MotionStepLimits {
@@ -165,7 +167,8 @@ impl GridRelaxation<'_> {
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 let rounding = stalled.increment_rounding(leaf, &self.state, size);
-                rest = remaining_error(size, previous, tolerances, (accuracy, rounding), first);
+                let required = RequiredAccuracy { accuracy, rounding };
+                rest = remaining_error(size, previous, tolerances, required, first);
             } else {
                 motion.newton_step_size = f64::INFINITY;
             }
@@ -291,8 +294,7 @@ fn assembled(
 
 /// The time steps of the damped motion, in units of sqrt(rho L^4/A).
 struct DampedTimeSteps {
-    /// Damping c: critical for the lowest bending mode of a single rod, whose frequency is 3.516
-    /// (canonical value beta_1^2 of the clamped-free beam).
+    /// Damping c: critical for the lowest bending mode of a single rod.
     damping: f64,
     /// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
     /// Twice as long a one may carry the leaf into another valley.
@@ -310,7 +312,7 @@ struct DampedTimeSteps {
 }
 
 const TIME_STEPS: DampedTimeSteps = DampedTimeSteps {
-    damping: 2.0 * 3.516,
+    damping: 2.0 * CLAMPED_ROD_FREQUENCY,
     first: 0.06,
     shortest: 1e-7,
     longest: 1e3,

@@ -256,15 +256,35 @@ impl<'p> IndexMapSweep<'p> {
     }
 }
 
-/// Points closer than this part of both ranges are merged: their errors would dominate the
-/// slopes of interpolating polynomials.
-const MERGING_DISTANCE_IN_RANGES: f64 = 1e-4;
+/// When critical points of paths and points of curves are the same. Parameters are fractions of
+/// their ranges, and distances of tips lengths.
+struct CurveMatching {
+    /// Points of a path closer than this part of both ranges are merged: their errors would
+    /// dominate the slopes of interpolating polynomials.
+    merged_in_ranges: f64,
+    /// Points of a curve closer than this are merged, for the same reason.
+    merged_on_curve: f64,
+    /// Crossings closer than this may be in either order.
+    same_crossing: f64,
+    /// Parameters and tips that agree within this plus both error bounds are the same.
+    same_point: f64,
+    /// A curve and a branch with tips farther apart than this belong to different leaves.
+    largest_tip_distance: f64,
+    /// Iterations for the nearest point of a curve.
+    nearest_point_iterations: usize,
+    /// A point may lie outside an interval of a curve by this part of it.
+    interval_overhang: f64,
+}
 
-/// Crossings closer than this may be in either order.
-const SAME_CROSSING_DISTANCE: f64 = 1e-3;
-
-/// A curve and a branch with tips farther apart than this (lengths) belong to different leaves.
-const LARGEST_TIP_DISTANCE: f64 = 0.02;
+const CURVE_MATCHING: CurveMatching = CurveMatching {
+    merged_in_ranges: 1e-4,
+    merged_on_curve: 1e-3,
+    same_crossing: 1e-3,
+    same_point: 1e-6,
+    largest_tip_distance: 0.02,
+    nearest_point_iterations: 20,
+    interval_overhang: 0.05,
+};
 
 /// Curves between larger indices are not followed for a map: beyond this, singular
 /// matrices on the path itself are used.
@@ -322,7 +342,7 @@ impl CellPath {
         loop {
             let next = crossings.iter().position(|crossing| {
                 crossing.indices.contains(&now)
-                    && distance(crossing) > reached - SAME_CROSSING_DISTANCE
+                    && distance(crossing) > reached - CURVE_MATCHING.same_crossing
             });
             let Some(next) = next else { break };
             let crossing = crossings.remove(next);
@@ -343,8 +363,9 @@ impl CellPath {
         let mut points: Vec<&VerifiedBoundaryPoint> = Vec::new();
         for point in &curve.points {
             let far = |last: &&VerifiedBoundaryPoint| {
-                (0..2)
-                    .any(|i| (point.params[i] - last.params[i]).abs() > MERGING_DISTANCE_IN_RANGES)
+                (0..2).any(|i| {
+                    (point.params[i] - last.params[i]).abs() > CURVE_MATCHING.merged_in_ranges
+                })
             };
             if points.last().is_none_or(far) {
                 points.push(point);
@@ -399,7 +420,7 @@ impl CellPath {
             .tips
             .windows(2)
             .map(|pair| largest_tip_distance(&pair[0], &pair[1]));
-        off < LARGEST_TIP_DISTANCE + 0.5 * largest(steps)
+        off < CURVE_MATCHING.largest_tip_distance + 0.5 * largest(steps)
     }
 }
 
@@ -408,19 +429,6 @@ fn largest_tip_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
     largest(distances)
 }
-
-/// Parameters (as fractions) and tips that agree within this plus both error bounds are
-/// the same.
-const SAME_POINT_DISTANCE: f64 = 1e-6;
-
-const NEAREST_POINT_ITERATIONS: usize = 20;
-
-/// Points of a curve closer than this are merged for interpolation: their errors would dominate
-/// the slopes.
-const MERGING_DISTANCE_ON_CURVE: f64 = 1e-3;
-
-/// A point may lie outside an interval of a curve by this part of it.
-const INTERVAL_OVERHANG: f64 = 0.05;
 
 impl BoundarySeed<'_> {
     /// Its grid, for leaves with these kinks.
@@ -503,7 +511,7 @@ impl SingularPointSample<'_> {
         for point in &curve.points {
             let coordinates = parameters_and_tips(point.params, &point.tips);
             if (points_of_curve.last()).is_none_or(|last| {
-                parameter_distance(last, &coordinates) > MERGING_DISTANCE_ON_CURVE
+                parameter_distance(last, &coordinates) > CURVE_MATCHING.merged_on_curve
             }) {
                 points.push(point);
                 points_of_curve.push(coordinates);
@@ -513,7 +521,7 @@ impl SingularPointSample<'_> {
             let target = parameters_and_tips(self.params, &mirror_image_of_tips(self.tips, *signs));
             if let [only] = &points[..] {
                 return parameter_distance(&points_of_curve[0], &target)
-                    < SAME_POINT_DISTANCE + self.error + parameter_and_tip_error(only);
+                    < CURVE_MATCHING.same_point + self.error + parameter_and_tip_error(only);
             }
             (1..points.len()).any(|k| {
                 let pair = &points[k - 1..=k];
@@ -528,7 +536,7 @@ impl SingularPointSample<'_> {
                         &points_of_curve,
                         k,
                         &target,
-                        SAME_POINT_DISTANCE + self.error + within,
+                        CURVE_MATCHING.same_point + self.error + within,
                     )
             })
         })
@@ -579,9 +587,9 @@ fn is_on_interpolated_interval(
     }));
     let first = k - 1 - k.saturating_sub(2);
     let [low, high] = [at[first], at[first + 1]];
-    let beyond = INTERVAL_OVERHANG * (high - low);
+    let beyond = CURVE_MATCHING.interval_overhang * (high - low);
     let mut t = 0.5 * (low + high);
-    for _ in 0..NEAREST_POINT_ITERATIONS {
+    for _ in 0..CURVE_MATCHING.nearest_point_iterations {
         let h = 1e-4 * (high - low);
         let here = interpolate_polynomial(few, &at, t);
         let [a, b] = [t - h, t + h].map(|t| interpolate_polynomial(few, &at, t));
@@ -610,7 +618,8 @@ fn is_on_interpolated_interval(
 /// The polynomial through points at these values of a variable.
 pub fn interpolate_polynomial(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
     let mut sum = vec![0.0; points[0].as_ref().len()];
-    for (coordinates, weight) in points.iter().zip(interpolation_weights(at, t, at.len()).1) {
+    let weights = interpolation_weights(at, t, at.len()).weights;
+    for (coordinates, weight) in points.iter().zip(weights) {
         for (sum, x) in sum.iter_mut().zip(coordinates.as_ref()) {
             *sum += weight * x;
         }

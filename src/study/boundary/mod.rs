@@ -18,7 +18,8 @@ use crate::study::ParameterKeys;
 use crate::study::boundary::map::{IndexMapSweep, remove_repeated_ends};
 use crate::study::remark::BoundaryRemark;
 use crate::study::trace::{
-    PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest, trace_with_points,
+    LONGEST_BRANCH_STEP, PointOnGrid, RefinedCriticalPoint, Trace, TraceError, TraceRequest,
+    trace_with_points,
 };
 use crate::study::vary::ParameterSweep;
 use glam::DVec3;
@@ -67,9 +68,6 @@ impl BoundaryRequest {
         Ok(())
     }
 }
-
-/// Longest step along a curve if few values are asked for.
-const LONGEST_CURVE_STEP: f64 = 0.1;
 
 /// Longest step along curves that are followed for a map.
 const LONGEST_MAP_CURVE_STEP: f64 = 0.04;
@@ -197,7 +195,7 @@ fn boundary_without_curves(
 /// How curves through the critical points of the first trace are followed.
 fn continuation_options(request: &BoundaryRequest, tolerance: f64) -> BoundaryContinuationOptions {
     BoundaryContinuationOptions {
-        longest_step: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST_CURVE_STEP),
+        longest_step: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST_BRANCH_STEP),
         max_points: request.trace.most_points,
         accuracy: BoundaryAccuracy {
             tips: tolerance,

@@ -4,8 +4,8 @@
 //! Columns with other names are given theirs by [`MeasuredColumn`], with a factor and an offset for
 //! other units; [`RowFilter`] chooses rows.
 
-use crate::study::ParameterKeys;
 use crate::study::fit::FitError;
+use crate::study::{AXIS_NAMES, ParameterKeys};
 use std::num::NonZeroUsize;
 use std::str::FromStr;
 
@@ -45,8 +45,6 @@ pub(super) enum DatumDimension {
     Force,
     Frequency,
 }
-
-const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl FromStr for MeasuredQuantity {
     type Err = ();

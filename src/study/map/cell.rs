@@ -27,7 +27,7 @@ use crate::study::judge::{
 };
 use crate::study::map::remark::{MapMotionFailure, MapRemark};
 use crate::study::map::{
-    CellSolution, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
+    CellSolution, CellVerdict, Map, MapMethod, MapOutcome, MapRequest, MapRow, ReferenceConfidence,
 };
 use crate::study::remark::SolutionRemark;
 use crate::study::vary::{SolverSettings, VariedScenario};
@@ -124,7 +124,7 @@ impl<'a> MapCell<'a> {
         };
         let answer = match found {
             Ok(answer) => answer,
-            Err((outcome, remark)) => {
+            Err(CellVerdict { outcome, remark }) => {
                 return MapRow {
                     outcome,
                     remark,
@@ -135,7 +135,7 @@ impl<'a> MapCell<'a> {
         let length = longest(&self.scenario.rods);
         let reference = self.reference.as_ref();
         let distance = reference.and_then(|it| it.largest_distance(&answer));
-        let (outcome, remark) = self.judge_solution(&answer, distance);
+        let CellVerdict { outcome, remark } = self.judge_solution(&answer, distance);
         let margin = answer.undulation.margin();
         let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
         MapRow {
@@ -227,7 +227,7 @@ impl<'a> MapCell<'a> {
                 reason: failure.reason,
                 part: failure.lambda,
             };
-            (outcome, Some(remark))
+            CellVerdict::new(outcome, remark)
         })?;
         let remark = SolutionRemark::Shot {
             intervals: solution.intervals.len() - 1,
@@ -238,7 +238,7 @@ impl<'a> MapCell<'a> {
         if !answer.outcome.is_success() {
             let error = answer.error_bound();
             let known = MapRemark::Inaccurate { error };
-            return Err((MapOutcome::NotConverged, Some(known)));
+            return Err(CellVerdict::new(MapOutcome::NotConverged, known));
         }
         Ok(MethodSolution {
             index: morse_index_near(
@@ -256,29 +256,28 @@ impl<'a> MapCell<'a> {
     fn shoot_from_relaxed_leaf(&self, accuracy: f64, limit: &Limit) -> CellSolution {
         match &self.relaxed_answer.result {
             Ok(relaxed) => self.solve_by_shooting(relaxed.shooting_start(), accuracy, None, limit),
-            Err((outcome, why)) => {
-                let why = why.clone().map(Box::new);
-                Err((*outcome, Some(MapRemark::NoStart { why })))
+            Err(CellVerdict { outcome, remark }) => {
+                let why = remark.clone().map(Box::new);
+                Err(CellVerdict::new(*outcome, MapRemark::NoStart { why }))
             }
         }
     }
 
     /// The verdict on an answer at this distance from the reference.
-    fn judge_solution(
-        &self,
-        answer: &MethodSolution,
-        distance: Option<f64>,
-    ) -> (MapOutcome, Option<MapRemark>) {
+    fn judge_solution(&self, answer: &MethodSolution, distance: Option<f64>) -> CellVerdict {
         let remark = answer.remark.clone();
         if let Some(index @ 1..) = answer.index {
             let saddle = MapRemark::Saddle { index, remark };
-            return (MapOutcome::Saddle, Some(saddle));
+            return CellVerdict::new(MapOutcome::Saddle, saddle);
         }
         let (Some(reference), Some(distance)) = (&self.reference, distance) else {
-            return (MapOutcome::Right, Some(MapRemark::Uncompared { remark }));
+            return CellVerdict::new(MapOutcome::Right, MapRemark::Uncompared { remark });
         };
         if answer.agrees_within_errors(reference, distance) {
-            return (MapOutcome::Right, remark.map(MapRemark::Solution));
+            return CellVerdict {
+                outcome: MapOutcome::Right,
+                remark: remark.map(MapRemark::Solution),
+            };
         }
         let elsewhere = MapRemark::Elsewhere {
             distance: distance / longest(&self.scenario.rods),
@@ -289,7 +288,7 @@ impl<'a> MapCell<'a> {
             true => MapOutcome::OtherEquilibrium,
             false => MapOutcome::Inaccurate,
         };
-        (outcome, Some(elsewhere))
+        CellVerdict::new(outcome, elsewhere)
     }
 
     /// Whether the equilibrium near an answer is another than the reference.
@@ -315,9 +314,9 @@ impl<'a> MapCell<'a> {
 fn refuse_slow_grid(segments: usize, rods: usize, limit: Duration) -> Option<Timed<CellSolution>> {
     let (nodes, seconds) = (segments.saturating_mul(rods), limit.as_secs_f64());
     let late = nodes as f64 * LEAST_SECONDS_PER_NODE > seconds;
-    let why = Some(MapRemark::TooManyNodes { nodes, seconds });
+    let why = MapRemark::TooManyNodes { nodes, seconds };
     late.then_some(Timed {
-        result: Err((MapOutcome::OutOfTime, why)),
+        result: Err(CellVerdict::new(MapOutcome::OutOfTime, why)),
         seconds: 0.0,
     })
 }
@@ -337,7 +336,7 @@ fn run_within_limit(
     let allowed = limit.as_secs_f64();
     if found.seconds > allowed {
         let late = MapRemark::OutOfTime { seconds: allowed };
-        found.result = Err((MapOutcome::OutOfTime, Some(late)));
+        found.result = Err(CellVerdict::new(MapOutcome::OutOfTime, late));
     }
     found
 }
@@ -358,7 +357,7 @@ pub fn relax_with_error_estimate(
     let leaf = relax::relax(scenario, &options, &mut |_| {});
     let leaf = leaf.map_err(|refused| {
         let refused = MapRemark::Refused(refused.to_string());
-        (MapOutcome::Refused, Some(refused))
+        CellVerdict::new(MapOutcome::Refused, refused)
     })?;
     let saddle = leaf.stability.saddle;
     let saddle = saddle.map(|saddle| saddle.negative_eigenvalues);
@@ -368,13 +367,19 @@ pub fn relax_with_error_estimate(
             Outcome::Diverged => MapOutcome::Diverged,
             _ => MapOutcome::NotConverged,
         };
-        return Err((outcome, answer.remark.map(MapRemark::Solution)));
+        return Err(CellVerdict {
+            outcome,
+            remark: answer.remark.map(MapRemark::Solution),
+        });
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();
         let error = segments.and_then(|n| single_grid_error(scenario, n, tolerance, limit));
         let Some(error) = error else {
-            return Err((MapOutcome::NotConverged, Some(MapRemark::UnknownError)));
+            return Err(CellVerdict::new(
+                MapOutcome::NotConverged,
+                MapRemark::UnknownError,
+            ));
         };
         answer.error_estimate = Some(error + tolerance);
     }
@@ -427,7 +432,7 @@ pub fn solve_by_explicit_motion(
     tolerance: f64,
     limit: &Limit,
 ) -> CellSolution {
-    let refused = |why: MapRemark| Err((MapOutcome::Refused, Some(why)));
+    let refused = |why: MapRemark| Err(CellVerdict::new(MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
         return refused(MapRemark::NoTimeStep);
     };
@@ -454,7 +459,10 @@ pub fn solve_by_explicit_motion(
     };
     let failed = |outcome, motion: MapMotionFailure| {
         let step = stepped.clone();
-        Err((outcome, Some(MapRemark::MotionFailed { motion, step })))
+        Err(CellVerdict::new(
+            outcome,
+            MapRemark::MotionFailed { motion, step },
+        ))
     };
     let duration = physics.times().duration;
     while motion.time() < duration {

@@ -454,7 +454,23 @@ words! {
 
 /// An answer at rest within the tolerance, or an outcome and a remark that say why there
 /// is none.
-pub type CellSolution = Result<MethodSolution, (MapOutcome, Option<MapRemark>)>;
+pub type CellSolution = Result<MethodSolution, CellVerdict>;
+
+/// The outcome of a method in a cell, and what is to be said of it.
+#[derive(Clone, Debug)]
+pub struct CellVerdict {
+    outcome: MapOutcome,
+    remark: Option<MapRemark>,
+}
+
+impl CellVerdict {
+    fn new(outcome: MapOutcome, remark: MapRemark) -> Self {
+        CellVerdict {
+            outcome,
+            remark: Some(remark),
+        }
+    }
+}
 
 words! {
     /// Reliability of the reference.

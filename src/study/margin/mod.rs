@@ -227,9 +227,9 @@ fn stability_margin(
         })
         .collect();
     let (mut pushes, mut starts) = (Vec::new(), Vec::new());
-    for (push, found) in pushed {
-        starts.extend(found);
-        pushes.push(push);
+    for push in pushed {
+        starts.extend(push.starts);
+        pushes.push(push.force);
     }
     add_mirrored_forces(&mut pushes, rods);
     pushes.sort_by(|a, b| {
@@ -435,13 +435,18 @@ const FORCE_ROUNDING_ERROR: ForceRounding = ForceRounding {
     nearly_rigid: 3e-9,
 };
 
-/// Pushes a leaf in one direction until it loses its stability, or to the largest push;
-/// also returns start points for saddle searches there.
+/// The force at which a leaf loses its stability, with start points for saddle searches there.
+struct PushedLeaf {
+    force: CriticalTipForce,
+    starts: Vec<SaddleSearchStart>,
+}
+
+/// Pushes a leaf in one direction until it loses its stability, or to the largest push.
 fn find_critical_tip_force(
     stable: &StableLeaf,
     direction: AxisDirection,
     weight: f64,
-) -> (CriticalTipForce, Vec<SaddleSearchStart>) {
+) -> PushedLeaf {
     let make = |[force]: [f64; 1]| -> Result<Scenario, String> {
         let mut scenario = stable.scenario.clone();
         scenario.tip_force[direction.axis] += direction.sign() * force;
@@ -451,27 +456,30 @@ fn find_critical_tip_force(
         direction,
         ..CriticalTipForce::default()
     };
-    let failed = |why: CriticalTipForceRemark| CriticalTipForce {
-        more_than: Some(0.0),
-        remark: Some(why),
-        ..unknown.clone()
+    let failed = |why: CriticalTipForceRemark| PushedLeaf {
+        force: CriticalTipForce {
+            more_than: Some(0.0),
+            remark: Some(why),
+            ..unknown.clone()
+        },
+        starts: Vec::new(),
     };
     let family = match LeafFamily::new(&make, [0.0, stable.largest_force], false) {
         Ok(family) => family,
-        Err(out) => return (failed(branch_lost(&out)), Vec::new()),
+        Err(out) => return failed(branch_lost(&out)),
     };
     let mut grids = NestedBranchEquations::new(&family, stable.grid.clone());
     let followed = match continue_to_stability_loss(stable, direction, &mut grids) {
         Ok(followed) => followed,
-        Err(stuck) => return (failed(branch_lost(&stuck)), Vec::new()),
+        Err(stuck) => return failed(branch_lost(&stuck)),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
     let lost = |critical: &CriticalPoint| critical.indices[0] == 0 && critical.indices[1] > 0;
     let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
-        return (
-            force_without_stability_loss(stable, &followed, unknown),
-            Vec::new(),
-        );
+        return PushedLeaf {
+            force: force_without_stability_loss(stable, &followed, unknown),
+            starts: Vec::new(),
+        };
     };
     let force = refined.fraction * stable.largest_force;
     let then = postcritical_behavior(stable, &mut grids, critical);
@@ -480,9 +488,12 @@ fn find_critical_tip_force(
         refined.fraction_error * stable.largest_force + force_rounding_error(stable, force, weight);
     if 2.0 * error >= force {
         let below = force + error;
-        return (failed(CriticalTipForceRemark::NearZero { below }), starts);
+        return PushedLeaf {
+            starts,
+            ..failed(CriticalTipForceRemark::NearZero { below })
+        };
     }
-    let push = CriticalTipForce {
+    let force = CriticalTipForce {
         kind: match critical.kind {
             CriticalKind::Fold => InstabilityKind::Fold,
             CriticalKind::Branching => InstabilityKind::BranchPoint,
@@ -495,7 +506,7 @@ fn find_critical_tip_force(
         tips: family.tips(&refined.tips),
         ..unknown
     };
-    (push, starts)
+    PushedLeaf { force, starts }
 }
 
 fn force_rounding_error(stable: &StableLeaf, force: f64, weight: f64) -> f64 {

@@ -23,7 +23,7 @@ use crate::shape::Undulation;
 use crate::study::remark::{BranchRemark, TraceRemark};
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
 use crate::study::vary::{BaseScenario, ParameterSweep};
-use crate::study::{UnknownWord, VariableTarget, VaryError};
+use crate::study::{AXIS_NAMES, UnknownWord, VariableTarget, VaryError};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::collections::VecDeque;
@@ -152,8 +152,9 @@ impl TraceRequest {
 
 const DEAD_MOMENT_REFUSAL: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";
 
-/// Longest step along a branch if few values are asked for.
-const LONGEST_BRANCH_STEP: f64 = 0.1;
+/// Longest step along a branch, or along a curve of a boundary, if few values are asked for, as a part
+/// of the range.
+pub(super) const LONGEST_BRANCH_STEP: f64 = 0.1;
 
 /// Points closer than this (fractions of the range, lengths) are the same.
 const SAME_POINT_DISTANCE: f64 = 1e-5;
@@ -738,8 +739,6 @@ pub enum TraceShow {
     /// The mean twist of the veins, in radians.
     Twist,
 }
-
-const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 impl Display for TraceShow {
     fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
