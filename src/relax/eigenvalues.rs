@@ -86,7 +86,7 @@ impl LowestModes {
     }
 }
 
-/// A list of eigenvalues.
+/// Which of the lowest eigenvalues of a leaf are computed, and for what.
 #[derive(Clone, Copy)]
 pub struct EigenvalueRequest {
     pub count: usize,
@@ -107,7 +107,7 @@ pub struct OmittedEigenvalues {
 }
 
 impl EigenvalueRequest {
-    /// The modes that are requested.
+    /// The eigenvalues that the options of a relaxation request.
     pub fn requested(problem: &RelaxationProblem) -> Self {
         EigenvalueRequest {
             count: problem.options.modes,
@@ -244,7 +244,7 @@ pub fn lowest(
 struct NestedEigenvalues<'a> {
     series: EigenvalueSeries,
     finest: Option<GridModes<'a>>,
-    /// The grid before that.
+    /// The leaf on the grid before the finest.
     coarser: Option<Cow<'a, GridLevel>>,
     /// Segments of each grid of the series.
     segments: Vec<usize>,
@@ -464,7 +464,7 @@ const BAR: EigenvalueBar = EigenvalueBar {
     small_fraction: 1e-3,
 };
 
-/// An extrapolated eigenvalue.
+/// An eigenvalue extrapolated over nested grids, in the leaf's units.
 struct ExtrapolatedEigenvalue {
     value: f64,
     /// If there are at least two grids.

@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) enum GridPolicy {
     /// The present ones, and finer ones where the tolerance requires them.
     AsNeeded,
-    /// The present ones only.
+    /// The grids of the present equilibrium alone.
     These,
 }
 
@@ -314,7 +314,7 @@ impl EquilibriumTracker {
         self.options = options.clone();
     }
 
-    /// The leaf on its grids.
+    /// The leaf on the grids of the present equilibrium.
     pub(crate) fn levels(&self) -> &[GridLevel] {
         &self.at.levels
     }

@@ -31,13 +31,13 @@ pub enum Extent {
 /// An attempt that was made, and what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attempt {
-    /// How it was made.
+    /// How the leaf was to come to rest.
     pub strategy: Strategy,
     /// How much of the leaf it solved for.
     pub extent: Extent,
-    /// Segments of its first grid.
+    /// Segments of the first grid of the attempt.
     pub segments: usize,
-    /// What came of it.
+    /// How the attempt ended.
     pub end: AttemptEnd,
 }
 
@@ -108,7 +108,7 @@ pub(crate) struct WorkLog<'o> {
     pub farthest_position: Option<PathPosition>,
     /// The attempts to bring the leaf to rest.
     pub attempts: Vec<Attempt>,
-    /// The memory of Newton's equations.
+    /// Memory that the equations of one grid leave to those of the next.
     pub workspace: EquationWorkspace,
 }
 
@@ -126,7 +126,7 @@ impl<'o> WorkLog<'o> {
         }
     }
 
-    /// Notes an attempt.
+    /// Notes an attempt that was made, and how it ended.
     pub fn log(&mut self, strategy: Strategy, extent: Extent, segments: usize, end: AttemptEnd) {
         self.attempts.push(Attempt {
             strategy,

@@ -32,7 +32,7 @@ words! {
 }
 
 words! {
-    /// A stage of the path.
+    /// What is done to the leaf on a part of its path.
     pub enum Stage {
         /// The loads are put on the veins apart.
         LoadedLeaf = "loading",
@@ -43,7 +43,7 @@ words! {
     }
 }
 
-/// A place on the path.
+/// A place on the path of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPosition {
     /// The stage that the leaf is in.
@@ -55,7 +55,7 @@ pub struct PathPosition {
 /// Where the stability of the path was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Event {
-    /// The stage.
+    /// The stage in which the stability was lost.
     pub stage: Stage,
     /// The part of the stage, from 0 to 1.
     pub part: f64,

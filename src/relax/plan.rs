@@ -1,5 +1,5 @@
 //! The plan of a relaxation: which attempts are made to bring a leaf to rest, in which order, by which
-//! rule each is accepted.
+//! rule each is accepted, on which grids and with how much work.
 //!
 //! The equilibrium that is asked for is that of slow loading ([`Path`](crate::relax::path::Path)), or
 //! that of a release from arcs. The first is often known without loading the leaf slowly: where
@@ -157,7 +157,7 @@ impl<'a> RelaxationProblem<'a> {
         self.options.method.segments()
     }
 
-    /// Whether unstable equilibria are accepted.
+    /// Whether a saddle is a result, and not left.
     pub fn keeps_unstable(&self) -> bool {
         matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
     }
@@ -213,7 +213,7 @@ impl<'a> RelaxationProblem<'a> {
         (released && !moved).then_some(Path::Released)
     }
 
-    /// The largest number of corrections.
+    /// How often the leaf may be corrected by its estimated error.
     pub fn corrections(&self) -> usize {
         let grids = matches!(self.options.method, Method::SemiImplicit(_));
         let free = !self.leaf.has_placed_supports() && self.segments().is_none();
@@ -276,7 +276,7 @@ pub enum Acceptance {
 pub struct WayFromStart {
     /// Largest displacement (lengths) or rotation (radians) of a node.
     pub distance: f64,
-    /// Steps of the iteration.
+    /// Accepted steps of the iteration that led there.
     pub steps: usize,
 }
 
@@ -294,7 +294,7 @@ pub(super) const LONGEST_WAY_IN_FIRST_VALLEY: WayFromStart = WayFromStart {
 pub struct PlannedAttempt {
     pub strategy: Strategy,
     pub extent: Extent,
-    /// Segments of its first grid.
+    /// Segments of the first grid of the attempt.
     pub segments: usize,
     pub acceptance: Acceptance,
     /// Whether it is made only before the time limit.

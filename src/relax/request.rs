@@ -247,7 +247,7 @@ pub struct UnsupportedSetting {
 /// Options of a relaxation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method.
+    /// How the leaf is brought to rest.
     pub method: Method,
     /// Which equilibrium is meant, where there are several (semi-implicit and explicit method).
     pub route: Route,
@@ -280,7 +280,7 @@ pub enum Progress {
     Relaxing {
         /// Segments per rod of the present grid.
         grid: usize,
-        /// Step on that grid.
+        /// Number of the step on that grid, from 0.
         step: usize,
         /// Size of that step: largest rotation or displacement, in radians or
         /// lengths of the leaf. It goes to zero as the leaf comes to rest.
@@ -335,7 +335,7 @@ const ALLOWED_TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the larg
 /// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
 pub const MAX_NODES: usize = 4_000_000;
 
-/// Largest number of modes.
+/// Largest number of modes that may be requested.
 pub const MOST_MODES: usize = 100;
 
 /// Largest number of intervals of a shooting.
@@ -368,7 +368,7 @@ pub enum RelaxError {
         rods: usize,
         /// Segments per rod.
         segments: usize,
-        /// Their product.
+        /// Nodes of all rods together.
         nodes: usize,
     },
     /// Too much memory.

@@ -31,7 +31,7 @@ use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
-/// A relaxed leaf.
+/// What a relaxation on nested grids found.
 pub(crate) struct RelaxedLeaf {
     /// The leaf in the units of the scenario.
     pub result: Equilibrium,

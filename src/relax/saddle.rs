@@ -45,7 +45,7 @@ const EXCESS_SAFETY: f64 = 3.0;
 /// A saddle that the leaf reached and left before it came to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Saddle {
-    /// Its energy.
+    /// Potential energy of the leaf at the saddle.
     pub energy: f64,
     /// Its number of negative eigenvalues (Morse index).
     pub negative_eigenvalues: usize,

@@ -564,9 +564,9 @@ const ONE_SIDED_DIFFERENCE_RULE: [DifferenceTerm; 5] = [
 
 /// A scenario with another value of a parameter, in a finite difference.
 pub(crate) struct NeighbouringScenario<S = Arc<Scenario>> {
-    /// By which the parameter differs.
+    /// Difference of the parameter from its value.
     offset: f64,
-    /// Weight in the derivative.
+    /// Weight of the scenario in the derivative.
     weight: f64,
     scenario: S,
 }
@@ -575,7 +575,7 @@ pub(crate) struct NeighbouringScenario<S = Arc<Scenario>> {
 pub(crate) struct Parameter<'a> {
     /// The scenario with another value of the parameter, if that is admissible.
     pub make: Box<dyn Fn(f64) -> Option<Scenario> + Send + Sync + 'a>,
-    /// Its value.
+    /// Value of the parameter in the scenario.
     pub value: f64,
     /// Size used for the step where the value is zero.
     pub unit: f64,
@@ -662,9 +662,9 @@ pub(crate) struct Linearized {
     /// Whether the matrix is factorized rod by rod; otherwise a sparse direct factorization is
     /// used.
     factorized: bool,
-    /// Linear solutions so far.
+    /// Right-hand sides for which the equations were solved so far.
     pub solves: usize,
-    /// Factorizations so far.
+    /// How often the matrix was factorized so far.
     pub factorizations: usize,
 }
 
@@ -837,7 +837,7 @@ const BAR: DerivativeBar = DerivativeBar {
 #[derive(Default)]
 struct VectorSeries(Vec<GridVectors>);
 
-/// Values on a grid.
+/// Values of a series on one grid.
 struct GridVectors {
     segments: usize,
     values: Vec<DVec3>,

@@ -266,7 +266,7 @@ fn shoot(
     }
 }
 
-/// The outcome of a solution.
+/// The end of a run in which shooting found a solution.
 fn outcome_of_solution(
     scenario: &Scenario,
     solution: &ShootingSolution,

@@ -61,13 +61,13 @@ pub type RelaxOnGrid<'a> = dyn Fn(Grid, &mut WorkLog) -> Option<NestedEquilibriu
 
 /// What has to be computed next for the decision on stability.
 enum NextStabilityCheck {
-    /// The count is certain.
+    /// Nothing: the count on the finest grid is certain.
     CountIsCertain,
-    /// A finer grid.
+    /// The leaf on this finer grid.
     Finer(Grid),
-    /// Compute these eigenvalues.
+    /// These eigenvalues on all grids.
     Compute(EigenvalueRequest),
-    /// The matrix does not fit into memory.
+    /// Nothing: the matrix does not fit into memory.
     OutOfMemory,
 }
 

@@ -33,7 +33,7 @@ struct DefectCorrection {
     /// The part of the error assumed to remain after a correction before it has been measured: on a
     /// grid of n segments this number over n^2.
     contraction_by_segments: f64,
-    /// The least part assumed.
+    /// The least part of the error assumed to remain.
     least_contraction: f64,
     /// The largest measured part with which corrections continue.
     largest_contraction: f64,
@@ -94,7 +94,7 @@ impl FactorizedLevel {
         })
     }
 
-    /// The number of the grid.
+    /// The number of the grid of these equations, from the coarsest.
     pub fn grid(&self) -> usize {
         self.level_number
     }
@@ -128,7 +128,7 @@ pub struct DefectEstimate {
     pub position_errors: PositionErrors,
     /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
     pub rods: Vec<Vec<RodFields>>,
-    /// Its potential energy, dimensionless.
+    /// Potential energy of the leaf, in units of A/L.
     pub energy: f64,
     /// The error of the energy: see [`energy_error`].
     pub energy_error: f64,
@@ -137,7 +137,7 @@ pub struct DefectEstimate {
     pub errors: Vec<Vec<FieldChange>>,
     /// The finest grid or, for a corrected leaf, one with as many segments as its accuracy needs.
     pub grid: Grid,
-    /// Number of corrections.
+    /// How often the leaf was corrected by its estimated error.
     pub corrections: usize,
 }
 

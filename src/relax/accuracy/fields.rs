@@ -212,7 +212,7 @@ const LONGEST_STEP: f64 = 1.0 / 64.0;
 /// Safety factor on the error between stations.
 const SAFETY: f64 = 2.0;
 
-/// All rods at one sigma.
+/// The fields of all rods at one fraction of their lengths.
 pub type LeafSection = Vec<RodFields>;
 
 /// A station at which a leaf is known.

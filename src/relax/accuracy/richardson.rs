@@ -22,7 +22,7 @@ const ORDER: OrderTest = OrderTest {
     useless_column_ratio: 0.1,
 };
 
-/// Safety factors of error estimates.
+/// Safety factors of the errors that the last changes of a table tell.
 struct ExtrapolationSafety {
     /// Factor on the last change of a column without a proven order.
     unproven_order: f64,
@@ -74,7 +74,7 @@ pub struct Extrapolated<T> {
 pub struct Richardson {
     /// Rows of the table, one per grid; column m has the terms up to ds^(2m) removed.
     table: Vec<Vec<Vec<f64>>>,
-    /// Segments of each grid.
+    /// Segments of each grid, from coarse to fine.
     segments: Vec<usize>,
     /// Changes below this are rounding, if it is more than [`ROUNDING`].
     noise: f64,

@@ -319,7 +319,7 @@ pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
     let gaps = state.tissue.chunks(n + 1);
     let nodes = gaps.flat_map(|gap| stencils.iter().map(|stencil| stencil.value(|i| gap[i])));
     other.tissue = nodes.collect();
-    // Ends are exact.
+    // The ends of veins are common to all grids.
     for j in 0..leaf.rods() {
         let (from, to) = (state.base(j), other.base(j));
         for (a, b) in [(from, to), (from + n, to + grid.segments())] {
@@ -376,7 +376,7 @@ impl<const MOST: usize> Stencil<MOST> {
         }
     }
 
-    /// Points and their weights.
+    /// The points of the stencil, with their weights.
     pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
         (self.first..).zip(self.weights[..self.count].iter().copied())
     }
@@ -421,7 +421,7 @@ impl<const MOST: usize> Stencil<MOST> {
 /// A Lagrange basis polynomial at one place.
 struct LagrangeBasis {
     value: f64,
-    /// The derivative.
+    /// Derivative with respect to the place, in distances of points.
     slope: f64,
 }
 
@@ -448,7 +448,7 @@ fn lagrange(count: usize, a: usize, t: f64) -> LagrangeBasis {
 pub struct VeinStation {
     /// The number of the vein, from 0.
     pub vein: usize,
-    /// Fraction of its length.
+    /// Fraction of the vein's length.
     pub sigma: f64,
 }
 

@@ -33,9 +33,9 @@ const LARGEST_GRID_RATIO: usize = 8;
 /// strains of some millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
 const SMALLEST_LOADING_COMPLIANCE: f64 = 1e-6;
 
-/// What slow loading came to.
+/// How slow loading ended.
 pub enum LoadingEnd {
-    /// The result of the relaxation.
+    /// With the result of the relaxation, at rest or not.
     Final(RelaxationResult),
     /// A failure after which the leaf may be released from arcs instead.
     GivenUp(Box<RelaxationFailure>),
@@ -278,7 +278,7 @@ pub fn takes_loads_stably(
 
 /// Slow loading on one grid.
 struct LoadPathRun {
-    /// The last state.
+    /// The last state of the leaf on its path.
     level: GridLevel,
     /// Where the path lost its stability.
     events: Vec<Event>,

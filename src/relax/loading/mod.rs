@@ -77,7 +77,7 @@ struct PathState {
 
 /// An equilibrium that Newton's method found from a prediction.
 struct CorrectedState {
-    /// The Morse index.
+    /// Negative eigenvalues of the energy's Hessian.
     index: usize,
     /// Distance from the prediction, lengths or radians.
     drift: f64,
@@ -93,9 +93,9 @@ pub struct LoadPath<'w> {
     /// Count of force evaluations at which the loading ends without success.
     pub most_evaluations: usize,
     pub solver: DefiniteSolver,
-    /// The last states at rest.
+    /// The last states at rest, through which the next is predicted.
     previous_states: Vec<PathState>,
-    /// The next state.
+    /// The state that is predicted and corrected.
     pub next: State,
     pub events: Vec<Event>,
     /// The stage in which the leaf is, and the part of that.
@@ -105,7 +105,7 @@ pub struct LoadPath<'w> {
     pub bias_direction: DVec3,
 }
 
-/// What a step came to.
+/// Where a step of slow loading led.
 enum LoadStepOutcome {
     /// A stable equilibrium so far from its prediction.
     Stable(f64),
@@ -422,11 +422,11 @@ pub struct LoadedLeaf<'a> {
     lambda: f64,
 }
 
-/// How tips are moved.
+/// How the tips are moved while veins are joined.
 enum TipMotion {
     /// They are free, or a single one.
     Free,
-    /// Together.
+    /// From apart to one point, each on its path.
     Joining(Vec<TipJoiningPath>),
 }
 
@@ -437,14 +437,14 @@ enum TipMotion {
 struct TipJoiningPath {
     base: DVec3,
     from: DVec3,
-    /// Rotation into the common direction.
+    /// Rotation vector that turns the chord of the vein into the common direction.
     turn: DVec3,
     /// The common end.
     to: DVec3,
 }
 
 impl TipJoiningPath {
-    /// Of all tips.
+    /// The paths on which all tips move to one point.
     fn joining_paths(bases: &[DVec3], tips: &[DVec3]) -> Vec<TipJoiningPath> {
         let mean = |value: &dyn Fn(DVec3) -> DVec3| {
             tips.iter().map(|tip| value(*tip)).sum::<DVec3>() / tips.len() as f64
@@ -562,7 +562,7 @@ struct BucklingBound {
     /// The part of its bending energy that is set against the moments of a vein: about the best where
     /// the bound decides.
     moment_energy_fraction: f64,
-    /// Safety factor on the loads.
+    /// Safety factor on the loads of a vein.
     safety: f64,
     /// The largest strain of stretch or shear by the loads: the bound is that of rods that neither
     /// stretch nor shear.

@@ -202,7 +202,7 @@ impl SpringRate {
         }
     }
 
-    /// After a step that succeeded.
+    /// Lowers the spring rate after a step that succeeded.
     fn decrease_after_success(&mut self) {
         self.factor = match self.factor {
             fell if fell < 1.0 => (fell * fell).max(MOTION.largest_decrease),
@@ -214,7 +214,7 @@ impl SpringRate {
         }
     }
 
-    /// After a step that failed.
+    /// Raises the spring rate after a step that failed.
     fn increase_after_failure(&mut self) {
         self.factor = match self.factor {
             rose if rose > 1.0 => (rose * rose).min(MOTION.largest_increase),

@@ -203,22 +203,22 @@ pub struct Stability {
 /// the scenario's units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sensitivity {
-    /// The number.
+    /// Key of the number in the scenario.
     pub key: String,
-    /// Its value.
+    /// Value of the number in the scenario.
     pub value: f64,
     /// Derivative of the joint tip alone, or one per rod.
     #[serde(flatten, serialize_with = "shape::serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Bound on its error; `None` on a single grid.
     pub tip_error: Option<f64>,
-    /// Derivative of the energy.
+    /// Derivative of the potential energy.
     pub energy: f64,
-    /// Bound on its error.
+    /// Bound on the error of the derivative of the energy.
     pub energy_error: Option<f64>,
     /// Derivative of the lowest eigenvalue (the squared frequency), if it is known.
     pub lowest_eigenvalue: Option<f64>,
-    /// Bound on its error.
+    /// Bound on the error of the derivative of the lowest eigenvalue.
     pub lowest_eigenvalue_error: Option<f64>,
     /// Derivatives of the frequencies of the requested modes, in cycles per time; none for an
     /// unstable mode, and for a nearly rigid leaf only the lowest.
@@ -243,7 +243,7 @@ pub struct Sensitivity {
     /// requested to solve the equations for each.
     #[serde(skip)]
     pub positions: Vec<Vec<DVec3>>,
-    /// Bound on their error.
+    /// Bound on the error of the derivatives of positions.
     #[serde(skip)]
     pub positions_error: Option<f64>,
 }
@@ -280,7 +280,7 @@ impl Shape {
 pub struct Equilibrium {
     /// Name of the scenario.
     pub scenario: String,
-    /// The method.
+    /// How the leaf was brought to rest.
     pub method: Method,
     /// How the run ended.
     pub outcome: Outcome,
@@ -337,7 +337,7 @@ pub struct Equilibrium {
     /// The attempts to bring the leaf to rest, in their order; empty for shooting.
     #[serde(skip)]
     pub attempts: Vec<Attempt>,
-    /// Work done.
+    /// Steps, factorizations and evaluations on all grids.
     pub work: SolverCounts,
     /// Time of the solve alone, in seconds.
     pub wall_seconds: f64,
@@ -429,17 +429,17 @@ impl Margin {
 pub struct AxisDirection {
     /// 0, 1, 2 for x, y, z.
     pub axis: usize,
-    /// Whether against it.
+    /// Whether the direction is against the axis.
     pub negative: bool,
 }
 
 impl AxisDirection {
-    /// All six.
+    /// The directions along and against all axes.
     pub fn all() -> impl Iterator<Item = AxisDirection> {
         (0..3).flat_map(|axis| [false, true].map(|negative| AxisDirection { axis, negative }))
     }
 
-    /// Its sign.
+    /// The component along its axis of a unit vector in this direction.
     pub fn sign(self) -> f64 {
         if self.negative { -1.0 } else { 1.0 }
     }
@@ -469,14 +469,14 @@ impl Serialize for AxisDirection {
 /// The effect of a dead force at the tip that grows from zero in one direction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CriticalTipForce {
-    /// The direction.
+    /// Direction of the force.
     #[serde(rename = "axis")]
     pub direction: AxisDirection,
-    /// What ends the stability.
+    /// How the stability ends as the force grows.
     pub kind: InstabilityKind,
     /// The force at which stability is lost.
     pub force: Option<f64>,
-    /// Bound on its error.
+    /// Bound on the error of that force.
     pub error: Option<f64>,
     /// The force at which stability is lost, in weights of the leaf, if it has any.
     pub per_weight: Option<f64>,
@@ -486,7 +486,7 @@ pub struct CriticalTipForce {
     pub then: Option<PostcriticalBehavior>,
     /// The equilibrium it reaches under this force, if it snaps at a fold.
     pub neighbour: Option<Neighbour>,
-    /// Positions of the tips then.
+    /// Positions of the tips when stability is lost.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Whether this was obtained as the mirror image of the opposite push.
@@ -526,7 +526,7 @@ pub enum PostcriticalBehavior {
 /// from which the leaf falls to one of them on either side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Barrier {
-    /// Its energy above the leaf's.
+    /// Energy of the saddle above that of the leaf.
     pub energy: f64,
     /// Bound on the error, if it is known on more than one grid.
     pub error: Option<f64>,
@@ -534,7 +534,7 @@ pub struct Barrier {
     pub height: Option<f64>,
     /// The height over the longest rod's length.
     pub relative: Option<f64>,
-    /// The saddle.
+    /// The saddle over which the leaf would pass.
     pub saddle: Saddle,
     /// The equilibrium on its other side.
     pub neighbour: Neighbour,
@@ -543,7 +543,7 @@ pub struct Barrier {
 /// The equilibrium beyond a barrier, or beyond a fold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Neighbour {
-    /// Its energy.
+    /// Potential energy there.
     pub energy: f64,
     /// Position of the joint tip, or of the first rod's.
     pub tip: DVec3,
@@ -553,13 +553,13 @@ pub struct Neighbour {
 /// matters. As JSON it is `blade` in `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BladeReport {
-    /// The largest width.
+    /// Width of the blade where it is widest.
     pub width: f64,
     /// Width of the strip of each vein there.
     pub strip_width: f64,
     /// A1, A2 and A3 there of the vein in the middle.
     pub couple_stiffness: [f64; 3],
-    /// H1, H2 and H3.
+    /// Stiffnesses H1, H2 and H3 there of the vein in the middle.
     pub force_stiffness: [f64; 3],
     /// k1, k2, k3 and c1 of the tissue beside it there; none of a single vein.
     pub tissue: Option<[f64; 4]>,

@@ -25,10 +25,9 @@ use crate::shape::{
 };
 use glam::DVec3;
 
-/// How a run ended.
+/// The outcome of a run, with what is to be said of it.
 pub struct RunEnd {
     pub outcome: Outcome,
-    /// What is to be said of it.
     pub remark: Option<EquilibriumRemark>,
 }
 
@@ -41,7 +40,7 @@ impl RunEnd {
     }
 }
 
-/// Assembles the result.
+/// Assembles the result of a relaxation in the units of the scenario.
 pub fn equilibrium(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
@@ -168,7 +167,7 @@ const LEAST_STATION_SEGMENTS: usize = 8;
 
 /// The leaf at the stations of its result.
 struct ResultStations {
-    /// Fractions of the length.
+    /// Places of the stations, as fractions of the length.
     stations: Vec<f64>,
     /// The rods there, in the units of the scenario.
     rods: Vec<RodShape>,

@@ -27,7 +27,7 @@ struct GripStepLimits {
     /// The largest change of the leaf beside that of its holders (radians, lengths), in the valley of its
     /// energy: one that moves farther may have left its equilibrium.
     drift: f64,
-    /// The largest such change elsewhere.
+    /// The largest such change of a leaf that left the valley of its energy.
     drift_outside_valley: f64,
 }
 
@@ -62,7 +62,7 @@ const MAX_SADDLE_ESCAPES: i32 = 3;
 /// How a leaf came to where it is held.
 pub struct HeldState {
     pub state: State,
-    /// Whether it rests there.
+    /// Whether the leaf is at rest where it is held.
     pub near_rest: bool,
     /// Whether its energy was not convex along the path.
     pub left_convex_valley: bool,

@@ -86,7 +86,7 @@ struct GuessQuality {
 /// The end of the iteration on a grid, converged or not.
 pub struct GridSolution {
     pub level: GridLevel,
-    /// The remaining iteration error.
+    /// Remaining error of positions and rotations (lengths, radians), or why the iteration failed.
     pub iteration_error: Result<f64, EquilibriumFailure>,
     /// Whether the leaf had to move through states of non-convex energy, instead of coming to rest in
     /// the valley of the initial guess.

@@ -32,7 +32,7 @@ struct MotionStepLimits {
     /// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
     /// without a test of the energy, whose change is below rounding.
     negligible: f64,
-    /// Steps on one grid.
+    /// Largest number of steps on one grid.
     count: usize,
 }
 
@@ -128,7 +128,7 @@ impl GridRelaxation<'_> {
         newton.solve(leaf, &mut self.state, system, equations)
     }
 
-    /// Damped motion until rest.
+    /// Lets the leaf move, damped, until it is at rest; returns the remaining error.
     fn move_to_rest(
         &mut self,
         leaf: &DiscreteLeaf,

@@ -76,7 +76,7 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     State::new(leaf.segments(), x, q)
 }
 
-/// The disturbances of initial states.
+/// The pattern by which initial states are disturbed out of the plane of the fan.
 struct DisturbancePattern {
     /// Largest slope out of the plane.
     largest_slope: f64,
