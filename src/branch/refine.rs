@@ -401,8 +401,8 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
     ) -> Result<Option<ExtrapolatedPoint>, VerificationFailure> {
         let accurate = level >= FINER_GRIDS && self.table.error() <= self.accuracy;
         let (state, fraction) = (&self.point.state, self.point.fraction);
-        let mut point = || (self.table).extrapolated_point(&mut self.equations, state, fraction);
-        Ok(accurate.then(&mut point).transpose()?)
+        let point = || (self.table).extrapolated_point(&mut self.equations, state, fraction);
+        Ok(accurate.then(point).transpose()?)
     }
 }
 
