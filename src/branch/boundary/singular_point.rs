@@ -27,7 +27,7 @@ const ROUNDING_FORCING: f64 = 1e-5;
 
 /// Eigenvalues that differ by more than this, relative to their derivative with respect to
 /// arclength, do not vanish together.
-pub const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
+pub(super) const COINCIDENT_EIGENVALUE_TOLERANCE: f64 = 1e-5;
 
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
