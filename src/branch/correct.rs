@@ -314,7 +314,7 @@ impl BranchEquations<'_> {
 }
 
 /// A point of a branch found by a step from another, and the step that has led to it.
-pub struct SteppedPoint {
+pub(super) struct SteppedPoint {
     pub point: EquilibriumPoint,
     /// Length of the step along the tangent at its start.
     pub step: f64,

@@ -16,7 +16,7 @@ use crate::leaf::{NodalField, State};
 use crate::numbers::larger;
 
 /// Additional modes in the border: others may be nearly neutral.
-pub(super) const EXTRA_BORDER_MODES: usize = 2;
+const EXTRA_BORDER_MODES: usize = 2;
 
 /// How the zero of an eigenvalue, or of another function, along a curve is sought by a secant
 /// method.
@@ -90,7 +90,7 @@ pub struct CriticalPoint {
 
 /// The critical points between two points of a branch, the second of them `step` along the
 /// tangent of the first.
-pub fn locate_critical_points(
+pub(super) fn locate_critical_points(
     equations: &mut BranchEquations,
     a: &EquilibriumPoint,
     b: &EquilibriumPoint,
@@ -414,7 +414,7 @@ const LARGEST_VERTEX_OFFSET: f64 = 0.1;
 /// pitchfork: no eigenvalue changes its sign along this branch, but one does along the other, which
 /// goes on beyond the vertex. The points are on either side of the vertex, `step` apart; the
 /// tangent of the result is that of the other branch. Fails if that is not found.
-pub fn locate_pitchfork_vertex(
+pub(super) fn locate_pitchfork_vertex(
     equations: &mut BranchEquations,
     a: &EquilibriumPoint,
     b: &EquilibriumPoint,

@@ -384,7 +384,7 @@ pub(super) fn has_converged(size: f64, previous: f64) -> bool {
 const NEUTRAL_SINGULAR_VALUE: f64 = 1e-7;
 
 /// Stiffness in stretch and shear, in units of A/L^2, above which segments count as stiff.
-pub const STIFF: f64 = 1e4;
+pub(super) const STIFF: f64 = 1e4;
 
 /// Subspace iterations: few suffice, since the wanted modes are far softer than the rest.
 const SUBSPACE_ITERATIONS: usize = 8;

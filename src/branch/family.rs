@@ -306,7 +306,7 @@ impl<'a, const N: usize> Leaves<'a, N> {
 }
 
 /// Puts the bases of all rods where the leaf holds them, and held tips where it holds them.
-pub fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
+pub(super) fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.place_held_nodes(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
@@ -319,7 +319,7 @@ pub fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
 }
 
 /// At most `MOST` values by key, the most recently used first.
-pub struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
+struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
 
 impl<K, V, const MOST: usize> Default for LruCache<K, V, MOST> {
     fn default() -> Self {
@@ -394,7 +394,9 @@ const DIFFERENCE: f64 = 1e-5;
 /// A value after and before the present one of a parameter, for a central difference; `value`
 /// takes the distance from it. At an end of the range, where there may be no leaf beyond, the
 /// present one takes the place of that.
-pub fn values_on_both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T; 2], E> {
+pub(super) fn values_on_both_sides<T, E>(
+    mut value: impl FnMut(f64) -> Result<T, E>,
+) -> Result<[T; 2], E> {
     let sides = [DIFFERENCE, -DIFFERENCE];
     let [after, before] = sides.map(|step| value(step).or_else(|_| value(0.0)));
     Ok([after?, before?])
@@ -402,7 +404,7 @@ pub fn values_on_both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) ->
 
 /// Derivative of the forces with respect to a parameter, by central differences; `forces` takes
 /// the distance from the present value of the parameter.
-pub fn force_parameter_derivative<E>(
+pub(super) fn force_parameter_derivative<E>(
     mut forces: impl FnMut(f64) -> Result<NodalField, E>,
 ) -> Result<NodalField, E> {
     let at = |step: f64| Ok((step, forces(step)?));
@@ -412,18 +414,22 @@ pub fn force_parameter_derivative<E>(
 }
 
 /// The largest stiffness in stretch and shear with which segment forces are condensed out.
-pub fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
+pub(super) fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
     let stiffnesses = leaf.sections.iter().map(|it| it.condensing.max_element());
     stiffnesses.fold(0.0, f64::max)
 }
 
 /// Rounding error of an eigenvalue of the matrix of a leaf of this largest stiffness.
-pub fn eigenvalue_rounding(stiffest: f64, segments: usize) -> f64 {
+pub(super) fn eigenvalue_rounding(stiffest: f64, segments: usize) -> f64 {
     f64::EPSILON * stiffest * (segments as f64).powi(2)
 }
 
 /// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
-pub fn unbalanced_forces(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> NodalField {
+pub(super) fn unbalanced_forces(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+) -> NodalField {
     let mut moved = state.clone();
     place_supports(leaf, &mut moved);
     leaf.assemble_forces(&moved, system);
@@ -432,14 +438,14 @@ pub fn unbalanced_forces(leaf: &DiscreteLeaf, state: &State, system: &mut System
 
 /// Increments of the nodes with the forces of the segments that complete the law of nearly rigid
 /// ones (none if empty).
-pub struct CompletedIncrements<'s> {
+pub(super) struct CompletedIncrements<'s> {
     pub increments: &'s NodalField,
     pub law_forces: &'s [DVec3],
 }
 
 /// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
 /// segments at a clamp depend on all of its displacement, however short the step.
-pub fn state_after_step(
+pub(super) fn state_after_step(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,

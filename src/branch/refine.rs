@@ -48,7 +48,7 @@ const AGREEING_GRIDS: usize = 3;
 /// Compliances by which the matrices of nearly rigid leaves are softened, in units of
 /// L^2/A, used one to four times: smaller ones increase rounding errors, larger ones the error
 /// of extrapolation to zero.
-pub const REGULARIZATION_COMPLIANCES: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
+pub(super) const REGULARIZATION_COMPLIANCES: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 
 /// Stiffness in stretch and shear, in units of A/L^2, above which matrices are softened.
 pub const NEARLY_RIGID: f64 = 1.01 * STIFFEST;
@@ -60,12 +60,12 @@ pub(super) fn is_nearly_rigid(leaf: &DiscreteLeaf) -> bool {
 
 /// Weights of the values at softenings of 1, 2, 3, 4 for extrapolation to zero: by the cubic
 /// through all of them, and by the parabola through the first three.
-pub const CUBIC_EXTRAPOLATION_WEIGHTS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+pub(super) const CUBIC_EXTRAPOLATION_WEIGHTS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
 
-pub const PARABOLIC_EXTRAPOLATION_WEIGHTS: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
+pub(super) const PARABOLIC_EXTRAPOLATION_WEIGHTS: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
 
 /// Refinement of the finest grid of a critical point over the one it was found on.
-pub const FINEST_GRID_RATIO: f64 = 4.0;
+pub(super) const FINEST_GRID_RATIO: f64 = 4.0;
 
 /// Spacings (in arclength) of the points from which a branch is interpolated across a branch
 /// point, in this order, until the error of the tips is below `INTERPOLATION_ERROR_FRACTION` of
@@ -177,7 +177,7 @@ fn point_on_next_grid<'a>(
 
 /// A regular point with the given accuracy of its tips, on as many grids as necessary;
 /// they must agree on branch and index.
-pub fn verify_regular_point(
+pub(super) fn verify_regular_point(
     family: &LeafFamily,
     grid: &Grid,
     point: &EquilibriumPoint,
@@ -211,7 +211,7 @@ pub fn verify_at_parameter(
 
 /// The Morse index at a given parameter on which enough successively refined grids in a row
 /// agree; on all of them the point must be on the same branch.
-pub fn confirmed_index(
+pub(super) fn confirmed_index(
     equations: &mut BranchEquations,
     point: &EquilibriumPoint,
 ) -> Result<usize, VerificationFailure> {
@@ -401,8 +401,8 @@ impl NestedGridPoint for NestedRegularPoint<'_> {
     ) -> Result<Option<ExtrapolatedPoint>, VerificationFailure> {
         let accurate = level >= FINER_GRIDS && self.table.error() <= self.accuracy;
         let (state, fraction) = (&self.point.state, self.point.fraction);
-        let mut point = || (self.table).extrapolated_point(&mut self.equations, state, fraction);
-        Ok(accurate.then(&mut point).transpose()?)
+        let point = || (self.table).extrapolated_point(&mut self.equations, state, fraction);
+        Ok(accurate.then(point).transpose()?)
     }
 }
 
@@ -456,7 +456,7 @@ fn parameter_derivatives(
 }
 
 /// A critical point with the given accuracy of its tips, on at least so many `grids`.
-pub fn refine_critical(
+pub(super) fn refine_critical(
     family: &LeafFamily,
     grid: &Grid,
     found: &CriticalPoint,

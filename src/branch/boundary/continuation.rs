@@ -9,14 +9,15 @@ use crate::branch::boundary::codimension_two::{
     CodimensionTwoPoint, boundary_point_at_distance, boundary_point_at_parameter,
     codimension_two_between,
 };
-use crate::branch::boundary::grid_transfer::{FinerBoundaryPoint, boundary_point_on_finer};
 use crate::branch::boundary::point_search::{
     BoundarySearchTolerance, TwoParameterEquations, TwoParameterProblem,
 };
 use crate::branch::boundary::refine::{
     BoundaryAccuracy, UnverifiedBoundaryPoint, VerifiedBoundaryPoint, verify_boundary_point,
 };
-use crate::branch::boundary::singular_point::{BoundarySeed, SingularPoint};
+use crate::branch::boundary::singular_point::{
+    BoundarySeed, FinerBoundaryPoint, SingularPoint, boundary_point_on_finer,
+};
 use crate::branch::continuation::{BranchEnd, StepControl};
 use crate::branch::convergence::VerificationFailure;
 use crate::branch::critical::CriticalKind;

@@ -33,7 +33,6 @@
 
 mod codimension_two;
 mod continuation;
-mod grid_transfer;
 mod point_search;
 mod refine;
 mod singular_point;
@@ -42,13 +41,12 @@ pub use crate::branch::boundary::codimension_two::CodimensionTwoKind;
 pub use crate::branch::boundary::continuation::{
     BoundaryContinuationOptions, ContinuedBoundary, follow_boundary,
 };
-pub use crate::branch::boundary::grid_transfer::coarsened;
-use crate::branch::boundary::grid_transfer::{GridBoundaryPoint, coarser_grid};
 pub(crate) use crate::branch::boundary::point_search::TwoParameterDirection;
 use crate::branch::boundary::point_search::TwoParameterEquations;
 pub use crate::branch::boundary::point_search::{TwoParameterProblem, TwoParameterState};
 pub use crate::branch::boundary::refine::{BoundaryAccuracy, VerifiedBoundaryPoint};
-pub use crate::branch::boundary::singular_point::BoundarySeed;
+pub use crate::branch::boundary::singular_point::{BoundarySeed, coarsened};
+use crate::branch::boundary::singular_point::{GridBoundaryPoint, coarser_grid};
 use crate::branch::continuation::{BranchEnd, CRITICAL_GRIDS, ContinuationOptions, follow_branch};
 use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 use crate::branch::critical::{CriticalKind, CriticalPoint};

@@ -193,7 +193,7 @@ pub struct BoundarySearchTolerance {
 }
 
 /// Eigenvalues below this, or below their rounding error, belong to neutral modes.
-pub const NEUTRAL_EIGENVALUE: f64 = 1e-7;
+pub(super) const NEUTRAL_EIGENVALUE: f64 = 1e-7;
 
 /// Largest number of evaluations of the eigenvalue in the secant method.
 const EVALUATIONS: usize = 30;
@@ -257,7 +257,10 @@ pub struct BoundarySearchResult {
 /// Modes that a symmetry keeps apart do not mix, and H couples them by no more than rounding. Where
 /// their eigenvalues coincide, its eigenvectors are any mixture of them: then each part has its
 /// own.
-pub fn border_eigenvalues(sample: &TwoParameterLinearization, neutral: usize) -> BorderEigenvalues {
+pub(super) fn border_eigenvalues(
+    sample: &TwoParameterLinearization,
+    neutral: usize,
+) -> BorderEigenvalues {
     let h = &sample.solved.h;
     let (own, count) = (neutral.min(h.nrows()), h.nrows());
     let coupling = h.view((0, own), (own, count - own));

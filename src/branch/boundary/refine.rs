@@ -7,12 +7,13 @@
 //! method, from coarse grids on, and their parameters are extrapolated to no softening.
 
 use crate::branch::boundary::codimension_two::{CodimensionTwoKind, locate_codimension_two};
-use crate::branch::boundary::grid_transfer::{boundary_point_on_coarser, boundary_point_on_finer};
 use crate::branch::boundary::point_search::{
     BoundaryPointSearch, BoundarySearchTolerance, TwoParameterDirection, TwoParameterEquations,
     TwoParameterProblem, TwoParameterState,
 };
-use crate::branch::boundary::singular_point::SingularPoint;
+use crate::branch::boundary::singular_point::{
+    SingularPoint, boundary_point_on_coarser, boundary_point_on_finer,
+};
 use crate::branch::convergence::{
     EXACT_PARAMETER_ERROR, GridLimits, MAX_GRIDS, NestedGridPoint, Relocation, VerificationFailure,
     verify_over_grids,
