@@ -95,10 +95,13 @@ fn find_rest<'a>(
         }
         let half = half.filter(|_| attempt.extent == Extent::Half);
         let found = match attempt.strategy {
-            Strategy::SlowLoading => match load_slowly(problem, half, effort) {
-                LoadingEnd::Final(found) => return found,
-                LoadingEnd::GivenUp(failure) => Err(failure),
-            },
+            Strategy::SlowLoading => {
+                let LoadingEnd { found, given_up } = load_slowly(problem, half, effort);
+                if !given_up {
+                    return found;
+                }
+                found
+            }
             _ => {
                 let MadeAttempt { found, end } = solve_planned(problem, half, &attempt, effort);
                 effort.log(attempt.strategy, attempt.extent, attempt.segments, end);

@@ -33,12 +33,28 @@ const LARGEST_GRID_RATIO: usize = 8;
 /// strains of some millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
 const SMALLEST_LOADING_COMPLIANCE: f64 = 1e-6;
 
-/// How slow loading ended.
-pub enum LoadingEnd {
-    /// With the result of the relaxation, at rest or not.
-    Final(RelaxationResult),
-    /// A failure after which the leaf may be released from arcs instead.
-    GivenUp(Box<RelaxationFailure>),
+/// What slow loading came to.
+pub struct LoadingEnd {
+    /// The result of the relaxation, at rest or not.
+    pub found: RelaxationResult,
+    /// Whether it failed so that the leaf may be released from arcs instead.
+    pub given_up: bool,
+}
+
+impl LoadingEnd {
+    fn with_result(found: RelaxationResult) -> Self {
+        LoadingEnd {
+            found,
+            given_up: false,
+        }
+    }
+
+    fn without_rest(failure: RelaxationFailure) -> Self {
+        LoadingEnd {
+            found: Err(Box::new(failure)),
+            given_up: true,
+        }
+    }
 }
 
 /// Loads the leaf slowly, and brings it to rest on nested grids from where that leads; the
@@ -61,7 +77,7 @@ pub fn load_slowly<'a>(
             Err(failure) => {
                 let end = AttemptEnd::PathLost;
                 effort.log(Strategy::SlowLoading, Extent::Whole, segments, end);
-                return LoadingEnd::GivenUp(Box::new(failure.with_path(path)));
+                return LoadingEnd::without_rest(failure.with_path(path));
             }
         };
         grid = level.leaf.grid.refined();
@@ -90,7 +106,7 @@ pub fn load_slowly<'a>(
             effort.log(Strategy::SlowLoading, Extent::Half, on.segments(), end);
             if let (Ok(found), AttemptEnd::Accepted) = (found, end) {
                 let whole = found.mirrored_to_whole(&reduced).with_path(path);
-                return LoadingEnd::Final(Ok(whole));
+                return LoadingEnd::with_result(Ok(whole));
             }
             begun = NestedEquilibrium::without_grids(problem);
         }
@@ -115,13 +131,13 @@ pub fn load_slowly<'a>(
             Ok(found) if end == AttemptEnd::Inaccurate => {
                 let at = found.with_path(path);
                 let stop = EquilibriumFailure::StepLimit;
-                return LoadingEnd::GivenUp(Box::new(RelaxationFailure { at, stop }));
+                return LoadingEnd::without_rest(RelaxationFailure { at, stop });
             }
             Err(failure) if given_up => {
-                return LoadingEnd::GivenUp(Box::new(failure.with_path(path)));
+                return LoadingEnd::without_rest(failure.with_path(path));
             }
             Err(_) if !last && !out_of_time => {}
-            followed => return LoadingEnd::Final(result_with_path(followed, path)),
+            followed => return LoadingEnd::with_result(result_with_path(followed, path)),
         }
     }
 }

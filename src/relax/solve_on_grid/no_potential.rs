@@ -214,7 +214,8 @@ fn apply_loads(
                 let mut coarse =
                     || leaf.assemble(&before, system).largest_turn > LOADING.coarse_segment_bending;
                 let unresolved = stop == EquilibriumFailure::Unresolved;
-                if !step.is_shortest && !(unresolved && coarse()) {
+                let ends = step.is_shortest || unresolved && coarse();
+                if !ends {
                     return StepEnd::TooLong(stop);
                 }
                 StepEnd::Ended(match coarse() {
