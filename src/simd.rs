@@ -128,7 +128,7 @@ pub fn group_components([a, b, c, d]: [DVec3; GROUP]) -> [NumberGroup; 3] {
 
 /// A part of each of three arrays, mutably.
 #[inline(always)]
-pub fn array_chunks_mut(arrays: &mut [impl AsMut<[f64]>; 3], span: ArraySpan) -> [&mut [f64]; 3] {
+pub fn spans_mut(arrays: &mut [impl AsMut<[f64]>; 3], span: ArraySpan) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;
     [
         slice_mut(x.as_mut(), span),

@@ -53,8 +53,7 @@ impl DiscreteLeaf {
     pub fn is_nearly_rigid(&self) -> bool {
         let mut segments = self.rod_index_pairs(0..self.segments());
         segments.any(|(j, i)| {
-            self.missing_law_fraction(j, i) * self.completed_law_fraction(j, i, false)
-                != DVec3::ZERO
+            self.missing_law_fraction(j, i) * self.completed_components(j, i, false) != DVec3::ZERO
         })
     }
 
@@ -65,8 +64,7 @@ impl DiscreteLeaf {
         let missing = |(j, i): (usize, usize)| {
             let section = self.section(j, i);
             let change = (after.n[j * n + i] - before.n[j * n + i]).length();
-            let missing =
-                self.missing_law_fraction(j, i) * self.completed_law_fraction(j, i, false);
+            let missing = self.missing_law_fraction(j, i) * self.completed_components(j, i, false);
             (missing / section.condensing).max_element() * change
         };
         largest(self.rod_index_pairs(0..n).map(missing))
@@ -95,7 +93,7 @@ impl DiscreteLeaf {
     /// finite stiffness. A straight rigid rod between holders has no force of its own, and its
     /// length depends on its deflection in second order: Newton's method with its exact length
     /// would converge slowly there, where that with a limited stiffness keeps it straight.
-    fn completed_law_fraction(&self, j: usize, i: usize, rigid: bool) -> DVec3 {
+    fn completed_components(&self, j: usize, i: usize, rigid: bool) -> DVec3 {
         let is_rigid = self.section(j, i).compliance.cmpeq(DVec3::ZERO);
         match rigid {
             true => DVec3::ONE,
@@ -120,7 +118,7 @@ impl DiscreteLeaf {
         let close = |gaps: &mut [DVec3]| {
             let segments = self.rod_index_pairs(0..self.segments());
             for (gap, (j, i)) in gaps.iter_mut().zip(segments) {
-                *gap *= self.completed_law_fraction(j, i, rigid);
+                *gap *= self.completed_components(j, i, rigid);
             }
         };
         close(gaps);

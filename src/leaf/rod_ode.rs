@@ -52,12 +52,12 @@ pub struct StationFields(Vec<GroupFields>);
 impl StationFields {
     /// The fields of rod `j`.
     pub fn rod(&self, j: usize) -> RodFields {
-        rod_fields(&self.0, j)
+        unpack_rod_fields(&self.0, j)
     }
 }
 
 /// The fields of rod `j` in its group.
-fn rod_fields(groups: &[GroupFields], j: usize) -> RodFields {
+fn unpack_rod_fields(groups: &[GroupFields], j: usize) -> RodFields {
     let RodLane { group, lane } = rod_lane(j);
     let vector =
         |first: usize| DVec3::from_array([0, 1, 2].map(|c| groups[group][first + c].0[lane]));
@@ -126,7 +126,7 @@ impl<'a> RodIntegrator<'a> {
             }),
             fields,
         };
-        integrator.look_up_laws(0.0);
+        integrator.look_up_laws_at(0.0);
         integrator
     }
 
@@ -187,7 +187,7 @@ impl<'a> RodIntegrator<'a> {
         for i in 0..STAGES {
             self.set_stage(h, STAGE_WEIGHTS[i]);
             if !self.uniform {
-                self.look_up_laws(sigma + STAGE_NODES[i] * h);
+                self.look_up_laws_at(sigma + STAGE_NODES[i] * h);
             }
             let mut kernel = SlopeKernel {
                 stage: &self.stage,
@@ -217,7 +217,7 @@ impl<'a> RodIntegrator<'a> {
             }
         };
         let here = |j: usize| {
-            let RodFields { x, q, .. } = rod_fields(fields, j);
+            let RodFields { x, q, .. } = unpack_rod_fields(fields, j);
             Pose {
                 position: x,
                 rotation: q,
@@ -267,7 +267,7 @@ impl<'a> RodIntegrator<'a> {
             for c in 0..3 {
                 slopes[FORCE + c].0[lane] -= force[c];
             }
-            let x = rod_fields(&self.stage.fields, j).x;
+            let x = unpack_rod_fields(&self.stage.fields, j).x;
             slopes[ENERGY].0[lane] -= force.dot(x);
         }
     }
@@ -299,7 +299,7 @@ impl<'a> RodIntegrator<'a> {
     }
 
     /// Looks up the constitutive laws of all rods at one sigma.
-    fn look_up_laws(&mut self, sigma: f64) {
+    fn look_up_laws_at(&mut self, sigma: f64) {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
             let sections = lane_rods(g, rods).map(|j| leaf.section(j, sigma, 1.0));

@@ -12,7 +12,7 @@ use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
 use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
-use crate::relax::plan::{GRIDS, RelaxationProblem};
+use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy};
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
 use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
@@ -95,8 +95,7 @@ impl NestedEquilibrium {
             .collect();
         let expected: Vec<State> = guesses.iter().map(|guess| guess.state.clone()).collect();
         let problem = RelaxationProblem {
-            // As for a reduced leaf: it fails if the leaf would have to move far.
-            whole_leaf: Some(&leaf),
+            valley: ValleyPolicy::StayOnBranch,
             ..RelaxationProblem::new(&leaf, options, tolerance)
         };
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
@@ -513,7 +512,7 @@ impl EquilibriumTracker {
         grid: Grid,
     ) -> Result<NestedEquilibrium, ContinuationFailure> {
         let problem = RelaxationProblem {
-            whole_leaf: Some(leaf),
+            valley: ValleyPolicy::StayOnBranch,
             ..RelaxationProblem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
         };
         let state = self.state_on(leaf, &grid);

@@ -24,7 +24,7 @@ words! {
     pub enum Route {
         /// The equilibrium of a leaf that is loaded slowly: see [`Path`].
         #[default]
-        LoadedLeaf = "loading",
+        Loading = "loading",
         /// The equilibrium to which a leaf moves that is released under all of its loads, with
         /// its tips together and its veins bent to circular arcs.
         Release = "release",
@@ -35,7 +35,7 @@ words! {
     /// What is done to the leaf on a part of its path.
     pub enum Stage {
         /// The loads are put on the veins apart.
-        LoadedLeaf = "loading",
+        Loading = "loading",
         /// The tips are moved together, and the coupling is put on.
         Joining = "joining",
         /// What is held is moved to its place.

@@ -108,6 +108,18 @@ const SMALLEST_SINGLE_GRID_TOLERANCE: f64 = 5e-7;
 /// Largest number of corrections of a leaf by its estimated error.
 const CORRECTIONS: usize = 4;
 
+/// Where a leaf may go from its initial guess.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValleyPolicy {
+    /// Into another valley of its energy: saddles are left.
+    MayLeave,
+    /// It fails where it would have to leave the valley of its initial guess.
+    Stay,
+    /// It also fails where it rests with a negative eigenvalue, whatever that is worth: the leaf
+    /// follows its branch of stable equilibria.
+    StayOnBranch,
+}
+
 /// The leaf that is to come to rest, and how.
 #[derive(Clone, Copy)]
 pub struct RelaxationProblem<'a> {
@@ -122,8 +134,8 @@ pub struct RelaxationProblem<'a> {
     pub shape_alone: bool,
     /// Whether to tell that the rods stay in their plane, as nothing acts out of it.
     pub planar: bool,
-    /// Whether it fails where the leaf would have to leave the valley of its initial guess.
-    pub stays_in_valley: bool,
+    /// Where the leaf may go from its initial guess.
+    pub valley: ValleyPolicy,
 }
 
 impl<'a> RelaxationProblem<'a> {
@@ -136,7 +148,7 @@ impl<'a> RelaxationProblem<'a> {
             tolerance,
             shape_alone: false,
             planar: false,
-            stays_in_valley: false,
+            valley: ValleyPolicy::MayLeave,
         }
     }
 
@@ -181,7 +193,7 @@ impl<'a> RelaxationProblem<'a> {
             _ => false,
         };
         // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
-        self.options.route == Route::LoadedLeaf
+        self.options.route == Route::Loading
             && !released
             && !self.leaf.has_placed_supports()
             && !self.leaf.hinged()
@@ -196,7 +208,7 @@ impl<'a> RelaxationProblem<'a> {
             Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none()
         );
         settles
-            && self.options.route == Route::LoadedLeaf
+            && self.options.route == Route::Loading
             && !self.leaf.has_placed_supports()
             && !self.leaf.hinged()
             && !self.leaf.loads.has_moments()

@@ -335,7 +335,7 @@ impl EquilibriumDoubt {
             Path::Loaded {
                 confirmed: false, ..
             } => Some(EquilibriumDoubt::UnconfirmedPath),
-            Path::Released if meant == Route::LoadedLeaf => Some(EquilibriumDoubt::ReleasedInstead),
+            Path::Released if meant == Route::Loading => Some(EquilibriumDoubt::ReleasedInstead),
             _ => None,
         }
     }

@@ -432,7 +432,7 @@ pub fn check_wind_options(scenario: &Scenario, options: &Options) -> Result<(), 
             "the search for an equilibrium of any index"
         }
         Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
-        Method::SemiImplicit(_) if options.route == Route::LoadedLeaf => "slow loading",
+        Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
         Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
         Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
             return Err(RelaxError::ChangingWind);

@@ -16,7 +16,7 @@ use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
 use crate::relax::plan::{
     Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
-    WayFromStart, least_segments, may_solve_half, plan,
+    ValleyPolicy, WayFromStart, least_segments, may_solve_half, plan,
 };
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
@@ -135,7 +135,10 @@ fn solve_planned<'a>(
     effort: &mut WorkLog,
 ) -> MadeAttempt {
     let part = RelaxationProblem {
-        stays_in_valley: attempt.strategy == Strategy::FirstValley,
+        valley: match attempt.strategy {
+            Strategy::FirstValley => ValleyPolicy::Stay,
+            _ => ValleyPolicy::MayLeave,
+        },
         ..problem.reduced_to_half(half)
     };
     let grid = grid_of(problem.leaf, attempt.segments);

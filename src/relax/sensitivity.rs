@@ -393,7 +393,7 @@ pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<ParameterForc
     let n = leaf.moving_nodes().len();
     let force = |(tip, axis): (usize, usize)| {
         let mut unit = ParameterForces::zeros(leaf.rods());
-        unit.node_forces_mut(tip, n)[n - 1][3 + axis] = 1.0;
+        unit.rod_forces_mut(tip, n)[n - 1][3 + axis] = 1.0;
         unit
     };
     let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));

@@ -200,7 +200,7 @@ words! {
         /// or the rest shape of free rods.
         Released = "released",
         /// In the equilibrium under the loads and with the rest shape of time 0.
-        ConfirmedEquilibrium = "at-rest",
+        AtRest = "at-rest",
     }
 }
 

@@ -286,7 +286,7 @@ impl Simulation {
     }
 
     /// Bounds the steps to half of those of a coarser run.
-    fn halve_coarser_steps(&mut self, coarser: &Trajectory) {
+    fn bound_steps_by_coarser(&mut self, coarser: &Trajectory) {
         let halves = coarser.longest_steps.iter().map(|longest| 0.5 * longest);
         self.longest_steps = halves.collect();
     }

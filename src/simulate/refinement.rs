@@ -393,7 +393,7 @@ impl Refinement {
         }
         let trajectory = self.run_unrecorded(run, watch)?;
         if factor > 1.0 {
-            first.halve_coarser_steps(&trajectory);
+            first.bound_steps_by_coarser(&trajectory);
             self.coarser = Some(with_trajectory(trajectory.clone()));
         }
         let other = with_trajectory(trajectory);
@@ -412,7 +412,7 @@ impl Refinement {
     /// The comparison of a later run with the one before.
     fn compare_next(&self, next: &mut Simulation) -> Option<MotionComparison> {
         let coarser = self.coarser.clone()?;
-        next.halve_coarser_steps(&coarser.trajectory);
+        next.bound_steps_by_coarser(&coarser.trajectory);
         Some(MotionComparison::new(next.segments(), coarser, self.length))
     }
 }

@@ -32,9 +32,7 @@ pub(crate) fn start_state(
             Ok(released_state(&DiscreteLeaf::new(leaf, grid.clone())))
         }
         // Held tips and grips are moved to their positions by the relaxation.
-        MotionStart::Released | MotionStart::ConfirmedEquilibrium => {
-            state_at_rest(leaf, grid, tolerance, limit)
-        }
+        MotionStart::Released | MotionStart::AtRest => state_at_rest(leaf, grid, tolerance, limit),
     }
 }
 

@@ -24,7 +24,7 @@ fn the_best_next_measurement_is_named() {
         ..made(&forces)
     };
     let found = fitted(&wanted);
-    assert_eq!(found.outcome, FitOutcome::UnidentifiableCombination);
+    assert_eq!(found.outcome, FitOutcome::Undetermined);
     assert_eq!(found.candidates[0].experiment, "up");
     let bits: Vec<f64> = found.candidates.iter().map(|one| one.bits).collect();
     assert!(bits[0] > bits[1] + 1.0, "{bits:?}");
@@ -34,7 +34,7 @@ fn the_best_next_measurement_is_named() {
     // Each of them made.
     let with = |force: [f64; 3]| fitted(&made(&[&forces[..], &[force]].concat())).outcome;
     assert_eq!(with([0.0, 0.0, 0.7]), FitOutcome::Converged);
-    assert_eq!(with([1.0, 0.4, 0.0]), FitOutcome::UnidentifiableCombination);
+    assert_eq!(with([1.0, 0.4, 0.0]), FitOutcome::Undetermined);
 }
 
 /// A vein whose tip is pinned.

@@ -119,7 +119,7 @@ fn a_number_at_its_bound_is_not_determined() {
         let found = fitted(&asked);
         assert_eq!(found.parameters[0].value, at);
         assert!(!found.parameters[0].determined);
-        assert_eq!(found.outcome, FitOutcome::UnidentifiableCombination);
+        assert_eq!(found.outcome, FitOutcome::Undetermined);
         assert!(
             found.says.concat().contains("at its bound"),
             "{:?}",

@@ -83,7 +83,7 @@ fn exchanged_axes_are_named() {
     let beats = "frequency_1,frequency_2,frequency_3,frequency_4\n0.6130,0.9692,3.8416,6.0741\n";
     let free = ["stiffness.bending_2", "stiffness.bending_3"];
     let found = fitted(&request(base(&rod, ""), &[beats], &free));
-    assert_eq!(found.outcome, FitOutcome::UnidentifiableCombination);
+    assert_eq!(found.outcome, FitOutcome::Undetermined);
     let [one, other] = [0, 1].map(|k| &found.parameters[k]);
     assert!(!one.determined && !other.determined);
     let alternative = only(&found.alternatives);
@@ -115,7 +115,7 @@ fn mirror_images_are_named() {
     let found = fitted(&request(begin, &[&table], &["load.tip_force[1]"]));
     assert_eq!(
         found.outcome,
-        FitOutcome::UnidentifiableCombination,
+        FitOutcome::Undetermined,
         "{:?}",
         found.parameters
     );

@@ -125,11 +125,7 @@ fn all_that_is_open_is_named_and_nothing_else() {
             let found = fitted(&request(base(&built.text, ""), &[&data], &free));
             let (says, remarks) = (&found.says, &found.remarks);
             let said = format!("kind {kind}, {number}: {says:?} {remarks:?}");
-            assert_eq!(
-                found.outcome,
-                FitOutcome::UnidentifiableCombination,
-                "{said}"
-            );
+            assert_eq!(found.outcome, FitOutcome::Undetermined, "{said}");
             let open = built.open.split('|').map(|of| of.split(' ').collect());
             let open: Vec<Vec<&str>> = open.collect();
             assert_eq!(found.undetermined.len(), open.len(), "{said}");
@@ -161,7 +157,7 @@ fn a_ratio_that_alone_is_felt_is_named() {
     let stiffness = "stiffness.bending_2+stiffness.bending_3+stiffness.torsion";
     let free = [stiffness, "dynamics.density"];
     let found = fitted(&request(base(&slender, RIGID), &[data], &free));
-    assert_eq!(found.outcome, FitOutcome::UnidentifiableCombination);
+    assert_eq!(found.outcome, FitOutcome::Undetermined);
     let open = only(&found.undetermined);
     let mut parts = open.values();
     assert!(parts.all(|part| (part - 1.0).abs() < 1e-3), "{open:?}");

@@ -137,7 +137,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
                 at: vec![0.0, 0.1, 0.25],
                 value: vec![[0.0; 3], blow, [0.0; 3]],
             };
-            dynamics.start = MotionStart::ConfirmedEquilibrium;
+            dynamics.start = MotionStart::AtRest;
         }
         5 => {
             leaf.wind = Some(Wind {
@@ -152,7 +152,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
                 at: vec![0.0, 1.0],
                 value: vec![0.2, random.uniform(0.5, 1.5)],
             };
-            dynamics.start = MotionStart::ConfirmedEquilibrium;
+            dynamics.start = MotionStart::AtRest;
         }
         _ => {}
     }

@@ -292,7 +292,7 @@ fn rest_in_wind_converges_with_the_square_of_the_segments() {
 fn a_motion_that_starts_at_rest_in_wind_stays_there() {
     let mut leaf = in_gusts();
     leaf.wind.as_mut().unwrap().velocity = Schedule::constant([1.0, 3.0, 4.0]);
-    leaf.dynamics.start = MotionStart::ConfirmedEquilibrium;
+    leaf.dynamics.start = MotionStart::AtRest;
     leaf.dynamics.duration = 2.0;
     leaf.dynamics.output_interval = 1.0;
     let rest = rests(&leaf, on(8));

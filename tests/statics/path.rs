@@ -131,7 +131,7 @@ fn a_column_turns_aside_at_its_critical_load() {
     ));
     let found = column.relax().unwrap();
     let event = only(events(&found));
-    assert_eq!(event.stage, Stage::LoadedLeaf);
+    assert_eq!(event.stage, Stage::Loading);
     assert_eq!(
         event.happening,
         StabilityLoss::Branched { equally_open: true }
@@ -144,9 +144,7 @@ fn a_column_turns_aside_at_its_critical_load() {
 
 /// Parts of the loading at which something happened.
 fn parts_of_loading(leaf: &Equilibrium) -> Vec<f64> {
-    let loading = events(leaf)
-        .iter()
-        .filter(|it| it.stage == Stage::LoadedLeaf);
+    let loading = events(leaf).iter().filter(|it| it.stage == Stage::Loading);
     loading.map(|it| it.part).collect()
 }
 

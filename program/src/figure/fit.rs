@@ -613,7 +613,7 @@ fn equalize_axis_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, A
 const FEWEST_EXPERIMENTS: usize = 4;
 
 /// Experiments are in line up to this part of their distance.
-const COLLINEARITY_TOLERANCE: f64 = 1e-6;
+const COLLINEAR_EXPERIMENTS_TOLERANCE: f64 = 1e-6;
 
 /// A result of an experiment, and where a panel has it: the value that varied, or the number of the
 /// experiment.
@@ -749,7 +749,8 @@ fn most_varying_setting(settings: &[&ExperimentSettings]) -> Option<usize> {
             .iter()
             .zip(longest)
             .map(|(a, b)| (a - part * b).powi(2));
-        off.sum::<f64>() <= COLLINEARITY_TOLERANCE * COLLINEARITY_TOLERANCE * square
+        off.sum::<f64>()
+            <= COLLINEAR_EXPERIMENTS_TOLERANCE * COLLINEAR_EXPERIMENTS_TOLERANCE * square
     };
     if !steps.iter().all(in_line) {
         return None;

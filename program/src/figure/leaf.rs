@@ -272,7 +272,7 @@ impl LeafPanels {
             let bounds = padded_box(veins.low, veins.high);
             let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, SPACE_MARGINS, None);
             draw_panel_title(page, cell.corner, "(d)", "in space");
-            scene.draw_box(page);
+            scene.draw_floor_and_walls(page);
             scene.draw_axes(page, 38.0);
             scene.draw_direction_arrows(page, true, 0.0);
             scene.draw_leaf(page, veins, veins.line_width());

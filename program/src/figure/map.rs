@@ -304,7 +304,7 @@ fn draw_method_name(
 const ROUNDING_VARIATION: f64 = 1e-9;
 
 /// A curve over the number that varies.
-struct MapCurve {
+struct CurveOverNumber {
     name: &'static str,
     color: Color,
     value: fn(&MapRow) -> Option<f64>,
@@ -314,11 +314,11 @@ struct MapCurve {
 struct CurvePanel {
     title: &'static str,
     axis_name: String,
-    curves: Vec<MapCurve>,
+    curves: Vec<CurveOverNumber>,
 }
 
 fn curve_panels(map: &Map) -> Vec<CurvePanel> {
-    let curve = |name, color: usize, value| MapCurve {
+    let curve = |name, color: usize, value| CurveOverNumber {
         name,
         color: CURVE_COLORS[color],
         value,
@@ -697,7 +697,7 @@ mod tests {
 
     #[test]
     fn every_method_and_outcome_is_named() {
-        let map = sample::sample_map();
+        let map = sample::map_of_all_outcomes();
         let svg = svg(&map);
         for method in MapMethod::ALL {
             assert!(svg.contains(&format!(">{method}</text>")), "{method}");
@@ -713,7 +713,7 @@ mod tests {
 
     #[test]
     fn waves_are_shown_in_place_of_outcomes() {
-        let mut map = sample::sample_map();
+        let mut map = sample::map_of_all_outcomes();
         assert!(!svg(&map).contains("waves"));
         map.show = MapShow::Waves;
         let svg = svg(&map);
@@ -726,7 +726,7 @@ mod tests {
 
     #[test]
     fn one_method_along_one_axis_is_drawn_as_curves() {
-        let mut map = sample::sample_map();
+        let mut map = sample::map_of_all_outcomes();
         map.request.axes.remove(0);
         map.request.methods.truncate(1);
         map.rows
@@ -742,7 +742,7 @@ mod tests {
         assert_eq!(curves(&svg), [6, 2]);
         assert!(svg.contains("where the tip is") && svg.contains(">energy<"));
         // Not of several methods, nor over two axes.
-        assert!(curves(&self::svg(&sample::sample_map())).is_empty());
+        assert!(curves(&self::svg(&sample::map_of_all_outcomes())).is_empty());
         map.show = MapShow::Waves;
         let svg = self::svg(&map);
         assert_eq!(curves(&svg), [2, 2, 2]);
@@ -751,7 +751,7 @@ mod tests {
 
     #[test]
     fn one_axis_and_missing_cells_are_drawn() {
-        let mut map = sample::sample_map();
+        let mut map = sample::map_of_all_outcomes();
         map.request.axes.remove(0);
         map.rows.retain(|row| row.cell < 3);
         let svg = svg(&map);

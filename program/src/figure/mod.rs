@@ -55,7 +55,7 @@ mod tests {
             check(&sample::sample_check(21, 32, 0.1), &scenario()),
             chart(&sample::sample_chart()),
             scaling(&sample::sample_scaling()),
-            map(&sample::sample_map()),
+            map(&sample::map_of_all_outcomes()),
             energy(&sample::sample_record(5, 16), &scenario()),
             filmstrip(&sample::sample_record(5, 16), &scenario()),
         ] {

@@ -285,7 +285,7 @@ fn draw_picture(
         FILM.page - DVec2::new(0.0, FILM.title_height),
     );
     let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, FILM.margins, None);
-    scene.draw_box(&mut page);
+    scene.draw_floor_and_walls(&mut page);
     scene.draw_axes(&mut page, 36.0);
     scene.draw_direction_arrows(&mut page, true, time);
     scene.draw_leaf(

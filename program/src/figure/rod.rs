@@ -129,7 +129,7 @@ pub fn draw(
             let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, LAYOUT.margins, None);
             page.draw_group("rod", |page| {
                 draw_panel_title(page, corner, "", "in space, with its shadow on the floor");
-                scene.draw_box(page);
+                scene.draw_floor_and_walls(page);
                 scene.draw_axes(page, 38.0);
                 scene.draw_direction_arrows(page, true, 0.0);
                 scene.draw_shadows(page, veins, LAYOUT.line);

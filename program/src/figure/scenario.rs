@@ -205,7 +205,7 @@ pub struct DirectionArrow {
 }
 
 /// Names of the axes as fractions of L, with what they mean.
-const FRACTION_AXIS_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
+const COORDINATE_OVER_LENGTH_NAMES: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
 
 pub const COORDINATE_NAMES: [&str; 3] = ["x", "y", "z"];
 
@@ -249,7 +249,7 @@ impl FigureSetting {
 
     /// The name of an axis whose values are shown.
     pub fn axis_name(&self, axis: usize) -> String {
-        match (&self.units.length, FRACTION_AXIS_NAMES[axis]) {
+        match (&self.units.length, COORDINATE_OVER_LENGTH_NAMES[axis]) {
             (Some(unit), _) => name_with_unit(COORDINATE_NAMES[axis], Some(unit)),
             (None, (name, meaning)) => format!("{name} = {meaning}"),
         }
@@ -260,7 +260,7 @@ impl FigureSetting {
         match (&self.units.length, values) {
             (Some(_), true) => self.axis_name(axis),
             (Some(_), false) => COORDINATE_NAMES[axis].into(),
-            (None, _) => FRACTION_AXIS_NAMES[axis].0.into(),
+            (None, _) => COORDINATE_OVER_LENGTH_NAMES[axis].0.into(),
         }
     }
 

@@ -25,7 +25,10 @@ impl ReportedResult for Check {
         let mut lines = vec![("verdict", verdict_sentence(self, units))];
         lines.extend(method_lines(self, units));
         lines.extend(label_first_line("differ", difference_lines(self, units)));
-        lines.extend(label_first_line("error", error_estimate_lines(self, units)));
+        lines.extend(label_first_line(
+            "error",
+            both_error_estimate_lines(self, units),
+        ));
         lines.extend(self.solution().into_iter().flat_map(shooting_detail_lines));
         // Otherwise the verdict explains why the leaf is not at rest.
         if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
@@ -125,7 +128,7 @@ fn number_with_unit(number: String, quantity: ComparedQuantity, units: &Units) -
 }
 
 /// The error estimates of both methods.
-fn error_estimate_lines(check: &Check, units: &Units) -> Vec<String> {
+fn both_error_estimate_lines(check: &Check, units: &Units) -> Vec<String> {
     let relaxed = &check.relaxed;
     let mut lines = vec![match relaxed.accuracy.error_estimate {
         Some(error) => {

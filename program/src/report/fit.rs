@@ -23,9 +23,7 @@ impl ReportedResult for Fit {
     fn report_lines(&self, units: &Units) -> LabelledLines {
         let found = match self.outcome {
             FitOutcome::Converged => "a minimum; the data determine every free number",
-            FitOutcome::UnidentifiableCombination => {
-                "a minimum; the data do not determine every free number"
-            }
+            FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
             FitOutcome::Systematic => {
                 "a minimum, at which the residuals are systematic: the model lacks something"
             }

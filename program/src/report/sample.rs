@@ -87,7 +87,7 @@ pub fn sample_check(rods: usize, segments: usize, angle: f64) -> Check {
 }
 
 /// A map of 2 x 4 cells in which every outcome and reference occurs.
-pub fn sample_map() -> Map {
+pub fn map_of_all_outcomes() -> Map {
     let text = r#"
         name = "vein"
         leaf = { rods = 1, length = 1.0, fan = [0.0] }

@@ -25,7 +25,7 @@ impl ReportedResult for Record {
 
     fn report_lines(&self, units: &Units) -> LabelledLines {
         let mut lines = vec![
-            ("moved", motion_line(self, units)),
+            ("moved", reached_time_line(self, units)),
             ("grid", format!("{} segments a vein", self.segments)),
             ("step", time_step_line(self, units)),
         ];
@@ -50,7 +50,7 @@ impl ReportedResult for Record {
     }
 }
 
-fn motion_line(record: &Record, units: &Units) -> String {
+fn reached_time_line(record: &Record, units: &Units) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
     let time = |time: f64| number_in_unit(format_five_digits(time), units, TIME);
     let (reached, outputs) = (time(record.time), record.moments.len());

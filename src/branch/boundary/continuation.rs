@@ -315,7 +315,7 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             });
         }
         let mut step = self.step;
-        let mut given = self.first_parameter_limit(now, step, |which| {
+        let mut given = self.first_passed_mark(now, step, |which| {
             now.solution.params[which] + step * now.tangent.params[which]
         });
         if given.is_none() {
@@ -325,7 +325,7 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
             };
             let found = boundary_point_at_distance(manifold, now, step, tolerance)?;
             let (next, off) = (found.point, found.prediction_error);
-            given = self.first_parameter_limit(now, step, |which| next.solution.params[which]);
+            given = self.first_passed_mark(now, step, |which| next.solution.params[which]);
             if given.is_none() {
                 let turn = self.accepts(manifold, [now, &next], off, step)?;
                 if turn > STEPS.growth_cosine {
@@ -375,7 +375,7 @@ impl<'a, 'h> BoundaryContinuation<'a, 'h> {
     }
 
     /// Where the step first leaves a range, or passes the initial value of the second parameter.
-    fn first_parameter_limit(
+    fn first_passed_mark(
         &self,
         now: &SingularPoint,
         step: f64,

@@ -70,7 +70,7 @@ impl DiscreteLeaf {
         forces: &mut ParameterForces,
     ) {
         let (n, first) = (self.segments(), self.first_node());
-        forces.node_forces_mut(j, n + 1 - first);
+        forces.rod_forces_mut(j, n + 1 - first);
         forces.gap_effects_mut(j, n);
         for i in 0..n {
             let section = self.section(j, i);
@@ -110,9 +110,9 @@ impl DiscreteLeaf {
         let rod = &rate.rods[j];
         let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
         let ends_here = j == 0 || !self.leaf.joined();
-        forces.node_forces_mut(j, count);
+        forces.rod_forces_mut(j, count);
         if rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO) {
-            forces.node_forces_mut(j + 1, count);
+            forces.rod_forces_mut(j + 1, count);
         }
         let base = state.x[state.base(j)];
         forces.energy -= (gravity * (self.load_factor * self.grid.node_weight(0))).dot(base);
@@ -226,7 +226,7 @@ impl DiscreteLeaf {
         let segment = &segments[j * n];
         let k = hessian_at_constant_force(segment, section);
         add_to_increment(
-            &mut forces.node_forces_mut(j, n)[0],
+            &mut forces.rod_forces_mut(j, n)[0],
             k.xb.transpose() * shift - k.ab.transpose() * turn,
             k.xx * shift - k.xa * turn,
         );
@@ -300,7 +300,7 @@ impl DiscreteLeaf {
             if change != DVec3::ZERO {
                 forces.energy -= change.dot(state.x[state.base(j) + i]);
                 if nodes.contains(&i) {
-                    let on = &mut forces.node_forces_mut(j, nodes.len())[i - nodes.start];
+                    let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
                     add_to_increment(on, DVec3::ZERO, change);
                 }
             }
@@ -333,7 +333,7 @@ impl DiscreteLeaf {
             forces.energy += energy;
             for (j, load) in [g, g + 1].into_iter().zip(on_nodes) {
                 if nodes.contains(&i) {
-                    let on = &mut forces.node_forces_mut(j, nodes.len())[i - nodes.start];
+                    let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
                     add_to_increment(on, load.moment, load.force);
                 }
             }
@@ -343,7 +343,7 @@ impl DiscreteLeaf {
     /// Adds the changes of dead moments to the forces.
     fn add_moment_changes(&self, rate: &LeafParameterDerivative, forces: &mut ParameterForces) {
         for it in &rate.moments {
-            let nodes = forces.node_forces_mut(0, self.moving_nodes().len());
+            let nodes = forces.rod_forces_mut(0, self.moving_nodes().len());
             if let Some(i) = self
                 .grid
                 .nearest_node(it.sigma)

@@ -245,7 +245,7 @@ impl ParameterForces {
     }
 
     /// The forces on the nodes of rod `j`, of which `count` have equations.
-    pub fn node_forces_mut(&mut self, j: usize, count: usize) -> &mut [Increment] {
+    pub fn rod_forces_mut(&mut self, j: usize, count: usize) -> &mut [Increment] {
         let nodes = &mut self.nodes[j];
         nodes.resize(count, [0.0; 6]);
         nodes
@@ -262,7 +262,7 @@ impl ParameterForces {
     pub fn add(&mut self, times: f64, other: &ParameterForces) {
         for (j, (nodes, gaps)) in other.nodes.iter().zip(&other.gaps).enumerate() {
             let count = nodes.len().max(self.nodes[j].len());
-            add_scaled_increments(self.node_forces_mut(j, count), times, nodes);
+            add_scaled_increments(self.rod_forces_mut(j, count), times, nodes);
             let count = gaps.len().max(self.gaps[j].len());
             let sums = self.gap_effects_mut(j, count);
             (sums.iter_mut().zip(gaps)).for_each(|(sum, more)| *sum += times * *more);

@@ -89,7 +89,7 @@ impl DiscreteLeaf {
         if i > 0 {
             let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
             let k = hessian_at_constant_force(segment, section);
-            let nodes = forces.node_forces_mut(j, count);
+            let nodes = forces.rod_forces_mut(j, count);
             if i > first {
                 let moment = k.ab * turned + k.xa.transpose() * moved;
                 let force = k.xx * moved + k.xb * turned;
@@ -104,7 +104,7 @@ impl DiscreteLeaf {
         if i < n {
             let (section, segment) = (self.section(j, i), &segments[j * n + i]);
             let k = hessian_at_constant_force(segment, section);
-            let nodes = forces.node_forces_mut(j, count);
+            let nodes = forces.rod_forces_mut(j, count);
             let moment = k.aa * turned - k.xa.transpose() * moved;
             add_to_increment(&mut nodes[i - first], -moment, DVec3::ZERO);
             add_to_increment(
@@ -150,7 +150,7 @@ impl DiscreteLeaf {
                 }
             }
             for (j, load) in [g, g + 1].into_iter().zip(loads) {
-                let on_node = &mut forces.node_forces_mut(j, count)[i - first];
+                let on_node = &mut forces.rod_forces_mut(j, count)[i - first];
                 add_to_increment(on_node, load.moment, load.force);
             }
         }

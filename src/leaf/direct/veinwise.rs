@@ -475,7 +475,7 @@ impl WithSimd for RodElimination<'_> {
         if let Some(before) = before {
             add_previous(&mut vein.swept, before, work)?;
         }
-        Some(turns + sweep_displacements(simd, &mut vein.swept, work)?)
+        Some(turns + sweep_out_displacements(simd, &mut vein.swept, work)?)
     }
 }
 
@@ -624,7 +624,7 @@ impl Workspace {
 /// upper triangle; the number of negative pivots. A node whose pivot is too small for what it
 /// divides is left for later; `None` if only such are left.
 #[inline(always)]
-fn sweep_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
+fn sweep_out_displacements<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
     let Workspace {
         displacements_per_rod: width,
         eliminated_displacements: own,
@@ -729,7 +729,7 @@ fn subtract_rank_three_product<S: Simd>(
     }
 }
 
-/// [`sweep_displacements`] of a matrix of three rows: minus its inverse.
+/// [`sweep_out_displacements`] of a matrix of three rows: minus its inverse.
 #[inline(always)]
 fn sweep_matrix3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
     let mut swept = [false; 3];

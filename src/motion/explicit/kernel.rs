@@ -36,7 +36,7 @@ use crate::leaf::{Loads, NodalMoment};
 use crate::motion::explicit::layout::{AlignedArray, BlockMaterial, NODES_PER_BLOCK, PackLayout};
 use crate::rotation::{HALF_ANGLE_POLYNOMIAL, Quaternions};
 use crate::simd::{
-    ArraySpan, Lanes, MAX_LANES, Vectors, array_chunks, array_chunks_mut, slice, slice_mut,
+    ArraySpan, Lanes, MAX_LANES, Vectors, array_chunks, slice, slice_mut, spans_mut,
 };
 use pulp::Simd;
 use std::ops::Deref;
@@ -347,7 +347,7 @@ impl PackStep<'_> {
             slice_mut(next_y, span),
             slice_mut(next_z, span),
         ];
-        let mut v = array_chunks_mut(&mut self.motion.v, span);
+        let mut v = spans_mut(&mut self.motion.v, span);
         let [to_before, to_after] = coupling.map(|coupling| Vectors::splat(simd, coupling));
         let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
         let (keep, kick) = (
@@ -408,7 +408,7 @@ impl PackStep<'_> {
             slice_mut(k, span),
             slice_mut(l, span),
         ];
-        let mut p = array_chunks_mut(p, span);
+        let mut p = spans_mut(p, span);
         let keep = Lanes::splat(simd, self.velocity_factor);
         let half_kick = Lanes::splat(simd, 0.5 * self.kick);
         let half_step = Lanes::splat(simd, 0.5 * self.drift);
@@ -631,19 +631,19 @@ fn segment_force_loop<S: Simd, const ROUND: bool, const DAMPED: bool, const REST
     let rest_force = array_chunks(&material.rest_force, ArraySpan::new(0, count));
     let rest_moment = array_chunks(&material.rest_moment, ArraySpan::new(0, count));
     let rest_turn = array_chunks(&material.rest_turn, ArraySpan::new(0, count));
-    let mut force = array_chunks_mut(&mut block.n, ArraySpan::new(MAX_LANES, count));
-    let mut left = array_chunks_mut(&mut block.left, ArraySpan::new(MAX_LANES, count));
-    let mut right = array_chunks_mut(&mut block.right, ArraySpan::new(MAX_LANES, count));
+    let mut force = spans_mut(&mut block.n, ArraySpan::new(MAX_LANES, count));
+    let mut left = spans_mut(&mut block.left, ArraySpan::new(MAX_LANES, count));
+    let mut right = spans_mut(&mut block.right, ArraySpan::new(MAX_LANES, count));
     let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
     let mut past = DAMPED.then(|| {
         [
             PastStrains {
-                last: array_chunks_mut(last_v, span),
-                earlier: array_chunks_mut(earlier_v, span),
+                last: spans_mut(last_v, span),
+                earlier: spans_mut(earlier_v, span),
             },
             PastStrains {
-                last: array_chunks_mut(last_psi, span),
-                earlier: array_chunks_mut(earlier_psi, span),
+                last: spans_mut(last_psi, span),
+                earlier: spans_mut(earlier_psi, span),
             },
         ]
     });

@@ -555,11 +555,8 @@ pub struct StateOnGrid {
     pub state: State,
 }
 
-/// The level of the whole leaf from that of its half, or from its own.
+/// The level of the whole leaf from that of its half.
 pub fn mirror_level(reduced: &Leaf, whole: &Leaf, level: &GridLevel) -> GridLevel {
-    if !reduced.is_mirror_half() {
-        return level.clone();
-    }
     GridLevel {
         leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
         state: whole_state(reduced, &level.state),

@@ -13,7 +13,7 @@ use crate::relax::accuracy::{
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::{Event, Path, PathPosition, Stage};
-use crate::relax::plan::{GRIDS, RelaxationProblem, WORK};
+use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
@@ -112,7 +112,10 @@ pub fn load_slowly<'a>(
         }
         let last = grid.segments() > GRIDS.finest_of_loading || problem.segments().is_some();
         let in_valley = RelaxationProblem {
-            stays_in_valley: !last,
+            valley: match last {
+                true => ValleyPolicy::MayLeave,
+                false => ValleyPolicy::Stay,
+            },
             ..*problem
         };
         let segments = on.segments();
@@ -287,7 +290,7 @@ pub fn takes_loads_stably(
         return true;
     }
     let grid = coarsest_grid(problem.leaf);
-    let run = follow_path_on_grid(problem, grid, Stage::LoadedLeaf, effort);
+    let run = follow_path_on_grid(problem, grid, Stage::Loading, effort);
     effort.farthest_position = None;
     run.end.is_ok() && run.events.is_empty()
 }

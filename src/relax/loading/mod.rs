@@ -135,7 +135,7 @@ impl<'w> LoadPath<'w> {
             next: state.clone(),
             previous_states: vec![PathState { lambda: 0.0, state }],
             events: Vec::new(),
-            stage: Stage::LoadedLeaf,
+            stage: Stage::Loading,
             lambda: 0.0,
             loading,
             bias_direction: DVec3::ZERO,
@@ -145,7 +145,7 @@ impl<'w> LoadPath<'w> {
     /// Loads the leaf to the end of a stage, as far as it can; the last state and what happened on the way are kept.
     pub fn run(&mut self, last: Stage) -> Result<(), EquilibriumFailure> {
         for stage in self.loading.stages() {
-            if stage == Stage::Joining && last == Stage::LoadedLeaf {
+            if stage == Stage::Joining && last == Stage::Loading {
                 break;
             }
             let PathState { state, .. } = self.previous_states.pop().expect("the last state");
@@ -494,7 +494,7 @@ impl<'a> LoadedLeaf<'a> {
             whole,
             leaf,
             tips,
-            stage: Stage::LoadedLeaf,
+            stage: Stage::Loading,
             lambda: 0.0,
         }
     }
@@ -505,7 +505,7 @@ impl<'a> LoadedLeaf<'a> {
         let loaded =
             [loads.gravity, loads.tip_force] != [DVec3::ZERO; 2] || loads.rod_load_factor != 0.0;
         let joined = !matches!(self.tips, TipMotion::Free) || self.whole.coupled();
-        let stages = [(loaded, Stage::LoadedLeaf), (joined, Stage::Joining)];
+        let stages = [(loaded, Stage::Loading), (joined, Stage::Joining)];
         stages
             .into_iter()
             .filter(|(any, _)| *any)
@@ -515,7 +515,7 @@ impl<'a> LoadedLeaf<'a> {
     /// Begins a stage in a state.
     pub fn begin(&mut self, stage: Stage, state: &State) {
         (self.stage, self.lambda) = (stage, 0.0);
-        if stage == Stage::LoadedLeaf {
+        if stage == Stage::Loading {
             return;
         }
         self.leaf = self.whole.clone();
@@ -531,7 +531,7 @@ impl<'a> LoadedLeaf<'a> {
     /// `from`.
     pub fn carry_to_lambda(&mut self, [from, part]: [f64; 2], state: &mut State) {
         let (loads, coupling) = match self.stage {
-            Stage::LoadedLeaf => (part, 0.0),
+            Stage::Loading => (part, 0.0),
             Stage::Joining | Stage::Moving => (1.0, part),
         };
         self.leaf.set_load_factors(self.whole, loads, coupling);

@@ -151,7 +151,7 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
             stage: match leaf.joined() && leaf.rods() > 1 {
                 _ if leaf.has_placed_supports() => Stage::Moving,
                 true => Stage::Joining,
-                false => Stage::LoadedLeaf,
+                false => Stage::Loading,
             },
             part: 1.0,
             happening: StabilityLoss::Branched {

@@ -16,7 +16,7 @@ use crate::relax::accuracy::{
 };
 use crate::relax::log::WorkLog;
 use crate::relax::path::Event;
-use crate::relax::plan::{GRIDS, RelaxationProblem, WORK, WayFromStart};
+use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK, WayFromStart};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_summary;
@@ -263,7 +263,7 @@ fn solve_semi_implicit(
 ) -> GridSolution {
     let accuracy = accuracy(problem, history, &leaf);
     let convex_only = problem.whole_leaf.is_some()
-        || problem.stays_in_valley
+        || problem.valley != ValleyPolicy::MayLeave
         || problem.too_coarse(leaf.segments());
     let nodes = leaf.rods() * leaf.segments();
     let granted = (WORK.guaranteed * WORK.coarse_segments / leaf.segments())
@@ -433,8 +433,11 @@ pub fn check_stability(
         return Ok(StabilityCheck::new(found, true));
     }
     let compared = !last && found.levels.len() == 1 && problem.segments().is_none();
-    if let Some(whole) = problem.whole_leaf {
-        let level = mirror_level(problem.leaf, whole, level);
+    if problem.whole_leaf.is_some() || problem.valley == ValleyPolicy::StayOnBranch {
+        let level = match problem.whole_leaf {
+            Some(whole) => mirror_level(problem.leaf, whole, level),
+            None => level.clone(),
+        };
         let mut system = System::new(&level.leaf);
         let count = count_negative(problem, &level, &mut system, compared, &mut effort.work);
         let index = count.index.unwrap_or(found.index);
@@ -471,7 +474,7 @@ pub fn check_stability(
         let known = before == found.index || problem.segments().is_some();
         return Ok(StabilityCheck::new(found.rejoin_finest(level), known));
     }
-    if problem.stays_in_valley {
+    if problem.valley == ValleyPolicy::Stay {
         return found
             .rejoin_finest(level)
             .into_failure(EquilibriumFailure::Saddle);

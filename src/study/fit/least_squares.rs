@@ -71,7 +71,7 @@ pub(super) enum GaussNewtonOutcome {
 }
 
 /// A known minimum, besides which another one is searched.
-pub(super) struct ExcludedMinimum<'t> {
+pub(super) struct KnownMinimum<'t> {
     pub theta: &'t [f64],
     /// The largest sum of another minimum that fits as well.
     pub largest_sum: f64,
@@ -79,7 +79,7 @@ pub(super) struct ExcludedMinimum<'t> {
     pub distance: f64,
 }
 
-impl ExcludedMinimum<'_> {
+impl KnownMinimum<'_> {
     /// Whether a step hardly leads to such a minimum: the sum that is expected after it is too large
     /// still, or it leads back to the known minimum.
     fn is_step_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
@@ -110,7 +110,7 @@ pub(super) struct GaussNewtonIteration<'m, 'a> {
     /// minimum by them.
     pub reuses_derivatives: bool,
     /// A minimum besides which another one is searched that fits as well.
-    pub excluded_minimum: Option<ExcludedMinimum<'m>>,
+    pub excluded_minimum: Option<KnownMinimum<'m>>,
     /// The values tried from the last point at which a leaf would have had to jump, the farthest first.
     pub jumps: Vec<Vec<f64>>,
     /// Called with the number of the step and the sum.

@@ -12,7 +12,7 @@ use crate::study::fit::data::{Experiment, ObservedExperiment};
 use crate::study::fit::free::{FitCoordinate, LONGEST_COORDINATE_STEP};
 use crate::study::fit::lack_of_fit::{FAR_FROM_BASE, data_contradict_model, data_far_from_model};
 use crate::study::fit::least_squares::{
-    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+    GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult, KnownMinimum,
 };
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, Weighting, round_to_three_digits};
 use crate::study::fit::prediction::DatumQuantity;
@@ -72,9 +72,9 @@ impl FitMinimum {
     }
 
     /// This minimum as one besides which another is searched from these values.
-    pub fn exclude_from(&self, theta: &[f64]) -> ExcludedMinimum<'_> {
+    pub fn exclude_from(&self, theta: &[f64]) -> KnownMinimum<'_> {
         let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
-        ExcludedMinimum {
+        KnownMinimum {
             theta: &self.theta,
             largest_sum: self.sum + self.significant_excess,
             distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
@@ -294,7 +294,7 @@ pub(super) fn assemble_fit(
         {
             FitOutcome::Converged
         }
-        GaussNewtonOutcome::Converged => FitOutcome::UnidentifiableCombination,
+        GaussNewtonOutcome::Converged => FitOutcome::Undetermined,
         _ => FitOutcome::NotConverged,
     };
     let candidates = match statistics::rank_candidate_experiments(stats, wanted) {

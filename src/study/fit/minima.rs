@@ -9,7 +9,7 @@ use crate::study::fit::columns::FitError;
 use crate::study::fit::data::Experiment;
 use crate::study::fit::free::FitCoordinate;
 use crate::study::fit::least_squares::{
-    ExcludedMinimum, GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult,
+    GaussNewtonIteration, GaussNewtonOutcome, GaussNewtonResult, KnownMinimum,
 };
 use crate::study::fit::local_fit::{FitMinimum, LocalFitSearch};
 use crate::study::fit::model::{CoarseModel, FitModel, FitPoint, MOST_RELAXATION_STEPS, Weighting};
@@ -168,7 +168,7 @@ fn find_coarse_minimum(
     model: &FitModel,
     weighting: Weighting,
     theta: &[f64],
-    besides: Option<ExcludedMinimum>,
+    besides: Option<KnownMinimum>,
     most_steps: usize,
 ) -> CoarseMinimum {
     let first = model.with_loose_tolerance(weighting.assumed_deviation);
@@ -446,7 +446,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
     fn find_coarse_minimum(
         &self,
         theta: &[f64],
-        besides: Option<ExcludedMinimum>,
+        besides: Option<KnownMinimum>,
         most_steps: usize,
     ) -> Option<EvaluatedStart> {
         let found = find_coarse_minimum(self.model, self.weighting, theta, besides, most_steps);
@@ -484,7 +484,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         let told = self.model.values_in_words(&other.theta);
         fit.says.push(format!("other values fit as well: {told}"));
         fit.alternatives.push(alternative);
-        fit.outcome = FitOutcome::UnidentifiableCombination;
+        fit.outcome = FitOutcome::Undetermined;
         let parameters = fit.parameters.iter_mut().zip(differs);
         parameters.for_each(|(parameter, differs)| parameter.determined &= !differs);
     }

@@ -16,7 +16,7 @@ words! {
         /// Not at a minimum.
         NotConverged = "not-converged",
         /// At a minimum, but some number or combination of numbers is not determined.
-        UnidentifiableCombination = "undetermined",
+        Undetermined = "undetermined",
         /// At a minimum, but the residuals are systematic there: the model lacks something.
         Systematic = "systematic",
         /// At a minimum, but the data contradict the model there.

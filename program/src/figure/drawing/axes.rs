@@ -287,7 +287,7 @@ struct AxisRange {
     largest_value: f64,
 }
 
-const AXIS_RANGE: AxisRange = AxisRange {
+const AXIS_RANGE_RULES: AxisRange = AxisRange {
     linear_padding: 0.06,
     logarithmic_padding: 0.12,
     most_decades: 18.0,
@@ -366,8 +366,12 @@ pub struct LabelledValue {
 
 impl Axis {
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
-        let [start, end] = [start, end]
-            .map(|value| value.clamp(-AXIS_RANGE.largest_value, AXIS_RANGE.largest_value));
+        let [start, end] = [start, end].map(|value| {
+            value.clamp(
+                -AXIS_RANGE_RULES.largest_value,
+                AXIS_RANGE_RULES.largest_value,
+            )
+        });
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
         // An extent that is only rounding counts as zero.
@@ -402,10 +406,10 @@ impl Axis {
     /// A linear axis that covers these values, with padding.
     pub fn linear_covering(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) =
-            extent_of_values(values.filter(|value| value.abs() < AXIS_RANGE.largest_value))
+            extent_of_values(values.filter(|value| value.abs() < AXIS_RANGE_RULES.largest_value))
                 .unwrap_or_default();
         let axis = Axis::linear(name, low, high);
-        let padding = AXIS_RANGE.linear_padding * (axis.end - axis.start);
+        let padding = AXIS_RANGE_RULES.linear_padding * (axis.end - axis.start);
         Axis {
             start: axis.start - padding,
             end: axis.end + padding,
@@ -433,8 +437,9 @@ impl Axis {
         let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
         let (start, end) = match extent_of_values(drawable.map(f64::log10)) {
             Some((low, high)) => {
-                let low = low.max(high - AXIS_RANGE.most_decades);
-                let padding = (0.5 * (fewest - (high - low))).max(AXIS_RANGE.logarithmic_padding);
+                let low = low.max(high - AXIS_RANGE_RULES.most_decades);
+                let padding =
+                    (0.5 * (fewest - (high - low))).max(AXIS_RANGE_RULES.logarithmic_padding);
                 (low - padding, high + padding)
             }
             None => (-fewest, 0.0),
@@ -485,7 +490,7 @@ impl Axis {
     pub fn fraction(&self, value: f64) -> f64 {
         let at = match self.sign {
             Some(sign) => (sign * value).log10(),
-            None if value.abs() < AXIS_RANGE.largest_value => value,
+            None if value.abs() < AXIS_RANGE_RULES.largest_value => value,
             None => f64::NAN,
         };
         (at - self.start) / (self.end - self.start)

@@ -265,7 +265,7 @@ impl<'s> SpacePanel<'s> {
     }
 
     /// Draws the floor, the two walls behind the leaf, and their grid.
-    pub fn draw_box(&self, page: &mut Drawing) {
+    pub fn draw_floor_and_walls(&self, page: &mut Drawing) {
         let (low, high) = (self.low, self.high);
         // Seen from large xi and small eta, the walls at small xi and large eta are
         // behind the leaf.
@@ -592,7 +592,7 @@ impl<'s> SmallPanels<'s> {
         caption.draw(page, cell.corner);
         let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
         let scene = SpacePanel::new(bounds, setting, view, cell, SMALL_PANEL.margins, step);
-        scene.draw_box(page);
+        scene.draw_floor_and_walls(page);
         if index == 0 {
             scene.draw_axis_names(page, 9.0, false);
         }

@@ -36,7 +36,7 @@ struct DotLimits {
     fewest: usize,
 }
 
-const SECOND_SOLUTION_DOTS: DotLimits = DotLimits {
+const SECOND_SOLUTION_DOT_LIMITS: DotLimits = DotLimits {
     veins: 24,
     most: 160,
     per_extent: 14.0,
@@ -218,13 +218,13 @@ impl DrawnVeins {
     /// Adds a second solution as dots, on as many veins and at as many nodes as can be
     /// distinguished.
     pub fn add_second_solution(&mut self, rods: &[RodShape]) {
-        let every = self.count.div_ceil(SECOND_SOLUTION_DOTS.veins).max(1);
-        let most = (SECOND_SOLUTION_DOTS.most / rods.len().div_ceil(every).max(1))
-            .max(SECOND_SOLUTION_DOTS.fewest);
+        let every = self.count.div_ceil(SECOND_SOLUTION_DOT_LIMITS.veins).max(1);
+        let most = (SECOND_SOLUTION_DOT_LIMITS.most / rods.len().div_ceil(every).max(1))
+            .max(SECOND_SOLUTION_DOT_LIMITS.fewest);
         // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.largest_extent();
-        let wanted = (SECOND_SOLUTION_DOTS.per_extent * lengths).ceil() as usize;
-        let dots = wanted.clamp(SECOND_SOLUTION_DOTS.fewest, most);
+        let wanted = (SECOND_SOLUTION_DOT_LIMITS.per_extent * lengths).ceil() as usize;
+        let dots = wanted.clamp(SECOND_SOLUTION_DOT_LIMITS.fewest, most);
         for rod in rods.iter().step_by(every) {
             let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
             // The base is under the clamp's marker.
