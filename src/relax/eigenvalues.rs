@@ -11,7 +11,7 @@ use crate::relax::accuracy::richardson::{
     BestColumn, EXTRAPOLATED_GRIDS, Extrapolated, Richardson,
 };
 use crate::relax::accuracy::transfer::{GridLevel, Stencil};
-use crate::relax::loading::arrival::on_next_grid;
+use crate::relax::nested_grids::on_next_grid;
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
 use crate::relax::request::Options;
 use crate::relax::result::Mode;

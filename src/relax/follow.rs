@@ -6,12 +6,10 @@ use crate::leaf::{
     DiscreteLeaf, Grid, Leaf, LeafParameterDerivative, LinearResponse, State, Weighted,
 };
 use crate::newton::EquilibriumFailure;
-use crate::relax::Outcome;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
-use crate::relax::loading::arrival;
-use crate::relax::loading::arrival::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::log::WorkLog;
+use crate::relax::nested_grids::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy};
 use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
 use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
@@ -19,6 +17,7 @@ use crate::relax::result::Equilibrium;
 use crate::relax::same_equilibrium::{is_near_prediction, is_same_beside_fold};
 use crate::relax::sensitivity::Linearized;
 use crate::relax::stability::state_from_rod_shapes;
+use crate::relax::{Outcome, nested_grids};
 use crate::run::Instant;
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
@@ -297,7 +296,7 @@ impl EquilibriumTracker {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        match arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort) {
+        match nested_grids::solve_from_guesses(&problem, begun, vec![guess], &mut effort) {
             Ok(found) if found.is_stable() => {
                 let leaf = equilibrium_with_stability(&problem, Ok(found), clock, &mut effort);
                 let follower =
@@ -520,7 +519,7 @@ impl EquilibriumTracker {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = WorkLog::new(ignored);
         let begun = NestedEquilibrium::without_grids(&problem);
-        let found = arrival::solve_from_guesses(&problem, begun, vec![guess], &mut effort);
+        let found = nested_grids::solve_from_guesses(&problem, begun, vec![guess], &mut effort);
         Ok(found
             .map_err(|_| ContinuationFailure::OtherEquilibrium)?
             .with_work(effort.work))

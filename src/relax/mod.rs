@@ -12,6 +12,7 @@ pub(crate) mod eigenvalues;
 mod follow;
 mod loading;
 mod log;
+pub(crate) mod nested_grids;
 mod path;
 pub(crate) mod plan;
 mod remark;

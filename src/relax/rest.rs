@@ -5,14 +5,12 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::newton::EquilibriumFailure;
 use crate::relax::accuracy::transfer::StateOnGrid;
 use crate::relax::accuracy::{History, NestedEquilibrium, RelaxationResult, result_with_path};
-use crate::relax::eigenvalues;
 use crate::relax::eigenvalues::EigenvalueRequest;
-use crate::relax::loading::arrival;
 use crate::relax::loading::arrival::{
-    LoadingEnd, follow_load_path, grid_of, load_slowly, solve_from_guesses, solve_from_start,
-    state_on_requested_grid, takes_loads_stably,
+    LoadingEnd, follow_load_path, grid_of, load_slowly, state_on_requested_grid, takes_loads_stably,
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
+use crate::relax::nested_grids::{solve_from_guesses, solve_from_start};
 use crate::relax::path::Path;
 use crate::relax::plan::{
     Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
@@ -26,6 +24,7 @@ use crate::relax::request::{
 use crate::relax::result::{Equilibrium, Outcome, report};
 use crate::relax::solve_on_grid::{check_segments, explicit};
 use crate::relax::stability::{Decision, Verdict, decide, state_from_rod_shapes};
+use crate::relax::{eigenvalues, nested_grids};
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
@@ -333,7 +332,7 @@ pub fn relax_from(
     let mut effort = WorkLog::new(progress);
     let begun = NestedEquilibrium::without_grids(&problem);
     let guesses = vec![StateOnGrid { grid, state }];
-    let found = arrival::solve_from_guesses(&problem, begun, guesses, &mut effort);
+    let found = nested_grids::solve_from_guesses(&problem, begun, guesses, &mut effort);
     let (settled, end) = match &found {
         Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
         Ok(_) => (false, AttemptEnd::Unstable),

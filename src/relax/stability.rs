@@ -10,8 +10,8 @@ use crate::relax::accuracy::transfer::{GridLevel, positions, prolong};
 use crate::relax::eigenvalues::{
     EigenvalueRequest, LowestModes, OmittedEigenvalues, affordable_next_grid, deciding_grid,
 };
-use crate::relax::loading::arrival::{continue_on, refine_to_tolerance};
 use crate::relax::log::WorkLog;
+use crate::relax::nested_grids::{continue_on, refine_to_tolerance};
 use crate::relax::plan::{GRIDS, RelaxationProblem};
 use crate::relax::request::{MOST_MODES, Options, Progress, SemiImplicit};
 use crate::relax::saddle::bounds;

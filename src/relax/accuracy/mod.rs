@@ -3,7 +3,7 @@
 //!
 //! An equilibrium on nested grids is a value: on a finer grid another one takes its place. Whoever
 //! needs the leaf more accurately, or is not sure of its index, asks
-//! [`arrival`](crate::relax::loading::arrival) for that.
+//! [`nested_grids`](crate::relax::nested_grids) for that.
 
 pub(crate) mod defect;
 pub(crate) mod fields;
