@@ -233,6 +233,7 @@ pub(super) fn solve_first_grid(
                 }
                 if before.is_none()
                     && let [.., coarse, _] = failed.as_slice()
+                    && 4 * coarse.segments() == level.leaf.segments()
                     && is_confirmed_on(problem, &mut found, &level, coarse.tripled(), effort)
                 {
                     let found = found.with_finer_level(level);
@@ -287,7 +288,7 @@ pub(super) fn is_confirmed_on(
     rest.is_ok() && is_same_on_two_grids(level, &other)
 }
 
-/// The leaf with up to two of the coarser grids that failed from the start, brought to rest there from
+/// The leaf with the two next coarser grids, which failed from the start, brought to rest there from
 /// the restricted equilibrium of its only grid so far.
 pub(super) fn add_coarser_grids(
     problem: &RelaxationProblem,

@@ -42,13 +42,13 @@ docs/speed.md: 1.3e-6 | 13.3 s | `tolerance=1e-5` | 2.9e-7 | 0.60 ms | {} |
 README.md: a leaf of 10,000 veins {} s
 docs/speed.md: | 10,000 | {} |
 
-src/motion/explicit/mod.rs: PARALLEL_SEGMENTS: usize = {};
+src/motion/explicit/mod.rs: parallel_segments: {},
 docs/command-line.md: in leaves of {} segments and more
 
-src/motion/explicit/mod.rs: PARALLEL_SEGMENTS: usize = {};
+src/motion/explicit/mod.rs: parallel_segments: {},
 docs/speed.md: From {} segments on, rods are shared
 
-src/leaf/system.rs: PARALLEL_NODES: usize = {};
+src/leaf/system.rs: LEAST_PARALLEL_NODES: usize = {};
 docs/command-line.md: in leaves of {} nodes
 
 src/study/trace/mod.rs: MOST_POINTS: usize = {};
