@@ -64,7 +64,7 @@ pub struct ScenarioArguments {
     #[arg(long)]
     json: bool,
 
-    /// Say what it took: steps, factorisations, time
+    /// Say what was tried and what it took: attempts, steps, factorisations, time
     #[arg(long, short)]
     verbose: bool,
 }
