@@ -25,9 +25,7 @@ pub enum Profile {
 }
 
 /// Properties along a rod that follow from one description of it, each with an index.
-pub(super) trait RodProperties:
-    Any + Debug + Send + Sync + UnwindSafe + RefUnwindSafe
-{
+pub(super) trait RodProperties: Debug + Send + Sync + UnwindSafe + RefUnwindSafe {
     /// A property at the fraction `sigma` of the length.
     fn value_at(&self, property: usize, sigma: f64) -> f64;
 
@@ -52,6 +50,9 @@ pub(super) trait RodProperties:
     fn integration_panels(&self) -> usize {
         1
     }
+
+    /// The description as a value of its own type.
+    fn as_any(&self) -> &dyn Any;
 
     /// Whether another description has the same type and content.
     fn is_equal(&self, other: &dyn Any) -> bool;
@@ -82,7 +83,7 @@ impl DerivedProfile {
 impl PartialEq for DerivedProfile {
     fn eq(&self, other: &Self) -> bool {
         let same = (self.property, self.factor) == (other.property, other.factor);
-        same && self.source.is_equal(&*other.source)
+        same && self.source.is_equal(other.source.as_any())
     }
 }
 

@@ -490,6 +490,10 @@ impl RodProperties for BladePart {
         INTEGRATION_PANELS
     }
 
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
     fn is_equal(&self, other: &dyn Any) -> bool {
         other.downcast_ref() == Some(self)
     }

@@ -233,6 +233,10 @@ impl RodProperties for Section {
         &self.kinks
     }
 
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
     fn is_equal(&self, other: &dyn Any) -> bool {
         other.downcast_ref() == Some(self)
     }
