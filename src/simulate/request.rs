@@ -6,16 +6,16 @@ use crate::{relax, words};
 /// Default number of segments per rod, unless its rest shape needs more.
 pub(crate) const DEFAULT_MOTION_SEGMENTS: usize = 16;
 
-/// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
+/// The error of tips that a [`Refinement`](crate::simulate::Refinement) aims at unless a tolerance is given, relative to the
 /// longest rod.
 pub const DEFAULT_TIP_ERROR: f64 = 1e-3;
 
 words! {
     /// The method of time integration.
     pub enum Scheme {
-        /// [`Explicit`]: short, very cheap steps. Not for rigid rods.
+        /// `Explicit`: short, very cheap steps. Not for rigid rods.
         Explicit = "explicit",
-        /// [`SemiImplicit`]: steps as long as accuracy allows, for any stiffness.
+        /// `SemiImplicit`: steps as long as accuracy allows, for any stiffness.
         SemiImplicit = "semi-implicit",
     }
 }
@@ -23,7 +23,7 @@ words! {
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method; `None`: the one that costs less, as [`SchemeChoice`] says.
+    /// The method; `None`: the one that costs less, as [`SchemeChoice`](crate::simulate::SchemeChoice) says.
     pub scheme: Option<Scheme>,
     /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
@@ -32,10 +32,10 @@ pub struct Options {
     /// one, such that the error of a step stays below the scenario's tolerance.
     pub step: Option<f64>,
     /// Replaces the scenario's tolerance: for the semi-implicit method, the
-    /// local error of a step relative to the longest rod. Of a [`Refinement`] also the error of
+    /// local error of a step relative to the longest rod. Of a [`Refinement`](crate::simulate::Refinement) also the error of
     /// tips that it aims at, in place of [`DEFAULT_TIP_ERROR`].
     pub tolerance: Option<f64>,
-    /// When the motion ends early, as [`Stopped::Interrupted`].
+    /// When the motion ends early, as [`Stopped::Interrupted`](crate::simulate::Stopped::Interrupted).
     pub limit: Limit,
 }
 
