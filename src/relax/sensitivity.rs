@@ -421,7 +421,7 @@ struct MultipleEigenvalue {
     rounding: f64,
 }
 
-const MULTIPLE: MultipleEigenvalue = MultipleEigenvalue {
+const MULTIPLE_EIGENVALUE: MultipleEigenvalue = MultipleEigenvalue {
     eigenvalues: 1e-6,
     derivatives: 1e-3,
     rounding: 1e-3,
@@ -469,14 +469,16 @@ impl NeighbouringEquilibria {
         let pairs = modes.windows(2).enumerate();
         let equal = |pair: &[Eigenpair]| {
             let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
-            (a - b).abs() <= MULTIPLE.eigenvalues * a.abs().max(b.abs())
+            (a - b).abs() <= MULTIPLE_EIGENVALUE.eigenvalues * a.abs().max(b.abs())
         };
         for (k, pair) in pairs.filter(|(_, pair)| equal(pair)) {
             let [a, b] = [rates[k], rates[k + 1]];
             let mixed = self.eigenvalue_rate(&pair[0].plus(&pair[1])) - 0.5 * (a + b);
-            let rounding =
-                MULTIPLE.eigenvalues * MULTIPLE.rounding * pair[0].eigenvalue.abs() / farthest;
-            let same = MULTIPLE.derivatives * a.abs().max(b.abs()) + rounding;
+            let rounding = MULTIPLE_EIGENVALUE.eigenvalues
+                * MULTIPLE_EIGENVALUE.rounding
+                * pair[0].eigenvalue.abs()
+                / farthest;
+            let same = MULTIPLE_EIGENVALUE.derivatives * a.abs().max(b.abs()) + rounding;
             if !(mixed.abs() <= same && (a - b).abs() <= same) {
                 rates[k..k + 2].fill(f64::NAN);
             }

@@ -68,7 +68,7 @@ pub struct ShapeSnapshot {
 }
 
 /// Number of nodes for cubic interpolation.
-pub(super) const CUBIC: usize = 4;
+pub(super) const CUBIC_NODES: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
 /// by rod, base to tip.
@@ -116,7 +116,7 @@ impl Frame {
     pub fn interpolated_to_stations(&self, from: &[f64], to: &[f64]) -> Frame {
         let weights: Vec<_> = to
             .iter()
-            .map(|&at| interpolation_weights(from, at, CUBIC))
+            .map(|&at| interpolation_weights(from, at, CUBIC_NODES))
             .collect();
         let mut there = Frame {
             positions: Vec::new(),
@@ -246,7 +246,7 @@ pub(super) fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
 /// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
 /// held.
 pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
-    let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC);
+    let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC_NODES);
     let mut points = frame.tips(joined);
     for rod in 0..frame.rods {
         let near = frame.centerline(rod)[first..].iter().zip(&weights);
