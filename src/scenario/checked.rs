@@ -117,7 +117,7 @@ impl Scenario {
                 self.tissue
                     .iter()
                     .flatten()
-                    .flat_map(Tissue::stiffness_profiles),
+                    .flat_map(Tissue::profiles),
             )
             .chain(self.distributed.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));

@@ -167,8 +167,9 @@ impl Scenario {
         if key == Key::TissueGrown {
             return Some(json!(self.tissue_grown));
         }
-        let which = Key::TISSUE.iter().position(|one| *one == key)?;
-        let of = |gap: &Tissue| gap.stiffness_profiles()[which].at(0.0);
+        let mut keys = Key::TISSUE.iter().chain([&Key::TissueContraction]);
+        let which = keys.position(|one| *one == key)?;
+        let of = |gap: &Tissue| gap.profiles()[which].at(0.0);
         Some(number_or_list(tissue.iter().map(of)))
     }
 

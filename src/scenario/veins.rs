@@ -130,6 +130,9 @@ pub struct Tissue {
     pub stiffness: [Profile; 3],
     /// c1, moment per angle and length of leaf, against a fold along the veins.
     pub fold: Profile,
+    /// Poisson's ratio times the width of the gap: by so much, times the strain v1 - 1 of its veins, the
+    /// gap narrows without force, and by so much, times their curvature u2, it folds without moment.
+    pub contraction: Profile,
 }
 
 impl Default for Tissue {
@@ -137,6 +140,7 @@ impl Default for Tissue {
         Tissue {
             stiffness: [0.0; 3].map(Profile::Constant),
             fold: Profile::Constant(0.0),
+            contraction: Profile::Constant(0.0),
         }
     }
 }
@@ -146,6 +150,12 @@ impl Tissue {
     pub(crate) fn stiffness_profiles(&self) -> [&Profile; 4] {
         let [along, across, normal] = &self.stiffness;
         [along, across, normal, &self.fold]
+    }
+
+    /// Everything that may vary along the gap.
+    pub(crate) fn profiles(&self) -> [&Profile; 5] {
+        let [along, across, normal, fold] = self.stiffness_profiles();
+        [along, across, normal, fold, &self.contraction]
     }
 }
 
@@ -315,12 +325,14 @@ pub(super) fn read_tissue(
         let gap = |[along, across, normal, fold]: [Profile; 4]| Tissue {
             stiffness: [along, across, normal],
             fold,
+            contraction: Profile::Constant(0.0),
         };
         let of_blade = || parts.tissue_profiles().into_iter().map(gap).collect();
         return Ok((gaps > 0).then(of_blade));
     }
     let mut tissue = vec![Tissue::default(); gaps];
-    for (which, key) in Key::TISSUE.into_iter().enumerate() {
+    let keys = Key::TISSUE.into_iter().chain([Key::TissueContraction]);
+    for (which, key) in keys.enumerate() {
         let Some(item) = entries.given_value(key) else {
             continue;
         };
@@ -329,6 +341,7 @@ pub(super) fn read_tissue(
         for (gap, stiffness) in tissue.iter_mut().zip(item.number_for_each(gaps)?) {
             match which {
                 3 => gap.fold = Profile::Constant(stiffness),
+                4 => gap.contraction = Profile::Constant(stiffness),
                 axis => gap.stiffness[axis] = Profile::Constant(stiffness),
             }
         }

@@ -265,19 +265,27 @@ impl<'e> EntryValue<'e> {
             range,
             NumberRange::Positive | NumberRange::PositiveOrInfinite
         );
+        let not_negative = matches!(
+            range,
+            NumberRange::NotNegative | NumberRange::NotNegativeOrInfinite
+        );
+        let infinite = matches!(
+            range,
+            NumberRange::PositiveOrInfinite | NumberRange::NotNegativeOrInfinite
+        );
         let problem = match value {
             _ if value.is_nan() && !self.displayed_value().contains("nan") => {
                 "is not a number a computer can hold (the largest is 1.8e308)"
             }
             _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
             _ if positive && value <= 0.0 => "must be greater than 0",
-            f64::INFINITY if range == NumberRange::PositiveOrInfinite => return Ok(value),
+            f64::INFINITY if infinite => return Ok(value),
             f64::INFINITY if positive => INFINITE,
             f64::INFINITY => "must be a finite number",
             _ if positive && !MAGNITUDES.contains(&value) => {
                 "must lie between 1e-50 and 1e50: choose other units"
             }
-            _ if range == NumberRange::NotNegative && value < 0.0 => "must not be negative",
+            _ if not_negative && value < 0.0 => "must not be negative",
             _ => return Ok(value),
         };
         Err(self.value_error(problem))
@@ -336,6 +344,7 @@ impl<'e> EntryValue<'e> {
         // Infinity cannot be interpolated between knots.
         let range = match self.key().form().range() {
             NumberRange::PositiveOrInfinite => NumberRange::Positive,
+            NumberRange::NotNegativeOrInfinite => NumberRange::NotNegative,
             range => range,
         };
         let values = self.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;

@@ -134,14 +134,16 @@ keys! {
     CouplingY "coupling.y": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// coupling along e3.
     CouplingZ "coupling.z": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
-    /// tissue between neighbours that slide along each other: force per displacement and length of leaf.
-    TissueAlong "tissue.along": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
+    /// tissue between neighbours that slide along each other: force per displacement and length of leaf; `inf`: they do not.
+    TissueAlong "tissue.along": PerGap(NotNegativeOrInfinite), [-2, 1, 0], Default("0.0");
     /// tissue whose width changes, likewise.
     TissueAcross "tissue.across": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
-    /// tissue of which one side rises above the other, likewise.
-    TissueNormal "tissue.normal": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
+    /// tissue of which one side rises above the other, likewise; `inf`: neither does.
+    TissueNormal "tissue.normal": PerGap(NotNegativeOrInfinite), [-2, 1, 0], Default("0.0");
     /// tissue that folds along the rods: moment per angle and length of leaf.
     TissueFold "tissue.fold": PerGap(NotNegative), [0, 1, 0], Default("0.0");
+    /// length by which a gap narrows, at rest, per stretch of its veins, and by which it folds per curvature: Poisson's ratio times the width.
+    TissueContraction "tissue.contraction": PerGap(Finite), [1, 0, 0], Default("0.0");
     /// whether tissue grows with the rods: else `rest.stretch` strains it.
     TissueGrown "tissue.grown": Switch, [0, 0, 0], Default("true");
     /// force per length of rod, one for all or one each.
@@ -299,6 +301,7 @@ impl Key {
     pub(super) fn follows_from_blade(self) -> bool {
         match self {
             Key::Length | Key::Fan | Key::Base | Key::RestBend3 => true,
+            Key::TissueContraction => true,
             _ if Key::TISSUE.contains(&self) => true,
             _ => matches!(self.table(), "stiffness" | "section"),
         }
@@ -435,6 +438,7 @@ pub(crate) enum ValueSchema {
 pub(crate) enum NumberRange {
     Finite,
     NotNegative,
+    NotNegativeOrInfinite,
     Positive,
     PositiveOrInfinite,
 }
