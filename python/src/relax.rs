@@ -9,7 +9,9 @@ use leafdyn::relax::{
     Settings,
 };
 use leafdyn::scenario;
-use leafdyn::study::{self, MarginProgress, ParameterKeys, SensitivityError};
+use leafdyn::study::{
+    self, MarginProgress, ParameterKeys, RefinedBlade, SensitivityError, VeinsError,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -42,6 +44,11 @@ pub struct Asked {
     margin: bool,
     /// Which equilibrium is meant.
     path: String,
+    /// To which error in veins a blade is refined, as a fraction of its largest displacement; for one
+    /// leaf only.
+    veins: Option<f64>,
+    /// Whether the error in veins is estimated.
+    veins_error: bool,
     /// The shape from which it starts; for one leaf only.
     start: Option<Start>,
 }
@@ -167,7 +174,26 @@ pub fn relax_one(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
+    if let Some(tolerance) = asked.veins {
+        let base = scenario.base(py)?;
+        let refined = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let name = base.scenario().name.clone();
+            study::refine_veins(&base, tolerance, &options, &mut reporter(monitor, &name))
+        })?;
+        let RefinedBlade { base, leaf } = refined.map_err(|error| match error {
+            VeinsError::Vary(error) => vary_error(py, error),
+            error => value_error(error),
+        })?;
+        return Ok(Leaf::new(
+            leaf,
+            base.scenario().clone().into(),
+            asked.stations,
+        ));
+    }
     let input = scenario.checked.clone();
+    let estimate = asked.veins_error && input.blade.is_some();
+    let estimate = (estimate.then(|| scenario.base(py)).transpose()?).zip(Some(options.clone()));
     let found = if let Some(start) = &asked.start {
         let (scenario, stations, rods) = (input.clone(), start.stations.clone(), start.rods());
         let found = run(py, progress, move |monitor| {
@@ -234,6 +260,15 @@ pub fn relax_one(
             error => value_error(error),
         })?
     };
+    let found = match estimate {
+        None => found,
+        Some((base, mut options)) => run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let mut found = found;
+            study::estimate_error_in_veins(&base, &mut found, &options);
+            found
+        })?,
+    };
     Ok(Leaf::new(found, input, asked.stations))
 }
 
@@ -241,20 +276,28 @@ pub fn relax_one(
 #[pyfunction]
 pub fn relax_many(
     py: Python,
-    scenarios: Vec<PyRef<Scenario>>,
+    given: Vec<PyRef<Scenario>>,
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Vec<Leaf>> {
     let mut options = asked.options()?;
-    let scenarios: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
+    let scenarios: Vec<Arc<scenario::Scenario>> = (given.iter())
         .map(|scenario| scenario.checked.clone())
         .collect();
     let inputs = scenarios.clone();
+    let base = |scenario: &PyRef<Scenario>| {
+        let estimate = asked.veins_error && scenario.checked.blade.is_some();
+        estimate.then(|| scenario.base(py)).transpose()
+    };
+    let bases = given.iter().map(base).collect::<PyResult<Vec<_>>>()?;
     let found = run(py, progress, move |monitor| {
         options.limit = monitor.limit();
         let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
         let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
-            let found = relax::relax(scenario, &options, &mut |_| {});
+            let mut found = relax::relax(scenario, &options, &mut |_| {});
+            if let (Ok(leaf), Some(base)) = (&mut found, &bases[number]) {
+                study::estimate_error_in_veins(base, leaf, &options);
+            }
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             monitor.report(done as f64, Some(all as f64), || {
                 format!("{done} of {all} leaves, {}", elapsed(clock))

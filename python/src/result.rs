@@ -216,6 +216,12 @@ impl Leaf {
         all.set_item(intern!(py, "negative_eigenvalues"), negative)?;
         let neutral = found.stability.neutral_directions;
         all.set_item(intern!(py, "neutral_directions"), neutral)?;
+        let blade = found.blade.as_ref();
+        let veins = blade.and_then(|blade| blade.error_in_veins);
+        all.set_item(intern!(py, "error_in_veins"), veins)?;
+        let veins = blade.and_then(|blade| blade.error_in_veins_remark.as_ref());
+        let veins = veins.map(ToString::to_string);
+        all.set_item(intern!(py, "error_in_veins_remark"), veins)?;
         all.set_item(intern!(py, "wall_seconds"), found.wall_seconds)?;
         Ok(all)
     }

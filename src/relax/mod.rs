@@ -37,7 +37,7 @@ pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, St
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{
     CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
-    SpanHolder,
+    SpanHolder, VeinsRemark,
 };
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
@@ -51,7 +51,7 @@ pub(crate) use crate::relax::result::serialize_index;
 pub use crate::relax::result::{
     Accuracy, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, FewerVeins,
     InstabilityKind, Margin, Mode, Model, Neighbour, Outcome, PostcriticalBehavior, Sensitivity,
-    Shape, Stability,
+    Shape, Stability, TriedVeins,
 };
 pub use crate::relax::saddle::Saddle;
 pub(crate) use crate::relax::saddle::{

@@ -148,6 +148,20 @@ remarks! {
             /// Part of the change from the leaf of arcs to this leaf that was made.
             part: f64,
         } = "shooting-failed",
+        /// A refined blade whose error in veins is larger than wanted, or not known.
+        #[error(
+            "with {rods} veins, the most that are tried, the error in veins is {}, where {} is wanted: allow more",
+            .error.map_or("not known".to_owned(), |error| format!("about {}", format_two_digits(error))),
+            format_two_digits(*.wanted)
+        )]
+        ErrorInVeins {
+            /// The number of veins.
+            rods: usize,
+            /// The error, a length, if it is known.
+            error: Option<f64>,
+            /// The error that was wanted, a length.
+            wanted: f64,
+        } = "error-in-veins",
     }
 
     /// What may keep a leaf from coming to rest, with what would help. Its sentence ends that of an
@@ -192,6 +206,50 @@ remarks! {
             /// Whether another method may find an equilibrium.
             may_shoot: bool,
         } = "loads",
+    }
+
+    /// Why the error in veins of a blade is not known, or how uncertain it is.
+    pub enum VeinsRemark {
+        /// A key that says something of each vein, or of some.
+        #[error("{key} is that of single veins, and with fewer veins the leaf would be another{}", whole_blade_hint(.key))]
+        SingleVeins {
+            /// The key, or its table.
+            key: &'static str,
+        } = "single-veins",
+        /// Fewer veins with which the blade is no scenario.
+        #[error("there is no such blade with {rods} veins: {why}")]
+        NoSuchBlade {
+            /// The smaller number of veins.
+            rods: usize,
+            /// Why.
+            why: String,
+        } = "no-such-blade",
+        /// Veins that are far apart for the length of the blade.
+        #[error(
+            "the veins are further apart than a quarter of the length of the blade, \
+             where no comparison with fewer tells an error: take more veins"
+        )]
+        ShortAndWide = "short-and-wide",
+        /// A blade with fewer veins that is not at rest.
+        #[error("with {rods} veins the blade does not come to rest")]
+        FewerNotAtRest {
+            /// The smaller number of veins.
+            rods: usize,
+        } = "fewer-not-at-rest",
+        /// A blade with fewer veins that rests elsewhere.
+        #[error("with {rods} veins the blade rests in another equilibrium, {} away", format_two_digits(*.distance))]
+        AnotherEquilibrium {
+            /// The smaller number of veins.
+            rods: usize,
+            /// The largest distance of equal places.
+            distance: f64,
+        } = "another-equilibrium",
+        /// An estimate from very few veins.
+        #[error("it is estimated from {rods} veins, and may be larger")]
+        VeryFew {
+            /// The smaller number of veins.
+            rods: usize,
+        } = "very-few",
     }
 
     /// What makes the result of a relaxation doubtful. Veins are counted from 0, stations are fractions
@@ -364,6 +422,16 @@ impl fmt::Display for SpanHolder {
     }
 }
 
+/// What to give in place of a load of single veins.
+fn whole_blade_hint(key: &str) -> &'static str {
+    match key {
+        "load.gravity" | "dynamics.density" => {
+            ": blade.mass_density with load.g is the weight of the whole blade"
+        }
+        _ => "",
+    }
+}
+
 fn obstacle_text(obstacle: &Option<Box<RestObstacle>>) -> String {
     obstacle
         .as_ref()
@@ -454,6 +522,11 @@ mod tests {
             *obstacle = None;
         }
         assert!(remark.to_string().ends_with("no stable equilibrium"));
+        let key = "load.gravity";
+        let remark = VeinsRemark::SingleVeins { key };
+        let sentence = "load.gravity is that of single veins, and with fewer veins the leaf would be another: \
+                        blade.mass_density with load.g is the weight of the whole blade";
+        assert_eq!(remark.to_string(), sentence);
         let key = "leaf.fan";
         let slip = PlausibilityWarning::AngleInDegrees { key, angle: -60.0 };
         let doubt = EquilibriumDoubt::Implausible(slip);

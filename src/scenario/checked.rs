@@ -113,12 +113,7 @@ impl Scenario {
         let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
         let profiles = profiles
             .chain(masses.map(|(_, mass)| mass))
-            .chain(
-                self.tissue
-                    .iter()
-                    .flatten()
-                    .flat_map(Tissue::profiles),
-            )
+            .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
             .chain(self.distributed.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
@@ -178,6 +173,29 @@ impl Scenario {
     pub fn has_own_loads(&self) -> bool {
         let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];
         weights || self.distributed.is_some() || !self.points.is_empty()
+    }
+
+    /// The key, or the table, of something that acts on single veins or on each of them, so that the
+    /// leaf with another number of veins is another one: loads per vein, points, grips, couplings
+    /// and wind. `None` where all follows from a blade as a whole.
+    pub fn key_of_loads_on_veins(&self) -> Option<&'static str> {
+        let acts = |load: &[f64; 3]| *load != [0.0; 3];
+        let free_tips = !self.joined && self.rods.len() > 1;
+        let blade_mass = self.blade.as_ref().is_some_and(|blade| blade.has_mass());
+        let keys = [
+            (!self.grips.is_empty(), "grip"),
+            (!self.points.is_empty(), "load.point"),
+            (
+                acts(&self.gravity) || !self.own_gravity.is_empty(),
+                Key::Gravity.path(),
+            ),
+            (self.distributed.is_some(), Key::Distributed.path()),
+            (free_tips && acts(&self.tip_force), Key::TipForce.path()),
+            (self.coupling.iter().any(acts), "coupling"),
+            (self.wind.is_some(), Key::WindWidth.path()),
+            (acts(&self.g) && !blade_mass, Key::Density.path()),
+        ];
+        keys.into_iter().find_map(|(acts, key)| acts.then_some(key))
     }
 
     /// Whether dead moments act at rest.

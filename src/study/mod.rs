@@ -1,5 +1,6 @@
 //! Studies built on the solvers.
 
+mod blade;
 mod boundary;
 mod chart;
 mod check;
@@ -16,6 +17,10 @@ pub(crate) mod vary;
 pub use crate::branch::{BranchEnd, CorrectorFailure, CriticalKind, VerificationFailure};
 pub use crate::run::UnknownWord;
 pub use crate::shooting::{NeutralDirection, ShootingSolution};
+pub use crate::study::blade::{
+    DEFAULT_VEINS_TOLERANCE, MOST_REFINED_VEINS, RefinedBlade, VeinsError, estimate_error_in_veins,
+    refine_veins, relax_blade,
+};
 pub use crate::study::boundary::map::BoundaryMap;
 pub use crate::study::boundary::{
     BoundaryCurve, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES, StabilityBoundary,
@@ -58,7 +63,7 @@ pub use crate::study::remark::{
     BoundaryRemark, BranchRemark, CheckReason, EquilibriaRemark, SolutionRemark, TraceRemark,
 };
 pub use crate::study::sensitivity::{
-    SensitivityError, relax_blade, relax_with_sensitivities, sensitivities_of_tracker,
+    SensitivityError, relax_with_sensitivities, sensitivities_of_tracker,
 };
 pub use crate::study::trace::result::{ForceDisplacementLine, TraceShow, TraceUntil};
 pub use crate::study::trace::{

@@ -9,6 +9,7 @@ mod derivatives;
 mod doubts;
 mod elastica;
 mod error_estimate;
+mod error_in_veins;
 mod every_tolerance;
 mod explicit_relaxation;
 mod extreme_leaves;

@@ -12,7 +12,7 @@ use crate::report::numbers::{
 };
 use crate::report::table::{LabelledLines, label_first_line};
 use glam::DVec3;
-use leafdyn::numbers::largest;
+use leafdyn::numbers::{format_two_digits, largest};
 use leafdyn::relax::{
     Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
     Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
@@ -76,7 +76,9 @@ impl ReportedResult for Equilibrium {
         }
         lines.extend(largest_stress_line(self, units).map(|stress| ("stress", stress)));
         lines.extend(margin_waves_line(self, units).map(|waves| ("waves", waves)));
-        lines.push(("error", error_line(self, units)));
+        let errors = std::iter::once(error_line(self, units));
+        let errors = errors.chain(error_in_veins_lines(self, units));
+        lines.extend(label_first_line("error", errors));
         lines.extend(lowest_modes_line(self, units).map(|modes| ("modes", modes)));
         lines.extend(label_first_line("changes", tip_change_lines(self, units)));
         let blade = self.blade.as_ref().map(|it| blade_lines(it, units));
@@ -420,11 +422,43 @@ fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
             effect.unwrap_or_default()
         ));
     }
-    if let Some(fewer) = blade.half_as_many {
-        let (rods, apart) = (fewer.rods, position_error_text(fewer.difference, units));
-        lines.push(format!(
-            "with {rods} veins in place of these it differs by {apart}"
-        ));
+    lines
+}
+
+/// The lines on the error in veins of a blade, if it was asked for.
+fn error_in_veins_lines(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
+    let Some(blade) = &equilibrium.blade else {
+        return Vec::new();
+    };
+    let about = |error: f64| number_in_unit(format_two_digits(error), units, LENGTH);
+    let remark = blade.error_in_veins_remark.as_ref();
+    let mut lines = Vec::new();
+    match (blade.error_in_veins, blade.half_as_many) {
+        (Some(error), Some(fewer)) => {
+            let (rods, more) = (equilibrium.rod_count, 2 * equilibrium.rod_count - 1);
+            let known = format!(
+                "in veins about {} (of {rods}, from the same blade with {}",
+                about(error),
+                fewer.rods
+            );
+            // An error of second order, on half the distances.
+            lines.push(match remark {
+                Some(remark) => format!("{known}; {remark})"),
+                None => format!(
+                    "{known}; {more} would make it about {})",
+                    about(error / 4.0)
+                ),
+            });
+        }
+        _ => lines.extend(remark.map(|remark| format!("in veins not known: {remark}"))),
+    }
+    if !blade.veins_tried.is_empty() {
+        let tried = blade.veins_tried.iter().map(|tried| {
+            let error = tried.error_in_veins.map_or("not known".into(), about);
+            format!("with {} {error}", tried.rods)
+        });
+        let tried: Vec<String> = tried.collect();
+        lines.push(format!("in veins of those tried: {}", tried.join(", ")));
     }
     lines
 }

@@ -12,7 +12,10 @@ use crate::verbs::request::{
 use clap::Args;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study;
-use leafdyn::study::{Equilibria, MarginError, MarginProgress, ParameterKeys, SensitivityError};
+use leafdyn::study::{
+    DEFAULT_VEINS_TOLERANCE, Equilibria, MarginError, MarginProgress, ParameterKeys, RefinedBlade,
+    SensitivityError, VeinsError,
+};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;
@@ -67,9 +70,40 @@ pub struct RelaxArguments {
     #[arg(long, conflicts_with_all = ["all", "sensitivity"])]
     margin: bool,
 
+    /// With so many veins, as --set leaf.rods=N; auto: a blade with as many as bring its error in veins below T times its largest displacement
+    #[arg(
+        long,
+        value_name = "N|auto[:T]",
+        value_parser = parse_veins,
+    )]
+    veins: Option<VeinsChoice>,
+
     /// Solve for the whole leaf, even if half of it would do
     #[arg(long, help_heading = EXPERT_OPTIONS_HEADING)]
     full_model: bool,
+}
+
+/// How many veins a leaf is relaxed with in place of those of the scenario.
+#[derive(Clone, Copy, Debug)]
+enum VeinsChoice {
+    Number(usize),
+    /// As many as an error in veins needs, a fraction of the largest displacement.
+    Refined(f64),
+}
+
+fn parse_veins(text: &str) -> Result<VeinsChoice, String> {
+    let refused =
+        || format!("{text}: must be a number of veins, or auto, or auto:T as in auto:1e-3");
+    let Some(tolerance) = text.strip_prefix("auto") else {
+        let number = text.parse().ok().filter(|number| *number > 0);
+        return number.map(VeinsChoice::Number).ok_or_else(refused);
+    };
+    let tolerance = match tolerance.strip_prefix(':') {
+        Some(tolerance) => tolerance.parse().map_err(|_| refused())?,
+        None if tolerance.is_empty() => DEFAULT_VEINS_TOLERANCE,
+        None => return Err(refused()),
+    };
+    Ok(VeinsChoice::Refined(tolerance))
 }
 
 fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
@@ -90,7 +124,19 @@ fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, to
 }
 
 impl RelaxArguments {
-    pub fn run(self) -> Result<ExitStatus, Refusal> {
+    pub fn run(mut self) -> Result<ExitStatus, Refusal> {
+        match self.veins {
+            Some(VeinsChoice::Number(veins)) => {
+                self.request.overrides.push(format!("leaf.rods={veins}"));
+            }
+            Some(VeinsChoice::Refined(_))
+                if self.all || self.margin || !self.sensitivity.is_empty() =>
+            {
+                let why = "not with --all, --margin or --sensitivity: ask for these with the number that it finds";
+                return Err(format!("--veins auto: {why}").into());
+            }
+            _ => {}
+        }
         let traits = VerbTraits {
             varies_numbers: !self.sensitivity.is_empty(),
             has_station_choice: true,
@@ -109,11 +155,19 @@ impl RelaxArguments {
     }
 
     fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
-        let live = match job.selection.kinds.contains(&FileKind::Live) {
-            true => Some(job.write_live_page()?),
-            false => None,
+        let is_live = job.selection.kinds.contains(&FileKind::Live);
+        let live_page = |job: &ScenarioJob| is_live.then(|| job.write_live_page()).transpose();
+        let mut live = live_page(job)?;
+        let refined;
+        let (job, equilibrium) = match self.veins {
+            Some(VeinsChoice::Refined(tolerance)) => {
+                let RefinedBlade { base, leaf } = self.refine_blade(job, tolerance)?;
+                refined = job.with_base(base);
+                live = live_page(&refined)?;
+                (&refined, leaf)
+            }
+            _ => (job, self.solve_equilibrium(job)?),
         };
-        let equilibrium = self.solve_equilibrium(job)?;
         if job.is_interrupted() && !equilibrium.outcome.is_at_rest() {
             return Err(InterruptedRun("the leaf is not at rest").into());
         }
@@ -146,8 +200,8 @@ impl RelaxArguments {
         })
     }
 
-    fn solve_equilibrium(&self, job: &ScenarioJob) -> Result<Equilibrium, Refusal> {
-        let options = Options {
+    fn options(&self, job: &ScenarioJob) -> Result<Options, Refusal> {
+        Ok(Options {
             method: self.method_with_options()?,
             route: self.path,
             tolerance: self.request.tolerance,
@@ -157,12 +211,42 @@ impl RelaxArguments {
             limit: job.limit.clone(),
             stations: job.selection.stations,
             ..Options::default()
-        };
+        })
+    }
+
+    /// A blade with as many veins as its accuracy needs.
+    fn refine_blade(&self, job: &ScenarioJob, tolerance: f64) -> Result<RefinedBlade, Refusal> {
+        let options = self.options(job)?;
+        let mut line = job.progress_line();
+        let wanted = self.request.tolerance.unwrap_or(job.scenario.tolerance);
+        let refined = study::refine_veins(&job.base, tolerance, &options, &mut |progress| {
+            line.update_solver(progress, wanted)
+        });
+        refined.map_err(|error| match error {
+            VeinsError::Relax(error) => error.into(),
+            error => format!("--veins auto: {error}").into(),
+        })
+    }
+
+    /// The leaf at rest, a blade with its error in veins.
+    fn solve_equilibrium(&self, job: &ScenarioJob) -> Result<Equilibrium, Refusal> {
+        let options = self.options(job)?;
+        let mut leaf = self.relax_with_questions(job, &options)?;
+        study::estimate_error_in_veins(&job.base, &mut leaf, &options);
+        Ok(leaf)
+    }
+
+    /// The leaf at rest, with what else is asked of it.
+    fn relax_with_questions(
+        &self,
+        job: &ScenarioJob,
+        options: &Options,
+    ) -> Result<Equilibrium, Refusal> {
         let mut line = job.progress_line();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         if !self.sensitivity.is_empty() {
             let (base, keys) = (&job.base, &self.sensitivity);
-            let found = study::relax_with_sensitivities(base, keys, &options, &mut |progress| {
+            let found = study::relax_with_sensitivities(base, keys, options, &mut |progress| {
                 line.update_solver(progress, tolerance);
             });
             return found.map_err(|error| match error {
@@ -172,7 +256,7 @@ impl RelaxArguments {
         }
         if self.margin {
             let mut searching = false;
-            let found = study::relax_with_margin(&job.scenario, &options, &mut |progress| {
+            let found = study::relax_with_margin(&job.scenario, options, &mut |progress| {
                 if let (false, MarginProgress::Searching { .. }) = (searching, progress) {
                     searching = true;
                     line.next_phase();
@@ -184,7 +268,7 @@ impl RelaxArguments {
                 error => format!("--margin: {error}").into(),
             });
         }
-        Ok(study::relax_blade(&job.base, &options, &mut |progress| {
+        Ok(study::relax_blade(&job.base, options, &mut |progress| {
             line.update_solver(progress, tolerance)
         })?)
     }

@@ -410,6 +410,7 @@ fn read_standard_input() -> Result<String, Refusal> {
 }
 
 /// One scenario of a request, and where its files go.
+#[derive(Clone)]
 pub struct ScenarioJob {
     /// Whether its result is printed as JSON.
     pub(super) json: bool,
@@ -469,6 +470,15 @@ fn panic_message(cause: &(dyn Any + Send)) -> String {
 }
 
 impl ScenarioJob {
+    /// The same job for a scenario with other numbers.
+    pub fn with_base(&self, base: BaseScenario) -> ScenarioJob {
+        ScenarioJob {
+            scenario: base.scenario().clone(),
+            base,
+            ..self.clone()
+        }
+    }
+
     /// The progress line of the scenario; hidden if scenarios run in parallel, which share one.
     pub fn progress_line(&self) -> ProgressLine {
         ProgressLine::new(&self.scenario.name, !self.runs_in_parallel)

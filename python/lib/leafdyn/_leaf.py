@@ -62,6 +62,13 @@ class Equilibrium(Viewed):
         """How the leaf came to this equilibrium: ``"stable-throughout"``, ``"snapped"``, ``"branched"`` or ``"released"``."""
     )
     path_events = Attribute[list[str]]("What happened on the way, a phrase each.")
+    error_in_veins = Attribute[float | None](
+        """Of a blade, if `relax` was asked for it (``veins_error``), about how far some point would move with many more
+        veins, a length: an estimate, no bound; none of other leaves, and where it is not known."""
+    )
+    error_in_veins_remark = Attribute[str | None](
+        "Why `error_in_veins` was asked for and is not known, or how uncertain it is; none otherwise."
+    )
     wall_seconds = Attribute[float]("The time of the solution alone, in seconds.")
 
     def __init__(self, core: _leafdyn.Leaf, request: tuple[Scenario, dict[str, Any]] | None = None) -> None:
@@ -315,6 +322,7 @@ class Equilibrium(Viewed):
             "lengths": (rods, self.lengths, (1, 0, 0)),
             "energy": ((), self.energy, ENERGY),
             "error_estimate": ((), self.error_estimate, (1, 0, 0)),
+            "error_in_veins": ((), self.error_in_veins, (1, 0, 0)),
             "negative_eigenvalues": ((), self.negative_eigenvalues, None),
             "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
             "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
@@ -384,6 +392,8 @@ class Equilibrium(Viewed):
             words.append(f"tip ({', '.join(f'{x:.5g}' for x in known)}){f' {unit}' if unit else ''}{within}")
         elif within:
             words.append(f"{self.rods} rods{within}")
+        if self.error_in_veins is not None:
+            words.append(f"in veins about {self.error_in_veins:.1e}")
         return f"<Equilibrium {self.name}: {', '.join(words)}>"
 
     def __getstate__(self) -> dict[str, Any]:

@@ -142,6 +142,7 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         state.setdefault("stresses", None)
     eigenvalues = said.get("lowest_eigenvalues")
     errors = [math.inf if bound is None else bound for bound in said.get("eigenvalue_errors") or []]
+    blade = said.get("blade") or {}
     tips = [said["tip"]] if said["tip"] is not None else said["tips"]
     entries = said.get("sensitivities") or []
     nowhere = np.empty((0, 0, 3))
@@ -156,6 +157,8 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "remark": said.get("remark"),
         "remark_code": said.get("remark_code"),
         "doubts": said.get("doubts", []),
+        "error_in_veins": blade.get("error_in_veins"),
+        "error_in_veins_remark": blade.get("error_in_veins_remark"),
         "rods": len(positions),
         "joined": scenario.joined,
         "segments": said.get("segments") or [],

@@ -29,16 +29,44 @@ def asked_for(
     margin: bool = False,
     path: str = "loading",
     start: Equilibrium | None = None,
+    veins: str | tuple[str, float] | None = None,
+    veins_error: bool = False,
 ) -> dict[str, Any]:
-    asked = {**locals(), "sensitivity": list(sensitivity), "start": None if start is None else _shape(start)}
+    asked = {
+        **locals(),
+        "sensitivity": list(sensitivity),
+        "start": None if start is None else _shape(start),
+        "veins": _refined(veins),
+    }
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
     numbers(tolerance=tolerance)
-    switches(keep_unstable=keep_unstable, full_model=full_model, mode_shapes=mode_shapes, margin=margin)
+    switches(
+        keep_unstable=keep_unstable,
+        full_model=full_model,
+        mode_shapes=mode_shapes,
+        margin=margin,
+        veins_error=veins_error,
+    )
     text("method", method, "semi-implicit")
     text("path", path, "loading")
     if start is not None and (margin or path != "loading"):
         raise ValueError(f"start goes with neither margin nor path = {path!r}: it is where the leaf begins")
+    if veins is not None and (margin or start is not None):
+        raise ValueError(f"veins = {veins!r} goes with neither margin nor start: ask for these with the number it finds")
     return asked
+
+
+REFINED = 1e-2
+"""The error in veins to which a blade is refined, as a fraction of its largest displacement."""
+
+
+def _refined(veins: str | tuple[str, float] | None) -> float | None:
+    """To which error in veins a blade is refined."""
+    word, tolerance = veins if isinstance(veins, tuple) and len(veins) == 2 else (veins, REFINED)
+    if word is not None and word != "auto":
+        raise ValueError(f'veins = {veins!r}: must be "auto" or ("auto", 1e-3); set={{"leaf.rods": 9}} sets a number')
+    numbers(veins=tolerance)
+    return None if word is None else tolerance
 
 
 def _shape(start: Equilibrium) -> dict[str, list[float]]:
@@ -68,6 +96,8 @@ def relax(
     full_model: bool = False,
     modes: SupportsIndex = 0,
     margin: bool = False,
+    veins: str | tuple[str, float] | None = None,
+    veins_error: bool = False,
     stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
@@ -101,6 +131,11 @@ def relax(
         How many of the lowest eigenvalues to find, too (the program finds 3); `leafdyn.modes` finds their shapes.
     margin
         Also find how far a stable leaf is from losing its stability, as its ``margin``.
+    veins
+        ``"auto"``: a blade (``[blade]``) with as many veins as bring its ``error_in_veins`` below a hundredth of its
+        largest displacement, or ``("auto", 1e-3)`` below that part of it; left out: as many as the scenario has.
+    veins_error
+        Also estimate the ``error_in_veins`` of a blade, from the same blade with half as many veins.
     stations
         At ``stations + 1`` equally spaced stations of every vein; left out: those of the finest grid, at least 17.
     progress
@@ -139,6 +174,12 @@ def relax(
     >>> alone = leafdyn.relax(column, start=pushed)
     >>> alone.tip.round(5), alone.stable
     (array([ 0.74102, -0.59321,  0.     ]), True)
+
+    A blade with as many veins as it needs:
+
+    >>> blade = leafdyn.relax(leafdyn.new("blade"), veins="auto")
+    >>> [tried["rods"] for tried in blade.blade["veins_tried"]][-1] == blade.rods
+    True
     """
     asked = asked_for(
         method,
@@ -154,11 +195,16 @@ def relax(
         margin,
         path,
         start,
+        veins,
+        veins_error,
     )
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
-        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    warn(found.name, found.remark, *found.doubts)
+        core = _leafdyn.relax(leaf._core, asked, heard)
+    if veins is not None:
+        leaf = Scenario(leaf, {"leaf.rods": len(core.lengths())})
+    found = Equilibrium(core, (leaf, asked))
+    warn(found.name, found.remark, found.error_in_veins_remark, *found.doubts)
     return found
 
 
@@ -174,6 +220,7 @@ def relax_many(
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: SupportsIndex = 0,
+    veins_error: bool = False,
     stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium]:
@@ -199,7 +246,17 @@ def relax_many(
     if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
         raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
     asked = asked_for(
-        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, path=path
+        method,
+        tolerance,
+        segments,
+        intervals,
+        keep_unstable,
+        full_model,
+        modes,
+        False,
+        stations,
+        path=path,
+        veins_error=veins_error,
     )
     leaves = []
     for number, scenario in enumerate(scenarios):
@@ -211,7 +268,7 @@ def relax_many(
     with reporter(progress) as heard:
         found = relaxed(leaves, asked, heard)
     for number, leaf in enumerate(found):
-        warn(f"scenarios[{number}], {leaf.name}", leaf.remark, *leaf.doubts)
+        warn(f"scenarios[{number}], {leaf.name}", leaf.remark, leaf.error_in_veins_remark, *leaf.doubts)
     return found
 
 

@@ -35,6 +35,7 @@ _PLAIN = (
     "negative_eigenvalues",
     "neutral_directions",
     "error_estimate",
+    "error_in_veins",
     "outcome",
     "success",
     "remark",
@@ -74,7 +75,7 @@ def sweep(
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"reaction_x"`` and so on (of a
         held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``,
         ``"neutral_directions"``,
-        ``"error_estimate"``, ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
+        ``"error_estimate"``, ``"error_in_veins"`` (of blades), ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
         ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time); or a dict of functions
         of an `Equilibrium`.
     client
@@ -113,7 +114,17 @@ def sweep(
     """
     package = pandas()
     wanted, modes = _wanted(columns)
-    asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, None, path=path)
+    asked = asked_for(
+        method,
+        tolerance,
+        segments,
+        None,
+        keep_unstable,
+        full_model,
+        modes,
+        path=path,
+        veins_error="error_in_veins" in wanted,
+    )
     base = checked(scenario, set)
     vary = vary if isinstance(vary, Mapping) else spans(vary)
     axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
@@ -133,7 +144,7 @@ def sweep(
         | {name: _column(package, name, [row[at] for _, row in rows]) for at, name in enumerate(wanted)}
     )
     # That of a table of a map is relative.
-    like = {"error_estimate": "tip_x"}
+    like = {"error_estimate": "tip_x", "error_in_veins": "tip_x"}
     units = {name: column_unit(base.units, like.get(name, name)) for name in (*axes, *wanted)}
     found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
     return found
@@ -234,6 +245,6 @@ def _column(package: Any, name: str, column: list[Any]) -> Any:
     kinds = {"stable": "boolean", "negative_eigenvalues": "Int64"}
     if name in kinds:
         return package.array(column, dtype=kinds[name])
-    if name in ("energy", "residual"):
+    if name in ("energy", "residual", "error_in_veins"):
         return np.array([nan if value is None else value for value in column], dtype=np.float64)
     return _varied(column)

@@ -9,7 +9,8 @@ use crate::relax::accuracy::StrainEffects;
 use crate::relax::log::Attempt;
 use crate::relax::path::Path;
 use crate::relax::remark::{
-    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, serialize_remark,
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, VeinsRemark,
+    serialize_remark,
 };
 use crate::relax::request::Method;
 use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
@@ -573,8 +574,17 @@ pub struct BladeReport {
     pub least_width: Option<f64>,
     /// By how much centerlines move if that is half as much, if it is known.
     pub least_width_effect: Option<f64>,
-    /// What the blade does with half as many veins, if that is known.
+    /// What the blade does with half as many veins, if that was asked for and is known.
     pub half_as_many: Option<FewerVeins>,
+    /// Estimate of the largest error of a position that more veins would not have, in units of length:
+    /// 1.5 times the difference to half as many. No bound; of fewer than 5 veins there is none.
+    pub error_in_veins: Option<f64>,
+    /// Why it was asked for and is not known, or how uncertain it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_in_veins_remark: Option<VeinsRemark>,
+    /// The numbers of veins up to this one, where it was refined.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub veins_tried: Vec<TriedVeins>,
 }
 
 /// A blade with fewer veins.
@@ -582,8 +592,17 @@ pub struct BladeReport {
 pub struct FewerVeins {
     /// The number of veins.
     pub rods: usize,
-    /// The largest distance of their centerlines from the surface of the blade with all veins.
+    /// The largest distance of their centerlines from equal places of the blade with all veins.
     pub difference: f64,
+}
+
+/// A number of veins with which a blade was relaxed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TriedVeins {
+    /// The number of veins.
+    pub rods: usize,
+    /// Its error in veins, if that is known.
+    pub error_in_veins: Option<f64>,
 }
 
 impl BladeReport {
@@ -619,6 +638,9 @@ impl BladeReport {
             least_width: blade.least_width(),
             least_width_effect: None,
             half_as_many: None,
+            error_in_veins: None,
+            error_in_veins_remark: None,
+            veins_tried: Vec::new(),
         })
     }
 }

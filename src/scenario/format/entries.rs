@@ -276,6 +276,26 @@ impl Entries {
         keys.any(|key| self.is_given(key))
     }
 
+    /// A key whose value is a list with one entry for each rod, or each gap between two, if there is one.
+    pub(crate) fn key_with_list_per_rod(&self) -> Option<Key> {
+        let is_list_of_lists = |value: &Value| (value.get(0)).is_some_and(|first| first.is_array());
+        Key::all().find(|key| {
+            let Some(value) = self.entry(*key, 0).map(|entry| &entry.value) else {
+                return false;
+            };
+            match key.form() {
+                ValueSchema::PerRod(_) | ValueSchema::PerGap(_) | ValueSchema::Fan => {
+                    value.is_array()
+                }
+                ValueSchema::Quantity(_) => {
+                    value.is_array() || value.get("value").is_some_and(is_list_of_lists)
+                }
+                ValueSchema::VectorPerRod | ValueSchema::VectorQuantity => is_list_of_lists(value),
+                _ => false,
+            }
+        })
+    }
+
     fn entry(&self, key: Key, row: usize) -> Option<&Entry> {
         self.entries[key as usize].get(row)?.as_deref()
     }

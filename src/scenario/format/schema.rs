@@ -115,7 +115,9 @@ fn entry_schema(key: Key) -> Value {
 fn number_schema(range: NumberRange) -> Value {
     match range {
         NumberRange::Finite => json!({ "type": "number" }),
-        NumberRange::NotNegative | NumberRange::NotNegativeOrInfinite => json!({ "type": "number", "minimum": 0 }),
+        NumberRange::NotNegative | NumberRange::NotNegativeOrInfinite => {
+            json!({ "type": "number", "minimum": 0 })
+        }
         NumberRange::Positive | NumberRange::PositiveOrInfinite => {
             json!({ "type": "number", "exclusiveMinimum": 0 })
         }

@@ -1,0 +1,451 @@
+//! How accurate a blade is as one of so many veins: the error in veins, estimated by the same blade with
+//! half as many, the number of veins that an accuracy needs, and the effect of narrow ends.
+
+use crate::natural::Natural;
+use crate::numbers::largest;
+use crate::relax::{
+    Equilibrium, EquilibriumRemark, FewerVeins, Method, Options, Outcome, Progress, RelaxError,
+    SemiImplicit, TriedVeins, VeinsRemark, relax,
+};
+use crate::run::RefusedOption;
+use crate::scenario::{Blade, Scenario};
+use crate::study::judge::SAME_STATION_DISTANCE;
+use crate::study::{BaseScenario, ParameterKeys, VaryError};
+use glam::DVec3;
+
+/// How the error in veins is estimated.
+struct VeinsRules {
+    /// The fewest veins of which it is estimated: half of fewer have no tissue, or no vein inside.
+    fewest: usize,
+    /// With so many veins or fewer in place of these the estimate is often too small.
+    very_few: usize,
+    /// The estimate over the difference to half as many veins. Of an error of second order, which is then
+    /// 1/3 of the difference, it is 4.5 times, of one of first order 1.5 times as large.
+    factor: f64,
+    /// The widest gap between veins, as a fraction of the blade's length, of which anything is told: a
+    /// short wide plate in shear approaches its limit from the other side with more veins.
+    widest_gap: f64,
+    /// A difference of more than this fraction of the length is that of another equilibrium.
+    another_equilibrium: f64,
+    /// The error of the grid of the smaller blade, as a fraction of the difference.
+    grid_error: f64,
+    /// The first tolerance of the smaller blade; twice as large saves no grid.
+    first_tolerance: f64,
+}
+
+const RULES: VeinsRules = VeinsRules {
+    fewest: 5,
+    very_few: 3,
+    factor: 1.5,
+    widest_gap: 0.25,
+    another_equilibrium: 0.1,
+    grid_error: 0.1,
+    first_tolerance: 1e-4,
+};
+
+/// The largest number of veins to which a blade is refined.
+pub const MOST_REFINED_VEINS: usize = 65;
+
+/// The error in veins to which a blade is refined if nothing is said: a fraction of the largest
+/// displacement from the natural leaf.
+pub const DEFAULT_VEINS_TOLERANCE: f64 = 1e-2;
+
+/// Tolerance of the blade with narrower ends that a blade is compared with.
+const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
+
+const LEAST_WIDTH_KEY: &str = "blade.least_width";
+
+const RODS_KEY: &str = "leaf.rods";
+
+/// Relaxes the leaf of `base` and, if it is a blade that comes to rest in a stable equilibrium, tells in
+/// [`Equilibrium::blade`] by how much narrower ends would move it; not for a fixed grid, or by
+/// other methods than the semi-implicit one.
+///
+/// # Errors
+/// If it cannot be relaxed; where the blade with narrower ends cannot be, that is left out.
+pub fn relax_blade(
+    base: &BaseScenario,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let mut leaf = relax(base.scenario(), options, progress)?;
+    compare_with_narrower_ends(base, &mut leaf, options);
+    Ok(leaf)
+}
+
+/// Tells by how much a blade at rest moves if its least width is half as much.
+fn compare_with_narrower_ends(base: &BaseScenario, leaf: &mut Equilibrium, options: &Options) {
+    let scenario = base.scenario();
+    let refines = (options.method.semi_implicit()).is_some_and(|how| how.segments.is_none());
+    let is_narrow = (leaf.blade.as_ref()).is_some_and(|blade| blade.least_width.is_some());
+    let (Some(blade), true) = (&scenario.blade, refines && is_narrow) else {
+        return;
+    };
+    if leaf.stable() != Some(true) {
+        return;
+    }
+    let tolerance = leaf.accuracy.tolerance.max(COMPARED_BLADE_TOLERANCE);
+    let narrower = blade_with_number(base, LEAST_WIDTH_KEY, 0.5 * blade.least_width_fraction());
+    let found = (narrower.ok())
+        .and_then(|it| relax(&it, &shape_options(options, tolerance), &mut |_| {}).ok())
+        .filter(|found| found.stable() == Some(true));
+    let effect = found.map(|found| largest_distance([scenario, scenario], [leaf, &found]));
+    if let Some(report) = &mut leaf.blade {
+        report.least_width_effect = effect;
+    }
+}
+
+/// The scenario of a blade with another number at a key.
+fn blade_with_number(base: &BaseScenario, key: &str, value: f64) -> Result<Scenario, VaryError> {
+    let keys: ParameterKeys = key.parse()?;
+    Ok(base.scenario_with_values(&[(&keys, value)])?.scenario)
+}
+
+/// Options of a relaxation for the shape alone. Slower methods than the semi-implicit one are not used.
+fn shape_options(options: &Options, tolerance: f64) -> Options {
+    let how = options.method.semi_implicit();
+    let on_grid = || SemiImplicit::on_grid(options.method.segments());
+    Options {
+        method: Method::SemiImplicit(how.unwrap_or_else(on_grid)),
+        tolerance: Some(tolerance),
+        modes: 0,
+        mode_shapes: false,
+        every_node: false,
+        stations: None,
+        ..options.clone()
+    }
+}
+
+/// Estimates the error in veins of a blade of `base` that came to rest with these `options`, from the
+/// same blade with half as many veins ((N + 1)/2 of N where N is odd, N/2 where it is even): 1.5
+/// times the largest difference of equal places. The estimate is put in [`Equilibrium::blade`], with
+/// a remark where there is none, or where it is uncertain; nothing else of the leaf changes. Of
+/// fewer than 5 veins, and of a leaf that is not at rest, nothing is told.
+///
+/// It is an estimate, not a bound. It fails for three veins in place of five and for short wide blades
+/// in shear, whose error does not go down with every vein.
+pub fn estimate_error_in_veins(base: &BaseScenario, leaf: &mut Equilibrium, options: &Options) {
+    if leaf.rod_count < RULES.fewest || leaf.blade.is_none() || !leaf.outcome.is_at_rest() {
+        return;
+    }
+    let compared = match key_of_single_veins(base) {
+        Some(key) => Err(VeinsRemark::SingleVeins { key }),
+        None => compare_with_fewer_veins(base, leaf, options),
+    };
+    tell_error_in_veins(leaf, compared);
+}
+
+/// Takes what a comparison with fewer veins tells.
+fn tell_error_in_veins(leaf: &mut Equilibrium, compared: Result<FewerVeins, VeinsRemark>) {
+    let Some(report) = &mut leaf.blade else {
+        return;
+    };
+    report.half_as_many = compared.as_ref().ok().copied();
+    report.error_in_veins = report
+        .half_as_many
+        .map(|fewer| RULES.factor * fewer.difference);
+    report.error_in_veins_remark = match compared {
+        Ok(FewerVeins { rods, .. }) if rods <= RULES.very_few => {
+            Some(VeinsRemark::VeryFew { rods })
+        }
+        Ok(_) => None,
+        Err(remark) => Some(remark),
+    };
+}
+
+/// A key that says something of single veins, so that the leaf with fewer veins is another one.
+fn key_of_single_veins(base: &BaseScenario) -> Option<&'static str> {
+    let list = || base.entries.key_with_list_per_rod().map(|key| key.path());
+    base.scenario().key_of_loads_on_veins().or_else(list)
+}
+
+/// Relaxes the blade with half as many veins, as accurately as the difference needs.
+fn compare_with_fewer_veins(
+    base: &BaseScenario,
+    leaf: &Equilibrium,
+    options: &Options,
+) -> Result<FewerVeins, VeinsRemark> {
+    let scenario = base.scenario();
+    refuse_short_and_wide(scenario)?;
+    let rods = leaf.rod_count.div_ceil(2);
+    let fewer = blade_with_number(base, RODS_KEY, rods as f64).map_err(|error| {
+        let why = error.to_string();
+        VeinsRemark::NoSuchBlade { rods, why }
+    })?;
+    let finest = leaf.accuracy.tolerance;
+    let mut tolerance = finest.max(RULES.first_tolerance);
+    loop {
+        let found =
+            relax(&fewer, &shape_options(options, tolerance), &mut |_| {}).map_err(|error| {
+                let why = error.to_string();
+                VeinsRemark::NoSuchBlade { rods, why }
+            })?;
+        let compared = compare_veins([scenario, &fewer], [leaf, &found])?;
+        let wanted = RULES.grid_error * compared.difference;
+        // Beyond the accuracy of the blade itself no difference is seen.
+        if tolerance <= finest || (found.accuracy.error_estimate).is_none_or(|bar| bar <= wanted) {
+            return Ok(compared);
+        }
+        tolerance = (wanted / leaf.shape.longest())
+            .min(RULES.grid_error * tolerance)
+            .max(finest);
+    }
+}
+
+/// Refuses blades of which no number of fewer veins tells an error.
+fn refuse_short_and_wide(scenario: &Scenario) -> Result<(), VeinsRemark> {
+    let apart = |blade: &Blade| 0.5 * (blade.vein_position(1) - blade.vein_position(0));
+    let gap = |blade: &Blade| blade.width(blade.widest()) * apart(blade);
+    let is_wide = |blade: &Blade| gap(blade) > RULES.widest_gap * blade.length();
+    match scenario.blade.as_deref().is_some_and(is_wide) {
+        true => Err(VeinsRemark::ShortAndWide),
+        false => Ok(()),
+    }
+}
+
+/// The difference of a blade and the same with fewer veins, both at rest, if it is one in veins.
+fn compare_veins(
+    [scenario, fewer]: [&Scenario; 2],
+    [leaf, found]: [&Equilibrium; 2],
+) -> Result<FewerVeins, VeinsRemark> {
+    let rods = found.rod_count;
+    if !found.outcome.is_at_rest() {
+        return Err(VeinsRemark::FewerNotAtRest { rods });
+    }
+    let difference = largest_distance([scenario, fewer], [leaf, found]);
+    let index = |leaf: &Equilibrium| leaf.stability.negative_eigenvalues;
+    let same_index = index(leaf)
+        .zip(index(found))
+        .is_none_or(|(one, other)| one == other);
+    let near = difference <= RULES.another_equilibrium * leaf.shape.longest();
+    match same_index && near {
+        true => Ok(FewerVeins { rods, difference }),
+        false => Err(VeinsRemark::AnotherEquilibrium {
+            rods,
+            distance: difference,
+        }),
+    }
+}
+
+/// The largest distance between equal places of two forms of a blade: of the veins of the second from
+/// where these lie in the first, at stations in common.
+fn largest_distance([whole, other]: [&Scenario; 2], [leaf, found]: [&Equilibrium; 2]) -> f64 {
+    let (Some(blade), Some(other)) = (&whole.blade, &other.blade) else {
+        return f64::NAN;
+    };
+    let etas: Vec<f64> = (0..leaf.rod_count)
+        .map(|j| blade.vein_position(j))
+        .collect();
+    let vein = |k: usize| {
+        let across = AcrossVeins::new(&etas, other.vein_position(k));
+        let stations = found.shape.stations.iter().zip(&found.shape.rods[k].nodes);
+        let apart = stations.filter_map(|(sigma, node)| {
+            let same = |station: &f64| (station - sigma).abs() < SAME_STATION_DISTANCE;
+            let at = leaf.shape.stations.iter().position(same)?;
+            let position = |j: usize| leaf.shape.rods[j].nodes[at].position;
+            Some(across.interpolated(position).distance(node.position))
+        });
+        largest(apart)
+    };
+    largest((0..found.rod_count).map(vein))
+}
+
+/// Interpolation across the veins of a blade by the cubic through the four nearest, or through all of
+/// fewer; where there is a vein it is that.
+struct AcrossVeins {
+    first: usize,
+    weights: Vec<f64>,
+}
+
+impl AcrossVeins {
+    /// To the place `eta` among veins at these `etas`.
+    fn new(etas: &[f64], eta: f64) -> Self {
+        let count = etas.len().min(4);
+        let right = etas.partition_point(|of| *of < eta);
+        let first = right.saturating_sub(count / 2).min(etas.len() - count);
+        let near = &etas[first..first + count];
+        let weight = |own: usize| {
+            let others = (0..count).filter(|j| *j != own);
+            others
+                .map(|j| (eta - near[j]) / (near[own] - near[j]))
+                .product()
+        };
+        AcrossVeins {
+            first,
+            weights: (0..count).map(weight).collect(),
+        }
+    }
+
+    fn interpolated(&self, position: impl Fn(usize) -> DVec3) -> DVec3 {
+        let terms = self.weights.iter().enumerate();
+        terms
+            .map(|(j, weight)| *weight * position(self.first + j))
+            .sum()
+    }
+}
+
+/// Why the veins of a leaf are not refined.
+#[derive(Debug, thiserror::Error)]
+pub enum VeinsError {
+    /// The relaxation cannot be run.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
+    /// There is no such blade with more veins.
+    #[error(transparent)]
+    Vary(#[from] VaryError),
+    /// A leaf whose veins are given one by one.
+    #[error(
+        "only the veins of a blade can be refined: a leaf without [blade] is another with more veins"
+    )]
+    NoBlade,
+    /// A blade with entries of single veins.
+    #[error("{0}")]
+    SingleVeins(VeinsRemark),
+}
+
+/// A blade with as many veins as its accuracy needs.
+#[derive(Clone, Debug)]
+pub struct RefinedBlade {
+    /// The scenario with this number of veins.
+    pub base: BaseScenario,
+    /// The blade at rest; [`Equilibrium::blade`] tells which numbers of veins were tried.
+    pub leaf: Equilibrium,
+}
+
+/// Relaxes a blade with N veins, as many as `base` has or 5, then with 2N - 1 and so on, until the error in
+/// veins is at most `tolerance` times its largest displacement from the natural leaf, or less than
+/// the error of the grid. An estimate from three veins is not enough. If
+/// [`MOST_REFINED_VEINS`] do not suffice the outcome is that the tolerance is not reached, with a
+/// remark; a blade that does not come to rest is not refined further.
+///
+/// The leaf is the same as that of [`relax_blade`] with this number of veins.
+///
+/// # Errors
+/// Requests that cannot be met: leaves without a blade, with keys of single veins, and a tolerance that is
+/// not between 0 and 1.
+pub fn refine_veins(
+    base: &BaseScenario,
+    tolerance: f64,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<RefinedBlade, VeinsError> {
+    if !(tolerance > 0.0 && tolerance < 1.0) {
+        let why = "must be between 0 and 1: a fraction of the largest displacement";
+        return Err(RelaxError::from(RefusedOption::new("veins", tolerance, why)).into());
+    }
+    if base.scenario().blade.is_none() {
+        return Err(VeinsError::NoBlade);
+    }
+    if let Some(key) = key_of_single_veins(base) {
+        return Err(VeinsError::SingleVeins(VeinsRemark::SingleVeins { key }));
+    }
+    let keys: ParameterKeys = RODS_KEY.parse()?;
+    let mut rods = base.scenario().rods.len().max(RULES.fewest);
+    let mut tried = Vec::new();
+    let mut fewer: Option<RefinedBlade> = None;
+    loop {
+        let base = base.with_value(&keys, rods as f64)?;
+        let scenario = base.scenario();
+        let mut leaf = relax(scenario, options, progress)?;
+        match &fewer {
+            None => estimate_error_in_veins(&base, &mut leaf, options),
+            Some(fewer) if leaf.outcome.is_at_rest() => {
+                let compared = refuse_short_and_wide(scenario).and_then(|()| {
+                    compare_veins([scenario, fewer.base.scenario()], [&leaf, &fewer.leaf])
+                });
+                tell_error_in_veins(&mut leaf, compared);
+            }
+            Some(_) => {}
+        }
+        let report = leaf.blade.as_ref();
+        let error = report.and_then(|blade| blade.error_in_veins);
+        let from_few = report
+            .and_then(|blade| blade.half_as_many)
+            .is_none_or(|fewer| fewer.rods <= RULES.very_few);
+        tried.push(TriedVeins {
+            rods,
+            error_in_veins: error,
+        });
+        let wanted = (tolerance * largest_displacement(scenario, &leaf))
+            .max(leaf.accuracy.error_estimate.unwrap_or(0.0));
+        let enough = !from_few && error.is_some_and(|error| error <= wanted);
+        let next = 2 * rods - 1;
+        let stopped = !leaf.outcome.is_at_rest() || options.limit.reached();
+        if !enough && !stopped && next <= MOST_REFINED_VEINS {
+            (fewer, rods) = (Some(RefinedBlade { base, leaf }), next);
+            continue;
+        }
+        compare_with_narrower_ends(&base, &mut leaf, options);
+        if let Some(report) = &mut leaf.blade {
+            report.veins_tried = tried;
+        }
+        if !enough && leaf.outcome.is_success() {
+            leaf.outcome = Outcome::ToleranceNotReached;
+            leaf.remark = Some(EquilibriumRemark::ErrorInVeins {
+                rods,
+                error,
+                wanted,
+            });
+        }
+        return Ok(RefinedBlade { base, leaf });
+    }
+}
+
+/// The largest displacement of a station from its place in the natural leaf.
+fn largest_displacement(scenario: &Scenario, leaf: &Equilibrium) -> f64 {
+    let natural = Natural::new(scenario, true);
+    let vein =
+        |j: usize| {
+            let stations = leaf.shape.stations.iter().zip(&leaf.shape.rods[j].nodes);
+            largest(stations.map(|(sigma, node)| {
+                (natural.vein_pose(j, *sigma).position).distance(node.position)
+            }))
+        };
+    largest((0..leaf.rod_count).map(vein))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same blade that hangs to the other side is another equilibrium.
+    #[test]
+    fn far_away_is_another_equilibrium() {
+        let rest = |g: f64, rods: usize| {
+            let text = format!(
+                "name = 'blade'\nleaf = {{ rods = {rods} }}\nload.g = [0, 0, {g}]\n\
+                 blade = {{ length = 25.0, width = 2.0, thickness = 0.03, young = 5e4, mass_density = 8e-6 }}"
+            );
+            let scenario = Scenario::from_toml(&text).unwrap();
+            let leaf = scenario.relaxation().tolerance(1e-4).run().unwrap();
+            (scenario, leaf)
+        };
+        let (scenario, leaf) = rest(-981.0, 5);
+        let (fewer, alike) = rest(-981.0, 3);
+        let near = compare_veins([&scenario, &fewer], [&leaf, &alike]).unwrap();
+        assert!(near.rods == 3 && near.difference < 0.1);
+        let (fewer, risen) = rest(981.0, 3);
+        let far = compare_veins([&scenario, &fewer], [&leaf, &risen]).unwrap_err();
+        assert_eq!(far.code(), "another-equilibrium");
+    }
+
+    /// A cubic across veins is met everywhere, and a vein is met to the last bit.
+    #[test]
+    fn interpolation_across_veins_is_cubic() {
+        for rods in [5, 6, 9] {
+            let etas: Vec<f64> = (0..rods)
+                .map(|j| (2 * j + 1 - rods) as f64 / (rods - 1) as f64)
+                .collect();
+            let surface = |y: f64| DVec3::new(1.0 - y * y, y, y * y * y - 0.3 * y);
+            for eta in [-1.0, -0.9, -0.31, 0.0, 0.07, 0.5, 0.98, 1.0] {
+                let across = AcrossVeins::new(&etas, eta);
+                let found = across.interpolated(|j| surface(etas[j]));
+                assert!(found.distance(surface(eta)) < 1e-14, "{rods} {eta}");
+            }
+            for (j, eta) in etas.iter().enumerate() {
+                let found = AcrossVeins::new(&etas, *eta).interpolated(|j| surface(etas[j]));
+                assert_eq!(found, surface(etas[j]));
+            }
+        }
+    }
+}
