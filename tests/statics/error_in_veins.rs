@@ -1,7 +1,7 @@
 //! The error in veins that a blade states covers what more veins change, the leaf is the same whether it
 //! is stated or not, and a blade is refined to as many veins as it says.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use leafdyn::relax::{Outcome, VeinsRemark};
 use leafdyn::study::{
@@ -18,6 +18,9 @@ const JUDGED: f64 = 1e-3;
 
 /// Tolerance of the blades, so that the errors of their grids do not count.
 const TOLERANCE: f64 = 1e-5;
+
+/// Blades of many veins that take longer are not judged.
+const LONGEST: Duration = Duration::from_secs(10);
 
 /// Farther from the truth, in lengths, is another equilibrium.
 const ANOTHER: f64 = 0.1;
@@ -46,12 +49,12 @@ fn random_blade(seed: usize) -> String {
     let edges = random.chance(0.5);
     let rods = [9, 9, 10, 12, 13, 17][(6.0 * random.even()) as usize];
     // The weight of a strip that bends it, in units of E t^3/(12 L^3).
-    let weight = random.log(0.3, 20.0);
+    let weight = random.log(0.3, 50.0);
     let per_area = weight * thickness.powi(3) / (12.0 * length.powi(3));
     let g = random.vector(per_area / thickness, 0);
     let elevation = random.uniform(-0.5, 0.9);
-    let curved = match random.chance(0.4) {
-        true => format!("rest.bend_2 = {:?}", random.uniform(-2.0, 2.0) / length),
+    let curved = match random.chance(0.7) {
+        true => format!("rest.bend_2 = {:?}", random.uniform(-5.0, 5.0) / length),
         false => String::new(),
     };
     format!(
@@ -111,7 +114,9 @@ fn the_error_in_veins_of_random_blades_holds() {
             ["".into(), format!("leaf.rods={MANY}")].map(|change| base(&text, &change));
         let leaf = stated(&own, TOLERANCE);
         let report = leaf.blade.as_ref().unwrap();
-        let truth = relaxed(many.scenario(), &to(TOLERANCE));
+        let mut limited = to(TOLERANCE);
+        limited.limit = Limit::with_deadline(Instant::now() + LONGEST);
+        let truth = relaxed(many.scenario(), &limited);
         if !truth.outcome.is_at_rest() {
             continue;
         }
@@ -161,7 +166,7 @@ fn blade(changes: &str) -> BaseScenario {
 
 /// What a blade says in place of its error in veins, or besides.
 fn remark(changes: &str) -> Option<VeinsRemark> {
-    let report = stated(&blade(changes), 1e-4).blade.unwrap();
+    let report = stated(&blade(changes), 1e-3).blade.unwrap();
     let uncertain = matches!(
         report.error_in_veins_remark,
         Some(VeinsRemark::VeryFew { .. })
@@ -269,11 +274,11 @@ fn the_leaf_stays_as_it_was() {
 fn veins_are_refined_until_their_error_is_small_enough() {
     let start = blade("leaf.rods=3; rest.bend_2=0.05; blade.width.value[1]=8");
     let displacement = distance(
-        &settled(start.scenario(), &to(1e-5)),
-        &settled(&start.scenario().unloaded(), &to(1e-5)),
+        &settled(start.scenario(), &on(16)),
+        &settled(&start.scenario().unloaded(), &on(16)),
     );
     let refined = |tolerance: f64| {
-        let found = refine_veins(&start, tolerance, &to(1e-5), &mut |_| {});
+        let found = refine_veins(&start, tolerance, &on(16), &mut |_| {});
         let RefinedBlade { base, leaf } = found.unwrap();
         assert_eq!(base.scenario().rods.len(), leaf.rod_count);
         (base, leaf)
@@ -282,18 +287,17 @@ fn veins_are_refined_until_their_error_is_small_enough() {
     let tried = coarse.blade.unwrap().veins_tried;
     // That from three veins is not enough.
     assert_eq!(tried.iter().map(|it| it.rods).collect::<Vec<_>>(), [5, 9]);
-    let error = |rods: f64| rods * displacement;
-    let wanted = 0.5 * tried[1].error_in_veins.unwrap() / error(1.0);
+    let wanted = 0.4 * tried[1].error_in_veins.unwrap() / displacement;
     let (base, leaf) = refined(wanted);
     let report = leaf.blade.as_ref().unwrap();
     let (last, before) = report.veins_tried.split_last().unwrap();
     assert!(last.rods > 9 && last.rods == leaf.rod_count);
     assert_eq!(last.error_in_veins, report.error_in_veins);
-    assert!(last.error_in_veins.unwrap() <= 1.01 * wanted * displacement);
+    assert!(last.error_in_veins.unwrap() <= (1.0 + 1e-6) * wanted * displacement);
     for tried in before.iter().filter(|it| it.rods > 5) {
-        assert!(tried.error_in_veins.unwrap() > 0.99 * wanted * displacement);
+        assert!(tried.error_in_veins.unwrap() > wanted * displacement);
     }
-    let alone = relax_blade(&base, &to(1e-5), &mut |_| {}).unwrap();
+    let alone = relax_blade(&base, &on(16), &mut |_| {}).unwrap();
     assert_eq!(alone.tips, leaf.tips);
     assert_eq!(alone.shape, leaf.shape);
     assert_eq!(
@@ -310,8 +314,8 @@ fn too_few_veins_are_told() {
         let refused = refine_veins(&start, tolerance, &to(1e-4), &mut |_| {});
         assert!(matches!(refused, Err(VeinsError::Relax(_))), "{tolerance}");
     }
-    let start = blade("leaf.rods=34; rest.bend_2=0.05; blade.width.value[1]=8");
-    let found = refine_veins(&start, 1e-9, &to(1e-5), &mut |_| {});
+    let start = blade("leaf.rods=34");
+    let found = refine_veins(&start, 1e-9, &on(16), &mut |_| {});
     let leaf = found.unwrap().leaf;
     assert_eq!(leaf.rod_count, 34);
     assert_eq!(leaf.outcome, Outcome::ToleranceNotReached);

@@ -422,3 +422,84 @@ fn an_exact_tip_has_the_digits_that_rounding_leaves() {
         }
     }
 }
+
+const BLADE: &str = "relax scenarios/measured/blade.toml --tolerance 1e-4";
+
+/// The console and JSON tell the error in veins of every blade with five veins or more, or why not.
+#[test]
+fn a_blade_tells_its_error_in_veins() {
+    let place = Workplace::new();
+    let run = place.ok(format!("{BLADE} --write json"));
+    run.says(&[
+        "in veins about ",
+        " cm (of 9, from the same blade with 5; 17 would make it about ",
+    ]);
+    let blade = &place.json("out/blade/summary.json")["blade"];
+    let difference = blade["half_as_many"]["difference"].as_f64().unwrap();
+    assert_eq!(blade["error_in_veins"], json!(1.5 * difference));
+    let few = place.ok(format!("{BLADE} --veins 5 --write none"));
+    few.says(&[
+        "blade: 5 veins",
+        "estimated from 3 veins, and may be larger)",
+    ]);
+    let told = place.told(0, format!("{BLADE} --write none --set leaf.rods=4"));
+    let none = (
+        &told["blade"]["error_in_veins"],
+        &told["blade"]["half_as_many"],
+    );
+    assert_eq!(none, (&Value::Null, &Value::Null));
+    let per_vein = "--set load.g=[0,0,0] --set load.gravity=[0,0,-1e-5]";
+    let run = place.ok(format!("{BLADE} --write none {per_vein}"));
+    run.says(&["in veins not known: load.gravity is that of single veins"]);
+}
+
+/// Files are those of the blade with as many veins as it needs; too few end with status 1, and what makes
+/// no sense is refused.
+#[test]
+fn veins_are_refined_on_request() {
+    let place = Workplace::new();
+    let run = place.ok(format!(
+        "{BLADE} --veins auto --set leaf.rods=3 --write json,csv"
+    ));
+    run.says(&[
+        "blade: 9 veins",
+        "in veins of those tried: with 5 ",
+        ", with 9 ",
+    ]);
+    let summary = place.json("out/blade/summary.json");
+    tells(&summary, "rods=9 outcome=converged");
+    assert_eq!(summary["input"]["leaf"]["rods"], json!(9));
+    let tried = summary["blade"]["veins_tried"].list();
+    assert_eq!(
+        (&tried[0]["rods"], &tried[1]["rods"]),
+        (&json!(5), &json!(9))
+    );
+    assert_eq!(
+        tried[1]["error_in_veins"],
+        summary["blade"]["error_in_veins"]
+    );
+    assert_eq!(summary["positions"].list().len(), 9);
+    // On a single grid, whose own error is not known.
+    let most = format!("{BLADE} --veins auto:1e-12 --segments 16 --modes 0 --set leaf.rods=34");
+    let summary = place.told(1, format!("{most} --write none"));
+    let found = "rods=34 outcome=tolerance-not-reached remark_code=error-in-veins";
+    tells(&summary, found);
+    let cases = [
+        ("--veins 5x", "must be a number of veins, or auto"),
+        ("--veins auto:", "must be a number of veins, or auto"),
+        ("--veins auto:2", "--veins 2: must be between 0 and 1"),
+        ("--veins auto --all", "not with --all"),
+        ("--veins auto --margin", "--margin"),
+        (
+            "--veins auto --set load.gravity=[0,0,-1e-5]",
+            "load.gravity is that of single veins",
+        ),
+    ];
+    for (option, message) in cases {
+        let run = place.run(format!("{BLADE} {option}")).ends(2);
+        contains(&run.err, &[message]);
+    }
+    place.refuses("relax leaf.toml --veins auto", "only the veins of a blade");
+    let run = place.run("check leaf.toml --veins auto").ends(2);
+    contains(&run.err, &["--veins"]);
+}
