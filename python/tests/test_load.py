@@ -23,7 +23,7 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
     scenario = leafdyn.Scenario(source)
     (tmp_path / "leaf.toml").write_text(scenario.text)
     assert program("relax", tmp_path / "leaf.toml", "--out", tmp_path / "out").returncode == 0
-    leaf, again = leafdyn.relax(scenario, modes=3), leafdyn.load(tmp_path / "out")
+    leaf, again = leafdyn.relax(scenario, modes=3, veins_error=True), leafdyn.load(tmp_path / "out")
     assert isinstance(again, leafdyn.Equilibrium)
     for name in ARRAYS:
         assert np.array_equal(getattr(again, name), getattr(leaf, name)), name
@@ -33,7 +33,7 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
     for name in (
         "name method outcome success remark remark_code doubts rods joined segments tolerance residual energy stable "
         "negative_eigenvalues neutral_directions path path_events error_estimate tip_reaction_error "
-        "tip_reaction_moments_error grip_reaction_errors"
+        "tip_reaction_moments_error grip_reaction_errors error_in_veins error_in_veins_remark"
     ).split():
         assert getattr(again, name) == getattr(leaf, name), name
     assert repr(again) == repr(leaf)

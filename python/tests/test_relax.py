@@ -295,3 +295,42 @@ def test_a_remark_on_a_leaf_at_rest_is_a_warning() -> None:
     with pytest.warns(leafdyn.LeafWarning, match="leaf.fan is in radians"):
         leaf = leafdyn.relax({**fan(1), "leaf": {"rods": 1, "length": 1.0, "fan": [-60]}, "coupling": {}})
     assert leaf.outcome == "converged"
+
+
+def test_the_error_in_veins_of_a_blade() -> None:
+    blade = leafdyn.new("blade")
+    plain = leafdyn.relax(blade)
+    assert plain.error_in_veins is None and plain.error_in_veins_remark is None
+    assert plain.blade is not None and plain.blade["half_as_many"] is None
+    told = leafdyn.relax(blade, veins_error=True)
+    assert told.blade is not None and told.error_in_veins is not None
+    assert told.error_in_veins == told.blade["error_in_veins"] == 1.5 * told.blade["half_as_many"]["difference"]
+    assert np.array_equal(told.positions, plain.positions)
+    assert "in veins about" in repr(told) and "in veins" not in repr(plain)
+    many = leafdyn.relax_many([blade, fan(3)], veins_error=True)
+    assert [leaf.error_in_veins for leaf in many] == [told.error_in_veins, None]
+    assert pickle.loads(pickle.dumps(told)).error_in_veins == told.error_in_veins
+    with pytest.warns(leafdyn.LeafWarning, match="coupling is that of single veins"):
+        other = leafdyn.relax(blade, set={"coupling.z": 1e-9}, veins_error=True)
+    assert other.error_in_veins is None and "coupling" in str(other.error_in_veins_remark)
+
+
+def test_a_blade_has_as_many_veins_as_it_needs() -> None:
+    blade = leafdyn.new("blade")
+    found = leafdyn.relax(blade, set={"leaf.rods": 3}, veins="auto")
+    assert found.success and found.blade is not None and found.scenario is not None
+    assert found.rods == len(found.scenario.lengths) == found.blade["veins_tried"][-1]["rods"] > 5
+    alone = leafdyn.relax(blade, set={"leaf.rods": found.rods})
+    assert np.array_equal(alone.positions, found.positions)
+    with pytest.warns(leafdyn.LeafWarning, match="the most that are tried"):
+        few = leafdyn.relax(blade, set={"leaf.rods": 34}, segments=8, veins=("auto", 1e-12))
+    assert (few.success, few.remark_code, few.rods) == (False, "error-in-veins", 34)
+    with pytest.raises(ValueError, match="veins = 2"):
+        leafdyn.relax(blade, veins=("auto", 2.0))
+    with pytest.raises(ValueError, match=r"only the veins of a blade"):
+        leafdyn.relax(fan(5), veins="auto")
+    for wrong in [9, "all", ("auto",)]:
+        with pytest.raises(ValueError, match="must be .auto."):
+            leafdyn.relax(blade, veins=wrong)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="goes with neither margin nor start"):
+        leafdyn.relax(blade, veins="auto", margin=True)

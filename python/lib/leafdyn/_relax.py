@@ -52,7 +52,7 @@ def asked_for(
     if start is not None and (margin or path != "loading"):
         raise ValueError(f"start goes with neither margin nor path = {path!r}: it is where the leaf begins")
     if veins is not None and (margin or start is not None):
-        raise ValueError(f"veins = {veins!r} goes with neither margin nor start: ask for these with the number it finds")
+        raise ValueError(f"veins = {veins!r} goes with neither margin nor start: ask again with its number")
     return asked
 
 
@@ -62,11 +62,13 @@ REFINED = 1e-2
 
 def _refined(veins: str | tuple[str, float] | None) -> float | None:
     """To which error in veins a blade is refined."""
-    word, tolerance = veins if isinstance(veins, tuple) and len(veins) == 2 else (veins, REFINED)
-    if word is not None and word != "auto":
+    if veins is None:
+        return None
+    asked = ("auto", REFINED) if veins == "auto" else veins
+    if not isinstance(asked, tuple) or len(asked) != 2 or asked[0] != "auto":
         raise ValueError(f'veins = {veins!r}: must be "auto" or ("auto", 1e-3); set={{"leaf.rods": 9}} sets a number')
-    numbers(veins=tolerance)
-    return None if word is None else tolerance
+    numbers(veins=asked[1])
+    return asked[1]
 
 
 def _shape(start: Equilibrium) -> dict[str, list[float]]:
