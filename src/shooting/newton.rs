@@ -12,13 +12,14 @@ use crate::numbers::largest;
 use crate::scenario::{BaseRotations, ZeroEnergyRotation};
 use crate::shape::equally_spaced;
 use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, RodState};
-use crate::shooting::integrate::{LeafTrajectory, ShootingNodes};
+use crate::shooting::integrate::{LeafTrajectory, ShootingNodes, longest_step};
 use crate::shooting::intervals::{
     CondensedEquations, INTERVAL_CHOICE, IntegratedInterval, PerturbationUnits, choose_intervals,
     integrate, responses, sensitivities,
 };
 use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
 use glam::DVec3;
+use std::f64::consts::LOG10_E;
 
 /// What controls Newton's method. Corrections are in the units of the unknowns.
 struct ShootingNewtonControl {
@@ -49,8 +50,15 @@ struct ShootingNewtonControl {
     /// Cost of all linearizations, in rods times steps of the integration, beyond which Newton's
     /// method that may give up has to converge as it does near a solution: some seconds.
     largest_cost: usize,
+    /// Estimated cost of a single linearization of a leaf with tissue beyond which nothing is begun,
+    /// likewise: a solution takes about three times as much, two seconds.
+    largest_estimate: f64,
     /// Cost of a linearization of the tissue of a gap over that of a rod.
     tissue_cost: usize,
+    /// Cost of a response through the tissue of a gap to perturbations of a rod, likewise.
+    response_cost: usize,
+    /// Such a cost where stresses of the tissue are unknowns.
+    stress_response_cost: usize,
     /// A leaf that turned by less than this (radians) keeps its linearization.
     relinearization_angle: f64,
     /// Distance from an axis (lengths) within which a point is on it.
@@ -71,7 +79,10 @@ const CONTROL: ShootingNewtonControl = ShootingNewtonControl {
     noise_factor: 1e3,
     rounding: 1e-5,
     largest_cost: 300_000,
-    tissue_cost: 20,
+    largest_estimate: 70_000.0,
+    tissue_cost: 12,
+    response_cost: 6,
+    stress_response_cost: 16,
     relinearization_angle: 1e-3,
     axis_distance: 1e-6,
     turn_load: 1e-6,
@@ -298,13 +309,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
 
     /// The cost of a linearization along the last integration.
     fn linearization_cost(&self) -> usize {
-        let rods = self.equations.rods();
-        let gaps = if self.equations.has_tissue() {
-            rods - 1
-        } else {
-            0
-        };
-        self.steps * (rods + CONTROL.tissue_cost * gaps)
+        self.steps * step_cost(self.equations)
     }
 
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, ShootingFailureReason> {
@@ -465,6 +470,36 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         }
         nodes
     }
+}
+
+/// The cost of the linearization of a step over that for a single rod.
+fn step_cost(equations: &BoundaryValueProblem) -> usize {
+    let rods = equations.rods();
+    if !equations.has_tissue() {
+        return rods;
+    }
+    let response = match equations.has_tissue_stresses() {
+        true => CONTROL.stress_response_cost,
+        false => CONTROL.response_cost,
+    };
+    rods + (rods - 1) * (CONTROL.tissue_cost + response * rods)
+}
+
+/// Refuses a leaf with tissue for which a single linearization costs too much, before any work: an
+/// integration with this tolerance takes at least the steps that the growth of perturbations asks for.
+pub fn check_work(
+    equations: &BoundaryValueProblem,
+    near: &LeafTrajectory,
+    tolerance: f64,
+) -> Result<(), ShootingFailureReason> {
+    let rate = |j: usize| equations.perturbation_rate(j, near.largest_resultants(j).force);
+    let rate = largest((0..equations.rods()).map(rate));
+    let cost = rate / longest_step(tolerance) * step_cost(equations) as f64;
+    if equations.has_tissue() && cost > CONTROL.largest_estimate {
+        let growth = rate * LOG10_E;
+        return Err(ShootingFailureReason::TooMuchWork { growth });
+    }
+    Ok(())
 }
 
 impl Residuals {
