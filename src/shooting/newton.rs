@@ -50,9 +50,17 @@ struct ShootingNewtonControl {
     /// Cost of all linearizations, in rods times steps of the integration, beyond which Newton's
     /// method that may give up has to converge as it does near a solution: some seconds.
     largest_cost: usize,
-    /// Estimated cost of a single linearization of a leaf with tissue beyond which nothing is begun,
-    /// likewise: a solution takes about three times as much, two seconds.
+    /// Estimated cost of a solution of a leaf with tissue beyond which nothing is begun, likewise: about
+    /// two seconds.
     largest_estimate: f64,
+    /// Linearizations and integrations in this estimate: a solution with two tolerances takes so many.
+    estimated_linearizations: usize,
+    estimated_integrations: usize,
+    /// Size of a correction beyond which no part of it is tried where Newton's method may give up: a leaf at
+    /// rest is nearer, and what begins there takes many short steps.
+    largest_correction: f64,
+    /// Cost of the slopes of a rod with tissue, over that of a linearization without.
+    slope_cost: usize,
     /// Cost of a linearization of the tissue of a gap over that of a rod.
     tissue_cost: usize,
     /// Cost of a response through the tissue of a gap to perturbations of a rod, likewise.
@@ -79,7 +87,11 @@ const CONTROL: ShootingNewtonControl = ShootingNewtonControl {
     noise_factor: 1e3,
     rounding: 1e-5,
     largest_cost: 300_000,
-    largest_estimate: 70_000.0,
+    largest_estimate: 150_000.0,
+    estimated_linearizations: 3,
+    estimated_integrations: 8,
+    largest_correction: 100.0,
+    slope_cost: 7,
     tissue_cost: 12,
     response_cost: 6,
     stress_response_cost: 16,
@@ -131,8 +143,8 @@ pub struct ShootingNewton<'e, 'a, 'p> {
     pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
-    /// Cost of all linearizations, in rods times steps.
-    linearization_cost_sum: usize,
+    /// Cost of all linearizations and, with tissue, integrations, in rods times steps.
+    cost_sum: usize,
     /// Which of the turns without resistance move something.
     effective_rotations: Vec<bool>,
     /// The last linearization, condensed to the tip; none before the first.
@@ -189,7 +201,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             requires_near_start: false,
             gives_up: false,
             steps: 0,
-            linearization_cost_sum: 0,
+            cost_sum: 0,
             effective_rotations: (equations.turnings().iter())
                 .map(|turning| rotation_moves_leaf(equations, near, turning))
                 .collect(),
@@ -228,7 +240,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             self.progress.iteration = iteration;
             let step = self.correction(&residuals);
             size = largest_component(&step);
-            if !size.is_finite() {
+            let near = !self.gives_up || size <= CONTROL.largest_correction;
+            if !size.is_finite() || !near {
                 break;
             }
             self.progress.size = size;
@@ -303,8 +316,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
 
     /// Whether another linearization would cost too much for what may give up.
     fn costs_too_much(&self) -> bool {
-        self.gives_up
-            && self.linearization_cost_sum + self.linearization_cost() > CONTROL.largest_cost
+        self.gives_up && self.cost_sum + self.linearization_cost() > CONTROL.largest_cost
     }
 
     /// The cost of a linearization along the last integration.
@@ -325,7 +337,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.linearization_cost_sum += self.linearization_cost();
+        self.cost_sum += self.linearization_cost();
         self.condensed = CondensedEquations::new(
             self.equations,
             &self.units,
@@ -438,6 +450,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         let integrated = integrate(self.equations, nodes, tolerance, linear)?;
         self.steps = integrated.iter().map(|interval| interval.step_count).sum();
         self.log.work.steps += self.steps;
+        self.cost_sum += self.steps * slope_cost(self.equations);
         for interval in &integrated {
             self.log.work.slopes += interval.evaluations;
         }
@@ -485,8 +498,16 @@ fn step_cost(equations: &BoundaryValueProblem) -> usize {
     rods + (rods - 1) * (CONTROL.tissue_cost + response * rods)
 }
 
-/// Refuses a leaf with tissue for which a single linearization costs too much, before any work: an
-/// integration with this tolerance takes at least the steps that the growth of perturbations asks for.
+/// The cost of the slopes of a step, likewise; not counted without tissue.
+fn slope_cost(equations: &BoundaryValueProblem) -> usize {
+    match equations.has_tissue() {
+        true => CONTROL.slope_cost * equations.rods(),
+        false => 0,
+    }
+}
+
+/// Refuses a leaf with tissue of which a solution would cost too much, before any work: an integration with
+/// this tolerance takes at least the steps that the growth of perturbations asks for.
 pub fn check_work(
     equations: &BoundaryValueProblem,
     near: &LeafTrajectory,
@@ -494,8 +515,10 @@ pub fn check_work(
 ) -> Result<(), ShootingFailureReason> {
     let rate = |j: usize| equations.perturbation_rate(j, near.largest_resultants(j).force);
     let rate = largest((0..equations.rods()).map(rate));
-    let cost = rate / longest_step(tolerance) * step_cost(equations) as f64;
-    if equations.has_tissue() && cost > CONTROL.largest_estimate {
+    let steps = rate / longest_step(tolerance);
+    let cost = CONTROL.estimated_linearizations * step_cost(equations)
+        + CONTROL.estimated_integrations * slope_cost(equations);
+    if equations.has_tissue() && steps * cost as f64 > CONTROL.largest_estimate {
         let growth = rate * LOG10_E;
         return Err(ShootingFailureReason::TooMuchWork { growth });
     }
