@@ -1,13 +1,14 @@
 //! Tissue that is rigid along or normal to the veins, and tissue that contracts, by shooting: closed forms,
 //! the limit of stiff tissue, and starts whose forces are those of a leaf at rest.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use leafdyn::internals::shooting::{
     self, RequiredPrecision::LocalError, ShootingFailureReason, ShootingOptions, ShootingSolution,
     ShootingStart,
 };
 use leafdyn::relax::RodShape;
 use leafdyn::scenario::{Profile, Scenario};
+use leafdyn::shape::NodeState;
 use leafdyn_testing::*;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
@@ -135,7 +136,7 @@ const LEAF: &str = r#"
 "#;
 
 /// R^T (r_b - r_a), R being the mean rotation.
-fn strain(positions: [DVec3; 2], rotations: [glam::DQuat; 2]) -> DVec3 {
+fn strain(positions: [DVec3; 2], rotations: [DQuat; 2]) -> DVec3 {
     let [p, mut q] = rotations;
     if p.dot(q) < 0.0 {
         q = -q;
@@ -355,4 +356,76 @@ fn what_is_left_out_is_named() {
         };
         assert!(missing.to_string().contains(key), "{key}: {missing}");
     }
+}
+
+/// Three strips of a plate with rigid tissue bend as its beam E W t^3/12, bend in its plane as
+/// Timoshenko's, and twist with G W t^3/3; at the clamp alone it is stiffer.
+#[test]
+fn three_strips_are_a_plate() {
+    let (young, nu, length, width, t) = (1e4, 0.3, 1.0_f64, 0.1_f64, 0.01_f64);
+    let shear = young / (2.0 * (1.0 + nu));
+    let (h, d) = (width / 3.0, 1.0 - nu * nu);
+    // The part of shear stiffness at which three strips shear as the whole section.
+    let f = 1.0 - 5.0 / 54.0 + 2.0 / 243.0;
+    let plate = |forces: [[f64; 3]; 3]| {
+        let points = forces.iter().enumerate().map(|(j, force)| {
+            format!(
+                "[[load.point]]\nvein = {}\nat = 1.0\nforce = {force:?}\n",
+                j + 1
+            )
+        });
+        let scenario = parse(&format!(
+            r#"
+            name = "plate"
+            leaf = {{ rods = 3, length = {length}, fan = [0.0, 0.0, 0.0], joined = false, base = [[0.0, {}, 0.0], [0.0, 0.0, 0.0], [0.0, {h}, 0.0]] }}
+            stiffness = {{ torsion = {}, bending_2 = {}, bending_3 = {}, axial = {}, shear_2 = {}, shear_3 = {} }}
+            tissue = {{ along = inf, across = {}, normal = inf, fold = {}, contraction = {} }}
+            {}
+            "#,
+            -h,
+            shear * h * t.powi(3) / 3.0,
+            young * h * t.powi(3) / 12.0,
+            young * t * h.powi(3) / 12.0,
+            young * h * t,
+            f * shear * h * t,
+            shear * h * t * 5.0 / 6.0,
+            young * t / h / d,
+            young * t.powi(3) / (12.0 * h) / d,
+            nu * h,
+            points.collect::<String>(),
+        ));
+        // From the flat leaf, on which the loads are small.
+        let flat: Vec<RodShape> = (scenario.rods.iter())
+            .map(|rod| RodShape {
+                length: rod.length,
+                nodes: (STATIONS.iter())
+                    .map(|sigma| NodeState {
+                        position: rod.base_position() + DVec3::X * *sigma,
+                        rotation: DQuat::IDENTITY,
+                        v: DVec3::X,
+                        u: DVec3::ZERO,
+                        n: DVec3::ZERO,
+                        m: DVec3::ZERO,
+                    })
+                    .collect(),
+            })
+            .collect();
+        let (stations, rods) = (&STATIONS[..], &flat[..]);
+        let start = ShootingStart::Leaf { stations, rods };
+        let options = ShootingOptions::new(start, stations, LocalError(1e-9));
+        found(&scenario, shooting::solve(&scenario, &options, &mut |_| {}))
+    };
+    let load = 1e-6;
+    let tip = |shot: &ShootingSolution, j: usize| tip_node(&shot.rods, j);
+    let up = plate([[0.0, 0.0, load / 3.0]; 3]);
+    let beam = load * length.powi(3) / (3.0 * young * width * t.powi(3) / 12.0);
+    let aside = plate([[0.0, load / 3.0, 0.0]; 3]);
+    let timoshenko = load * length.powi(3) / (3.0 * young * t * width.powi(3) / 12.0)
+        + load * length / (5.0 / 6.0 * shear * width * t);
+    let torque = 2.0 * h * load;
+    let twisted = plate([[0.0, 0.0, -load], [0.0; 3], [0.0, 0.0, load]]);
+    let angle = torque * length / (shear * width * t.powi(3) / 3.0);
+    is_near("bending", tip(&up, 1).position.z, beam, 1e-2);
+    is_near("in the plane", tip(&aside, 1).position.y, timoshenko, 1e-3);
+    is_near("twist", 2.0 * tip(&twisted, 1).rotation.x, angle, 3e-2);
 }
