@@ -80,7 +80,7 @@ fn all_that_is_given_arrives() {
     let gap = |across: f64| Tissue {
         stiffness: [20.0, across, 0.0].map(Profile::Constant),
         fold: Profile::Constant(0.5),
-        ..Tissue::default()
+        contraction: Profile::Constant(0.0),
     };
     assert_eq!(leaf.tissue, Some(vec![gap(40.0), gap(30.0)]));
     // Of a tube the mass is that of the wall.

@@ -82,7 +82,7 @@ pub fn gripped_veins() -> Scenario {
         Tissue {
             stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
             fold: Profile::Constant(0.5),
-            ..Tissue::default()
+            contraction: Profile::Constant(0.0),
         };
         2
     ]);
