@@ -87,6 +87,12 @@ pub enum UnmodelledFeature {
         /// The method or the question.
         what: &'static str,
     },
+    /// Tissue that is rigid where shooting cannot keep it so.
+    #[error("tissue.along, tissue.normal = inf: shooting does not solve {what}")]
+    RigidTissue {
+        /// What else the leaf has, with its key, and what may be changed.
+        what: &'static str,
+    },
     /// A leaf to which no continuation leads from the arcs that shooting starts from.
     #[error("{why}; use shooting-from-rest")]
     FromArcs {

@@ -25,7 +25,8 @@ use crate::rotation::Pose;
 use crate::run::Limit;
 use crate::scenario::{Profile, Scenario, SupportKind, ZeroEnergyRotation, longest};
 use crate::shape::NodeState;
-use crate::shooting::tissue::{TissueEnergy, TissueTangent};
+use crate::shooting::tissue::{FrameRates, TissueEnergy};
+use crate::shooting::tissue_stresses::{RodSection, TissueState};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -124,14 +125,26 @@ impl<'a> BoundaryValueProblem<'a> {
             .map(|rod| least(&rod.couple_stiffness) / (force * length * length))
             .collect();
         let tissue = TissueEnergy::new(scenario, length, force);
-        let pull = |gap: usize| {
-            let tissue = tissue.as_ref().map_or(0.0, |tissue| tissue.largest(gap));
-            coupling[gap] + tissue
+        let of_tissue = |gap: usize| {
+            let tissue = tissue.as_ref();
+            tissue.map_or([0.0; 2], |tissue| tissue.largest_stiffnesses(gap))
         };
         let coupled_rate = (0..rods.len())
             .map(|j| {
                 let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
-                let pull: DVec3 = gaps.filter(|gap| *gap < coupling.len()).map(pull).sum();
+                let gaps = gaps.filter(|gap| *gap < coupling.len());
+                // Where tissue keeps veins level they twist as they rise, against which they bend.
+                let width = |gap: usize| tissue.as_ref().and_then(|it| it.rigid_width(gap));
+                let twisting = gaps.clone().filter_map(width).map(|width| {
+                    let [torsion, bending, _] = &rods[j].couple_stiffness;
+                    let shear = rods[j].force_stiffness[2].max_abs().recip();
+                    let rise = 0.25 * width * width / torsion.max_abs() * (length * length);
+                    let pull = 2.0 / (shear + rise);
+                    rods[j].length * (pull / bending.min()).sqrt()
+                });
+                let twisting = twisting.fold(0.0, f64::max);
+                let fold: f64 = gaps.clone().map(|gap| of_tissue(gap)[1]).sum();
+                let pull: DVec3 = gaps.map(|gap| coupling[gap] + of_tissue(gap)[0]).sum();
                 // Neighbors that move in the opposite direction double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
@@ -139,7 +152,12 @@ impl<'a> BoundaryValueProblem<'a> {
                 let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
                 // In a vein that has grown, forces have longer arms.
                 let grown = rods[j].rest_stretch.max_abs().sqrt();
-                (grown * bend).max((pull / stiffness).sqrt())
+                // Against a fold it twists, theta'' = fold theta.
+                let twist = (2.0 * lengths[j] * fold / softest[j]).sqrt();
+                (grown * bend)
+                    .max((pull / stiffness).sqrt())
+                    .max(twist)
+                    .max(twisting)
             })
             .collect();
         BoundaryValueProblem {
@@ -212,12 +230,51 @@ impl<'a> BoundaryValueProblem<'a> {
         self.tissue.is_some()
     }
 
-    /// The linearized loads by the tissue of gap `g`, if there is any.
-    pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<TissueTangent> {
-        let tissue = self.tissue.as_ref()?;
-        let rods = [g, g + 1].map(|j| RodState::from_flat_state(y, j).pose());
-        let TissueTangent(matrix) = tissue.tangent(g, sigma, rods);
-        Some(TissueTangent(matrix * self.load_lambda))
+    /// Whether stresses of the tissue are unknowns, by which all rods depend on each other.
+    pub fn has_tissue_stresses(&self) -> bool {
+        (self.tissue.as_ref()).is_some_and(TissueEnergy::has_stresses)
+    }
+
+    /// How many conditions at the tip the rigid tissue satisfies already: where tips are held in one point
+    /// gaps are closed.
+    pub fn redundant_tip_conditions(&self) -> usize {
+        match (&self.tissue, self.tip_constraint()) {
+            (Some(tissue), constraint) if constraint != TipConstraint::Free => {
+                tissue.rigid_strain_count()
+            }
+            _ => 0,
+        }
+    }
+
+    /// Solves for the tissue of the leaf in the flat state `y` at `sigma`; without tissue `state` remains
+    /// empty.
+    pub fn solve_tissue(&self, sigma: f64, y: &[f64], state: &mut TissueState) {
+        if let Some(tissue) = &self.tissue {
+            let section = |j| self.section(j, sigma, &RodState::from_flat_state(y, j));
+            let sections = (0..self.rods()).map(section);
+            state.solve(tissue, sigma, self.load_lambda, sections);
+        }
+    }
+
+    /// The law of rod `j` at `sigma`, in this state.
+    fn section(&self, j: usize, sigma: f64, rod: &RodState) -> RodSection {
+        let (law, length) = (self.material(j, sigma), self.lengths[j]);
+        let directors = rod.q.conjugate();
+        RodSection {
+            pose: rod.pose(),
+            resultants: Wrench {
+                force: directors * rod.n,
+                moment: directors * rod.m,
+            },
+            unstrained: FrameRates {
+                position: length * law.rest_strain,
+                rotation: length * law.rest_curvature,
+            },
+            compliance: FrameRates {
+                position: length * law.compliance,
+                rotation: length * law.flexibility,
+            },
+        }
     }
 
     /// Where an integration step from `from` towards `to` must end: at a kink before it, or there. A
@@ -275,36 +332,59 @@ impl<'a> BoundaryValueProblem<'a> {
         }
     }
 
-    /// Rod `j` at `sigma` in the units of the scenario, from a flat state.
-    pub fn node_state(&self, j: usize, sigma: f64, y: &[f64]) -> NodeState {
-        let rod = RodState::from_flat_state(y, j);
-        let directors = rod.q.conjugate();
-        let (n, m) = (directors * rod.n, directors * rod.m);
-        let law = self.material(j, sigma);
-        NodeState {
-            position: rod.r * self.length_unit,
-            rotation: rod.q,
-            v: law.rest_strain + law.compliance * n,
-            u: (law.rest_curvature + law.flexibility * m) / self.length_unit,
-            n: n * self.force_unit,
-            m: m * (self.force_unit * self.length_unit),
-        }
+    /// All rods at `sigma` in the units of the scenario, from a flat state.
+    pub fn node_states(&self, sigma: f64, y: &[f64]) -> Vec<NodeState> {
+        let mut tissue = TissueState::default();
+        self.solve_tissue(sigma, y, &mut tissue);
+        let node = |j: usize| {
+            let rod = RodState::from_flat_state(y, j);
+            let section = self.section(j, sigma, &rod);
+            let all = tissue
+                .rods
+                .get(j)
+                .map_or_else(Wrench::default, |rod| rod.carried);
+            let by_constraints = tissue.carried_by_constraints(j);
+            let rates = section.rates(&all);
+            let length = self.lengths[j];
+            let Wrench { force, moment } = section.resultants;
+            NodeState {
+                position: rod.r * self.length_unit,
+                rotation: rod.q,
+                v: rates.position / length,
+                u: rates.rotation / (length * self.length_unit),
+                n: (force - by_constraints.force) * self.force_unit,
+                m: (moment - by_constraints.moment) * (self.force_unit * self.length_unit),
+            }
+        };
+        (0..self.rods()).map(node).collect()
     }
 
-    /// Slopes of the flat state `y` at `sigma`.
-    pub fn write_slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
-        let mut energy = 0.0;
+    /// Slopes of the flat state `y` at `sigma`; `tissue` becomes that of the leaf there.
+    pub fn write_slopes(
+        &self,
+        sigma: f64,
+        y: &[f64],
+        tissue: &mut TissueState,
+        slopes: &mut [f64],
+    ) {
+        self.solve_tissue(sigma, y, tissue);
+        let mut energy = tissue.energy;
         let mut pull = DVec3::ZERO;
-        // What the tissue of the gap before the rod exerts on it.
-        let mut before = Wrench::default();
         for j in 0..self.rods() {
-            let rod = RodState::from_flat_state(y, j);
-            let (law, length) = (self.material(j, sigma), self.lengths[j]);
-            let frame = DMat3::from_quat(rod.q);
-            let (n, m) = (frame.transpose() * rod.n, frame.transpose() * rod.m);
-            let tangent = length * (frame * (law.rest_strain + law.compliance * n));
-            let bend = length * (frame * (law.rest_curvature + law.flexibility * m));
-            energy += 0.5 * length * (n.dot(law.compliance * n) + m.dot(law.flexibility * m));
+            let (rod, length) = (RodState::from_flat_state(y, j), self.lengths[j]);
+            let (section, carried, by_tissue) = match tissue.rods.get(j) {
+                Some(rod) => (rod.section, rod.carried, rod.by_pose),
+                None => {
+                    let none = Wrench::default();
+                    (self.section(j, sigma, &rod), none, none)
+                }
+            };
+            let rates = section.rates(&carried);
+            let (tangent, bend) = (rod.q * rates.position, rod.q * rates.rotation);
+            let n = section.resultants.force - carried.force;
+            let m = section.resultants.moment - carried.moment;
+            energy += 0.5
+                * (n.dot(section.compliance.position * n) + m.dot(section.compliance.rotation * m));
             let gravity = self.gravity + self.own_load(j, sigma);
             energy -= self.load_lambda * length * gravity.dot(rod.r);
             let mut load = self.load_lambda * length * gravity - pull;
@@ -315,44 +395,40 @@ impl<'a> BoundaryValueProblem<'a> {
                 energy += 0.5 * gap.dot(pull);
                 load += pull;
             }
-            let Wrench {
-                mut force,
-                mut moment,
-            } = std::mem::take(&mut before);
-            if let Some(tissue) = self.tissue.as_ref().filter(|_| j + 1 < self.rods()) {
-                let next = RodState::from_flat_state(y, j + 1);
-                let loads = tissue.loads(j, sigma, [rod.pose(), next.pose()]);
-                let [here, there] = loads.on_rods.map(|load| Wrench {
-                    force: self.load_lambda * load.force,
-                    moment: self.load_lambda * load.moment,
-                });
-                energy += self.load_lambda * loads.energy;
-                force += here.force;
-                moment += here.moment;
-                before = there;
-            }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
             RodState {
                 r: tangent,
                 q,
-                n: -load - force,
-                m: rod.n.cross(tangent) - moment,
+                n: by_tissue.force - load,
+                m: rod.n.cross(tangent) + by_tissue.moment,
             }
             .write_flat_state(slopes, j);
         }
         slopes[STATE_SIZE * self.rods()] = energy;
     }
 
-    /// Derivatives of the slopes of rod `j` with respect to its own state: with the frame
-    /// turned by theta, R^T n changes by R^T (dn - theta x n).
-    pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> SlopeDerivatives {
+    /// Derivatives of the slopes of rod `j` with respect to its own state, what the `tissue` carries being
+    /// given: with the frame turned by theta, R^T n changes by R^T (dn - theta x n).
+    pub fn derivatives(
+        &self,
+        j: usize,
+        sigma: f64,
+        y: &[f64],
+        tissue: &TissueState,
+    ) -> SlopeDerivatives {
         let rod = RodState::from_flat_state(y, j);
-        let (law, length) = (self.material(j, sigma), self.lengths[j]);
+        let (section, rates) = match tissue.rods.get(j) {
+            Some(rod) => (rod.section, rod.rates()),
+            None => {
+                let section = self.section(j, sigma, &rod);
+                (section, section.rates(&Wrench::default()))
+            }
+        };
         let frame = DMat3::from_quat(rod.q);
-        let spatial = |c: DVec3| length * (frame * DMat3::from_diagonal(c) * frame.transpose());
-        let (r_n, theta_m) = (spatial(law.compliance), spatial(law.flexibility));
-        let n = frame.transpose() * rod.n;
-        let tangent = cross_matrix(length * (frame * (law.rest_strain + law.compliance * n)));
+        let spatial = |c: DVec3| frame * DMat3::from_diagonal(c) * frame.transpose();
+        let r_n = spatial(section.compliance.position);
+        let theta_m = spatial(section.compliance.rotation);
+        let tangent = cross_matrix(frame * rates.position);
         let r_theta = r_n * cross_matrix(rod.n) - tangent;
         SlopeDerivatives {
             r_theta,

@@ -7,6 +7,7 @@ use crate::natural::{
 use crate::numbers::{larger, largest};
 use crate::shape::RodShape;
 use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE, RodState, STATE_SIZE};
+use crate::shooting::tissue_stresses::TissueState;
 use glam::DVec3;
 
 /// What bounds the integration of an initial-value problem.
@@ -61,6 +62,8 @@ pub struct InitialValueIntegrator<'e, 'a> {
     /// States at the stages of the last step.
     pub stages: Vec<Vec<f64>>,
     slopes: Vec<Vec<f64>>,
+    /// The tissue at the last evaluation of slopes.
+    tissue: TissueState,
     next: Vec<f64>,
     steps: usize,
     pub evaluations: usize,
@@ -85,12 +88,13 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
             last_step: 0.0,
             stages: blank(),
             slopes: blank(),
+            tissue: TissueState::default(),
             next: y.clone(),
             y,
             steps: 0,
             evaluations: 1,
         };
-        equations.write_slopes(sigma, &integrator.y, &mut integrator.slopes[0]);
+        integrator.evaluate_first_slopes();
         integrator.step = 0.1 * tolerance.powf(0.125) / integrator.slope().max(1e-3);
         integrator
     }
@@ -106,9 +110,7 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         let rate = (0..self.equations.rods())
             .map(|j| self.equations.perturbation_rate(j, force(j)))
             .fold(1.0, f64::max);
-        let looser = self.tolerance / LIMITS.reference_tolerance;
-        let longest = LIMITS.longest_step * looser.powf(0.125);
-        longest.min(LIMITS.longest_loose_step) / rate
+        longest_step(self.tolerance) / rate
     }
 
     /// Integrates to `end`; `after_step` is called after each step.
@@ -132,8 +134,7 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         let beyond = self.sigma - self.last_point_load > FRACTION_TOLERANCE;
         if beyond && self.equations.apply_point_loads(self.sigma, &mut self.y) {
             self.last_point_load = self.sigma;
-            self.equations
-                .write_slopes(self.sigma, &self.y, &mut self.slopes[0]);
+            self.evaluate_first_slopes();
         }
         let until = self.equations.step_end(self.sigma, until);
         loop {
@@ -176,8 +177,9 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
             let (before, after) = self.slopes.split_at_mut(i);
             weighted_slope_sum(&self.y, h, STAGE_WEIGHTS[i], before, &mut self.stages[i]);
             let sigma = self.sigma + STAGE_NODES[i] * h;
+            let stage = &self.stages[i];
             self.equations
-                .write_slopes(sigma, &self.stages[i], &mut after[0]);
+                .write_slopes(sigma, stage, &mut self.tissue, &mut after[0]);
         }
         self.evaluations += STAGES - 1;
         weighted_slope_sum(&self.y, h, &RESULT_WEIGHTS, &self.slopes, &mut self.next);
@@ -204,10 +206,23 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         for j in 0..self.equations.rods() {
             RodState::from_flat_state(&self.y, j).write_flat_state(&mut self.y, j);
         }
-        self.equations
-            .write_slopes(self.sigma, &self.y, &mut self.slopes[0]);
+        self.evaluate_first_slopes();
         self.evaluations += 1;
     }
+
+    /// The slopes of the present state.
+    fn evaluate_first_slopes(&mut self) {
+        let slopes = &mut self.slopes[0];
+        self.equations
+            .write_slopes(self.sigma, &self.y, &mut self.tissue, slopes);
+    }
+}
+
+/// Longest step for a tolerance, in units of the length over which a perturbation grows or turns.
+pub fn longest_step(tolerance: f64) -> f64 {
+    let looser = tolerance / LIMITS.reference_tolerance;
+    let longest = LIMITS.longest_step * looser.powf(0.125);
+    longest.min(LIMITS.longest_loose_step)
 }
 
 /// y + h sum of weights times slopes.
@@ -305,10 +320,11 @@ impl LeafTrajectory {
                 }
             }
         }
+        let mut tissue = TissueState::default();
         let slopes = (sigma.iter().zip(&states))
             .map(|(&sigma, y)| {
                 let mut slopes = vec![0.0; y.len()];
-                equations.write_slopes(sigma, y, &mut slopes);
+                equations.write_slopes(sigma, y, &mut tissue, &mut slopes);
                 slopes
             })
             .collect();
@@ -473,14 +489,18 @@ impl LeafTrajectory {
 
     /// The shape in the units of the scenario, at the trajectory's stations.
     pub fn shape(&self, equations: &BoundaryValueProblem) -> Vec<RodShape> {
-        (0..equations.rods())
-            .map(|j| RodShape {
-                length: equations.lengths[j] * equations.length_unit,
-                nodes: (self.sigma.iter().zip(&self.states))
-                    .map(|(&sigma, y)| equations.node_state(j, sigma, y))
-                    .collect(),
-            })
-            .collect()
+        let rod = |j: usize| RodShape {
+            length: equations.lengths[j] * equations.length_unit,
+            nodes: Vec::with_capacity(self.sigma.len()),
+        };
+        let mut rods: Vec<RodShape> = (0..equations.rods()).map(rod).collect();
+        for (&sigma, y) in self.sigma.iter().zip(&self.states) {
+            let nodes = equations.node_states(sigma, y);
+            for (rod, node) in rods.iter_mut().zip(nodes) {
+                rod.nodes.push(node);
+            }
+        }
+        rods
     }
 }
 

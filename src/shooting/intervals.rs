@@ -260,7 +260,8 @@ fn perturbation_responses<const W: usize>(
 /// [`IntervalChoice::largest_growth`].
 ///
 /// Growth is measured separately for positions, rotations, forces and moments, which makes it
-/// independent of units, for every rod with its neighbors held.
+/// independent of units, for every rod with its neighbors held; with tissue whose stresses are unknowns
+/// for the whole leaf.
 /// Fails if too many intervals would be needed.
 pub fn choose_intervals(
     equations: &BoundaryValueProblem,
@@ -281,7 +282,13 @@ pub fn choose_intervals(
             INTERVAL_CHOICE.growth_tolerance,
         );
         let mut rods: Vec<Perturbations<PERTURBATION_SIZE>> = (0..equations.rods())
-            .map(|j| Perturbations::unit_perturbations(j..j + 1, j, 0))
+            .map(|j| {
+                let rods = match equations.has_tissue_stresses() {
+                    true => coupled_rods(equations, j),
+                    false => j..j + 1,
+                };
+                Perturbations::unit_perturbations(rods, j, 0)
+            })
             .collect();
         while integrator.sigma < 1.0 {
             let before = integrator.sigma;
@@ -338,7 +345,8 @@ fn begin(equations: &BoundaryValueProblem, near: &LeafTrajectory, sigma: &[f64])
 
 /// Largest sensitivity within one kind of quantity.
 fn largest_growth(rows: &[[f64; PERTURBATION_SIZE]]) -> f64 {
-    let own = (0..PERTURBATION_SIZE).flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)));
+    let own =
+        (0..rows.len()).flat_map(|i| (0..3).map(move |c| (i, i % PERTURBATION_SIZE / 3 * 3 + c)));
     largest(own.map(|(i, c)| rows[i][c].abs()))
 }
 
@@ -361,8 +369,8 @@ pub struct CondensedEquations {
     left: Mat<f64>,
     singular_values: Vec<f64>,
     right: Mat<f64>,
-    /// How many directions the conditions determine: all, or all but the turns of veins that can
-    /// turn without resistance.
+    /// How many directions the conditions determine: all but the turns of veins that can
+    /// turn without resistance, and the forces between joint tips that rigid tissue carries as well.
     determined: usize,
     tip: TipConstraint,
     /// The first of the components that are free at the base.
@@ -398,7 +406,8 @@ impl CondensedEquations {
             return None;
         }
         let svd = conditions.svd().ok()?;
-        let determined = svd.S().column_vector().nrows();
+        let all = svd.S().column_vector().nrows();
+        let determined = all - equations.redundant_tip_conditions();
         let mut march = CondensedEquations {
             maps,
             bases,

@@ -28,6 +28,10 @@
 //! are condensed without forming the product of all sensitivities.
 //! [`ShootingOptions::intervals`] = 1 is plain single shooting, to show where it fails.
 //!
+//! **Tissue** acts on both its veins. Where it is rigid, rates of strains that vanish are conditions on n and m
+//! at every sigma, and what the integration carries are momenta: n and m, and what the tissue takes up from
+//! there to the tip. Conditions at the tip hold for them as they are.
+//!
 //! **Newton's method** is damped by an affine-invariant test. It starts
 //! from a relaxed leaf, or from arcs by continuation: a leaf whose rest shape is
 //! those arcs solves the equations without loads, and is changed step by step
@@ -46,6 +50,7 @@ mod newton;
 mod sensitivities;
 mod solve;
 mod tissue;
+mod tissue_stresses;
 
 use crate::memory::TooMuch;
 use crate::run::{Limit, UnmodelledFeature};
@@ -244,6 +249,11 @@ pub enum ShootingFailureReason {
         /// Decimal logarithm of the growth of perturbations from base to tip.
         growth: f64,
     },
+    /// A linearization would take too much work: not begun.
+    TooMuchWork {
+        /// Decimal logarithm of the growth of perturbations from base to tip, at most.
+        growth: f64,
+    },
     /// The equations are singular.
     Singular(NeutralDirection),
     /// The necessary number of intervals takes too much memory.
@@ -338,6 +348,11 @@ impl fmt::Display for ShootingFailureReason {
                 f,
                 "the equations are singular (ratio of singular values {:.1e}): {neutral}",
                 neutral.ratio
+            ),
+            ShootingFailureReason::TooMuchWork { growth } => write!(
+                f,
+                "shooting would take too much work for this leaf: between veins that tissue ties perturbations may grow \
+                 10^{growth:.0} times from base to tip"
             ),
             ShootingFailureReason::TooMuchMemory(too_much) => too_much.fmt(f),
             ShootingFailureReason::Unmodelled(unmodelled) => unmodelled.fmt(f),

@@ -12,13 +12,14 @@ use crate::numbers::largest;
 use crate::scenario::{BaseRotations, ZeroEnergyRotation};
 use crate::shape::equally_spaced;
 use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, RodState};
-use crate::shooting::integrate::{LeafTrajectory, ShootingNodes};
+use crate::shooting::integrate::{LeafTrajectory, ShootingNodes, longest_step};
 use crate::shooting::intervals::{
     CondensedEquations, INTERVAL_CHOICE, IntegratedInterval, PerturbationUnits, choose_intervals,
     integrate, responses, sensitivities,
 };
 use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
 use glam::DVec3;
+use std::f64::consts::LOG10_E;
 
 /// What controls Newton's method. Corrections are in the units of the unknowns.
 struct ShootingNewtonControl {
@@ -49,8 +50,23 @@ struct ShootingNewtonControl {
     /// Cost of all linearizations, in rods times steps of the integration, beyond which Newton's
     /// method that may give up has to converge as it does near a solution: some seconds.
     largest_cost: usize,
+    /// Estimated cost of a solution of a leaf with tissue beyond which nothing is begun, likewise: about
+    /// two seconds.
+    largest_estimate: f64,
+    /// Linearizations and integrations in this estimate: a solution with two tolerances takes so many.
+    estimated_linearizations: usize,
+    estimated_integrations: usize,
+    /// Size of a correction beyond which no part of it is tried where Newton's method may give up: a leaf at
+    /// rest is nearer, and what begins there takes many short steps.
+    largest_correction: f64,
+    /// Cost of the slopes of a rod with tissue, over that of a linearization without.
+    slope_cost: usize,
     /// Cost of a linearization of the tissue of a gap over that of a rod.
     tissue_cost: usize,
+    /// Cost of a response through the tissue of a gap to perturbations of a rod, likewise.
+    response_cost: usize,
+    /// Such a cost where stresses of the tissue are unknowns.
+    stress_response_cost: usize,
     /// A leaf that turned by less than this (radians) keeps its linearization.
     relinearization_angle: f64,
     /// Distance from an axis (lengths) within which a point is on it.
@@ -71,7 +87,14 @@ const CONTROL: ShootingNewtonControl = ShootingNewtonControl {
     noise_factor: 1e3,
     rounding: 1e-5,
     largest_cost: 300_000,
-    tissue_cost: 20,
+    largest_estimate: 150_000.0,
+    estimated_linearizations: 3,
+    estimated_integrations: 8,
+    largest_correction: 100.0,
+    slope_cost: 7,
+    tissue_cost: 12,
+    response_cost: 6,
+    stress_response_cost: 16,
     relinearization_angle: 1e-3,
     axis_distance: 1e-6,
     turn_load: 1e-6,
@@ -120,8 +143,8 @@ pub struct ShootingNewton<'e, 'a, 'p> {
     pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
-    /// Cost of all linearizations, in rods times steps.
-    linearization_cost_sum: usize,
+    /// Cost of all linearizations and, with tissue, integrations, in rods times steps.
+    cost_sum: usize,
     /// Which of the turns without resistance move something.
     effective_rotations: Vec<bool>,
     /// The last linearization, condensed to the tip; none before the first.
@@ -178,7 +201,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             requires_near_start: false,
             gives_up: false,
             steps: 0,
-            linearization_cost_sum: 0,
+            cost_sum: 0,
             effective_rotations: (equations.turnings().iter())
                 .map(|turning| rotation_moves_leaf(equations, near, turning))
                 .collect(),
@@ -217,7 +240,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             self.progress.iteration = iteration;
             let step = self.correction(&residuals);
             size = largest_component(&step);
-            if !size.is_finite() {
+            let near = !self.gives_up || size <= CONTROL.largest_correction;
+            if !size.is_finite() || !near {
                 break;
             }
             self.progress.size = size;
@@ -292,19 +316,12 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
 
     /// Whether another linearization would cost too much for what may give up.
     fn costs_too_much(&self) -> bool {
-        self.gives_up
-            && self.linearization_cost_sum + self.linearization_cost() > CONTROL.largest_cost
+        self.gives_up && self.cost_sum + self.linearization_cost() > CONTROL.largest_cost
     }
 
     /// The cost of a linearization along the last integration.
     fn linearization_cost(&self) -> usize {
-        let rods = self.equations.rods();
-        let gaps = if self.equations.has_tissue() {
-            rods - 1
-        } else {
-            0
-        };
-        self.steps * (rods + CONTROL.tissue_cost * gaps)
+        self.steps * step_cost(self.equations)
     }
 
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, ShootingFailureReason> {
@@ -320,7 +337,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.linearization_cost_sum += self.linearization_cost();
+        self.cost_sum += self.linearization_cost();
         self.condensed = CondensedEquations::new(
             self.equations,
             &self.units,
@@ -433,6 +450,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         let integrated = integrate(self.equations, nodes, tolerance, linear)?;
         self.steps = integrated.iter().map(|interval| interval.step_count).sum();
         self.log.work.steps += self.steps;
+        self.cost_sum += self.steps * slope_cost(self.equations);
         for interval in &integrated {
             self.log.work.slopes += interval.evaluations;
         }
@@ -465,6 +483,46 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         }
         nodes
     }
+}
+
+/// The cost of the linearization of a step over that for a single rod.
+fn step_cost(equations: &BoundaryValueProblem) -> usize {
+    let rods = equations.rods();
+    if !equations.has_tissue() {
+        return rods;
+    }
+    let response = match equations.has_tissue_stresses() {
+        true => CONTROL.stress_response_cost,
+        false => CONTROL.response_cost,
+    };
+    rods + (rods - 1) * (CONTROL.tissue_cost + response * rods)
+}
+
+/// The cost of the slopes of a step, likewise; not counted without tissue.
+fn slope_cost(equations: &BoundaryValueProblem) -> usize {
+    match equations.has_tissue() {
+        true => CONTROL.slope_cost * equations.rods(),
+        false => 0,
+    }
+}
+
+/// Refuses a leaf with tissue of which a solution would cost too much, before any work: an integration with
+/// this tolerance takes at least the steps that the growth of perturbations asks for.
+pub fn check_work(
+    equations: &BoundaryValueProblem,
+    near: &LeafTrajectory,
+    tolerance: f64,
+) -> Result<(), ShootingFailureReason> {
+    let rate = |j: usize| equations.perturbation_rate(j, near.largest_resultants(j).force);
+    let rate = largest((0..equations.rods()).map(rate));
+    let steps = rate / longest_step(tolerance);
+    let cost = CONTROL.estimated_linearizations * step_cost(equations)
+        + CONTROL.estimated_integrations * slope_cost(equations);
+    if equations.has_tissue() && steps * cost as f64 > CONTROL.largest_estimate {
+        let growth = rate * LOG10_E;
+        return Err(ShootingFailureReason::TooMuchWork { growth });
+    }
+    Ok(())
 }
 
 impl Residuals {

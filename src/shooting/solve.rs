@@ -7,7 +7,8 @@ use crate::scenario::{Scenario, SupportKind, longest};
 use crate::shape::{Difference, equally_spaced};
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::LeafTrajectory;
-use crate::shooting::newton::ShootingNewton;
+use crate::shooting::newton::{ShootingNewton, check_work};
+use crate::shooting::tissue::{has_rigid_tissue, rigid_tissue_obstacle};
 use crate::shooting::{
     CorrectionProgress, RequiredPrecision, ShootingCounts, ShootingFailure, ShootingFailureReason,
     ShootingLog, ShootingOptions, ShootingSolution, ShootingStart,
@@ -79,12 +80,21 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
     if scenario.wind.is_some() {
         return Err(UnmodelledFeature::Wind { what: "shooting" });
     }
+    if let Some(what) = rigid_tissue_obstacle(scenario) {
+        return Err(UnmodelledFeature::RigidTissue { what });
+    }
     let from_arcs = |why| Err(UnmodelledFeature::FromArcs { why });
     if from_rest {
         return Ok(());
     }
     if scenario.joined && scenario.rods.len() > 1 && !scenario.is_fan() {
         return from_arcs("veins that begin apart are led to their joint tip by the relaxation");
+    }
+    if scenario.joined && has_rigid_tissue(scenario) {
+        // The arcs do not keep its strains.
+        return from_arcs(
+            "a joint leaf with rigid tissue (tissue.along, tissue.normal) is led to rest by the relaxation",
+        );
     }
     if scenario.base_held == SupportKind::Pinned {
         // Without loads the leaf of arcs turns about its hinges.
@@ -215,6 +225,9 @@ fn solve_near(
     log: &mut ShootingLog,
 ) -> Result<ShootingSolution, ShootingFailureReason> {
     let stations = options.stations;
+    if options.gives_up && options.intervals.is_none() {
+        check_work(equations, near, LOCAL_ERRORS.comparison * tolerance)?;
+    }
     let mut newton = ShootingNewton::from_trajectory(equations, near, options.intervals, log)?;
     // Over intervals that are given perturbations may grow too much for another reason.
     newton.gives_up = options.gives_up && options.intervals.is_none();

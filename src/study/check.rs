@@ -169,6 +169,7 @@ impl Check {
                 let why = CheckReason::ShootingFailed(failure.reason.clone());
                 return match failure.reason {
                     ShootingFailureReason::Rounding { .. }
+                    | ShootingFailureReason::TooMuchWork { .. }
                     | ShootingFailureReason::Unbounded { fixed: false, .. } => {
                         CheckVerdict::NotIndependent(why)
                     }
@@ -421,6 +422,7 @@ impl Serialize for ShootingResult {
                 ShootingFailureReason::NoConvergence { .. } => ("no-convergence", None, *work),
                 ShootingFailureReason::Rounding { .. } => ("rounding", None, *work),
                 ShootingFailureReason::Unbounded { .. } => ("unbounded", None, *work),
+                ShootingFailureReason::TooMuchWork { .. } => ("too-much-work", None, *work),
                 ShootingFailureReason::TooMuchMemory(_) => ("too-much-memory", None, *work),
                 ShootingFailureReason::OutOfTime => ("out-of-time", None, *work),
                 ShootingFailureReason::Unmodelled(_) => ("not-modelled", None, *work),

@@ -156,6 +156,7 @@ fn with_tissue() -> Scenario {
         Tissue {
             stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
             fold: Profile::Constant(0.5),
+            contraction: Profile::Constant(0.0),
         };
         2
     ]);

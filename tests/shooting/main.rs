@@ -3,6 +3,7 @@
 mod agrees;
 mod error;
 mod kinks;
+mod rigid_tissue;
 mod singular;
 mod soft;
 mod tissue;

@@ -45,6 +45,7 @@ fn under_tension_only_many_intervals_succeed() {
             ShootingFailureReason::Singular(_)
             | ShootingFailureReason::Rounding { .. }
             | ShootingFailureReason::TooMuchMemory(_)
+            | ShootingFailureReason::TooMuchWork { .. }
             | ShootingFailureReason::OutOfTime
             | ShootingFailureReason::Unmodelled(_) => {
                 panic!("{}", failure.reason)

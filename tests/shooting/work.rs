@@ -1,7 +1,11 @@
 //! How much work a boundary-value solution takes. A change for the better is
 //! welcome here; one for the worse is a slowdown.
 
-use leafdyn::internals::shooting::ShootingCounts;
+use leafdyn::internals::shooting::{
+    self, RequiredPrecision, ShootingCounts, ShootingFailureReason, ShootingOptions, ShootingStart,
+};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Scenario;
 use leafdyn_testing::*;
 
 /// Linearisations and corrections to the last one, integration steps to a few.
@@ -40,4 +44,30 @@ fn from_arcs() {
         let shot = shot_alone(&leaf, &[0.0, 0.5, 1.0]);
         is(figure, shot.work, linearizations, iterations, steps);
     }
+}
+
+/// What would take far more than some seconds is not begun by who may give up; a small leaf is.
+#[test]
+fn too_much_work_is_not_begun() {
+    let blade = scenario("measured/blade", "");
+    let rest = settle(&blade, 1e-2);
+    let solve = |scenario: &Scenario, rest: &Equilibrium| {
+        let (stations, rods) = (&rest.shape.stations[..], &rest.shape.rods[..]);
+        let start = ShootingStart::Leaf { stations, rods };
+        let precision = RequiredPrecision::EstimatedError(1e-6);
+        let options = ShootingOptions {
+            gives_up: true,
+            ..ShootingOptions::new(start, stations, precision)
+        };
+        shooting::solve(scenario, &options, &mut |_| {})
+    };
+    let failure = solve(&blade, &rest).expect_err("nine veins");
+    let reason = failure.reason;
+    assert!(
+        matches!(reason, ShootingFailureReason::TooMuchWork { .. }),
+        "{reason}"
+    );
+    assert_eq!(failure.work, ShootingCounts::default());
+    let small = scenario("paper/fig04", "");
+    assert!(solve(&small, &settle(&small, 1e-6)).is_ok());
 }

@@ -81,7 +81,8 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     );
 
     let mut slopes = vec![0.0; equations.state_size()];
-    equations.write_slopes(sigma, &y, &mut slopes);
+    let mut tissue = TissueState::default();
+    equations.write_slopes(sigma, &y, &mut tissue, &mut slopes);
     let part = |k: usize| DVec3::new(value[3 * k], value[3 * k + 1], value[3 * k + 2]);
     let found = |k: usize| DVec3::from_slice(&slopes[k..]);
     assert!((found(0) - part(0)).length() < 1e-14);
@@ -92,7 +93,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     assert!((found(7) - part(2)).length() < 1e-14);
     assert!((found(10) - part(3)).length() < 1e-14);
 
-    let d = equations.derivatives(0, sigma, &y);
+    let d = equations.derivatives(0, sigma, &y, &tissue);
     let none = DMat3::ZERO;
     // Of R turned further by theta and of its rate w: theta' = dw + w x theta.
     let blocks = [
