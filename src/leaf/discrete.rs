@@ -199,8 +199,11 @@ impl DiscreteLeaf {
         State::new(self.segments(), xs, qs)
     }
 
-    /// The smallest compliance of any segment, in units of L^2/A.
+    /// The smallest compliance of any segment, in units of L^2/A, and of rigid tissue: zero.
     pub fn least_compliance(&self) -> f64 {
+        if self.has_rigid_tissue() {
+            return 0.0;
+        }
         self.sections
             .iter()
             .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
@@ -218,6 +221,7 @@ impl DiscreteLeaf {
         for (k, strip) in soft.strips.iter_mut().enumerate() {
             let stiffest = self.grid.node_weight(k % (n + 1)) / floor;
             strip.stiffness = strip.stiffness.min(DVec3::splat(stiffest));
+            strip.condensing = strip.stiffness;
         }
         soft
     }
@@ -254,7 +258,7 @@ impl DiscreteLeaf {
             };
             (0..n).map(gap).sum()
         };
-        (0..self.rods()).all(|j| open(j) <= within)
+        self.open_tissue_gap(state) <= within && (0..self.rods()).all(|j| open(j) <= within)
     }
 
     /// A shift of the matrix (times the mass matrix) above the error of a neutral mode's zero

@@ -122,6 +122,10 @@ pub fn half_state(half: &Leaf, whole: &State) -> State {
             state.x[tip].y = 0.0;
         }
     }
+    let gaps = half.scenario().rods.len() - 1;
+    let kinds = whole.tissue.chunks(gaps * (n + 1));
+    let own = kinds.flat_map(|kind| &kind[..(rods - 1) * (n + 1)]);
+    state.tissue = own.copied().collect();
     state
 }
 
@@ -151,6 +155,19 @@ pub fn whole_state(half: &Leaf, state: &State) -> State {
     }
     let mut whole = State::new(n, x, q);
     whole.n = forces;
+    let (gaps, own_gaps) = (rods - 1, half.rods() - 1);
+    for kind in state.tissue.chunks((own_gaps * (n + 1)).max(1)) {
+        for g in 0..gaps {
+            // The image of a strip goes from the image of its last node to that of its first.
+            let own = g.min(gaps - 1 - g);
+            let forces = &kind[own * (n + 1)..][..n + 1];
+            let image = |force: &DVec3| match own == g {
+                true => *force,
+                false => -reflect_vector(*force, true),
+            };
+            whole.tissue.extend(forces.iter().map(image));
+        }
+    }
     whole
 }
 

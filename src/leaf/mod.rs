@@ -128,6 +128,8 @@ pub struct TissueStiffness {
     pub displacement: DVec3,
     /// c_1: moment per radian of a fold along the veins.
     pub fold: f64,
+    /// Length by which the gap narrows per stretch of its veins.
+    pub contraction: f64,
 }
 
 /// Dead loads that all rods share, and the factors of dead loads on single rods.
@@ -399,6 +401,12 @@ impl Leaf {
         self.scenario.tissue.is_some()
     }
 
+    /// Whether the tissue in gap `g` narrows where its veins stretch.
+    fn tissue_contracts(&self, g: usize) -> bool {
+        let tissue = self.scenario.tissue.as_ref();
+        tissue.is_some_and(|tissue| tissue[g].contraction.max_abs() > 0.0)
+    }
+
     /// Stiffness of the tissue in gap `g` at `sigma`.
     pub fn tissue_stiffness(&self, g: usize, sigma: f64) -> TissueStiffness {
         let Some(tissue) = &self.scenario.tissue else {
@@ -410,6 +418,7 @@ impl Leaf {
         TissueStiffness {
             displacement: k * gap_length / self.scale.force(),
             fold: fold * gap_length / self.scale.force(),
+            contraction: tissue[g].contraction.at(sigma) / self.scale.length,
         }
     }
 

@@ -234,9 +234,11 @@ impl<'a> RodIntegrator<'a> {
             let strip = TissueStrip::stress_free_between(
                 stiffness.displacement,
                 stiffness.fold,
+                DVec3::ZERO,
                 &ends(left.0, right.0),
             );
-            let StripLoads { energy, on_nodes } = strip.loads(&ends(left.1, right.1));
+            let loads = strip.loads(&ends(left.1, right.1), DVec3::ZERO);
+            let StripLoads { energy, on_nodes } = loads;
             let at = rod_lane(g);
             slopes[at.group][ENERGY].0[at.lane] += energy;
             for (j, mut load) in [g, g + 1].into_iter().zip(on_nodes) {

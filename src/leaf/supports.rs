@@ -305,6 +305,27 @@ impl DiscreteLeaf {
                 for &c in self.held_components(g + 1, i) {
                     across.iter_mut().for_each(|row| row[c] = 0.0);
                 }
+                self.clear_held_cell_blocks(system, g, i);
+            }
+        }
+    }
+
+    /// Sets the entries of held components of the nodes of a gap at `i` to zero in the blocks to the nodes
+    /// before and after.
+    fn clear_held_cell_blocks(&self, system: &mut System, g: usize, i: usize) {
+        let at = i - self.first_node();
+        let [own, other] = [g, g + 1].map(|rod| self.held_components(rod, i));
+        if let Some([ahead, crossing]) = system.cell_blocks_mut(g, at) {
+            own.iter().for_each(|&c| ahead[c] = [0.0; UNKNOWNS]);
+            for &c in other {
+                crossing.iter_mut().for_each(|row| row[c] = 0.0);
+            }
+        }
+        let before = at.checked_sub(1);
+        if let Some([ahead, crossing]) = before.and_then(|at| system.cell_blocks_mut(g, at)) {
+            own.iter().for_each(|&c| crossing[c] = [0.0; UNKNOWNS]);
+            for &c in other {
+                ahead.iter_mut().for_each(|row| row[c] = 0.0);
             }
         }
     }

@@ -143,6 +143,9 @@ pub struct System {
     /// The blocks between neighboring rods, gap after gap, all nodes with equations; empty without
     /// tissue.
     pub(super) gap_blocks: Vec<NodeBlock>,
+    /// The blocks between a node and the next one of the neighboring rod, and the other way, gap after
+    /// gap, all nodes with equations; empty unless tissue contracts.
+    pub(super) cell_blocks: Vec<[NodeBlock; 2]>,
     /// What hinges and grips hold, nodes from the first with equations: these components have no
     /// momentum.
     held_components: Vec<HeldComponents>,
@@ -235,6 +238,14 @@ impl System {
             gap_blocks: vec![
                 Default::default();
                 if leaf.has_tissue() { (rods - 1) * n } else { 0 }
+            ],
+            cell_blocks: vec![
+                Default::default();
+                if leaf.has_contracting_tissue() {
+                    (rods - 1) * n
+                } else {
+                    0
+                }
             ],
             held_components: (0..rods)
                 .flat_map(|j| {

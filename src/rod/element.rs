@@ -168,27 +168,47 @@ impl<S: Simd> Element<S> {
         }
     }
 
-    /// The [`MidpointHessian`] of segments that carry the forces of their strains: the limit of
-    /// exact condensation, k = 1/c, in which c drops out, so that k may be zero,
+    /// The [`MidpointHessian`] of segments of which the law is condensed out exactly, k = 1/c, in which
+    /// c drops out, so that k may be zero, but for the components in `open` (ones and zeros), which are
+    /// rigid, c = 0. With the others in L,
     ///
-    /// diag(k) D = \[nu\] - diag(k) \[w\],
-    /// -\[w\] diag(k) \[w\] + (w nu^T + nu w^T)/2 - w.nu.
+    /// diag(k) D = L \[nu\] - diag(k) \[w\],
+    /// -\[w\] diag(k) \[w\] + \[nu\] L \[w\] + \[w\] L \[nu\] + w.nu - (w nu^T + nu w^T)/2.
     #[inline(always)]
-    fn strained_midpoint_hessian(&self, sections: &LaneSections<S>) -> MidpointHessian<S> {
+    fn strained_midpoint_hessian(
+        &self,
+        sections: &LaneSections<S>,
+        open: Vectors<S>,
+    ) -> MidpointHessian<S> {
         let (nu, w, k) = (self.nu, self.w, sections.condensing);
         let zero = Lanes::splat(k.x.simd, 0.0);
         let half = Lanes::splat(k.x.simd, 0.5);
-        let (k01, k02) = (k.x.mul_add(w.z, -nu.z), k.x.neg_mul_add(w.y, nu.y));
-        let (k10, k12) = (k.y.neg_mul_add(w.z, nu.z), k.y.mul_add(w.x, -nu.x));
-        let (k20, k21) = (k.z.mul_add(w.y, -nu.y), k.z.neg_mul_add(w.x, nu.x));
+        let law = Vectors::splat(k.x.simd, [1.0; 3]) - open;
+        let (k01, k02) = (
+            k.x.mul_add(w.z, -law.x * nu.z),
+            k.x.neg_mul_add(w.y, law.x * nu.y),
+        );
+        let (k10, k12) = (
+            k.y.neg_mul_add(w.z, law.y * nu.z),
+            k.y.mul_add(w.x, -law.y * nu.x),
+        );
+        let (k20, k21) = (
+            k.z.mul_add(w.y, -law.z * nu.y),
+            k.z.neg_mul_add(w.x, law.z * nu.x),
+        );
         let (products, squares) = (w * nu, w * w);
-        let xx = k.y.mul_add(squares.z, k.z * squares.y) - products.y - products.z;
-        let yy = k.x.mul_add(squares.z, k.z * squares.x) - products.x - products.z;
-        let zz = k.x.mul_add(squares.y, k.y * squares.x) - products.x - products.y;
+        // Of an open component the terms L = 1 are taken back.
+        let xx = k.y.mul_add(squares.z, k.z * squares.y) - products.y - products.z
+            + (open.y * products.z + open.z * products.y) * Lanes::splat(k.x.simd, 2.0);
+        let yy = k.x.mul_add(squares.z, k.z * squares.x) - products.x - products.z
+            + (open.x * products.z + open.z * products.x) * Lanes::splat(k.x.simd, 2.0);
+        let zz = k.x.mul_add(squares.y, k.y * squares.x) - products.x - products.y
+            + (open.x * products.y + open.y * products.x) * Lanes::splat(k.x.simd, 2.0);
         let mean = |a: Lanes<S>, b: Lanes<S>, c: Lanes<S>, d: Lanes<S>| half * a.mul_add(b, c * d);
-        let xy = mean(w.x, nu.y, w.y, nu.x) - k.z * w.x * w.y;
-        let xz = mean(w.x, nu.z, w.z, nu.x) - k.y * w.x * w.z;
-        let yz = mean(w.y, nu.z, w.z, nu.y) - k.x * w.y * w.z;
+        let both = |a: Lanes<S>, b: Lanes<S>, c: Lanes<S>, d: Lanes<S>| a.mul_add(b, c * d);
+        let xy = mean(w.x, nu.y, w.y, nu.x) - k.z * w.x * w.y - open.z * both(w.x, nu.y, w.y, nu.x);
+        let xz = mean(w.x, nu.z, w.z, nu.x) - k.y * w.x * w.z - open.y * both(w.x, nu.z, w.z, nu.x);
+        let yz = mean(w.y, nu.z, w.z, nu.y) - k.x * w.y * w.z - open.x * both(w.y, nu.z, w.z, nu.y);
         MidpointHessian {
             law: [
                 Vectors::new(zero, k10, k20),
@@ -239,10 +259,16 @@ impl<S: Simd> Element<S> {
         self.second_derivatives_from_midpoint(sections, self.midpoint_hessian(sections))
     }
 
-    /// Second derivatives as [`Element::second`], of segments that carry the forces of their strains.
+    /// Second derivatives as [`Element::second`], of segments that carry the forces of their strains,
+    /// or in the components in `open` (ones and zeros) those of a rigid law.
     #[inline(always)]
-    pub fn second_strained(&self, sections: &LaneSections<S>) -> SecondDerivatives<S> {
-        self.second_derivatives_from_midpoint(sections, self.strained_midpoint_hessian(sections))
+    pub fn second_strained(
+        &self,
+        sections: &LaneSections<S>,
+        open: Vectors<S>,
+    ) -> SecondDerivatives<S> {
+        let midpoint = self.strained_midpoint_hessian(sections, open);
+        self.second_derivatives_from_midpoint(sections, midpoint)
     }
 
     /// The second derivatives from those with respect to the rotation of the midpoint.

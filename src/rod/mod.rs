@@ -34,7 +34,10 @@ pub use crate::rod::section::{
     LaneNodes, LaneSections, NodePair, Section, SectionParameterDerivative, Wrench,
 };
 pub use crate::rod::segment::{Segment, SegmentGradient, SegmentHessian};
-pub use crate::rod::strip::{NodeBlock, StripLoads, TissueStrip};
+pub use crate::rod::strip::{
+    ContractingStrains, NodeBlock, PairGradient, StripHessian, StripLoads, StripStrainGradients,
+    StripStress, TissueStrip, VeinStrain,
+};
 
 /// Largest rotation (radians) between the ends of a segment that its grid resolves.
 pub const RESOLVED_TURN: f64 = 1.6;

@@ -10,15 +10,27 @@
 //! k_1 resists neighbors that slide along each other, k_2 a change of width, k_3 one vein that rises
 //! above the other, c_1 a fold along the veins. As a segment a strip carries a spatial
 //! force as a further unknown, which is condensed out ([`Element`]), so that Newton's method
-//! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
-//! direction, in which it then carries no force.
+//! converges as fast however stiff it is. It may have no stiffness in some direction, in which it then
+//! carries no force, or be rigid there: the force is then condensed out with a finite stiffness, a step of
+//! the method of multipliers.
+//!
+//! Tissue that contracts across the veins as they stretch, by Poisson's ratio, has the strains
+//!
+//! e_2 + c (v_1 - v0_1),   theta_1 - c (u_2 - u0_2)
+//!
+//! in place of e_2 and theta_1, with the means of the stretch v_1 and the bend u_2 of both veins:
+//! [`VeinStrain`] has these of a segment, with derivatives by its nodes.
 
-use crate::rod::element::{Element, FirstDerivatives, UNKNOWNS, nodal_gradient};
+use crate::rod::element::{Element, FirstDerivatives, NodalHessian, UNKNOWNS, nodal_gradient};
 use crate::rod::section::{LaneNodes, LaneSections, NodePair, Section, Wrench};
 use crate::rotation;
 use crate::simd::Vectors;
 use glam::DVec3;
+use nalgebra::SVector;
 use pulp::Scalar;
+
+/// Derivatives by the unknowns (rotation, displacement) of two nodes.
+pub type PairGradient = SVector<f64, 12>;
 
 /// A block of a matrix of the unknowns (rotation, displacement) of a node, rows first.
 pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
@@ -27,14 +39,45 @@ pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 /// to a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissueStrip {
-    /// k: force per displacement along the veins, across, and normal to the leaf.
+    /// k: force per displacement along the veins, across, and normal to the leaf; infinite: rigid.
     pub stiffness: DVec3,
+    /// Stiffness with which the force is condensed out: k, or of a rigid direction a finite one.
+    pub condensing: DVec3,
     /// c_1: moment per radian of a fold along the veins.
     pub fold_stiffness: f64,
     /// R^T (x1 - x0) in the natural leaf.
     pub stress_free_gap: DVec3,
     /// log(q0^* q1) in the natural leaf.
     pub stress_free_rotation: DVec3,
+    /// c: the length by which the strip narrows freely per stretch of its veins, and by which it
+    /// folds freely per curvature of theirs.
+    pub contraction: f64,
+}
+
+/// The mean strains, less those at rest, of the segments of both veins by which a strip contracts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContractingStrains {
+    /// v_1 - v0_1.
+    pub stretch: f64,
+    /// u_2 - u0_2.
+    pub bend: f64,
+}
+
+/// What a strip exerts in its strains across the veins and in its fold.
+#[derive(Clone, Copy, Debug)]
+pub struct StripStress {
+    /// The force along d2, its derivative of the energy by e_2.
+    pub across: f64,
+    /// The part of it that is carried, and not condensed out.
+    pub carried_across: f64,
+    /// The moment about d1, its derivative of the energy by theta_1.
+    pub fold: f64,
+}
+
+/// The derivatives of e_2 and theta_1 by the unknowns of the nodes of a strip.
+pub struct StripStrainGradients {
+    pub across: PairGradient,
+    pub fold: PairGradient,
 }
 
 /// The second derivatives of the energy of a strip.
@@ -66,12 +109,20 @@ struct StripStrains {
 }
 
 impl TissueStrip {
-    /// A strip that is without force between these ends.
-    pub fn stress_free_between(stiffness: DVec3, fold: f64, ends: &NodePair) -> TissueStrip {
+    /// A strip that is without force between these ends; `rigid` is the stiffness with which forces in
+    /// rigid directions are condensed out.
+    pub fn stress_free_between(
+        stiffness: DVec3,
+        fold: f64,
+        rigid: DVec3,
+        ends: &NodePair,
+    ) -> TissueStrip {
         let middle = rotation::midpoint(ends.q[0], ends.q[1]);
         TissueStrip {
             stiffness,
+            condensing: DVec3::select(is_infinite(stiffness), rigid, stiffness),
             fold_stiffness: fold,
+            contraction: 0.0,
             stress_free_gap: middle.inverse() * (ends.x[1] - ends.x[0]),
             stress_free_rotation: rotation::log(ends.q[0].conjugate() * ends.q[1]),
         }
@@ -82,10 +133,27 @@ impl TissueStrip {
         self.stiffness != DVec3::ZERO || self.fold_stiffness != 0.0
     }
 
-    /// The difference of the data from those of another strip.
+    /// Whether the strip is rigid in some direction.
+    pub fn is_rigid(&self) -> bool {
+        is_infinite(self.stiffness).any()
+    }
+
+    /// The strip whose veins are strained so: where it is without force then.
+    pub fn contracted(&self, strains: ContractingStrains) -> TissueStrip {
+        let mut strip = *self;
+        strip.stress_free_gap.y -= self.contraction * strains.stretch;
+        strip.stress_free_rotation.x += self.contraction * strains.bend;
+        strip
+    }
+
+    /// The difference of the data from those of another strip. What is rigid stays so.
     pub fn difference_from(&self, other: &TissueStrip) -> TissueStrip {
+        let rigid = is_infinite(self.stiffness);
+        let change = self.stiffness - other.stiffness;
         TissueStrip {
-            stiffness: self.stiffness - other.stiffness,
+            stiffness: DVec3::select(rigid, DVec3::ZERO, change),
+            condensing: DVec3::ZERO,
+            contraction: self.contraction - other.contraction,
             fold_stiffness: self.fold_stiffness - other.fold_stiffness,
             stress_free_gap: self.stress_free_gap - other.stress_free_gap,
             stress_free_rotation: self.stress_free_rotation - other.stress_free_rotation,
@@ -98,31 +166,39 @@ impl TissueStrip {
         self.fold_stiffness += times * other.fold_stiffness;
         self.stress_free_gap += times * other.stress_free_gap;
         self.stress_free_rotation += times * other.stress_free_rotation;
+        self.contraction += times * other.contraction;
     }
 
-    /// The strip between these ends, carrying the force of its strains.
-    fn strained_element(&self, ends: &NodePair) -> StripElement {
-        let sections = LaneSections::from(&Section {
+    /// The sections of the strip as an element.
+    fn sections(&self) -> LaneSections<Scalar> {
+        LaneSections::from(&Section {
             ds: 1.0,
             couple_stiffness: self.fold_stiffness * DVec3::X,
             rest_curvature: self.stress_free_rotation,
             rest_strain: self.stress_free_gap,
             compliance: DVec3::ZERO,
-            condensing: self.stiffness,
-        });
-        StripElement {
-            element: Element::with_strain_forces(&sections, &LaneNodes::from(ends)),
-            sections,
+            condensing: self.condensing,
+        })
+    }
+
+    /// The strip between these ends: it carries the force of its strains, and in rigid directions the
+    /// spatial force `carried`.
+    fn strained_element(&self, ends: &NodePair, carried: DVec3) -> StripElement {
+        let sections = self.sections();
+        let mut element = Element::with_strain_forces(&sections, &LaneNodes::from(ends));
+        let rigid = is_infinite(self.stiffness);
+        if rigid.any() {
+            let carried = DVec3::from(Vectors::from(carried).director_components(element.frame));
+            element.nu = DVec3::select(rigid, carried, DVec3::from(element.nu)).into();
         }
+        StripElement { element, sections }
     }
 
     /// The strip between these ends, carrying the spatial `force`. In directions without stiffness it
     /// carries none.
     fn element_with_force(&self, ends: &NodePair, force: DVec3) -> StripElement {
-        let StripElement {
-            mut element,
-            sections,
-        } = self.strained_element(ends);
+        let sections = self.sections();
+        let mut element = Element::with_strain_forces(&sections, &LaneNodes::from(ends));
         let dx = DVec3::from(element.w);
         let stiff = self.stiffness.cmpgt(DVec3::ZERO);
         let carried = DVec3::from(Vectors::from(force).director_components(element.frame));
@@ -132,9 +208,15 @@ impl TissueStrip {
         StripElement { element, sections }
     }
 
-    /// The spatial force of its strains between these ends.
-    pub fn force(&self, ends: &NodePair) -> DVec3 {
-        let element = self.strained_element(ends).element;
+    /// The part 1 - k/K of the law in each direction that condensing with k leaves open: all of it
+    /// where the strip is rigid, else none.
+    fn open_law(&self) -> DVec3 {
+        DVec3::select(is_infinite(self.stiffness), DVec3::ONE, DVec3::ZERO)
+    }
+
+    /// The spatial force of its strains between these ends, and in rigid directions that `carried`.
+    pub fn force(&self, ends: &NodePair, carried: DVec3) -> DVec3 {
+        let element = self.strained_element(ends, carried).element;
         element.nu.from_director_components(element.frame).into()
     }
 
@@ -143,9 +225,51 @@ impl TissueStrip {
     pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [Wrench; 2] {
         let element = self.element_with_force(ends, force).element;
         let Element { nu, w, gap, .. } = element;
-        let correction = Vectors::from(self.stiffness) * gap;
-        let g_mu = nu.cross(w + gap) - w.cross(correction);
+        let correction = Vectors::from(self.condensing) * gap;
+        let lawful = Vectors::from(DVec3::ONE - self.open_law()) * gap;
+        let g_mu = nu.cross(w + lawful) - w.cross(correction);
         nodal_loads(element.nodal_derivatives(nu + correction, g_mu, element.m))
+    }
+
+    /// The residual of the law in rigid directions: a length along each director.
+    pub fn open_gap(&self, ends: &NodePair, force: DVec3) -> DVec3 {
+        self.open_law() * DVec3::from(self.element_with_force(ends, force).element.gap)
+    }
+
+    /// The stress across and in the fold of the strip if it carries this spatial force, which is
+    /// condensed out.
+    pub fn condensed_stress(&self, ends: &NodePair, force: DVec3) -> StripStress {
+        let element = self.element_with_force(ends, force).element;
+        let nu = DVec3::from(element.nu) + self.condensing * DVec3::from(element.gap);
+        StripStress {
+            across: nu.y,
+            carried_across: DVec3::from(element.nu).y,
+            fold: DVec3::from(element.m).x,
+        }
+    }
+
+    /// The stress across and in the fold of the strip by its strains.
+    pub fn stress(&self, ends: &NodePair) -> StripStress {
+        let element = self.strained_element(ends, DVec3::ZERO).element;
+        StripStress {
+            across: DVec3::from(element.nu).y,
+            carried_across: DVec3::from(element.nu).y,
+            fold: DVec3::from(element.m).x,
+        }
+    }
+
+    /// The derivatives of its strains across and in the fold by the unknowns of its nodes, if it
+    /// carries this spatial force.
+    pub fn strain_gradients(&self, ends: &NodePair, force: DVec3) -> StripStrainGradients {
+        let element = self.element_with_force(ends, force).element;
+        let none = Vectors::from(DVec3::ZERO);
+        let turned = -DVec3::from(element.w).cross(DVec3::Y);
+        let across = element.nodal_derivatives(DVec3::Y.into(), turned.into(), none);
+        let fold = element.nodal_derivatives(none, none, DVec3::X.into());
+        StripStrainGradients {
+            across: pair_gradient(across),
+            fold: pair_gradient(fold),
+        }
     }
 
     /// The change of the spatial force that it carries for the displacement `dx` of the second node
@@ -163,7 +287,8 @@ impl TissueStrip {
         let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
         let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
         let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
-        let change = self.stiffness * (onto(dx) + gap + w.cross(mu)) - nu.cross(mu);
+        let turned = (DVec3::ONE - self.open_law()) * nu.cross(mu);
+        let change = self.condensing * (onto(dx) + gap + w.cross(mu)) - turned;
         Vectors::from(change)
             .from_director_components(element.frame)
             .into()
@@ -178,29 +303,38 @@ impl TissueStrip {
         }
     }
 
-    /// The energy of the strip, and the moment and force that it exerts on either node.
-    pub fn loads(&self, ends: &NodePair) -> StripLoads {
-        let StripElement { element, sections } = self.strained_element(ends);
+    /// The energy of the strip, and the moment and force that it exerts on either node, if it carries
+    /// this spatial force in rigid directions.
+    pub fn loads(&self, ends: &NodePair, carried: DVec3) -> StripLoads {
+        let StripElement { element, sections } = self.strained_element(ends, carried);
         let StripStrains { e, theta } = self.strains(&element);
-        let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold_stiffness * theta * theta);
+        let elastic = self.elastic_stiffness();
+        let energy = 0.5 * ((elastic * e).dot(e) + self.fold_stiffness * theta * theta);
         StripLoads {
             energy,
             on_nodes: nodal_loads(element.gradient(&sections)),
         }
     }
 
-    /// The change of the strip's energy and loads with its data, at the given `rate`.
+    /// The stiffness without that of rigid directions.
+    fn elastic_stiffness(&self) -> DVec3 {
+        DVec3::select(is_infinite(self.stiffness), DVec3::ZERO, self.stiffness)
+    }
+
+    /// The change of the strip's energy and loads with its data, at the given `rate`, but for that of
+    /// its forces in rigid directions.
     pub fn parameter_derivative(&self, ends: &NodePair, rate: &TissueStrip) -> StripLoads {
         let StripElement {
             mut element,
             sections,
-        } = self.strained_element(ends);
+        } = self.strained_element(ends, DVec3::ZERO);
         let StripStrains { e, theta } = self.strains(&element);
-        let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.stress_free_gap).dot(e)
+        let elastic = self.elastic_stiffness();
+        let energy = (0.5 * rate.stiffness * e - elastic * rate.stress_free_gap).dot(e)
             + (0.5 * rate.fold_stiffness * theta
                 - self.fold_stiffness * rate.stress_free_rotation.x)
                 * theta;
-        element.nu = (rate.stiffness * e - self.stiffness * rate.stress_free_gap).into();
+        element.nu = (rate.stiffness * e - elastic * rate.stress_free_gap).into();
         element.m = ((rate.fold_stiffness * theta
             - self.fold_stiffness * rate.stress_free_rotation.x)
             * DVec3::X)
@@ -211,9 +345,10 @@ impl TissueStrip {
         }
     }
 
-    /// The second derivatives of the strip's energy.
-    pub fn hessian(&self, ends: &NodePair) -> StripHessian {
-        let force = self.force(ends);
+    /// The second derivatives of the strip's energy; in rigid directions it carries this spatial
+    /// force, which is condensed out.
+    pub fn hessian(&self, ends: &NodePair, carried: DVec3) -> StripHessian {
+        let force = self.force(ends, carried);
         self.condensed_hessian(ends, force)
     }
 
@@ -221,7 +356,30 @@ impl TissueStrip {
     /// energy where the force is that of its strains.
     pub fn condensed_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
         let StripElement { element, sections } = self.element_with_force(ends, force);
-        let hessian = element.second_strained(&sections).nodal_hessian();
+        let open = self.open_law().into();
+        let hessian = element.second_strained(&sections, open).nodal_hessian();
+        StripHessian::from(hessian)
+    }
+}
+
+impl TissueStrip {
+    /// The part of [`TissueStrip::condensed_hessian`] without that of its stiffness: by the force that it
+    /// carries and by the moment of its fold.
+    pub fn geometric_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
+        let StripElement { element, .. } = self.element_with_force(ends, force);
+        let mut without = *self;
+        (without.condensing, without.fold_stiffness) = (DVec3::ZERO, 0.0);
+        let open = self.open_law().into();
+        StripHessian::from(
+            element
+                .second_strained(&without.sections(), open)
+                .nodal_hessian(),
+        )
+    }
+}
+
+impl From<NodalHessian<Scalar>> for StripHessian {
+    fn from(hessian: NodalHessian<Scalar>) -> Self {
         StripHessian {
             diagonal_blocks: hessian
                 .diagonal_blocks
@@ -229,6 +387,76 @@ impl TissueStrip {
             off_diagonal_block: hessian.off_diagonal_block.map(|row| row.map(f64::from)),
         }
     }
+}
+
+/// Which components are infinite.
+fn is_infinite(stiffness: DVec3) -> glam::BVec3 {
+    stiffness.cmpeq(DVec3::splat(f64::INFINITY))
+}
+
+/// The stretch v_1 and the bend u_2 of a segment between two nodes, and their derivatives.
+pub struct VeinStrain {
+    element: Element<Scalar>,
+    ds: f64,
+    /// Their excess over the segment's at rest.
+    pub excess: ContractingStrains,
+}
+
+impl VeinStrain {
+    /// The strains of a segment between its nodes.
+    pub fn between(section: &Section, ends: &NodePair) -> VeinStrain {
+        let sections = LaneSections::from(section);
+        let element = Element::with_strain_forces(&sections, &LaneNodes::from(ends));
+        VeinStrain {
+            excess: ContractingStrains {
+                stretch: DVec3::from(element.w).x - section.rest_strain.x,
+                bend: DVec3::from(element.u).y - section.rest_curvature.y,
+            },
+            element,
+            ds: section.ds,
+        }
+    }
+
+    /// The derivatives of the stretch by the unknowns of the nodes.
+    pub fn stretch_gradient(&self) -> PairGradient {
+        let turned = DVec3::X.cross(DVec3::from(self.element.w) * self.ds);
+        let none = Vectors::from(DVec3::ZERO);
+        let first = (self.element).nodal_derivatives(DVec3::X.into(), turned.into(), none);
+        pair_gradient(first) / self.ds
+    }
+
+    /// The derivatives of the bend by the unknowns of the nodes.
+    pub fn bend_gradient(&self) -> PairGradient {
+        let none = Vectors::from(DVec3::ZERO);
+        let first = (self.element).nodal_derivatives(none, none, DVec3::Y.into());
+        pair_gradient(first) / self.ds
+    }
+
+    /// The second derivatives of `stretch` times the stretch plus `bend` times the bend.
+    pub fn hessian(&self, stretch: f64, bend: f64) -> StripHessian {
+        let mut element = self.element;
+        element.nu = (stretch / self.ds * DVec3::X).into();
+        element.m = (bend / self.ds * DVec3::Y).into();
+        element.w = (DVec3::from(element.w) * self.ds).into();
+        // Without stiffness only the forces count.
+        let sections = LaneSections::from(&Section {
+            ds: 1.0,
+            couple_stiffness: DVec3::ZERO,
+            rest_curvature: DVec3::ZERO,
+            rest_strain: DVec3::ZERO,
+            compliance: DVec3::ZERO,
+            condensing: DVec3::ZERO,
+        });
+        let none = Vectors::from(DVec3::ZERO);
+        let hessian = element.second_strained(&sections, none).nodal_hessian();
+        StripHessian::from(hessian)
+    }
+}
+
+/// The derivatives by the unknowns of both nodes.
+fn pair_gradient(first: FirstDerivatives<Scalar>) -> PairGradient {
+    let [a, b] = nodal_gradient(first).map(|node| node.map(f64::from));
+    PairGradient::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] })
 }
 
 /// Moment and force on both nodes, minus the derivatives of an energy.
@@ -260,16 +488,21 @@ mod tests {
                 DQuat::from_scaled_axis(DVec3::new(-0.2, 0.5, 0.6) * scale),
             ],
         };
-        let strip = TissueStrip::stress_free_between(DVec3::new(20.0, 40.0, 0.0), 0.5, &ends(0.3));
+        let strip = TissueStrip::stress_free_between(
+            DVec3::new(20.0, 40.0, 0.0),
+            0.5,
+            DVec3::ZERO,
+            &ends(0.3),
+        );
         (strip, ends(1.0))
     }
 
     fn energy(strip: &TissueStrip, ends: &NodePair) -> f64 {
-        strip.loads(ends).energy
+        strip.loads(ends, DVec3::ZERO).energy
     }
 
     fn loads(strip: &TissueStrip, ends: &NodePair) -> [Wrench; 2] {
-        strip.loads(ends).on_nodes
+        strip.loads(ends, DVec3::ZERO).on_nodes
     }
 
     /// The ends with one of the 12 unknowns changed.
@@ -301,7 +534,12 @@ mod tests {
             let slope = slope(|h| energy(&strip, &moved(&ends, k, h)));
             assert!((found[k] + slope).abs() < 1e-9, "{k}: {} {slope}", found[k]);
         }
-        let rest = TissueStrip::stress_free_between(strip.stiffness, strip.fold_stiffness, &ends);
+        let rest = TissueStrip::stress_free_between(
+            strip.stiffness,
+            strip.fold_stiffness,
+            DVec3::ZERO,
+            &ends,
+        );
         assert!(
             flat(loads(&rest, &ends))
                 .iter()
@@ -314,7 +552,7 @@ mod tests {
     #[test]
     fn the_force_carried_becomes_that_of_the_strains() {
         let (strip, ends) = strained();
-        let strains = strip.force(&ends);
+        let strains = strip.force(&ends, DVec3::ZERO);
         let same = flat(strip.condensed_loads(&ends, strains));
         for (one, other) in same.into_iter().zip(flat(loads(&strip, &ends))) {
             assert!((one - other).abs() < 1e-13, "{one} {other}");
@@ -337,7 +575,7 @@ mod tests {
             };
             let found = strip.force_increment(&ends, strains, dx, turns);
             let expected = DVec3::from_array(
-                [0, 1, 2].map(|c| slope(|h| strip.force(&moved(&ends, k, h))[c])),
+                [0, 1, 2].map(|c| slope(|h| strip.force(&moved(&ends, k, h), DVec3::ZERO)[c])),
             );
             assert!(found.distance(expected) < 1e-8, "{k}: {found} {expected}");
         }
@@ -347,7 +585,7 @@ mod tests {
     #[test]
     fn the_hessian_is_the_symmetric_part_of_the_derivative_of_the_loads() {
         let (strip, ends) = strained();
-        let hessian = strip.hessian(&ends);
+        let hessian = strip.hessian(&ends, DVec3::ZERO);
         let by = |r: usize, k: usize| slope(|h| -flat(loads(&strip, &moved(&ends, k, h)))[r]);
         for (r, k) in (0..12).flat_map(|r| (r..12).map(move |k| (r, k))) {
             let found = match (r / 6, k / 6) {
@@ -370,9 +608,12 @@ mod tests {
             fold_stiffness: 0.7,
             stress_free_gap: DVec3::new(0.3, 0.1, -0.2),
             stress_free_rotation: DVec3::new(0.2, -0.1, 0.4),
+            ..TissueStrip::default()
         };
         let changed = |h: f64| TissueStrip {
             stiffness: strip.stiffness + h * rate.stiffness,
+            condensing: strip.stiffness + h * rate.stiffness,
+            contraction: 0.0,
             fold_stiffness: strip.fold_stiffness + h * rate.fold_stiffness,
             stress_free_gap: strip.stress_free_gap + h * rate.stress_free_gap,
             stress_free_rotation: strip.stress_free_rotation + h * rate.stress_free_rotation,

@@ -18,7 +18,7 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
     NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
-use crate::rod::{Section, Segment, StripLoads, TissueStrip};
+use crate::rod::{Section, Segment};
 use glam::DVec3;
 
 impl DiscreteLeaf {
@@ -315,29 +315,18 @@ impl DiscreteLeaf {
         each: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
-        let (n, nodes) = (self.segments(), self.moving_nodes());
-        let Some(first) = each.first() else {
+        let nodes = self.moving_nodes();
+        if each.is_empty() {
             return;
-        };
-        self.add_own_load_changes(state, each, forces);
-        for (k, own) in first.term.strips.iter().enumerate() {
-            let mut change = TissueStrip::default();
-            for Weighted { weight, term } in each {
-                change.add(*weight, &term.strips[k].difference_from(own));
-            }
-            if change == TissueStrip::default() {
-                continue;
-            }
-            let (g, i) = (k / (n + 1), k % (n + 1));
-            let StripLoads { energy, on_nodes } = self.strip_derivatives(state, g, i, &change);
-            forces.energy += energy;
-            for (j, load) in [g, g + 1].into_iter().zip(on_nodes) {
-                if nodes.contains(&i) {
-                    let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
-                    add_to_increment(on, load.moment, load.force);
-                }
-            }
         }
+        self.add_own_load_changes(state, each, forces);
+        let terms: Vec<_> = each.iter().map(|it| (it.weight, &it.term)).collect();
+        forces.energy += self.for_each_tissue_change(state, &terms, |j, i, load| {
+            if nodes.contains(&i) {
+                let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
+                add_to_increment(on, load.moment, load.force);
+            }
+        });
     }
 
     /// Adds the changes of dead moments to the forces.

@@ -141,18 +141,16 @@ impl DiscreteLeaf {
             }
             let pull = self.node_coupling(g, i)
                 * (displacement_part(&both[1]) - displacement_part(&both[0]));
-            let mut loads = [pull, -pull].map(Wrench::from_force);
-            if self.has_tissue() {
-                let tissue = self.tissue_response(state, g, i, &both);
-                for (load, tissue) in loads.iter_mut().zip(tissue) {
-                    load.moment += tissue.moment;
-                    load.force += tissue.force;
+            let mut add = |j: usize, i: usize, load: Wrench| {
+                if i >= first {
+                    let on_node = &mut forces.rod_forces_mut(j, count)[i - first];
+                    add_to_increment(on_node, load.moment, load.force);
                 }
+            };
+            for (j, load) in [(g, pull), (g + 1, -pull)] {
+                add(j, i, Wrench::from_force(load));
             }
-            for (j, load) in [g, g + 1].into_iter().zip(loads) {
-                let on_node = &mut forces.rod_forces_mut(j, count)[i - first];
-                add_to_increment(on_node, load.moment, load.force);
-            }
+            self.for_each_tissue_response(state, g, i, &both, add);
         }
     }
 

@@ -227,6 +227,20 @@ pub fn for_each_matrix_entry(
                 }
             }
         }
+        for i in 0..n - 1 {
+            let Some([ahead, crossing]) = system.cell_blocks(j, i) else {
+                break;
+            };
+            let [here, next] = [i, i + 1].map(|i| unknowns.node_numbers(j, i));
+            let [other, beyond] = [i, i + 1].map(|i| unknowns.node_numbers(j + 1, i));
+            for (from, block, to) in [(here, ahead, beyond), (next, crossing, other)] {
+                for (r, row) in block.iter().enumerate() {
+                    for (c, value) in row.iter().enumerate() {
+                        add(from[r], to[c], *value);
+                    }
+                }
+            }
+        }
         for (k, row) in border.iter().enumerate() {
             for (i, forces) in row[j].iter().enumerate() {
                 for (at, force) in unknowns.node_numbers(j, i).into_iter().zip(forces) {
