@@ -49,7 +49,7 @@ impl HalfTurn {
 const HALF_TURN_TOLERANCE: f64 = 0.01;
 
 /// Stiffness with which the forces of rigid tissue are condensed out, in units of the stiffness of the
-/// adjacent segments: in stretch along the veins, in bending and shear normal to them. Each iteration
+/// adjacent segments: in stretch along the veins, in shear normal to them. Each iteration
 /// leaves the inverse of it, or less, of an error of these forces; a larger one loses the soft modes to
 /// rounding.
 const RIGID_TISSUE_RATIO: f64 = 1e3;
@@ -269,7 +269,7 @@ impl DiscreteLeaf {
     }
 
     /// Stiffness of the segments next to the nodes of a strip: along the veins in stretch, normal to them
-    /// in bending and shear.
+    /// in shear, which bounds that of a curved leaf.
     fn segment_stiffness(&self, g: usize, i: usize) -> DVec3 {
         let n = self.segments();
         let mut most = DVec3::ZERO;
@@ -281,8 +281,7 @@ impl DiscreteLeaf {
             let of = |c: f64, k: f64| if c > 0.0 { 1.0 / c } else { k };
             let stretch = of(section.compliance.x, section.condensing.x) / section.ds;
             let shear = of(section.compliance.z, section.condensing.z) / section.ds;
-            let bend = 12.0 * section.couple_stiffness.y / section.ds.powi(3);
-            most = most.max(DVec3::new(stretch, 0.0, bend.min(shear)));
+            most = most.max(DVec3::new(stretch, 0.0, shear));
         }
         most
     }
