@@ -50,7 +50,9 @@ use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
-use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation};
+use crate::scenario::{
+    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation, longest,
+};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -175,6 +177,52 @@ impl std::ops::Mul<f64> for Loads {
     }
 }
 
+/// The layer at a clamped base in which tissue that contracts across its veins cannot do so, as a thin
+/// plate there cannot curve across. It is as long as the base is wide, with parts as thin as a gap.
+struct ClampLayer {
+    /// First part of the layer, in units of the width of the base: a larger one is resolved only on
+    /// finer grids.
+    first_part: f64,
+    /// Ratio of a part to the one before.
+    growth: f64,
+    /// Parts up to this length, a fraction of the leaf's, are graded; longer ones are as grids have them.
+    largest_part: f64,
+    /// Least width of the base, a fraction of the length: a narrower one is resolved by no grid, and
+    /// moves nothing.
+    least_width: f64,
+}
+
+const CLAMP_LAYER: ClampLayer = ClampLayer {
+    first_part: 1.0 / 3.0,
+    growth: 2.0,
+    largest_part: 1.0 / 8.0,
+    least_width: 1e-3,
+};
+
+/// Fractions of the length between which grids have segments of one length, graded towards a clamped
+/// base.
+fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
+    let tissue = scenario.tissue.iter().flatten();
+    let contracts = tissue.clone().any(|of| of.contraction.max_abs() > 0.0);
+    let rods = &scenario.rods;
+    let length = longest(rods);
+    let apart = rods
+        .windows(2)
+        .map(|pair| pair[0].base_position().distance(pair[1].base_position()));
+    let width = apart.sum::<f64>() / length;
+    let mut edges = Vec::new();
+    if contracts && scenario.base_held == SupportKind::Clamped && width > CLAMP_LAYER.least_width {
+        let mut part = CLAMP_LAYER.first_part * width;
+        let mut edge = 0.0;
+        while part < CLAMP_LAYER.largest_part {
+            edge += part;
+            edges.push(edge);
+            part *= CLAMP_LAYER.growth;
+        }
+    }
+    edges
+}
+
 impl Leaf {
     /// Scales a checked scenario.
     pub fn new(scenario: &Scenario) -> Self {
@@ -192,7 +240,8 @@ impl Leaf {
         } = &scenario.dynamics;
         let masses = density.iter().chain(rotary_inertia);
         let masses = masses.flat_map(Profile::kinks).copied();
-        let kinks = sorted_distinct(scenario.kinks().into_iter().chain(masses));
+        let layers = clamp_layer_edges(&scenario);
+        let kinks = sorted_distinct(scenario.kinks().into_iter().chain(masses).chain(layers));
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
