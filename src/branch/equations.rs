@@ -273,7 +273,7 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
         solve: &mut dyn FnMut(&mut System, &NodalField) -> Option<NodalField>,
     ) -> Result<LawCompletion, OutOfRange> {
         let leaf = self.leaves.leaf_at(at.params)?;
-        if !leaf.is_nearly_rigid() {
+        if !leaf.is_nearly_rigid() && !leaf.has_rigid_tissue() {
             return Ok(LawCompletion::default());
         }
         self.system.set_solution(increments);

@@ -147,7 +147,8 @@ impl DiscreteLeaf {
                 .enumerate()
                 .for_each(advance),
         }
-        for (force, more) in next.n.iter_mut().zip(&solution.law_forces) {
+        let carried = next.n.iter_mut().chain(&mut next.tissue);
+        for (force, more) in carried.zip(&solution.law_forces) {
             *force += step * *more;
         }
     }

@@ -199,11 +199,8 @@ impl DiscreteLeaf {
         State::new(self.segments(), xs, qs)
     }
 
-    /// The smallest compliance of any segment, in units of L^2/A, and of rigid tissue: zero.
+    /// The smallest compliance of any segment, in units of L^2/A.
     pub fn least_compliance(&self) -> f64 {
-        if self.has_rigid_tissue() {
-            return 0.0;
-        }
         self.sections
             .iter()
             .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))

@@ -17,8 +17,9 @@ use crate::leaf::derivative::parameter::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;
+use crate::leaf::tissue::ForceCarriers;
 use crate::numbers::largest;
-use crate::rod::{Section, Segment};
+use crate::rod::Section;
 use glam::DVec3;
 
 /// Largest missing part of the law of a segment, 1 - C k, by rounding.
@@ -109,13 +110,14 @@ impl DiscreteLeaf {
     /// it was.
     pub fn complete_law(
         &self,
-        segments: &[Segment],
+        carriers: &ForceCarriers,
         response: &mut LinearResponse,
         gaps: &mut [DVec3],
         rigid: bool,
         solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
     ) -> bool {
         let close = |gaps: &mut [DVec3]| {
+            // What is rigid in the tissue has a force everywhere.
             let segments = self.rod_index_pairs(0..self.segments());
             for (gap, (j, i)) in gaps.iter_mut().zip(segments) {
                 *gap *= self.completed_components(j, i, rigid);
@@ -133,10 +135,10 @@ impl DiscreteLeaf {
         let product = &mut |direction: &[f64]| {
             let mut left: Vec<DVec3> = vectors_from_numbers(direction);
             let mut forces = none.clone();
-            self.condense_gaps(segments, &left, &mut forces);
+            self.condense_gaps(carriers, &left, &mut forces);
             let nodes = solve(&forces)?;
             let mut carried = vec![DVec3::ZERO; left.len()];
-            self.carried_force_changes(segments, &nodes, &mut left, &mut carried);
+            self.carried_force_changes(carriers, &nodes, &mut left, &mut carried);
             close(&mut left);
             responses.push(LinearResponse {
                 nodes,
@@ -168,21 +170,23 @@ impl System {
         state: &State,
         solve: &mut dyn FnMut(&mut System, &NodalField) -> Option<NodalField>,
     ) -> Option<NodalField> {
-        let segments = leaf.all_segments(state);
-        let mut gaps: Vec<DVec3> = segments.iter().map(|segment| segment.gap).collect();
+        let carriers = leaf.force_carriers(state);
+        let segments = carriers.segments.iter();
+        let mut gaps: Vec<DVec3> = segments.map(|segment| segment.gap).collect();
+        gaps.extend(carriers.strips.iter().map(|it| it.rigid * it.element.gap));
         let mut response = LinearResponse {
             nodes: self.solution(),
             force_changes: vec![DVec3::ZERO; gaps.len()],
         };
         leaf.carried_force_changes(
-            &segments,
+            &carriers,
             &response.nodes,
             &mut gaps,
             &mut response.force_changes,
         );
         let first = response.nodes.clone();
         let complete =
-            leaf.complete_law(&segments, &mut response, &mut gaps, false, &mut |forces| {
+            leaf.complete_law(&carriers, &mut response, &mut gaps, false, &mut |forces| {
                 solve(self, forces)
             });
         if !complete {
@@ -193,11 +197,16 @@ impl System {
         let n = leaf.segments();
         let forces = leaf.rod_index_pairs(0..n).map(|(j, i)| {
             let (section, k) = (leaf.section(j, i), j * n + i);
-            segments[k].frame * (section.condensing * gaps[k] / section.ds)
+            carriers.segments[k].frame * (section.condensing * gaps[k] / section.ds)
         });
         self.law_forces.extend(forces);
+        let of_tissue = carriers.strips.iter().zip(&gaps[carriers.segments.len()..]);
+        let of_tissue = of_tissue.map(|(strip, gap)| {
+            strip.element.frame * (strip.section.condensing * *gap) / strip.weight
+        });
+        self.law_forces.extend(of_tissue);
         let mut nodes: NodalField = first.iter().map(|rod| vec![[0.0; 6]; rod.len()]).collect();
-        leaf.condense_gaps(&segments, &gaps, &mut nodes);
+        leaf.condense_gaps(&carriers, &gaps, &mut nodes);
         Some(nodes)
     }
 

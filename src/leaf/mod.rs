@@ -45,7 +45,7 @@ pub use crate::leaf::supports::NodeFreedom;
 pub use crate::leaf::system::{
     AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
 };
-pub use crate::leaf::tissue::HalfTurn;
+pub use crate::leaf::tissue::{ForceCarriers, HalfTurn};
 use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation::{self, Pose};

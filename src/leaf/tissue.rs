@@ -13,8 +13,8 @@ use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::numbers::{format_two_digits, largest};
 use crate::rod::{
-    ContractingStrains, NodeBlock, NodePair, PairGradient, StripHessian, StripLoads,
-    StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
+    ContractingStrains, NodeBlock, NodePair, PairGradient, Section, Segment, StripHessian,
+    StripLoads, StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
 };
 use crate::rotation;
 use glam::DVec3;
@@ -57,6 +57,29 @@ const RIGID_TISSUE_RATIO: f64 = 1e3;
 /// The same where no force is carried on from one step to the next, in explicit motions: the error by the
 /// finite stiffness is of second order in the length of the segments.
 const ELASTIC_TISSUE_RATIO: f64 = 10.0;
+
+/// The elements of a leaf in a state whose forces are condensed out of its linear equations, and not always
+/// exactly: see [`DiscreteLeaf::complete_law`].
+pub struct ForceCarriers {
+    /// All segments, rod after rod.
+    pub segments: Vec<Segment>,
+    /// The strips of all nodes, gap after gap; empty unless tissue is rigid.
+    pub strips: Vec<RigidStrip>,
+}
+
+/// A strip of a node as an element, by its rigid directions.
+pub struct RigidStrip {
+    /// The gap after rod `gap`.
+    pub gap: usize,
+    pub node: usize,
+    /// Ones in rigid directions, zeros in others.
+    pub rigid: DVec3,
+    /// Its weight, as a fraction of the length.
+    pub weight: f64,
+    /// Its data, of the length one, without compliance.
+    pub section: Section,
+    pub element: Segment,
+}
 
 /// Which strip of a node of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -310,6 +333,28 @@ impl DiscreteLeaf {
             strip.condensing = strip.stiffness;
         }
         soft
+    }
+
+    /// Sets the forces of the tissue to those of its strains.
+    pub fn set_tissue_forces(&self, state: &mut State) {
+        state.tissue.clear();
+        if !self.has_tissue() {
+            return;
+        }
+        let mut forces = vec![DVec3::ZERO; self.strips.len()];
+        for it in self.each_node_strip() {
+            let force = it.strip.force(&it.ends(state), DVec3::ZERO);
+            forces[self.strip_index(it.place, it.gap, it.node)] =
+                force / self.grid.node_weight(it.node);
+        }
+        for (g, s) in self.contracting_cells() {
+            let veins = self.cell_veins(state, g, s);
+            for corner in self.corners(state, g, s, &veins) {
+                let (place, i) = (StripPlace::ALL[1 + corner.end], s + corner.end);
+                forces[self.strip_index(place, g, i)] = corner.force / self.strip_weight(place, i);
+            }
+        }
+        state.tissue = forces;
     }
 
     /// Whether tissue is rigid in some direction.
@@ -713,6 +758,54 @@ impl DiscreteLeaf {
                 }
             }
         }
+    }
+
+    /// The strips of all nodes in a state by their rigid directions; none unless tissue is rigid.
+    pub(super) fn rigid_strips(&self, state: &State) -> Vec<RigidStrip> {
+        if !self.has_rigid_tissue() {
+            return Vec::new();
+        }
+        let rigid_strip = |it: PlacedStrip| {
+            let ends = it.ends(state);
+            let (rigid, strip) = (it.strip.rigid_directions(), it.strip);
+            let mut section = Section {
+                ds: 1.0,
+                couple_stiffness: DVec3::ZERO,
+                rest_curvature: DVec3::ZERO,
+                rest_strain: DVec3::ZERO,
+                compliance: DVec3::ZERO,
+                condensing: rigid * strip.condensing,
+            };
+            // In other directions it has no force, and its own length.
+            let own = Segment::new(&section, &ends, DVec3::ZERO).gap;
+            section.rest_strain = rigid * strip.stress_free_gap + (DVec3::ONE - rigid) * own;
+            let carried = self.node_tissue_force(state, it, &ends);
+            let middle = rotation::midpoint(ends.q[0], ends.q[1]);
+            let force = middle * (rigid * (middle.inverse() * carried));
+            RigidStrip {
+                gap: it.gap,
+                node: it.node,
+                rigid,
+                weight: self.grid.node_weight(it.node),
+                element: Segment::new(&section, &ends, force),
+                section,
+            }
+        };
+        self.each_node_strip().map(rigid_strip).collect()
+    }
+
+    /// The strip of a node by its number among those of all nodes.
+    pub(super) fn node_strip(&self, k: usize) -> &TissueStrip {
+        &self.strips[k]
+    }
+
+    /// Number of elements with forces: see [`ForceCarriers`].
+    pub fn force_carrier_count(&self) -> usize {
+        let strips = match self.has_rigid_tissue() {
+            true => (self.rods() - 1) * (self.segments() + 1),
+            false => 0,
+        };
+        self.rods() * self.segments() + strips
     }
 
     /// The largest length by which rigid tissue misses its law.

@@ -4,7 +4,7 @@
 //! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{
-    DenseParameterForces, DirectSolver, DiscreteLeaf, Leaf, LeafParameterDerivative,
+    DenseParameterForces, DirectSolver, DiscreteLeaf, ForceCarriers, Leaf, LeafParameterDerivative,
     LinearResponse, LinearSolveOutcome, MatrixFactors, NodalField, ParameterForces, State, System,
     Weighted, displacement_part, rotation_part,
 };
@@ -15,7 +15,6 @@ use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::plan::UNKNOWNS;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
-use crate::rod::Segment;
 use crate::scenario::{Grip, Scenario, SupportKind};
 use crate::{modes, rotation};
 use glam::DVec3;
@@ -658,7 +657,7 @@ const BEST_CONJUGATE_GRADIENT_ACCURACY: f64 = 1e-11;
 /// all right-hand sides.
 pub(crate) struct Linearized {
     system: System,
-    segments: Vec<Segment>,
+    carriers: ForceCarriers,
     /// Relative accuracy of the conjugate gradients.
     accuracy: f64,
     /// Whether the matrix is factorized rod by rod; otherwise a sparse direct factorization is
@@ -683,7 +682,7 @@ impl Linearized {
         };
         Linearized {
             system,
-            segments: leaf.all_segments(state),
+            carriers: leaf.force_carriers(state),
             accuracy: (CONJUGATE_GRADIENT_ACCURACY * tolerance)
                 .clamp(BEST_CONJUGATE_GRADIENT_ACCURACY, 1e-4),
             factorized,
@@ -701,7 +700,7 @@ impl Linearized {
         let force = |rate| {
             level
                 .leaf
-                .parameter_forces(&level.state, &self.segments, rate)
+                .parameter_forces(&level.state, &self.carriers, rate)
         };
         rates.iter().map(force).collect()
     }
@@ -722,7 +721,7 @@ impl Linearized {
         loads: &[ParameterForces],
         accuracy: f64,
     ) -> Option<Vec<LinearResponse>> {
-        let (leaf, segments, solves) = (&level.leaf, &self.segments, &mut self.solves);
+        let (leaf, carriers, solves) = (&level.leaf, &self.carriers, &mut self.solves);
         if self.factorized {
             let system = &mut self.system;
             let mut by_rods = |rhs: &NodalField| {
@@ -734,7 +733,7 @@ impl Linearized {
                 }
             };
             let found: Option<Vec<_>> = (loads.iter())
-                .map(|load| response(leaf, segments, load, &mut by_rods))
+                .map(|load| response(leaf, carriers, load, &mut by_rods))
                 .collect();
             if found.is_some() {
                 return found;
@@ -751,7 +750,7 @@ impl Linearized {
             Some(factor.solve_bordered(rhs, &[]).increments)
         };
         (loads.iter())
-            .map(|load| response(leaf, segments, load, &mut direct))
+            .map(|load| response(leaf, carriers, load, &mut direct))
             .collect()
     }
 
@@ -763,13 +762,13 @@ impl Linearized {
         forces: &ParameterForces,
         response: &LinearResponse,
     ) -> f64 {
-        level.leaf.mutual_work(&self.segments, forces, response)
+        level.leaf.mutual_work(&self.carriers, forces, response)
     }
 }
 
 fn response(
     leaf: &DiscreteLeaf,
-    segments: &[Segment],
+    carriers: &ForceCarriers,
     load: &ParameterForces,
     solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
 ) -> Option<LinearResponse> {
@@ -781,15 +780,15 @@ fn response(
         nodes: NodalField::new(),
         force_changes: vec![DVec3::ZERO; gaps.len()],
     };
-    leaf.condense_gaps(segments, &gaps, &mut rhs);
+    leaf.condense_gaps(carriers, &gaps, &mut rhs);
     response.nodes = solve(&rhs)?;
     leaf.carried_force_changes(
-        segments,
+        carriers,
         &response.nodes,
         &mut gaps,
         &mut response.force_changes,
     );
-    leaf.complete_law(segments, &mut response, &mut gaps, true, solve);
+    leaf.complete_law(carriers, &mut response, &mut gaps, true, solve);
     // Held nodes move with their holders.
     for (rod, moved) in response.nodes.iter_mut().zip(&load.support_increments) {
         let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());

@@ -138,6 +138,11 @@ impl TissueStrip {
         is_infinite(self.stiffness).any()
     }
 
+    /// Ones in rigid directions, zeros in others.
+    pub fn rigid_directions(&self) -> DVec3 {
+        DVec3::select(is_infinite(self.stiffness), DVec3::ONE, DVec3::ZERO)
+    }
+
     /// The strip whose veins are strained so: where it is without force then.
     pub fn contracted(&self, strains: ContractingStrains) -> TissueStrip {
         let mut strip = *self;
@@ -208,12 +213,6 @@ impl TissueStrip {
         StripElement { element, sections }
     }
 
-    /// The part 1 - k/K of the law in each direction that condensing with k leaves open: all of it
-    /// where the strip is rigid, else none.
-    fn open_law(&self) -> DVec3 {
-        DVec3::select(is_infinite(self.stiffness), DVec3::ONE, DVec3::ZERO)
-    }
-
     /// The spatial force of its strains between these ends, and in rigid directions that `carried`.
     pub fn force(&self, ends: &NodePair, carried: DVec3) -> DVec3 {
         let element = self.strained_element(ends, carried).element;
@@ -226,14 +225,14 @@ impl TissueStrip {
         let element = self.element_with_force(ends, force).element;
         let Element { nu, w, gap, .. } = element;
         let correction = Vectors::from(self.condensing) * gap;
-        let lawful = Vectors::from(DVec3::ONE - self.open_law()) * gap;
+        let lawful = Vectors::from(DVec3::ONE - self.rigid_directions()) * gap;
         let g_mu = nu.cross(w + lawful) - w.cross(correction);
         nodal_loads(element.nodal_derivatives(nu + correction, g_mu, element.m))
     }
 
     /// The residual of the law in rigid directions: a length along each director.
     pub fn open_gap(&self, ends: &NodePair, force: DVec3) -> DVec3 {
-        self.open_law() * DVec3::from(self.element_with_force(ends, force).element.gap)
+        self.rigid_directions() * DVec3::from(self.element_with_force(ends, force).element.gap)
     }
 
     /// The stress across and in the fold of the strip if it carries this spatial force, which is
@@ -287,7 +286,7 @@ impl TissueStrip {
         let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
         let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
         let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
-        let turned = (DVec3::ONE - self.open_law()) * nu.cross(mu);
+        let turned = (DVec3::ONE - self.rigid_directions()) * nu.cross(mu);
         let change = self.condensing * (onto(dx) + gap + w.cross(mu)) - turned;
         Vectors::from(change)
             .from_director_components(element.frame)
@@ -356,7 +355,7 @@ impl TissueStrip {
     /// energy where the force is that of its strains.
     pub fn condensed_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
         let StripElement { element, sections } = self.element_with_force(ends, force);
-        let open = self.open_law().into();
+        let open = self.rigid_directions().into();
         let hessian = element.second_strained(&sections, open).nodal_hessian();
         StripHessian::from(hessian)
     }
@@ -369,7 +368,7 @@ impl TissueStrip {
         let StripElement { element, .. } = self.element_with_force(ends, force);
         let mut without = *self;
         (without.condensing, without.fold_stiffness) = (DVec3::ZERO, 0.0);
-        let open = self.open_law().into();
+        let open = self.rigid_directions().into();
         StripHessian::from(
             element
                 .second_strained(&without.sections(), open)

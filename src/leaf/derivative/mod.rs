@@ -18,16 +18,21 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
     NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
-use crate::rod::{Section, Segment};
+use crate::leaf::tissue::{ForceCarriers, RigidStrip};
+use crate::rod::{Section, SectionParameterDerivative, Segment};
 use glam::DVec3;
 
 impl DiscreteLeaf {
-    /// All segments in a state, rod after rod, for use by all derivatives in that state.
-    pub fn all_segments(&self, state: &State) -> Vec<Segment> {
+    /// All elements that carry forces in a state, for use by all derivatives in that state.
+    pub fn force_carriers(&self, state: &State) -> ForceCarriers {
         let n = self.segments();
         let each = self.rod_index_pairs(0..n);
-        each.map(|(j, i)| self.segment(state, j, i, state.n[j * n + i]))
-            .collect()
+        ForceCarriers {
+            segments: each
+                .map(|(j, i)| self.segment(state, j, i, state.n[j * n + i]))
+                .collect(),
+            strips: self.rigid_strips(state),
+        }
     }
 
     /// The forces by which a change of the number unbalances this leaf, a whole one in space, in a state
@@ -35,7 +40,7 @@ impl DiscreteLeaf {
     pub fn parameter_forces(
         &self,
         state: &State,
-        segments: &[Segment],
+        carriers: &ForceCarriers,
         rate: &LeafParameterDerivative,
     ) -> ParameterForces {
         let mut forces = ParameterForces::zeros(self.rods());
@@ -43,20 +48,21 @@ impl DiscreteLeaf {
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.sections_unchanged() {
-                self.add_section_changes(segments, j, rod, &neighbors, &mut forces);
+                self.add_section_changes(&carriers.segments, j, rod, &neighbors, &mut forces);
             }
             let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
             if of_all || coupling || rod.length != 0.0 {
                 self.add_load_changes(state, j, rate, &mut forces);
             }
             if rod.base != NodeIncrement::default() {
-                self.add_base_motion(state, segments, j, rod.base, &mut forces);
+                self.add_base_motion(state, &carriers.segments, j, rod.base, &mut forces);
             }
         }
         self.add_moment_changes(rate, &mut forces);
         self.add_tissue_and_own_load_changes(state, &neighbors, &mut forces);
+        self.add_rigid_strip_changes(&carriers.strips, &neighbors, &mut forces);
         let motion = self.support_motion_increments(rate, &neighbors);
-        self.add_support_motion(state, segments, motion, &mut forces);
+        self.add_support_motion(state, carriers, motion, &mut forces);
         forces
     }
 
@@ -143,7 +149,7 @@ impl DiscreteLeaf {
     /// forces in the response to these.
     pub fn mutual_work(
         &self,
-        segments: &[Segment],
+        carriers: &ForceCarriers,
         forces: &ParameterForces,
         response: &LinearResponse,
     ) -> f64 {
@@ -157,27 +163,47 @@ impl DiscreteLeaf {
         }
         for (j, gaps) in forces.gaps.iter().enumerate() {
             for (i, gap) in gaps.iter().enumerate() {
-                work -= response.force_changes[j * n + i].dot(segments[j * n + i].frame * *gap);
+                let segment = &carriers.segments[j * n + i];
+                work -= response.force_changes[j * n + i].dot(segment.frame * *gap);
             }
+        }
+        let of_tissue = response.force_changes[carriers.segments.len()..].iter();
+        for ((strip, gap), change) in carriers
+            .strips
+            .iter()
+            .zip(&forces.tissue_gaps)
+            .zip(of_tissue)
+        {
+            work -= strip.weight * change.dot(strip.element.frame * *gap);
         }
         work
     }
 
     /// Adds to forces on the nodes the contribution of changes of the gaps when the forces of
     /// the segments are condensed out.
-    pub fn condense_gaps(&self, segments: &[Segment], gaps: &[DVec3], nodes: &mut NodalField) {
+    pub fn condense_gaps(&self, carriers: &ForceCarriers, gaps: &[DVec3], nodes: &mut NodalField) {
         let (n, first) = (self.segments(), self.first_node());
         for (j, i) in self.rod_index_pairs(0..n) {
             let gap = gaps[j * n + i];
             if gap == DVec3::ZERO {
                 continue;
             }
-            let segment = &segments[j * n + i];
+            let segment = &carriers.segments[j * n + i];
             let change = segment.gap_gradient(self.section(j, i), gap);
             if i >= first {
                 add_to_increment(&mut nodes[j][i - first], -change.a, change.x);
             }
             add_to_increment(&mut nodes[j][i + 1 - first], -change.b, -change.x);
+        }
+        let of_tissue = gaps[carriers.segments.len()..].iter();
+        for (strip, gap) in carriers.strips.iter().zip(of_tissue) {
+            if *gap == DVec3::ZERO || strip.node < first {
+                continue;
+            }
+            let (g, i) = (strip.gap, strip.node - first);
+            let change = strip.element.gap_gradient(&strip.section, *gap);
+            add_to_increment(&mut nodes[g][i], -change.a, change.x);
+            add_to_increment(&mut nodes[g + 1][i], -change.b, -change.x);
         }
         // Held components have no equations.
         self.clear_held_forces(nodes);
@@ -188,7 +214,7 @@ impl DiscreteLeaf {
     /// less than the segment's own.
     pub fn carried_force_changes(
         &self,
-        segments: &[Segment],
+        carriers: &ForceCarriers,
         increments: &NodalField,
         gaps: &mut [DVec3],
         force_changes: &mut [DVec3],
@@ -202,12 +228,25 @@ impl DiscreteLeaf {
                 let k = j * n + i;
                 let (b, dx1) = (rotation_part(increment), displacement_part(increment));
                 let section = self.section(j, i);
-                let segment = &segments[k];
+                let segment = &carriers.segments[k];
                 let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
                 force_changes[k] += segment.frame * (section.condensing * gap / section.ds);
                 gaps[k] = gap * self.missing_law_fraction(j, i);
                 (a, dx0) = (b, dx1);
             }
+        }
+        let first = carriers.segments.len();
+        for (k, strip) in (first..).zip(&carriers.strips) {
+            let Some(i) = strip.node.checked_sub(self.first_node()) else {
+                continue;
+            };
+            let [a, b] = [strip.gap, strip.gap + 1].map(|rod| &increments[rod][i]);
+            let dx = displacement_part(b) - displacement_part(a);
+            let turns = [a, b].map(rotation_part);
+            let change = (strip.element).gap_increment(&strip.section, dx, turns[0], turns[1]);
+            gaps[k] = strip.rigid * (gaps[k] + change);
+            let carried = strip.element.frame * (strip.section.condensing * gaps[k]);
+            force_changes[k] += carried / strip.weight;
         }
     }
 
@@ -327,6 +366,42 @@ impl DiscreteLeaf {
                 add_to_increment(on, load.moment, load.force);
             }
         });
+    }
+
+    /// Adds the effect of changes of the stress-free state on rigid tissue.
+    fn add_rigid_strip_changes(
+        &self,
+        strips: &[RigidStrip],
+        each: &[Weighted<DiscreteLeaf>],
+        forces: &mut ParameterForces,
+    ) {
+        let nodes = self.moving_nodes();
+        let Some(first) = each.first() else {
+            return;
+        };
+        for (k, strip) in strips.iter().enumerate() {
+            let own = first.term.node_strip(k).stress_free_gap;
+            let changes = each
+                .iter()
+                .map(|it| it.weight * (it.term.node_strip(k).stress_free_gap - own));
+            let rate = SectionParameterDerivative {
+                rest_strain: strip.rigid * changes.sum::<DVec3>(),
+                ..Default::default()
+            };
+            if rate.rest_strain == DVec3::ZERO {
+                continue;
+            }
+            let change = strip.element.parameter_derivative(&strip.section, &rate);
+            forces.tissue_gaps.resize(strips.len(), DVec3::ZERO);
+            forces.tissue_gaps[k] += change.gap;
+            forces.energy += change.energy;
+            for (rod, moment) in [strip.gap, strip.gap + 1].into_iter().zip(change.gradient) {
+                if nodes.contains(&strip.node) {
+                    let on = &mut forces.rod_forces_mut(rod, nodes.len())[strip.node - nodes.start];
+                    add_to_increment(on, -moment, DVec3::ZERO);
+                }
+            }
+        }
     }
 
     /// Adds the changes of dead moments to the forces.

@@ -218,6 +218,8 @@ pub struct ParameterForces {
     pub nodes: NodalField,
     /// Changes of the gaps of the segments, which are the residuals of their constitutive laws.
     pub gaps: Vec<Vec<DVec3>>,
+    /// The same of the strips of nodes, if rigid tissue is affected.
+    pub tissue_gaps: Vec<DVec3>,
     /// Change of the energy.
     pub energy: f64,
     /// Increments of held nodes. Rods on which no support moves have no entries.
@@ -229,7 +231,8 @@ pub struct ParameterForces {
 pub struct LinearResponse {
     /// Increments of the nodes.
     pub nodes: NodalField,
-    /// Changes of the spatial forces of the segments, rod after rod.
+    /// Changes of the spatial forces of the segments, rod after rod, and of rigid strips of nodes, per
+    /// unit of sigma.
     pub force_changes: Vec<DVec3>,
 }
 
@@ -239,6 +242,7 @@ impl ParameterForces {
         ParameterForces {
             nodes: vec![Vec::new(); rods],
             gaps: vec![Vec::new(); rods],
+            tissue_gaps: Vec::new(),
             energy: 0.0,
             support_increments: vec![Vec::new(); rods],
         }
@@ -267,6 +271,11 @@ impl ParameterForces {
             let sums = self.gap_effects_mut(j, count);
             (sums.iter_mut().zip(gaps)).for_each(|(sum, more)| *sum += times * *more);
         }
+        let count = self.tissue_gaps.len().max(other.tissue_gaps.len());
+        self.tissue_gaps.resize(count, DVec3::ZERO);
+        for (sum, more) in self.tissue_gaps.iter_mut().zip(&other.tissue_gaps) {
+            *sum += times * *more;
+        }
         self.energy += times * other.energy;
         for (moved, more) in self
             .support_increments
@@ -285,6 +294,8 @@ impl ParameterForces {
         for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {
             all[..own.len()].copy_from_slice(own);
         }
+        gaps.extend(&self.tissue_gaps);
+        gaps.resize(leaf.force_carrier_count(), DVec3::ZERO);
         let rod = |nodes: &Vec<Increment>| match nodes.is_empty() {
             true => vec![[0.0; 6]; count],
             false => nodes.clone(),
@@ -300,7 +311,7 @@ impl ParameterForces {
 pub struct DenseParameterForces {
     /// Changes of the unbalanced forces at the nodes.
     pub nodes: NodalField,
-    /// Changes of the gaps of the segments, rod after rod.
+    /// Changes of the gaps of the segments, rod after rod, and of the strips of nodes.
     pub gaps: Vec<DVec3>,
 }
 
@@ -309,7 +320,7 @@ impl LinearResponse {
     pub fn zeros(leaf: &DiscreteLeaf) -> LinearResponse {
         LinearResponse {
             nodes: vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()],
-            force_changes: vec![DVec3::ZERO; leaf.rods() * leaf.segments()],
+            force_changes: vec![DVec3::ZERO; leaf.force_carrier_count()],
         }
     }
 
@@ -321,7 +332,8 @@ impl LinearResponse {
                 state.advance_node(first + i, increment, step);
             }
         }
-        let forces = state.n.iter_mut().zip(&self.force_changes);
+        let carried = state.n.iter_mut().chain(&mut state.tissue);
+        let forces = carried.zip(&self.force_changes);
         forces.for_each(|(force, change)| *force += step * *change);
     }
 

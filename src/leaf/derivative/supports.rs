@@ -8,6 +8,7 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
     Increment, NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
+use crate::leaf::tissue::{ForceCarriers, RigidStrip};
 use crate::rod::{Segment, Wrench};
 use crate::rotation;
 use glam::DVec3;
@@ -58,18 +59,26 @@ impl DiscreteLeaf {
     pub(super) fn add_support_motion(
         &self,
         state: &State,
-        segments: &[Segment],
+        carriers: &ForceCarriers,
         motion: NodalField,
         forces: &mut ParameterForces,
     ) {
         for (j, rod) in motion.iter().enumerate() {
             for (i, by) in rod.iter().enumerate() {
                 if *by != [0.0; 6] {
-                    self.add_node_motion(state, segments, j, i + self.first_node(), by, forces);
+                    self.add_node_motion(
+                        state,
+                        &carriers.segments,
+                        j,
+                        i + self.first_node(),
+                        by,
+                        forces,
+                    );
                 }
             }
         }
         self.add_coupling_response(state, &motion, forces);
+        self.add_strip_motion(&carriers.strips, &motion, forces);
         forces.support_increments = motion;
     }
 
@@ -151,6 +160,32 @@ impl DiscreteLeaf {
                 add(j, i, Wrench::from_force(load));
             }
             self.for_each_tissue_response(state, g, i, &both, add);
+        }
+    }
+
+    /// Adds the changes of the gaps of rigid tissue by increments of its nodes.
+    fn add_strip_motion(
+        &self,
+        strips: &[RigidStrip],
+        increments: &NodalField,
+        forces: &mut ParameterForces,
+    ) {
+        let first = self.first_node();
+        for (k, strip) in strips.iter().enumerate() {
+            let by = |rod: usize| {
+                let i = strip.node.checked_sub(first);
+                let known = i.and_then(|i| increments[rod].get(i)).copied();
+                known.unwrap_or([0.0; 6])
+            };
+            let [a, b] = [strip.gap, strip.gap + 1].map(by);
+            if a == [0.0; 6] && b == [0.0; 6] {
+                continue;
+            }
+            let dx = displacement_part(&b) - displacement_part(&a);
+            let turns = [&a, &b].map(rotation_part);
+            let change = (strip.element).gap_increment(&strip.section, dx, turns[0], turns[1]);
+            forces.tissue_gaps.resize(strips.len(), DVec3::ZERO);
+            forces.tissue_gaps[k] += strip.rigid * change;
         }
     }
 

@@ -143,7 +143,7 @@ struct KickAir {
 pub struct RigidRodError;
 
 impl Explicit {
-    /// A leaf at rest in `state`. Time steps are nine tenths of the stable one,
+    /// A leaf at rest in `state`. Rigid tissue is made stiff. Time steps are nine tenths of the stable one,
     /// or `step` if that is given, stable or not.
     ///
     /// # Errors
@@ -157,6 +157,7 @@ impl Explicit {
         if leaf.least_compliance() == 0.0 {
             return Err(RigidRodError);
         }
+        let leaf = leaf.with_elastic_tissue();
         let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
         let tip_mass = |j| physics.inertia(&leaf, j, last).mass;
         let tip_weight = |j| leaf.grid.node_weight(last) * leaf.leaf.length(j);

@@ -103,6 +103,8 @@ pub fn relax_explicitly(
     request: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
     let physics = Physics::for_relaxation(&leaf.leaf);
+    let rigid = leaf.has_rigid_tissue();
+    let leaf = &leaf.with_elastic_tissue();
     let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
     let mut motion = motion.map_err(|_| EquilibriumFailure::NoDescent)?;
     let most_steps = WORK.explicit_node_steps / (leaf.rods() * leaf.segments());
@@ -114,6 +116,9 @@ pub fn relax_explicitly(
     request.work.steps += motion.steps();
     request.work.force_evaluations += motion.steps();
     request.state = motion.present_state();
+    if rigid {
+        leaf.set_tissue_forces(&mut request.state);
+    }
     settled
 }
 

@@ -69,7 +69,10 @@ impl GridRelaxation<'_> {
         leaf: &DiscreteLeaf,
         system: &mut System,
     ) -> Result<f64, EquilibriumFailure> {
-        let stiffest = leaf.least_compliance();
+        let stiffest = match leaf.has_rigid_tissue() {
+            true => 0.0,
+            false => leaf.least_compliance(),
+        };
         let moving_compliance = moving_compliance(&leaf.leaf, self.saddle_escapes);
         if stiffest >= moving_compliance {
             return self.move_to_rest(leaf, system, self.accuracy);
