@@ -51,7 +51,7 @@ use crate::rod::Section;
 use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{
-    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, ZeroEnergyRotation, longest,
+    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, Tissue, ZeroEnergyRotation, longest,
 };
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -177,8 +177,8 @@ impl std::ops::Mul<f64> for Loads {
     }
 }
 
-/// The layer at a clamped base in which tissue that contracts across its veins cannot do so, as a thin
-/// plate there cannot curve across. It is as long as the base is wide, with parts as thin as a gap.
+/// The layer at a clamped base of a thin plate, which can neither warp nor contract there: rigid tissue and
+/// such that contracts have it. It is as long as the base is wide, with parts as thin as a gap.
 struct ClampLayer {
     /// First part of the layer, in units of the width of the base: a larger one is resolved only on
     /// finer grids.
@@ -203,7 +203,8 @@ const CLAMP_LAYER: ClampLayer = ClampLayer {
 /// base.
 fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
     let tissue = scenario.tissue.iter().flatten();
-    let contracts = tissue.clone().any(|of| of.contraction.max_abs() > 0.0);
+    let is_layered = |of: &Tissue| of.contraction.max_abs() > 0.0 || of.is_rigid();
+    let has_layer = tissue.clone().any(is_layered);
     let rods = &scenario.rods;
     let length = longest(rods);
     let apart = rods
@@ -211,7 +212,7 @@ fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
         .map(|pair| pair[0].base_position().distance(pair[1].base_position()));
     let width = apart.sum::<f64>() / length;
     let mut edges = Vec::new();
-    if contracts && scenario.base_held == SupportKind::Clamped && width > CLAMP_LAYER.least_width {
+    if has_layer && scenario.base_held == SupportKind::Clamped && width > CLAMP_LAYER.least_width {
         let mut part = CLAMP_LAYER.first_part * width;
         let mut edge = 0.0;
         while part < CLAMP_LAYER.largest_part {

@@ -13,8 +13,9 @@ use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::numbers::{format_two_digits, largest};
 use crate::rod::{
-    ContractingStrains, NodeBlock, NodePair, PairGradient, Section, Segment, StripHessian,
-    StripLoads, StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
+    ContractingStrains, NodeBlock, NodePair, PairGradient, Section, Segment, SegmentGradient,
+    StripHessian, StripLoads, StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain,
+    Wrench,
 };
 use crate::rotation;
 use glam::DVec3;
@@ -304,7 +305,7 @@ impl DiscreteLeaf {
             let of = |c: f64, k: f64| if c > 0.0 { 1.0 / c } else { k };
             let stretch = of(section.compliance.x, section.condensing.x) / section.ds;
             let shear = of(section.compliance.z, section.condensing.z) / section.ds;
-            most = most.max(DVec3::new(stretch, 0.0, shear));
+            most = most.max(DVec3::new(stretch, 0.0, shear.min(stretch)));
         }
         most
     }
@@ -758,6 +759,88 @@ impl DiscreteLeaf {
                 }
             }
         }
+    }
+
+    /// The part of the tissue in the force and the moments of segment `i` of rod `j`: it resists a stretch and
+    /// a bend of the veins by which it contracts.
+    pub fn contraction_gradient(&self, state: &State, j: usize, i: usize) -> SegmentGradient {
+        let mut sum = PairGradient::zeros();
+        if self.has_contracting_tissue() {
+            for g in self.adjacent_gaps(j) {
+                let veins = self.cell_veins(state, g, i);
+                let own = &veins.strains[j - g];
+                let [stretch, bend] = [own.stretch_gradient(), own.bend_gradient()];
+                for corner in self.corners(state, g, i, &veins) {
+                    let StripStress { across, fold, .. } = corner.strip.stress(&corner.ends);
+                    let c = 0.5 * corner.strip.contraction;
+                    sum += c * (across * stretch - fold * bend);
+                }
+            }
+        }
+        let vector = |first: usize| DVec3::from_slice(&sum.as_slice()[first..first + 3]);
+        SegmentGradient {
+            x: vector(9),
+            a: vector(0),
+            b: vector(6),
+        }
+    }
+
+    /// What the forces of rigid tissue at an end of rod `j` lack there, or have too much, for those along the
+    /// rod to go on smoothly to its end: at a clamped base tissue has none, and at a tip it may have
+    /// a concentrated one.
+    pub fn rigid_end_load(&self, state: &State, j: usize, i: usize) -> Wrench {
+        let (n, mut load) = (self.segments(), Wrench::default());
+        if !self.has_rigid_tissue() || state.tissue.is_empty() || n < 4 || i > 0 && i < n {
+            return load;
+        }
+        let inner = match i {
+            0 => [1, 2, 3],
+            _ => [n - 1, n - 2, n - 3],
+        };
+        for g in self.adjacent_gaps(j) {
+            let density = |i: usize| state.tissue[self.strip_index(StripPlace::Node, g, i)];
+            let at = |i: usize| self.grid.sigma()[i];
+            // The parabola through the nodes next to the end.
+            let weight = |k: usize| {
+                let others = inner.iter().filter(|&&other| other != k);
+                let parts = others.map(|&other| (at(i) - at(other)) / (at(k) - at(other)));
+                parts.product::<f64>()
+            };
+            let wanted: DVec3 = inner.iter().map(|&k| weight(k) * density(k)).sum();
+            let Some(rigid) = self.strip(StripPlace::Node, g, inner[0]) else {
+                continue;
+            };
+            let rigid = rigid.rigid_directions();
+            let ends = strip_ends(state, g, i);
+            let middle = rotation::midpoint(ends.q[0], ends.q[1]);
+            let own = middle.inverse() * self.rigid_tissue_force(state, g, i);
+            let held = (self.strip(StripPlace::Node, g, i))
+                .map_or(DVec3::ZERO, TissueStrip::rigid_directions);
+            let missing =
+                rigid * (middle.inverse() * (self.grid.node_weight(i) * wanted)) - held * own;
+            let section = Section {
+                ds: 1.0,
+                couple_stiffness: DVec3::ZERO,
+                rest_curvature: DVec3::ZERO,
+                rest_strain: middle.inverse() * (ends.x[1] - ends.x[0]),
+                compliance: DVec3::ZERO,
+                condensing: DVec3::ZERO,
+            };
+            let change = Segment::new(&section, &ends, middle * missing).gradient(&section);
+            let (moment, force) = match j == g {
+                true => (-change.a, change.x),
+                false => (-change.b, -change.x),
+            };
+            load.moment += moment;
+            load.force += force;
+        }
+        load
+    }
+
+    /// The gaps on either side of rod `j`.
+    fn adjacent_gaps(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
+        let gaps = [j.checked_sub(1), (j + 1 < self.rods()).then_some(j)];
+        gaps.into_iter().flatten()
     }
 
     /// The strips of all nodes in a state by their rigid directions; none unless tissue is rigid.

@@ -152,6 +152,12 @@ impl Tissue {
         [along, across, normal, &self.fold]
     }
 
+    /// Whether it is rigid in some direction.
+    pub fn is_rigid(&self) -> bool {
+        let rigid = |k: &Profile| k.at(0.5) == f64::INFINITY;
+        self.stiffness.iter().any(rigid)
+    }
+
     /// Everything that may vary along the gap.
     pub(crate) fn profiles(&self) -> [&Profile; 5] {
         let [along, across, normal, fold] = self.stiffness_profiles();

@@ -7,7 +7,7 @@ use crate::relax::{
     serialize_index, serialize_remark,
 };
 use crate::run::Limit;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, Tissue};
 use crate::shape::{Difference, serialize_tips};
 use crate::shooting::{ShootingFailure, ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::study::judge::{
@@ -120,6 +120,9 @@ pub struct Check {
     /// Largest differences over all veins at each of them; empty without a solution.
     #[serde(rename = "differences")]
     pub along: Vec<Difference>,
+    /// Whether forces and moments count for the verdict.
+    #[serde(skip)]
+    compares_forces: bool,
 }
 
 impl Check {
@@ -134,6 +137,7 @@ impl Check {
             within_estimates: None,
             stations: relaxed.shape.stations.clone(),
             along: Vec::new(),
+            compares_forces: true,
             relaxed,
             shot,
         };
@@ -152,6 +156,14 @@ impl Check {
         self.difference = self.along.iter().copied().reduce(Difference::max);
         self.within_estimates = self.differs_within_estimates();
         self.verdict = self.reach_verdict();
+    }
+
+    /// The check of a leaf with rigid tissue, whose verdict is that of the shapes alone: what each vein bears
+    /// of the tissue's forces follows from layers as thin as the gaps, which shapes hardly depend on.
+    fn of_shapes_alone(mut self) -> Self {
+        self.compares_forces = false;
+        self.verdict = self.reach_verdict();
+        self
     }
 
     fn differs_within_estimates(&self) -> Option<bool> {
@@ -186,8 +198,9 @@ impl Check {
         let same = |found: Difference| {
             found.position <= self.allowed()
                 && found.rotation <= self.allowed_rotation()
-                && found.force <= force + solution.error.force
-                && found.moment <= moment + solution.error.moment
+                && (!self.compares_forces
+                    || found.force <= force + solution.error.force
+                        && found.moment <= moment + solution.error.moment)
         };
         let contradict = self
             .indices()
@@ -289,7 +302,13 @@ pub fn check(
     let relaxed = relax::relax_on_grids(scenario, &asked, false, progress)?.result;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| solve_by_shooting(scenario, &relaxed, options, progress));
-    Ok(Check::new(relaxed, shot))
+    let check = Check::new(relaxed, shot);
+    let rigid = scenario.tissue.iter().flatten().any(Tissue::is_rigid);
+    Ok(if rigid {
+        check.of_shapes_alone()
+    } else {
+        check
+    })
 }
 
 /// Solves the boundary-value problem from a relaxed leaf, to the same accuracy.

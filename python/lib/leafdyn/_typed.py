@@ -173,6 +173,7 @@ class TissueTable(TypedDict, total=False):
 
     across: float | Numbers
     along: float | Numbers
+    contraction: float | Numbers
     fold: float | Numbers
     grown: bool
     normal: float | Numbers

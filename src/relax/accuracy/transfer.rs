@@ -3,6 +3,7 @@
 //! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
+use crate::rod::SegmentGradient;
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
@@ -515,13 +516,37 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
     let n = leaf.segments();
     let to_directors = state.q[state.base(j) + i].conjugate();
     let carried = |i: usize| state.n[j * n + i];
+    // The vein and the part of the tissue that it strains.
+    let tissue = |i: usize| leaf.contraction_gradient(state, j, i);
     let segment = |i: usize| {
-        leaf.segment(state, j, i, carried(i))
-            .gradient(leaf.section(j, i))
+        let own = leaf
+            .segment(state, j, i, carried(i))
+            .gradient(leaf.section(j, i));
+        let tissue = tissue(i);
+        SegmentGradient {
+            x: carried(i) + tissue.x,
+            a: own.a + tissue.a,
+            b: own.b + tissue.b,
+        }
+    };
+    // The load on a node, without that part.
+    let load = |i: usize| {
+        let mut load = leaf.load(state, j, i);
+        let end = leaf.rigid_end_load(state, j, i);
+        (load.force, load.moment) = (load.force + end.force, load.moment + end.moment);
+        if i > 0 {
+            let before = tissue(i - 1);
+            (load.force, load.moment) = (load.force + before.x, load.moment + before.b);
+        }
+        if i < n {
+            let after = tissue(i);
+            (load.force, load.moment) = (load.force - after.x, load.moment + after.a);
+        }
+        load
     };
     let (force, moment) = if i == 0 {
-        let load = leaf.load(state, j, 0);
-        (carried(0) + load.force, load.moment - segment(0).a)
+        let (load, segment) = (load(0), segment(0));
+        (segment.x + load.force, load.moment - segment.a)
     } else {
         // The part of the nodal load that belongs to the left half-cell.
         let left = leaf.grid.segment_width(i - 1);
@@ -530,14 +555,17 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         } else {
             0.0
         };
-        let mut load = leaf.load(state, j, i);
+        let mut load = load(i);
         load.force -= match i == n {
             true => leaf.tip_force(j),
             false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
         };
         let before = left / (left + right);
-        let force = carried(i - 1) - before * load.force;
-        (force, segment(i - 1).b - before * load.moment)
+        let segment = segment(i - 1);
+        (
+            segment.x - before * load.force,
+            segment.b - before * load.moment,
+        )
     };
     [force, moment].map(|vector| to_directors * vector)
 }

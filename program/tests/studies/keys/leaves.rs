@@ -33,7 +33,7 @@ pub const LEAVES: &[TestLeaf] = &[
 leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }
 rest = { twist = 0.3, bend_2 = 0.4, bend_3 = 0.2, stretch = 1.05 }
 coupling = { x = 1.0, y = 2.0, z = 1.5 }
-tissue = { along = 2.0, across = 3.0, normal = 2.0, fold = 0.3 }
+tissue = { along = 2.0, across = 3.0, normal = 2.0, fold = 0.3, contraction = 0.1 }
 [load]
 gravity = [0.1, 0.2, -0.6]
 g = [0.1, 0.1, -0.3]

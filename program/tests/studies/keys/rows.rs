@@ -96,6 +96,7 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::TissueAcross => smooth("veins", "tissue.across=3.3"),
         Key::TissueNormal => smooth("veins", "tissue.normal=2.3"),
         Key::TissueFold => smooth("veins", "tissue.fold=0.35"),
+        Key::TissueContraction => smooth("veins", "tissue.contraction=0.12"),
         Key::TissueGrown => always("veins", "tissue.grown=false"),
         Key::Gravity => smooth("veins", "load.gravity[2]=-0.65"),
         Key::G => smooth("veins", "load.g[2]=-0.35"),
