@@ -370,10 +370,14 @@ impl DiscreteLeaf {
 
     /// The exponent of the growth of a perturbation along a vein over the fraction `width` of its length,
     /// with the properties in its middle: the vein bends or stretches against the tissue on both sides,
-    /// as on an elastic foundation.
+    /// as on an elastic foundation. Infinite where tissue contracts or is rigid, whose forces the
+    /// equations of single rods do not determine.
     pub fn tissue_growth_exponent(&self, width: f64) -> f64 {
         if !self.has_tissue() {
             return 0.0;
+        }
+        if self.has_contracting_tissue() || self.has_rigid_tissue() {
+            return f64::INFINITY;
         }
         let rate = |j: usize| {
             let gaps = [j.checked_sub(1), (j + 1 < self.rods()).then_some(j)];

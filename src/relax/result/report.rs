@@ -15,7 +15,7 @@ use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::rotation::Pose;
+use crate::rotation::{self, Pose};
 use crate::scenario::{
     LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
@@ -561,6 +561,10 @@ impl Equilibrium {
                 .collect()
         };
         let mut between = 0.0_f64;
+        let tied = scenario.tissue.iter().flatten();
+        let tied = tied
+            .clone()
+            .any(|of| of.is_rigid() || of.contraction.max_abs() > 0.0);
         let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
         let mut rest = to.as_slice();
         for (i, &station) in stations.iter().enumerate() {
@@ -578,6 +582,21 @@ impl Equilibrium {
                 rest.split_at(rest.partition_point(|at| *at < next - STATION_TOLERANCE));
             rest = others;
             if points.is_empty() {
+                continue;
+            }
+            if tied {
+                // Their equations have the forces of tissue that is rigid, or contracts, as unknowns.
+                let width = next - station;
+                for (vein, rod) in known.iter().enumerate() {
+                    let length = width * scenario.rods[vein].length;
+                    let ends = [&rod.nodes[i], &rod.nodes[i + 1]];
+                    let node = |at: &f64| hermite_node(ends, length, (at - station) / width);
+                    rods[vein].extend(points.iter().map(node));
+                    between = larger(
+                        between,
+                        hermite_error(stations, &rod.nodes, scenario.rods[vein].length, i),
+                    );
+                }
                 continue;
             }
             let [begin, end] = [i, i + 1].map(section);
@@ -618,6 +637,54 @@ impl Equilibrium {
         }
         self
     }
+}
+
+/// Safety factor on the error of Hermite interpolation, as told by leaving a node out.
+const HERMITE_SAFETY: f64 = 4.0;
+
+/// The state at the fraction `t` between two nodes that are a `length` apart along a vein: positions and
+/// rotations by Hermite interpolation of the third degree with their strains, which have an error of
+/// fourth order; strains and stress resultants linearly.
+fn hermite_node([a, b]: [&NodeState; 2], length: f64, t: f64) -> NodeState {
+    let (square, cube) = (t * t, t * t * t);
+    let value = [2.0 * cube - 3.0 * square + 1.0, 3.0 * square - 2.0 * cube];
+    let slope = [cube - 2.0 * square + t, cube - square];
+    let tangents = [a, b].map(|node| length * (node.rotation * node.v));
+    let position = value[0] * a.position
+        + value[1] * b.position
+        + slope[0] * tangents[0]
+        + slope[1] * tangents[1];
+    // The rotation vector from the first node on, and its slopes.
+    let whole = rotation::log(a.rotation.conjugate() * b.rotation);
+    let [first, last] = [a, b].map(|node| length * node.u);
+    let turned = whole.cross(last);
+    let last = last + 0.5 * turned + whole.cross(turned) / 12.0;
+    let vector = value[1] * whole + slope[0] * first + slope[1] * last;
+    NodeState {
+        position,
+        rotation: (a.rotation * rotation::exp(vector)).normalize(),
+        v: a.v.lerp(b.v, t),
+        u: a.u.lerp(b.u, t),
+        n: a.n.lerp(b.n, t),
+        m: a.m.lerp(b.m, t),
+    }
+}
+
+/// The error of positions between the nodes `i` and `i + 1`: what interpolation misses at either of them
+/// from its neighbors, in proportion to the fourth power of the distances.
+fn hermite_error(stations: &[f64], nodes: &[NodeState], length: f64, i: usize) -> f64 {
+    let missed = |k: usize| {
+        if k == 0 || k + 1 >= nodes.len() {
+            return 0.0;
+        }
+        let [before, at, after] = [k - 1, k, k + 1].map(|k| stations[k]);
+        let ends = [&nodes[k - 1], &nodes[k + 1]];
+        let t = (at - before) / (after - before);
+        let there = hermite_node(ends, (after - before) * length, t);
+        let part = (stations[i + 1] - stations[i]) / (after - before);
+        there.position.distance(nodes[k].position) * part.powi(4)
+    };
+    HERMITE_SAFETY * larger(missed(i), missed(i + 1))
 }
 
 /// Nodes of the finest grid, with all segments halved until there are enough.
