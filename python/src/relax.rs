@@ -276,23 +276,23 @@ pub fn relax_one(
 #[pyfunction]
 pub fn relax_many(
     py: Python,
-    given: Vec<PyRef<Scenario>>,
+    scenarios: Vec<PyRef<Scenario>>,
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Vec<Leaf>> {
     let mut options = asked.options()?;
-    let scenarios: Vec<Arc<scenario::Scenario>> = (given.iter())
+    let checked: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
         .map(|scenario| scenario.checked.clone())
         .collect();
-    let inputs = scenarios.clone();
+    let inputs = checked.clone();
     let base = |scenario: &PyRef<Scenario>| {
         let estimate = asked.veins_error && scenario.checked.blade.is_some();
         estimate.then(|| scenario.base(py)).transpose()
     };
-    let bases = given.iter().map(base).collect::<PyResult<Vec<_>>>()?;
+    let bases = scenarios.iter().map(base).collect::<PyResult<Vec<_>>>()?;
     let found = run(py, progress, move |monitor| {
         options.limit = monitor.limit();
-        let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
+        let (done, all, clock) = (AtomicUsize::new(0), checked.len(), Instant::now());
         let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
             let mut found = relax::relax(scenario, &options, &mut |_| {});
             if let (Ok(leaf), Some(base)) = (&mut found, &bases[number]) {
@@ -305,7 +305,7 @@ pub fn relax_many(
             found.map_err(|error| format!("scenarios[{number}], {}: {error}", scenario.name))
         };
         // One by one: a leaf may take a thousand times as long as the next.
-        let leaves = scenarios.par_iter().enumerate().with_max_len(1).map(one);
+        let leaves = checked.par_iter().enumerate().with_max_len(1).map(one);
         leaves.collect::<Result<Vec<Equilibrium>, String>>()
     })?;
     let leaves = found.or_else(refuse)?.into_iter().zip(inputs);
