@@ -17,7 +17,7 @@ use crate::leaf::derivative::parameter::LinearResponse;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, State};
 use crate::leaf::system::System;
-use crate::leaf::tissue::ForceCarriers;
+use crate::leaf::tissue::rigid::ForceCarriers;
 use crate::numbers::largest;
 use crate::rod::Section;
 use glam::DVec3;

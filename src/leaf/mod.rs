@@ -45,7 +45,9 @@ pub use crate::leaf::supports::NodeFreedom;
 pub use crate::leaf::system::{
     AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
 };
-pub use crate::leaf::tissue::{ForceCarriers, HalfTurn};
+pub use crate::leaf::tissue::cells::CellStiffness;
+pub use crate::leaf::tissue::rigid::ForceCarriers;
+pub use crate::leaf::tissue::strips::HalfTurn;
 use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation::{self, Pose};

@@ -66,12 +66,14 @@ pub struct ContractingStrains {
 /// What a strip exerts in its strains across the veins and in its fold.
 #[derive(Clone, Copy, Debug)]
 pub struct StripStress {
-    /// The force along d2, its derivative of the energy by e_2.
+    /// The force along d2, the derivative of the energy by e_2.
     pub across: f64,
     /// The part of it that is carried, and not condensed out.
     pub carried_across: f64,
-    /// The moment about d1, its derivative of the energy by theta_1.
+    /// The moment about d1, the derivative of the energy by theta_1.
     pub fold: f64,
+    /// The energy of both strains.
+    pub energy: f64,
 }
 
 /// The derivatives of e_2 and theta_1 by the unknowns of the nodes of a strip.
@@ -237,23 +239,17 @@ impl TissueStrip {
 
     /// The stress across and in the fold of the strip if it carries this spatial force, which is
     /// condensed out.
-    pub fn condensed_stress(&self, ends: &NodePair, force: DVec3) -> StripStress {
+    pub fn stress(&self, ends: &NodePair, force: DVec3) -> StripStress {
         let element = self.element_with_force(ends, force).element;
-        let nu = DVec3::from(element.nu) + self.condensing * DVec3::from(element.gap);
+        let [nu, w, gap, m] = [element.nu, element.w, element.gap, element.m].map(DVec3::from);
+        let across = (nu + self.condensing * gap).y;
+        let strain = (w + gap - self.stress_free_gap).y;
+        let turned = DVec3::from(element.u).x - self.stress_free_rotation.x;
         StripStress {
-            across: nu.y,
-            carried_across: DVec3::from(element.nu).y,
-            fold: DVec3::from(element.m).x,
-        }
-    }
-
-    /// The stress across and in the fold of the strip by its strains.
-    pub fn stress(&self, ends: &NodePair) -> StripStress {
-        let element = self.strained_element(ends, DVec3::ZERO).element;
-        StripStress {
-            across: DVec3::from(element.nu).y,
-            carried_across: DVec3::from(element.nu).y,
-            fold: DVec3::from(element.m).x,
+            across,
+            carried_across: nu.y,
+            fold: m.x,
+            energy: 0.5 * (across * strain + m.x * turned),
         }
     }
 

@@ -6,7 +6,8 @@ use crate::natural::{
 };
 use crate::numbers::{larger, largest};
 use crate::shape::RodShape;
-use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE, RodState, STATE_SIZE};
+use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE};
+use crate::shooting::rod_state::{RodState, STATE_SIZE};
 use crate::shooting::tissue_stresses::TissueState;
 use glam::DVec3;
 

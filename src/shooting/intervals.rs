@@ -11,12 +11,11 @@
 mod tests;
 
 use crate::numbers::{larger, largest};
-use crate::shooting::equations::{
-    BoundaryValueProblem, PERTURBATION_SIZE, RodState, TipConstraint, rotation_difference,
-};
+use crate::shooting::equations::{BoundaryValueProblem, TipConstraint};
 use crate::shooting::integrate::{
     InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
 };
+use crate::shooting::rod_state::{PERTURBATION_SIZE, RodState, rotation_difference};
 use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
 use glam::DVec3;

@@ -47,6 +47,7 @@ mod equations;
 mod integrate;
 mod intervals;
 mod newton;
+mod rod_state;
 mod sensitivities;
 mod solve;
 mod tissue;

@@ -11,12 +11,13 @@ use crate::memory;
 use crate::numbers::largest;
 use crate::scenario::{BaseRotations, ZeroEnergyRotation};
 use crate::shape::equally_spaced;
-use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, RodState};
+use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{LeafTrajectory, ShootingNodes, longest_step};
 use crate::shooting::intervals::{
     CondensedEquations, INTERVAL_CHOICE, IntegratedInterval, PerturbationUnits, choose_intervals,
     integrate, responses, sensitivities,
 };
+use crate::shooting::rod_state::{PERTURBATION_SIZE, RodState};
 use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
 use glam::DVec3;
 use std::f64::consts::LOG10_E;

@@ -3,8 +3,9 @@
 //! itself.
 
 use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
-use crate::shooting::equations::{BoundaryValueProblem, PERTURBATION_SIZE, SlopeDerivatives};
+use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
+use crate::shooting::rod_state::{PERTURBATION_SIZE, SlopeDerivatives};
 use crate::shooting::tissue::{GapTangent, PAIR_PERTURBATION_SIZE};
 use crate::shooting::tissue_stresses::{LinearStresses, StressChanges, TissueState};
 use glam::DMat3;
@@ -234,7 +235,7 @@ mod tests {
 
     use super::*;
     use crate::scenario::{Scenario, SupportKind};
-    use crate::shooting::equations::{RodState, rotation_difference};
+    use crate::shooting::rod_state::{RodState, rotation_difference};
 
     const END: f64 = 0.8;
 

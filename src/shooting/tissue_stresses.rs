@@ -8,7 +8,7 @@
 
 use crate::rod::Wrench;
 use crate::rotation::Pose;
-use crate::shooting::equations::PERTURBATION_SIZE;
+use crate::shooting::rod_state::PERTURBATION_SIZE;
 use crate::shooting::tissue::{
     FrameRates, GAP_STRAINS, GapTangent, PAIR_PERTURBATION_SIZE, StressedGap, TissueEnergy,
 };

@@ -18,7 +18,7 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
     NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
-use crate::leaf::tissue::{ForceCarriers, RigidStrip};
+use crate::leaf::tissue::rigid::{ForceCarriers, RigidStrip};
 use crate::rod::{Section, SectionParameterDerivative, Segment};
 use glam::DVec3;
 

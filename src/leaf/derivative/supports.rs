@@ -8,7 +8,7 @@ use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{
     Increment, NodalField, NodeIncrement, State, add_to_increment, displacement_part, rotation_part,
 };
-use crate::leaf::tissue::{ForceCarriers, RigidStrip};
+use crate::leaf::tissue::rigid::{ForceCarriers, RigidStrip};
 use crate::rod::{Segment, Wrench};
 use crate::rotation;
 use glam::DVec3;

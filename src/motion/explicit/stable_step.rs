@@ -31,7 +31,7 @@
 //! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
-use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
+use crate::leaf::{CellStiffness, DiscreteLeaf, NodeFreedom, State};
 use crate::motion::explicit::layout::{NodeData, PackLayout};
 use crate::motion::explicit::packs::{Pack, materials, node_data};
 use crate::motion::physics::{Physics, WindDrag};
@@ -258,35 +258,51 @@ fn coupling_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
 }
 
 /// Upper bound on the contribution of the tissue to the squared frequency: the largest of any single
-/// strip, half of the masses of a node belonging to either of its two gaps.
+/// strip, half of the masses of a node belonging to either of its two gaps, plus that of any cell whose strips
+/// contract, to which belongs a half of that again, as a node is in two cells of a gap.
 fn tissue_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
-    let mut largest = 0.0_f64;
+    // The inverse roots of inertia and mass of the part of a node.
+    let inverse_roots = |rod: usize, i: usize, cells: f64| {
+        let inertia = physics.inertia(leaf, rod, i);
+        let ends = [0, leaf.rods() - 1].contains(&rod);
+        let share = if ends { 1.0 } else { 0.5 } / cells;
+        // Bases that are held do not move.
+        let free = match i == 0 && physics.clamped() {
+            true => leaf.node_freedom(rod, 0),
+            false => NodeFreedom::FREE,
+        };
+        let part = |free: bool| if free { 1.0 / share } else { 0.0 };
+        let turning = inertia.polar().min(inertia.transverse);
+        [
+            part(free.rotation) / turning,
+            part(free.displacement) / inertia.mass,
+        ]
+        .map(f64::sqrt)
+    };
+    let mut of_strips = 0.0_f64;
     for strip in leaf.tissue_stiffness(state) {
         let (g, i) = (strip.gap, strip.node);
-        let inverse = |rod: usize| {
-            let inertia = physics.inertia(leaf, rod, i);
-            let ends = [0, leaf.rods() - 1].contains(&rod);
-            let share = if ends { 1.0 } else { 0.5 };
-            // Bases that are held do not move.
-            let free = match i == 0 && physics.clamped() {
-                true => leaf.node_freedom(rod, 0),
-                false => NodeFreedom::FREE,
-            };
-            let part = |free: bool| if free { 1.0 / share } else { 0.0 };
-            let turning = inertia.polar().min(inertia.transverse);
-            [
-                part(free.rotation) / turning,
-                part(free.displacement) / inertia.mass,
-            ]
-            .map(f64::sqrt)
-        };
-        let (a, b) = (inverse(g), inverse(g + 1));
+        let [a, b] = [g, g + 1].map(|rod| inverse_roots(rod, i, 1.0));
         let roots = [a[0], a[1], b[0], b[1]];
         let scaled = |r: usize, c: usize| roots[r / 3] * strip.matrix[(r, c)] * roots[c / 3];
         let matrix = SMatrix::<f64, 12, 12>::from_fn(scaled);
-        largest = largest.max(matrix.symmetric_eigenvalues().max());
+        of_strips = of_strips.max(matrix.symmetric_eigenvalues().max());
     }
-    largest
+    let mut of_cells = 0.0_f64;
+    for CellStiffness { cell, mut matrix } in leaf.cell_stiffness(state) {
+        let roots = [0, 1, 2, 3].map(|k| {
+            let (rod, i) = cell.node(k);
+            inverse_roots(rod, i, 2.0)
+        });
+        let root = |k: usize| roots[k / 6][k % 6 / 3];
+        for r in 0..matrix.nrows() {
+            for c in 0..matrix.ncols() {
+                matrix[(r, c)] *= root(r) * root(c);
+            }
+        }
+        of_cells = of_cells.max(matrix.symmetric_eigenvalues().max());
+    }
+    of_strips + of_cells
 }
 
 /// Part of the squared frequency 4 of a segment that is due to the rotations of its

@@ -1,0 +1,496 @@
+//! The cells between two nodes of neighboring veins, whose strips contract as the two segments between the nodes
+//! are strained: their energy, forces and second derivatives by the four nodes.
+
+use crate::leaf::block_tridiagonal::{RodLane, rod_lane};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
+use crate::leaf::system::System;
+use crate::leaf::tissue::strips::{StripPlace, strip_ends};
+use crate::rod::{
+    ContractingStrains, NodeBlock, NodePair, PairGradient, SegmentGradient, StripHessian,
+    StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
+};
+use crate::rotation;
+use glam::DVec3;
+use nalgebra::{SMatrix, SVector};
+
+/// Unknowns of the four nodes of a cell: of the first rod those of a segment, then of the next rod.
+const CELL_UNKNOWNS: usize = 4 * UNKNOWNS;
+
+/// The second derivatives of the energy of the strips of a cell, by the unknowns of its four nodes.
+pub type CellMatrix = SMatrix<f64, CELL_UNKNOWNS, CELL_UNKNOWNS>;
+
+/// Derivatives by the unknowns of the four nodes of a cell.
+pub(super) type CellGradient = SVector<f64, CELL_UNKNOWNS>;
+
+/// The two segments of a cell, whose strains contract its strips.
+struct CellStrains {
+    strains: [VeinStrain; 2],
+}
+
+impl CellStrains {
+    /// The mean excess of the strains of both veins.
+    fn mean(&self) -> ContractingStrains {
+        let [a, b] = self.strains.each_ref().map(|of| of.excess);
+        ContractingStrains {
+            stretch: 0.5 * (a.stretch + b.stretch),
+            bend: 0.5 * (a.bend + b.bend),
+        }
+    }
+
+    /// The derivatives of the mean stretch and bend by the unknowns of the four nodes.
+    fn gradients(&self) -> [CellGradient; 2] {
+        let both = |of: fn(&VeinStrain) -> PairGradient| {
+            let [a, b] = self.strains.each_ref().map(|vein| 0.5 * of(vein));
+            CellGradient::from_fn(|k, _| if k < 12 { a[k] } else { b[k - 12] })
+        };
+        [
+            both(VeinStrain::stretch_gradient),
+            both(VeinStrain::bend_gradient),
+        ]
+    }
+}
+
+/// A strip in a corner of a cell, in a state.
+struct CornerStrip {
+    /// The strip as its veins are strained.
+    strip: TissueStrip,
+    ends: NodePair,
+    /// Whether it is at the first nodes of the cell, or at the last: 0 or 1.
+    end: usize,
+    place: StripPlace,
+    /// The spatial force that it carries.
+    force: DVec3,
+}
+
+impl CornerStrip {
+    /// The derivatives of the contracted strains across and in the fold by the unknowns of the cell, from
+    /// those of the mean stretch and bend.
+    fn strain_gradients(&self, [stretch, bend]: &[CellGradient; 2]) -> [CellGradient; 2] {
+        let StripStrainGradients { across, fold } =
+            self.strip.strain_gradients(&self.ends, self.force);
+        let c = self.strip.contraction;
+        let mut gradients = [c * stretch, -c * bend];
+        for (gradient, own) in gradients.iter_mut().zip([across, fold]) {
+            for k in 0..12 {
+                gradient[corner_unknown(self.end, k)] += own[k];
+            }
+        }
+        gradients
+    }
+}
+
+/// Which forces the strips of a cell carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum CellForces {
+    /// Those of the state, which are condensed out.
+    Carried,
+    /// Those of their strains.
+    Strained,
+}
+
+/// The strips of a cell in a state.
+struct AssembledCell {
+    energy: f64,
+    /// Derivatives of the energy by the unknowns of the four nodes.
+    gradient: CellGradient,
+}
+
+/// A cell between segments of neighboring rods.
+#[derive(Clone, Copy, Debug)]
+pub struct TissueCell {
+    /// The gap after rod `gap`.
+    pub gap: usize,
+    /// The segment of both rods.
+    pub segment: usize,
+}
+
+impl TissueCell {
+    /// Rod and number of node `k` of the four, in the order of the unknowns.
+    pub fn node(self, k: usize) -> (usize, usize) {
+        (self.gap + k / 2, self.segment + k % 2)
+    }
+}
+
+/// The second derivatives of the energy of the strips of a cell.
+pub struct CellStiffness {
+    pub cell: TissueCell,
+    /// By the unknowns (rotation, displacement) of its four nodes.
+    pub matrix: CellMatrix,
+}
+
+/// The number among the unknowns of a cell of unknown `k` of the strip at its first or last nodes.
+fn corner_unknown(end: usize, k: usize) -> usize {
+    12 * (k / 6) + 6 * end + k % 6
+}
+
+impl DiscreteLeaf {
+    /// All cells whose strips contract.
+    pub(super) fn contracting_cells(&self) -> impl Iterator<Item = TissueCell> + use<> {
+        let gaps = match self.has_contracting_tissue() {
+            true => self.rods() - 1,
+            false => 0,
+        };
+        let n = self.segments();
+        (0..gaps).flat_map(move |gap| (0..n).map(move |segment| TissueCell { gap, segment }))
+    }
+
+    /// The cells next to node `i` in gap `gap`, if strips contract.
+    pub(super) fn cells_at_node(
+        &self,
+        gap: usize,
+        i: usize,
+    ) -> impl Iterator<Item = TissueCell> + use<> {
+        let cells = [i.checked_sub(1), (i < self.segments()).then_some(i)];
+        let contracts = self.has_contracting_tissue();
+        let cells = cells.into_iter().flatten().filter(move |_| contracts);
+        cells.map(move |segment| TissueCell { gap, segment })
+    }
+
+    /// The strains of the veins of a cell.
+    fn cell_strains(&self, state: &State, cell: TissueCell) -> CellStrains {
+        let TissueCell { gap, segment } = cell;
+        let strain =
+            |j: usize| VeinStrain::between(self.section(j, segment), &state.ends(j, segment));
+        CellStrains {
+            strains: [gap, gap + 1].map(strain),
+        }
+    }
+
+    /// The strips in the corners of a cell, as its veins are strained.
+    fn corner_strips(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        veins: &CellStrains,
+        forces: CellForces,
+    ) -> [CornerStrip; 2] {
+        let strained = veins.mean();
+        [StripPlace::Ahead, StripPlace::Behind].map(|place| {
+            let end = usize::from(place == StripPlace::Behind);
+            let (g, i) = (cell.gap, cell.segment + end);
+            let strip = self.strips[self.strip_index(place, g, i)].contracted(strained);
+            let ends = strip_ends(state, g, i);
+            let carried = self.carried_tissue_force(state, place, g, i);
+            let carried = carried.filter(|_| forces == CellForces::Carried);
+            CornerStrip {
+                force: carried.unwrap_or_else(|| strip.force(&ends, DVec3::ZERO)),
+                strip,
+                ends,
+                end,
+                place,
+            }
+        })
+    }
+
+    /// Energy and derivatives of the strips of a cell, and second derivatives, upper triangle, if wanted.
+    fn assembled_cell(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        forces: CellForces,
+        mut matrix: Option<&mut CellMatrix>,
+    ) -> AssembledCell {
+        let veins = self.cell_strains(state, cell);
+        let gradients = veins.gradients();
+        let (mut energy, mut gradient) = (0.0, CellGradient::zeros());
+        let (mut stretching, mut carried, mut bending) = (0.0, 0.0, 0.0);
+        for corner in self.corner_strips(state, cell, &veins, forces) {
+            let CornerStrip {
+                strip, ends, force, ..
+            } = &corner;
+            let loads = strip.condensed_loads(ends, *force);
+            for (node, load) in loads.into_iter().enumerate() {
+                for c in 0..3 {
+                    gradient[corner_unknown(corner.end, 6 * node + c)] -= load.moment[c];
+                    gradient[corner_unknown(corner.end, 6 * node + 3 + c)] -= load.force[c];
+                }
+            }
+            let stress = strip.stress(ends, *force);
+            let c = strip.contraction;
+            energy += stress.energy;
+            stretching += c * stress.across;
+            carried += c * stress.carried_across;
+            bending -= c * stress.fold;
+            if let Some(matrix) = &mut matrix {
+                let [by_across, by_fold] = corner.strain_gradients(&gradients);
+                add_square(matrix, strip.condensing.y, &by_across);
+                add_square(matrix, strip.fold_stiffness, &by_fold);
+                let geometric = strip.geometric_hessian(ends, *force);
+                add_pair(matrix, &geometric, |k| corner_unknown(corner.end, k));
+            }
+        }
+        gradient += stretching * gradients[0] + bending * gradients[1];
+        if let Some(matrix) = matrix {
+            for (vein, strain) in veins.strains.iter().enumerate() {
+                let geometric = strain.hessian(0.5 * carried, 0.5 * bending);
+                add_pair(matrix, &geometric, |k| 12 * vein + k);
+            }
+        }
+        AssembledCell { energy, gradient }
+    }
+
+    /// Adds the strips of a cell to the right-hand side of an assembled system and, if `matrix`, to its
+    /// matrix, where nodes move; returns their energy.
+    pub(super) fn add_cell(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        system: &mut System,
+        matrix: bool,
+    ) -> f64 {
+        let mut second = CellMatrix::zeros();
+        let wanted = matrix.then_some(&mut second);
+        let found = self.assembled_cell(state, cell, CellForces::Carried, wanted);
+        for k in 0..4 {
+            let (rod, i) = cell.node(k);
+            if i >= self.first_node() {
+                system.add_load(rod, i, cell_load(&found.gradient, k));
+            }
+        }
+        if matrix {
+            system.add_cell_matrix(cell, &second);
+        }
+        found.energy
+    }
+
+    /// Calls `add` with the rod, the node and the load of everything that the strips of a cell exert by
+    /// their strains; returns their energy.
+    pub(super) fn for_each_cell_load(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        mut add: impl FnMut(usize, usize, Wrench),
+    ) -> f64 {
+        let found = self.assembled_cell(state, cell, CellForces::Strained, None);
+        for k in 0..4 {
+            let (rod, i) = cell.node(k);
+            add(rod, i, cell_load(&found.gradient, k));
+        }
+        found.energy
+    }
+
+    /// The second derivatives of the energy of the strips of a cell.
+    fn cell_matrix(&self, state: &State, cell: TissueCell) -> CellMatrix {
+        let mut matrix = CellMatrix::zeros();
+        self.assembled_cell(state, cell, CellForces::Strained, Some(&mut matrix));
+        matrix.fill_lower_triangle_with_upper_triangle();
+        matrix
+    }
+
+    /// The second derivatives of the energy of every cell.
+    pub fn cell_stiffness(&self, state: &State) -> impl Iterator<Item = CellStiffness> {
+        self.contracting_cells().map(|cell| CellStiffness {
+            cell,
+            matrix: self.cell_matrix(state, cell),
+        })
+    }
+
+    /// Second derivatives of the energy of a cell along increments of its nodes.
+    pub(super) fn cell_curvature(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        increment: impl Fn(usize, usize) -> Increment,
+    ) -> f64 {
+        let all = cell_increments(cell, increment);
+        all.dot(&(self.cell_matrix(state, cell) * all))
+    }
+
+    /// Calls `add` with the changes of the loads of a cell, as rods, nodes and loads, by increments of its
+    /// nodes.
+    pub(super) fn for_each_cell_response(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        increment: impl Fn(usize, usize) -> Increment,
+        mut add: impl FnMut(usize, usize, Wrench),
+    ) {
+        let change = self.cell_matrix(state, cell) * cell_increments(cell, increment);
+        for k in 0..4 {
+            let (rod, i) = cell.node(k);
+            add(rod, i, cell_load(&change, k));
+        }
+    }
+
+    /// Calls `write` with the number of every strip of a cell and the spatial force, per unit of sigma, that it
+    /// carries after `step` times the increments of the nodes.
+    pub(super) fn advance_cell(
+        &self,
+        state: &State,
+        cell: TissueCell,
+        step: f64,
+        increment: impl Fn(usize, usize) -> Increment,
+        mut write: impl FnMut(usize, DVec3),
+    ) {
+        let veins = self.cell_strains(state, cell);
+        let [stretch, _] = veins.gradients();
+        let all = cell_increments(cell, increment);
+        let stretched = stretch.dot(&all);
+        for corner in self.corner_strips(state, cell, &veins, CellForces::Carried) {
+            let part = |node: usize| -> Increment {
+                std::array::from_fn(|c| all[corner_unknown(corner.end, 6 * node + c)])
+            };
+            let (a, b) = (part(0), part(1));
+            let dx = displacement_part(&b) - displacement_part(&a);
+            let turns = [rotation_part(&a), rotation_part(&b)];
+            let CornerStrip {
+                strip, ends, force, ..
+            } = &corner;
+            let change = strip.force_increment(ends, *force, dx, turns);
+            let across = rotation::midpoint(ends.q[0], ends.q[1]) * DVec3::Y;
+            let contracted = strip.condensing.y * strip.contraction * stretched * across;
+            let i = cell.segment + corner.end;
+            let weight = self.strip_weight(corner.place, i);
+            let number = self.strip_index(corner.place, cell.gap, i);
+            write(number, (*force + step * (change + contracted)) / weight);
+        }
+    }
+
+    /// The part of the tissue in the force and the moments of segment `i` of rod `j`: it resists a stretch and
+    /// a bend of the veins by which it contracts.
+    pub fn contraction_gradient(&self, state: &State, j: usize, i: usize) -> SegmentGradient {
+        let mut sum = PairGradient::zeros();
+        let gaps = self.adjacent_gaps(j);
+        for gap in gaps.filter(|_| self.has_contracting_tissue()) {
+            let cell = TissueCell { gap, segment: i };
+            let veins = self.cell_strains(state, cell);
+            let own = &veins.strains[j - gap];
+            let [stretch, bend] = [own.stretch_gradient(), own.bend_gradient()];
+            for corner in self.corner_strips(state, cell, &veins, CellForces::Strained) {
+                let StripStress { across, fold, .. } =
+                    corner.strip.stress(&corner.ends, corner.force);
+                let c = 0.5 * corner.strip.contraction;
+                sum += c * (across * stretch - fold * bend);
+            }
+        }
+        let vector = |first: usize| DVec3::from_slice(&sum.as_slice()[first..first + 3]);
+        SegmentGradient {
+            x: vector(9),
+            a: vector(0),
+            b: vector(6),
+        }
+    }
+}
+
+/// The increments of the four nodes of a cell.
+fn cell_increments(
+    cell: TissueCell,
+    increment: impl Fn(usize, usize) -> Increment,
+) -> CellGradient {
+    let nodes = [0, 1, 2, 3].map(|k| {
+        let (rod, i) = cell.node(k);
+        increment(rod, i)
+    });
+    CellGradient::from_fn(|k, _| nodes[k / UNKNOWNS][k % UNKNOWNS])
+}
+
+/// Adds `times` the product of a gradient with itself, upper triangle.
+fn add_square(matrix: &mut CellMatrix, times: f64, gradient: &CellGradient) {
+    for c in 0..CELL_UNKNOWNS {
+        let factor = times * gradient[c];
+        for r in 0..=c {
+            matrix[(r, c)] += factor * gradient[r];
+        }
+    }
+}
+
+/// Adds second derivatives between two nodes, of which unknown k has the number `at(k)` in the cell, in
+/// ascending order, upper triangle.
+fn add_pair(matrix: &mut CellMatrix, hessian: &StripHessian, at: impl Fn(usize) -> usize) {
+    for c in 0..6 {
+        for r in 0..6 {
+            if r <= c {
+                for (node, block) in hessian.diagonal_blocks.iter().enumerate() {
+                    matrix[(at(6 * node + r), at(6 * node + c))] += block[r][c];
+                }
+            }
+            matrix[(at(r), at(6 + c))] += hessian.off_diagonal_block[r][c];
+        }
+    }
+}
+
+/// Minus the part of derivatives by the unknowns of a cell that belongs to one of its nodes.
+fn cell_load(gradient: &CellGradient, node: usize) -> Wrench {
+    minus_wrench(&gradient.as_slice()[6 * node..])
+}
+
+/// Minus the moment and force that come first in these numbers.
+pub(super) fn minus_wrench(numbers: &[f64]) -> Wrench {
+    Wrench {
+        moment: -DVec3::from_slice(numbers),
+        force: -DVec3::from_slice(&numbers[3..]),
+    }
+}
+
+impl System {
+    /// The blocks between node `i` (from the first with equations) of rod `g` and node `i + 1` of the
+    /// next rod, and between node `i + 1` and node `i`, if tissue contracts.
+    pub(in crate::leaf) fn cell_blocks(&self, g: usize, i: usize) -> Option<&[NodeBlock; 2]> {
+        match g + 1 < self.rods {
+            true => self.cell_blocks.get(g * self.nodes() + i),
+            false => None,
+        }
+    }
+
+    /// As [`System::cell_blocks`], to be changed.
+    pub(in crate::leaf) fn cell_blocks_mut(
+        &mut self,
+        g: usize,
+        i: usize,
+    ) -> Option<&mut [NodeBlock; 2]> {
+        let nodes = self.nodes();
+        self.cell_blocks.get_mut(g * nodes + i)
+    }
+
+    pub(super) fn clear_cell_blocks(&mut self) {
+        self.cell_blocks.fill([NodeBlock::default(); 2]);
+    }
+
+    /// Adds the second derivatives of a cell between nodes s and s + 1 of rods g and g + 1, upper
+    /// triangle, where nodes have equations.
+    fn add_cell_matrix(&mut self, cell: TissueCell, matrix: &CellMatrix) {
+        let TissueCell { gap: g, segment: s } = cell;
+        let block = |a: usize, b: usize| -> NodeBlock {
+            std::array::from_fn(|r| std::array::from_fn(|c| matrix[(6 * a + r, 6 * b + c)]))
+        };
+        // Nodes of the cell: 0 and 1 on rod g, 2 and 3 on the next.
+        let (at, first) = (|node: usize| s + node % 2, self.first);
+        for node in (0..4).filter(|&node| at(node) >= first) {
+            let own = block(node, node);
+            self.add_block(g + node / 2, at(node), &own);
+        }
+        for node in (0..2).filter(|&node| at(node) >= first) {
+            let own = block(node, node + 2);
+            let across = self.gap_block_mut(g, at(node) - first);
+            for (sum, row) in across.iter_mut().flatten().zip(own.iter().flatten()) {
+                *sum += row;
+            }
+        }
+        let Some(i) = s.checked_sub(first) else {
+            return;
+        };
+        for rod in 0..2 {
+            let next = block(2 * rod, 2 * rod + 1);
+            let RodLane { group, lane } = rod_lane(g + rod);
+            let chain = &mut self.groups[group].matrix;
+            for (r, row) in next.iter().enumerate() {
+                for (c, value) in row.iter().enumerate() {
+                    chain.off_diagonal_entry_mut(i, r, c).0[lane] += value;
+                }
+            }
+        }
+        let crossing = block(1, 2);
+        let ahead = block(0, 3);
+        if let Some(blocks) = self.cell_blocks_mut(g, i) {
+            for (sum, value) in blocks
+                .iter_mut()
+                .flatten()
+                .flatten()
+                .zip([ahead, crossing].iter().flatten().flatten())
+            {
+                *sum += value;
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! One rod at one sigma, as the boundary-value problem has it: its state among the numbers of all rods, its
+//! perturbation, and the derivatives of its slopes.
+
+use crate::rotation::Pose;
+use glam::{DMat3, DQuat, DVec3};
+
+/// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
+pub const STATE_SIZE: usize = 13;
+
+/// Numbers that describe the perturbation of one rod at one sigma: displacement, spatial rotation,
+/// and the changes of n and m.
+pub const PERTURBATION_SIZE: usize = 12;
+
+/// One rod at one sigma.
+#[derive(Clone, Copy, Debug)]
+pub struct RodState {
+    /// Position of the centerline.
+    pub r: DVec3,
+    /// Rotation of the directors.
+    pub q: DQuat,
+    /// Force along the lab axes.
+    pub n: DVec3,
+    /// Moment along the lab axes.
+    pub m: DVec3,
+}
+
+impl RodState {
+    /// The numbers of rod `j` in a flat state; q of any length but zero.
+    #[inline]
+    pub fn from_flat_state(y: &[f64], j: usize) -> Self {
+        let y = &y[STATE_SIZE * j..STATE_SIZE * (j + 1)];
+        RodState {
+            r: DVec3::from_slice(y),
+            q: DQuat::from_slice(&y[3..]).normalize(),
+            n: DVec3::from_slice(&y[7..]),
+            m: DVec3::from_slice(&y[10..]),
+        }
+    }
+
+    /// Position and directors.
+    #[inline]
+    pub fn pose(&self) -> Pose {
+        Pose {
+            position: self.r,
+            rotation: self.q,
+        }
+    }
+
+    /// Writes the numbers of rod `j` into a flat state.
+    #[inline]
+    pub fn write_flat_state(&self, y: &mut [f64], j: usize) {
+        let y = &mut y[STATE_SIZE * j..STATE_SIZE * (j + 1)];
+        self.r.write_to_slice(y);
+        self.q.write_to_slice(&mut y[3..]);
+        self.n.write_to_slice(&mut y[7..]);
+        self.m.write_to_slice(&mut y[10..]);
+    }
+}
+
+/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SlopeDerivatives {
+    /// Derivative of r' with respect to the rotation.
+    pub r_theta: DMat3,
+    /// Derivative of r' with respect to n.
+    pub r_n: DMat3,
+    /// Derivative of the rotation rate with respect to the rotation.
+    pub theta_theta: DMat3,
+    /// Derivative of the rotation rate with respect to m.
+    pub theta_m: DMat3,
+    /// Derivative of m' with respect to the rotation.
+    pub m_theta: DMat3,
+    /// Derivative of m' with respect to n.
+    pub m_n: DMat3,
+}
+
+/// The rotation vector from `b` to `a`, to first order.
+pub fn rotation_difference(a: DQuat, b: DQuat) -> DVec3 {
+    let turn = a * b.conjugate();
+    let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
+    sign * DVec3::new(turn.x, turn.y, turn.z)
+}
