@@ -45,7 +45,7 @@ pub use crate::leaf::supports::NodeFreedom;
 pub use crate::leaf::system::{
     AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
 };
-pub use crate::leaf::tissue::cells::CellStiffness;
+pub use crate::leaf::tissue::cells::{CellStiffness, ContractionResultants};
 pub use crate::leaf::tissue::rigid::ForceCarriers;
 pub use crate::leaf::tissue::strips::HalfTurn;
 use crate::numbers::sorted_distinct;
@@ -204,9 +204,8 @@ const CLAMP_LAYER: ClampLayer = ClampLayer {
 /// Fractions of the length between which grids have segments of one length, graded towards a clamped
 /// base.
 fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
-    let tissue = scenario.tissue.iter().flatten();
-    let is_layered = |of: &Tissue| of.contraction.max_abs() > 0.0 || of.is_rigid();
-    let has_layer = tissue.clone().any(is_layered);
+    let mut tissue = scenario.tissue.iter().flatten();
+    let has_layer = tissue.any(Tissue::has_unknown_forces);
     let rods = &scenario.rods;
     let length = longest(rods);
     let apart = rods

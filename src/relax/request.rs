@@ -2,9 +2,11 @@
 //! be met.
 
 use crate::memory::TooMuch;
+use crate::natural::Natural;
+use crate::numbers::largest;
 use crate::relax::path::Route;
 use crate::run::{Limit, RefusedOption, UnmodelledFeature};
-use crate::scenario::{Scenario, UnbalancedMoment};
+use crate::scenario::{Scenario, UnbalancedMoment, longest};
 use crate::{read_and_write, shooting};
 use glam::DVec3;
 use std::fmt;
@@ -387,6 +389,17 @@ pub enum RelaxError {
         "leaf.base_held: without a load nothing holds the leaf against turning about its hinge: give it a load or another hinge, hold its tip, or clamp its base"
     )]
     TurnsFreely,
+    /// A shared place of tips that rigid tissue keeps apart.
+    #[error(
+        "tissue.along, tissue.normal = inf: the tips of veins that share one are {apart:.1e} of the longest vein apart \
+         in the natural leaf, where rigid tissue keeps them: let them end in one place at rest, leave the tips free \
+         (leaf.joined = false), or make the tissue soft; if they are apart by growth alone, tissue.grown = false lets \
+         growth strain the tissue instead"
+    )]
+    NaturalTipsApart {
+        /// Largest distance of the tips of two neighbors, over the longest vein.
+        apart: f64,
+    },
     /// Dead moments about the line about which a leaf on hinges turns freely.
     #[error(
         "leaf.base_held: no equilibrium exists: the leaf turns freely about {line}, and nothing balances the moments on it, \
@@ -419,6 +432,29 @@ pub fn check_hinge_equilibrium(scenario: &Scenario) -> Result<(), RelaxError> {
             Err(RelaxError::UnbalancedMoment { line, moment })
         }
         (false, None) => Ok(()),
+    }
+}
+
+/// Largest distance of two natural tips, over the longest vein, that counts as rounding.
+const SAME_TIP_DISTANCE: f64 = 1e-9;
+
+/// Refuses a shared place of the tips of veins that rigid tissue ties and that end apart in the natural leaf:
+/// beside the tip it would have to keep them as far apart as there.
+pub fn check_natural_tips(scenario: &Scenario) -> Result<(), RelaxError> {
+    let tissue = scenario.tissue.iter().flatten().enumerate();
+    let rigid = tissue.filter(|(_, of)| of.is_rigid()).map(|(gap, _)| gap);
+    let shared = scenario.joined || scenario.held_tip.is_some();
+    let mut rigid = rigid.filter(|_| shared).peekable();
+    if rigid.peek().is_none() {
+        return Ok(());
+    }
+    let natural = Natural::new(scenario, scenario.tissue_grown);
+    let tip = |j: usize| natural.vein_pose(j, 1.0).position;
+    let apart = largest(rigid.map(|gap| tip(gap).distance(tip(gap + 1))));
+    let apart = apart / longest(&scenario.rods);
+    match apart <= SAME_TIP_DISTANCE {
+        true => Ok(()),
+        false => Err(RelaxError::NaturalTipsApart { apart }),
     }
 }
 

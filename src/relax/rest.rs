@@ -18,8 +18,8 @@ use crate::relax::plan::{
 };
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
-    Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_tolerance,
-    check_wind_options,
+    Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_natural_tips,
+    check_tolerance, check_wind_options,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
 use crate::relax::solve_on_grid::{check_segments, explicit};
@@ -49,6 +49,7 @@ pub(crate) fn relax_on_grids(
     check_tolerance(tolerance)?;
     check_wind_options(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
+    check_natural_tips(scenario)?;
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {
@@ -307,6 +308,7 @@ pub fn relax_from(
     check_tolerance(tolerance)?;
     check_wind_options(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
+    check_natural_tips(scenario)?;
     check_start(scenario, stations, rods)?;
     let method = options.method;
     let Method::SemiImplicit(how) = method else {

@@ -158,6 +158,11 @@ impl Tissue {
         self.stiffness.iter().any(rigid)
     }
 
+    /// Whether its forces are unknowns beside those of the veins: it is rigid, or contracts.
+    pub fn has_unknown_forces(&self) -> bool {
+        self.is_rigid() || self.contraction.max_abs() > 0.0
+    }
+
     /// Everything that may vary along the gap.
     pub(crate) fn profiles(&self) -> [&Profile; 5] {
         let [along, across, normal, fold] = self.stiffness_profiles();

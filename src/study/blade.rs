@@ -9,6 +9,7 @@ use crate::relax::{
 };
 use crate::run::RefusedOption;
 use crate::scenario::{Blade, Scenario};
+use crate::shape::interpolation_weights;
 use crate::study::judge::SAME_STATION_DISTANCE;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
 use glam::DVec3;
@@ -52,6 +53,9 @@ pub const DEFAULT_VEINS_TOLERANCE: f64 = 1e-2;
 
 /// Tolerance of the blade with narrower ends that a blade is compared with.
 const COMPARED_BLADE_TOLERANCE: f64 = 1e-4;
+
+/// Veins through which a curve across a blade is laid.
+const VEINS_ACROSS: usize = 4;
 
 const LEAST_WIDTH_KEY: &str = "blade.least_width";
 
@@ -237,51 +241,21 @@ fn largest_distance([whole, other]: [&Scenario; 2], [leaf, found]: [&Equilibrium
         .map(|j| blade.vein_position(j))
         .collect();
     let vein = |k: usize| {
-        let across = AcrossVeins::new(&etas, other.vein_position(k));
+        // Across the veins by a cubic; where there is a vein it is that.
+        let across = interpolation_weights(&etas, other.vein_position(k), VEINS_ACROSS);
         let stations = found.shape.stations.iter().zip(&found.shape.rods[k].nodes);
         let apart = stations.filter_map(|(sigma, node)| {
             let same = |station: &f64| (station - sigma).abs() < SAME_STATION_DISTANCE;
             let at = leaf.shape.stations.iter().position(same)?;
-            let position = |j: usize| leaf.shape.rods[j].nodes[at].position;
-            Some(across.interpolated(position).distance(node.position))
+            let veins = leaf.shape.rods[across.first..].iter().zip(&across.weights);
+            let there: DVec3 = veins
+                .map(|(rod, weight)| *weight * rod.nodes[at].position)
+                .sum();
+            Some(there.distance(node.position))
         });
         largest(apart)
     };
     largest((0..found.rod_count).map(vein))
-}
-
-/// Interpolation across the veins of a blade by the cubic through the four nearest, or through all of
-/// fewer; where there is a vein it is that.
-struct AcrossVeins {
-    first: usize,
-    weights: Vec<f64>,
-}
-
-impl AcrossVeins {
-    /// To the place `eta` among veins at these `etas`.
-    fn new(etas: &[f64], eta: f64) -> Self {
-        let count = etas.len().min(4);
-        let right = etas.partition_point(|of| *of < eta);
-        let first = right.saturating_sub(count / 2).min(etas.len() - count);
-        let near = &etas[first..first + count];
-        let weight = |own: usize| {
-            let others = (0..count).filter(|j| *j != own);
-            others
-                .map(|j| (eta - near[j]) / (near[own] - near[j]))
-                .product()
-        };
-        AcrossVeins {
-            first,
-            weights: (0..count).map(weight).collect(),
-        }
-    }
-
-    fn interpolated(&self, position: impl Fn(usize) -> DVec3) -> DVec3 {
-        let terms = self.weights.iter().enumerate();
-        terms
-            .map(|(j, weight)| *weight * position(self.first + j))
-            .sum()
-    }
 }
 
 /// Why the veins of a leaf are not refined.
@@ -427,25 +401,5 @@ mod tests {
         let (fewer, risen) = rest(981.0, 3);
         let far = compare_veins([&scenario, &fewer], [&leaf, &risen]).unwrap_err();
         assert_eq!(far.code(), "another-equilibrium");
-    }
-
-    /// A cubic across veins is met everywhere, and a vein is met to the last bit.
-    #[test]
-    fn interpolation_across_veins_is_cubic() {
-        for rods in [5, 6, 9] {
-            let etas: Vec<f64> = (0..rods)
-                .map(|j| (2 * j + 1 - rods) as f64 / (rods - 1) as f64)
-                .collect();
-            let surface = |y: f64| DVec3::new(1.0 - y * y, y, y * y * y - 0.3 * y);
-            for eta in [-1.0, -0.9, -0.31, 0.0, 0.07, 0.5, 0.98, 1.0] {
-                let across = AcrossVeins::new(&etas, eta);
-                let found = across.interpolated(|j| surface(etas[j]));
-                assert!(found.distance(surface(eta)) < 1e-14, "{rods} {eta}");
-            }
-            for (j, eta) in etas.iter().enumerate() {
-                let found = AcrossVeins::new(&etas, *eta).interpolated(|j| surface(etas[j]));
-                assert_eq!(found, surface(etas[j]));
-            }
-        }
     }
 }

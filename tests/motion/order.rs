@@ -106,7 +106,7 @@ fn of_a_leaf_with_tissue() {
         Tissue {
             stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
             fold: Profile::Constant(0.5),
-            contraction: Profile::Constant(0.0),
+            contraction: Profile::Constant(0.05),
         };
         2
     ]);

@@ -34,6 +34,7 @@ mod reaction_bars;
 mod real_leaves;
 mod reductions;
 mod reference_leaves;
+mod rigid_tissue;
 mod rollup;
 mod section;
 mod sensitivities;

@@ -112,6 +112,17 @@ impl TissueCell {
     }
 }
 
+/// The part of the tissue in the resultants of a segment.
+#[derive(Clone, Copy, Debug)]
+pub struct ContractionResultants {
+    /// Its part of n_1, the force against a stretch.
+    pub stretching: f64,
+    /// Its part of m_2, the moment against a bend about d2.
+    pub bending: f64,
+    /// The derivatives of its energy by the nodes of the segment.
+    pub gradient: SegmentGradient,
+}
+
 /// The second derivatives of the energy of the strips of a cell.
 pub struct CellStiffness {
     pub cell: TissueCell,
@@ -347,29 +358,45 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The part of the tissue in the force and the moments of segment `i` of rod `j`: it resists a stretch and
-    /// a bend of the veins by which it contracts.
-    pub fn contraction_gradient(&self, state: &State, j: usize, i: usize) -> SegmentGradient {
-        let mut sum = PairGradient::zeros();
-        let gaps = self.adjacent_gaps(j);
-        for gap in gaps.filter(|_| self.has_contracting_tissue()) {
-            let cell = TissueCell { gap, segment: i };
+    /// What the tissue bears of the resultants of all segments, rod after rod, as it resists the stretch and the
+    /// bend of the veins by which it contracts; empty unless it does.
+    pub fn contraction_resultants(&self, state: &State) -> Vec<ContractionResultants> {
+        let n = self.segments();
+        let mut all = Vec::new();
+        if !self.has_contracting_tissue() {
+            return all;
+        }
+        // By the strains of each segment, from the cells on either side.
+        let mut sums = vec![[0.0; 2]; self.rods() * n];
+        for cell in self.contracting_cells() {
             let veins = self.cell_strains(state, cell);
-            let own = &veins.strains[j - gap];
-            let [stretch, bend] = [own.stretch_gradient(), own.bend_gradient()];
             for corner in self.corner_strips(state, cell, &veins, CellForces::Strained) {
                 let StripStress { across, fold, .. } =
                     corner.strip.stress(&corner.ends, corner.force);
                 let c = 0.5 * corner.strip.contraction;
-                sum += c * (across * stretch - fold * bend);
+                for rod in [cell.gap, cell.gap + 1] {
+                    let [stretch, bend] = &mut sums[rod * n + cell.segment];
+                    *stretch += c * across;
+                    *bend -= c * fold;
+                }
             }
         }
-        let vector = |first: usize| DVec3::from_slice(&sum.as_slice()[first..first + 3]);
-        SegmentGradient {
-            x: vector(9),
-            a: vector(0),
-            b: vector(6),
+        for ((j, i), [stretch, bend]) in self.rod_index_pairs(0..n).zip(sums) {
+            let section = self.section(j, i);
+            let strain = VeinStrain::between(section, &state.ends(j, i));
+            let gradient = stretch * strain.stretch_gradient() + bend * strain.bend_gradient();
+            let vector = |first: usize| DVec3::from_slice(&gradient.as_slice()[first..first + 3]);
+            all.push(ContractionResultants {
+                stretching: stretch / section.ds,
+                bending: bend / section.ds,
+                gradient: SegmentGradient {
+                    x: vector(9),
+                    a: vector(0),
+                    b: vector(6),
+                },
+            });
         }
+        all
     }
 }
 

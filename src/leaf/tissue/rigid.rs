@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// The same where no force is carried on from one step to the next, in explicit motions: the error by the
 /// finite stiffness is of second order in the length of the segments.
-const ELASTIC_TISSUE_RATIO: f64 = 10.0;
+const ELASTIC_TISSUE_RATIO: f64 = 100.0;
 
 /// The elements of a leaf in a state whose forces are condensed out of its linear equations, and not always
 /// exactly: see [`DiscreteLeaf::complete_law`].

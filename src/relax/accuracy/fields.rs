@@ -4,8 +4,7 @@
 use crate::leaf::{DiscreteLeaf, RodFields, RodIntegrator, StationFields};
 use crate::numbers::larger;
 use crate::relax::accuracy::richardson::{Richardson, distance};
-use crate::relax::accuracy::transfer;
-use crate::relax::accuracy::transfer::{GridLevel, Stencil, positions};
+use crate::relax::accuracy::transfer::{GridLevel, NodalResultants, Stencil, positions};
 use glam::{DQuat, DVec3};
 
 /// A node's values that are extrapolated: position, quaternion, n and m along the directors.
@@ -24,20 +23,26 @@ pub fn extrapolated_node_fields(
 ) -> Vec<Vec<RodFields>> {
     let finest = &levels[levels.len() - 1];
     let rods = 0..finest.leaf.rods();
-    if columns == 0 {
-        return rods.map(|j| on_grid(finest, j, parts)).collect();
-    }
     let used = &levels[levels.len() - 1 - columns..];
-    let rod = |j: usize| unpack_nodes(&extrapolated(used, &rotations(finest, j), j, parts));
+    let used: Vec<_> = used.iter().map(NodalResultants::on_level).collect();
+    if columns == 0 {
+        return rods.map(|j| on_grid(&used[0], finest, j, parts)).collect();
+    }
+    let rod = |j: usize| unpack_nodes(&extrapolated(&used, &rotations(finest, j), j, parts));
     rods.map(rod).collect()
 }
 
 /// The fields of rod `j` on one grid, at the ends of equal parts.
-fn on_grid(level: &GridLevel, j: usize, parts: usize) -> Vec<RodFields> {
+fn on_grid(
+    resultants: &NodalResultants,
+    level: &GridLevel,
+    j: usize,
+    parts: usize,
+) -> Vec<RodFields> {
     let GridLevel { leaf, state } = level;
     let stride = leaf.segments() / parts;
     let node = |(i, q): (usize, DQuat)| {
-        let [n, m] = transfer::resultants(leaf, state, j, i).map(|vector| q * vector);
+        let [n, m] = resultants.at(j, i).map(|vector| q * vector);
         let x = state.x[state.base(j) + i];
         RodFields { x, q, n, m }
     };
@@ -72,9 +77,18 @@ pub fn finer_nodes(
     let finest = &levels[levels.len() - 1];
     let rods = 0..finest.leaf.rods();
     let signs: Vec<_> = rods.clone().map(|j| rotations(finest, j)).collect();
+    let resultants: Vec<_> = levels[used..]
+        .iter()
+        .map(NodalResultants::on_level)
+        .collect();
     let on = |k: usize, j: usize| {
         let segments = levels[k].leaf.segments();
-        extrapolated(&levels[k.max(used)..], &signs[j], j, segments)
+        extrapolated(
+            &resultants[k.saturating_sub(used)..],
+            &signs[j],
+            j,
+            segments,
+        )
     };
     let mut reached: Vec<Vec<PackedNode>> = rods.clone().map(|j| on(0, j)).collect();
     let (mut grid, mut between) = (0, 0.0);
@@ -154,12 +168,18 @@ fn ratio(change: f64, part: f64) -> f64 {
 
 /// The values of a rod extrapolated over `levels` at the ends of so many parts; its quaternions on
 /// the finest grid are `signs`.
-fn extrapolated(levels: &[GridLevel], signs: &[DQuat], j: usize, parts: usize) -> Vec<PackedNode> {
-    let on = |GridLevel { leaf, state }: &GridLevel| {
+fn extrapolated(
+    levels: &[NodalResultants],
+    signs: &[DQuat],
+    j: usize,
+    parts: usize,
+) -> Vec<PackedNode> {
+    let on = |resultants: &NodalResultants| {
+        let (leaf, state) = (resultants.leaf, resultants.state);
         let stride = leaf.segments() / parts;
         let node = |i: usize| -> PackedNode {
             let k = state.base(j) + i * stride;
-            let [n, m] = transfer::resultants(leaf, state, j, i * stride);
+            let [n, m] = resultants.at(j, i * stride);
             // q and -q are the same rotation: all grids must use the same sign.
             let q = align_quaternion_sign(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
             let x = state.x[k];
@@ -269,7 +289,7 @@ pub fn integrate_between_stations(
 }
 
 /// The mean of two sections, the second with this weight.
-pub fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: f64) -> LeafSection {
+fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: f64) -> LeafSection {
     let rod = |(a, b): (&RodFields, &RodFields)| RodFields {
         x: a.x.lerp(b.x, weight),
         q: a.q.lerp(b.q, weight),

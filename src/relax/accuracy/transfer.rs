@@ -2,11 +2,11 @@
 //! halved or to any other, restriction, and prediction on a finer grid from several coarser ones by
 //! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
+use crate::leaf::{ContractionResultants, DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
 use crate::rod::SegmentGradient;
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// Segments of a panel between kinks from which on polynomials along it predict better than cubic
 /// Hermite interpolants.
@@ -493,13 +493,24 @@ pub fn fields_from_node_state(leaf: &Leaf, node: &NodeState) -> RodFields {
     }
 }
 
+/// Takes back the strain that a vein would have by what the tissue bears of its n_1 and m_2 (dimensionless).
+pub fn subtract_tissue_strain(leaf: &Leaf, at: VeinStation, part: DVec2, node: &mut NodeState) {
+    if part != DVec2::ZERO {
+        let section = leaf.section(at.vein, at.sigma, 1.0);
+        node.v.x -= section.compliance.x * part.x;
+        node.u.y -= part.y / (section.couple_stiffness.y * leaf.scale.length);
+    }
+}
+
 /// All rods of a state in the units of the scenario.
 pub fn rod_shapes(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
+    let resultants = NodalResultants::new(leaf, state);
     let rod = |j: usize| {
         let nodes = leaf.grid.sigma().iter().enumerate().map(|(i, &sigma)| {
             let (at, k) = (VeinStation { vein: j, sigma }, state.base(j) + i);
-            let resultants = resultants(leaf, state, j, i);
-            node_state(&leaf.leaf, at, state.x[k], state.q[k], resultants)
+            let mut node = node_state(&leaf.leaf, at, state.x[k], state.q[k], resultants.at(j, i));
+            subtract_tissue_strain(&leaf.leaf, at, resultants.of_tissue(j, i), &mut node);
+            node
         });
         RodShape {
             length: leaf.leaf.length(j) * leaf.leaf.scale.length,
@@ -509,65 +520,110 @@ pub fn rod_shapes(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
     (0..leaf.rods()).map(rod).collect()
 }
 
-/// Stress resultant n and couple m at node `i` of rod `j` along its directors, dimensionless:
-/// from the balance of the node's half-cell and the end moments of the adjoining segment, so
-/// that they have the clean ds^2 series of the positions.
-pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DVec3; 2] {
-    let n = leaf.segments();
-    let to_directors = state.q[state.base(j) + i].conjugate();
-    let carried = |i: usize| state.n[j * n + i];
-    // The vein and the part of the tissue that it strains.
-    let tissue = |i: usize| leaf.contraction_gradient(state, j, i);
-    let segment = |i: usize| {
-        let own = leaf
-            .segment(state, j, i, carried(i))
-            .gradient(leaf.section(j, i));
-        let tissue = tissue(i);
-        SegmentGradient {
-            x: carried(i) + tissue.x,
-            a: own.a + tissue.a,
-            b: own.b + tissue.b,
+/// The stress resultants at the nodes of a leaf in a state, along the directors, dimensionless.
+pub struct NodalResultants<'l> {
+    pub leaf: &'l DiscreteLeaf,
+    pub state: &'l State,
+    /// What the tissue bears of those of every segment; empty unless it contracts.
+    tissue: Vec<ContractionResultants>,
+}
+
+impl<'l> NodalResultants<'l> {
+    /// Those of a leaf in a state.
+    pub fn new(leaf: &'l DiscreteLeaf, state: &'l State) -> Self {
+        let tissue = leaf.contraction_resultants(state);
+        NodalResultants {
+            leaf,
+            state,
+            tissue,
         }
-    };
-    // The load on a node, without that part.
-    let load = |i: usize| {
-        let mut load = leaf.load(state, j, i);
-        let end = leaf.rigid_end_load(state, j, i);
-        (load.force, load.moment) = (load.force + end.force, load.moment + end.moment);
-        if i > 0 {
-            let before = tissue(i - 1);
-            (load.force, load.moment) = (load.force + before.x, load.moment + before.b);
-        }
-        if i < n {
-            let after = tissue(i);
-            (load.force, load.moment) = (load.force - after.x, load.moment + after.a);
-        }
-        load
-    };
-    let (force, moment) = if i == 0 {
-        let (load, segment) = (load(0), segment(0));
-        (segment.x + load.force, load.moment - segment.a)
-    } else {
-        // The part of the nodal load that belongs to the left half-cell.
-        let left = leaf.grid.segment_width(i - 1);
-        let right = if i < n {
-            leaf.grid.segment_width(i)
-        } else {
-            0.0
+    }
+
+    /// Those of a leaf at rest on one grid.
+    pub fn on_level(level: &'l GridLevel) -> Self {
+        NodalResultants::new(&level.leaf, &level.state)
+    }
+
+    /// Whether tissue bears a part of them.
+    pub fn include_tissue(&self) -> bool {
+        !self.tissue.is_empty()
+    }
+
+    /// The gradient of segment `i` of rod `j`, and the part of the tissue in it.
+    fn segment(&self, j: usize, i: usize) -> [SegmentGradient; 2] {
+        let (leaf, k) = (self.leaf, j * self.leaf.segments() + i);
+        let carried = self.state.n[k];
+        let own = leaf.segment(self.state, j, i, carried);
+        let mut whole = own.gradient(leaf.section(j, i));
+        whole.x = carried;
+        let none = SegmentGradient {
+            x: DVec3::ZERO,
+            a: DVec3::ZERO,
+            b: DVec3::ZERO,
         };
-        let mut load = load(i);
-        load.force -= match i == n {
-            true => leaf.tip_force(j),
-            false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
+        let tissue = self.tissue.get(k).map_or(none, |it| it.gradient);
+        whole.x += tissue.x;
+        whole.a += tissue.a;
+        whole.b += tissue.b;
+        [whole, tissue]
+    }
+
+    /// Force n and couple m at node `i` of rod `j`: from the balance of the node's half-cell and the end
+    /// moments of the adjoining segment, so that they have the clean ds^2 series of the positions. They
+    /// include what contracting tissue bears of them.
+    pub fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
+        let (leaf, state) = (self.leaf, self.state);
+        let n = leaf.segments();
+        let to_directors = state.q[state.base(j) + i].conjugate();
+        let before = i.checked_sub(1).map(|i| self.segment(j, i));
+        let after = (i < n).then(|| self.segment(j, i));
+        // The load on the node, without what the tissue exerts as a part of the segments.
+        let (load, end) = (leaf.load(state, j, i), leaf.rigid_end_load(state, j, i));
+        let (mut force, mut moment) = (load.force + end.force, load.moment + end.moment);
+        if let Some([_, tissue]) = &before {
+            (force, moment) = (force + tissue.x, moment + tissue.b);
+        }
+        if let Some([_, tissue]) = &after {
+            (force, moment) = (force - tissue.x, moment + tissue.a);
+        }
+        let (force, moment) = match (before, after) {
+            (None, Some([next, _])) => (next.x + force, moment - next.a),
+            (Some([before, _]), _) => {
+                // The part of the nodal load that belongs to the left half-cell.
+                let left = leaf.grid.segment_width(i - 1);
+                let right = if i < n {
+                    leaf.grid.segment_width(i)
+                } else {
+                    0.0
+                };
+                force -= match i == n {
+                    true => leaf.tip_force(j),
+                    false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
+                };
+                let part = left / (left + right);
+                (before.x - part * force, before.b - part * moment)
+            }
+            (None, None) => (DVec3::ZERO, DVec3::ZERO),
         };
-        let before = left / (left + right);
-        let segment = segment(i - 1);
-        (
-            segment.x - before * load.force,
-            segment.b - before * load.moment,
-        )
-    };
-    [force, moment].map(|vector| to_directors * vector)
+        [force, moment].map(|vector| to_directors * vector)
+    }
+
+    /// What the tissue bears of n_1 and of m_2 at node `i` of rod `j`: interpolated between the middles of the
+    /// segments on either side, at the ends from the last two.
+    pub fn of_tissue(&self, j: usize, i: usize) -> DVec2 {
+        let (leaf, n) = (self.leaf, self.leaf.segments());
+        let part = |i: usize| {
+            let of = self.tissue.get(j * n + i);
+            of.map_or(DVec2::ZERO, |of| DVec2::new(of.stretching, of.bending))
+        };
+        if n == 1 {
+            return part(0);
+        }
+        let before = i.saturating_sub(1).min(n - 2);
+        let [from, to] = [before, before + 1].map(|i| leaf.grid.segment_midpoint(i));
+        let weight = (leaf.grid.sigma()[i] - from) / (to - from);
+        part(before).lerp(part(before + 1), weight)
+    }
 }
 
 /// A leaf at rest on one grid.

@@ -4,8 +4,8 @@
 use crate::leaf::{DiscreteLeaf, FieldChange, Scale};
 use crate::numbers::{larger, largest};
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
-use crate::relax::accuracy::transfer::GridLevel;
-use crate::relax::accuracy::{FieldErrors, NestedEquilibrium, transfer};
+use crate::relax::accuracy::transfer::{GridLevel, NodalResultants};
+use crate::relax::accuracy::{FieldErrors, NestedEquilibrium};
 use crate::rod::Wrench;
 use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
@@ -330,11 +330,10 @@ impl Stresses {
         let nodes = || (0..rods).flat_map(|j| (0..sigma.len()).map(move |i| (j, i)));
         let on = |level: &GridLevel| -> Vec<DVec3> {
             let stride = level.leaf.segments() / (sigma.len() - 1);
-            let resultants =
-                |(j, i)| transfer::resultants(&level.leaf, &level.state, j, i * stride);
+            let resultants = NodalResultants::on_level(level);
             nodes()
                 .enumerate()
-                .map(|(k, at)| stress(k, resultants(at)))
+                .map(|(k, (j, i))| stress(k, resultants.at(j, i * stride)))
                 .collect()
         };
         let noise = ForceNoise {

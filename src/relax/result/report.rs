@@ -5,23 +5,23 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator};
 use crate::newton::EquilibriumFailure;
 use crate::numbers::larger;
 use crate::relax::accuracy::fields::{
-    KnownSection, LeafSection, SectionsBetween, align_quaternion_sign, integrate_between_stations,
-    weighted_mean_section,
+    KnownSection, LeafSection, align_quaternion_sign, integrate_between_stations,
 };
-use crate::relax::accuracy::transfer::{GridLevel, VeinStation, is_planar_level};
+use crate::relax::accuracy::transfer::{GridLevel, NodalResultants, VeinStation, is_planar_level};
 use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
 use crate::relax::path::{Event, Path, PathPosition, StabilityLoss, Stage};
 use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::rotation::{self, Pose};
+use crate::rotation::Pose;
 use crate::scenario::{
-    LARGEST_PLAUSIBLE_STRETCH, Scenario, held_tip_out_of_reach, plausibility_warnings,
+    LARGEST_PLAUSIBLE_STRETCH, Scenario, Tissue, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
 };
 use crate::shape::{
-    Centerline, NodeState, RodShape, STATION_TOLERANCE, Undulation, equally_spaced,
+    Centerline, InterpolationWeights, NodeState, RodShape, STATION_TOLERANCE, Undulation,
+    equally_spaced, interpolation_weights,
 };
 use glam::DVec3;
 
@@ -230,10 +230,23 @@ fn stations_of_result(
         }
     };
     let leaf = problem.leaf;
+    let resultants: Vec<_> = (found.levels.iter())
+        .map(NodalResultants::on_level)
+        .collect();
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let nodes = rod.iter().zip(grid.sigma());
         let nodes = nodes.map(|(fields, &sigma)| {
-            transfer::node_state_from_fields(leaf, VeinStation { vein: j, sigma }, fields)
+            let at = VeinStation { vein: j, sigma };
+            let mut node = transfer::node_state_from_fields(leaf, at, fields);
+            if resultants.iter().any(NodalResultants::include_tissue) {
+                let stencils = found.stencils(sigma);
+                let part = found.extrapolated_value(|k, _| {
+                    let [value, _] = &stencils[k];
+                    value.value(|i| resultants[k].of_tissue(j, i).extend(0.0))
+                });
+                transfer::subtract_tissue_strain(leaf, at, part.truncate(), &mut node);
+            }
+            node
         });
         RodShape {
             length: leaf.length(j) * leaf.scale.length,
@@ -561,10 +574,8 @@ impl Equilibrium {
                 .collect()
         };
         let mut between = 0.0_f64;
-        let tied = scenario.tissue.iter().flatten();
-        let tied = tied
-            .clone()
-            .any(|of| of.is_rigid() || of.contraction.max_abs() > 0.0);
+        let tied = (scenario.tissue.iter().flatten()).any(Tissue::has_unknown_forces);
+        let kinks = scenario.kinks();
         let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
         let mut rest = to.as_slice();
         for (i, &station) in stations.iter().enumerate() {
@@ -584,36 +595,26 @@ impl Equilibrium {
             if points.is_empty() {
                 continue;
             }
-            if tied {
-                // Their equations have the forces of tissue that is rigid, or contracts, as unknowns.
-                let width = next - station;
-                for (vein, rod) in known.iter().enumerate() {
-                    let length = width * scenario.rods[vein].length;
-                    let ends = [&rod.nodes[i], &rod.nodes[i + 1]];
-                    let node = |at: &f64| hermite_node(ends, length, (at - station) / width);
-                    rods[vein].extend(points.iter().map(node));
-                    between = larger(
-                        between,
-                        hermite_error(stations, &rod.nodes, scenario.rods[vein].length, i),
-                    );
-                }
-                continue;
-            }
             let [begin, end] = [i, i + 1].map(section);
             let ends = [(station, &begin), (next, &end)];
             let ends = ends.map(|(sigma, section)| KnownSection { sigma, section });
-            let found = match at_rest {
+            // The equations of a single rod do not determine the forces of tissue that is rigid, or contracts.
+            let found = match at_rest && !tied {
                 true => integrate_between_stations(&mut flow, leaf.kinks(), ends, points),
                 false => None,
             };
-            let found = found.unwrap_or_else(|| {
-                let weight = |at: &f64| (at - station) / (next - station);
-                let mean = |at: &f64| weighted_mean_section([&begin, &end], weight(at));
-                SectionsBetween {
-                    sections: points.iter().map(mean).collect(),
-                    added_error: if at_rest { next - station } else { 0.0 },
+            let Some(found) = found else {
+                for at in points {
+                    let through = StationInterpolation::new(stations, &kinks, *at);
+                    for (interpolated, rod) in rods.iter_mut().zip(known) {
+                        interpolated.push(through.node_state(&rod.nodes));
+                        if at_rest {
+                            between = larger(between, through.error(&rod.nodes));
+                        }
+                    }
                 }
-            });
+                continue;
+            };
             between = larger(between, found.added_error * leaf.scale.length);
             for (&sigma, section) in points.iter().zip(&found.sections) {
                 for (vein, fields) in section.iter().enumerate() {
@@ -639,53 +640,78 @@ impl Equilibrium {
     }
 }
 
-/// Safety factor on the error of Hermite interpolation, as told by leaving a node out.
-const HERMITE_SAFETY: f64 = 4.0;
+/// Most stations through which a vein is interpolated.
+const INTERPOLATED_STATIONS: usize = 6;
 
-/// The state at the fraction `t` between two nodes that are a `length` apart along a vein: positions and
-/// rotations by Hermite interpolation of the third degree with their strains, which have an error of
-/// fourth order; strains and stress resultants linearly.
-fn hermite_node([a, b]: [&NodeState; 2], length: f64, t: f64) -> NodeState {
-    let (square, cube) = (t * t, t * t * t);
-    let value = [2.0 * cube - 3.0 * square + 1.0, 3.0 * square - 2.0 * cube];
-    let slope = [cube - 2.0 * square + t, cube - square];
-    let tangents = [a, b].map(|node| length * (node.rotation * node.v));
-    let position = value[0] * a.position
-        + value[1] * b.position
-        + slope[0] * tangents[0]
-        + slope[1] * tangents[1];
-    // The rotation vector from the first node on, and its slopes.
-    let whole = rotation::log(a.rotation.conjugate() * b.rotation);
-    let [first, last] = [a, b].map(|node| length * node.u);
-    let turned = whole.cross(last);
-    let last = last + 0.5 * turned + whole.cross(turned) / 12.0;
-    let vector = value[1] * whole + slope[0] * first + slope[1] * last;
-    NodeState {
-        position,
-        rotation: (a.rotation * rotation::exp(vector)).normalize(),
-        v: a.v.lerp(b.v, t),
-        u: a.u.lerp(b.u, t),
-        n: a.n.lerp(b.n, t),
-        m: a.m.lerp(b.m, t),
+/// Safety factor on the error of such an interpolation, the difference to that through one station less.
+const INTERPOLATION_SAFETY: f64 = 2.0;
+
+/// Polynomials through the stations nearest to a place between two kinks.
+struct StationInterpolation {
+    value: InterpolationWeights,
+    /// Through one station less.
+    lower: InterpolationWeights,
+}
+
+impl StationInterpolation {
+    /// To the place `at`, between `kinks` that are stations.
+    fn new(stations: &[f64], kinks: &[f64], at: f64) -> Self {
+        let panel = kinks.partition_point(|kink| *kink < at);
+        let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
+        let high = kinks.get(panel).copied().unwrap_or(1.0);
+        let node = |at: f64| stations.partition_point(|it| *it < at - SAME_KINK_DISTANCE);
+        let (first, last) = (node(low), node(high).min(stations.len() - 1));
+        let near = &stations[first..=last];
+        let through = |count: usize| {
+            let InterpolationWeights {
+                first: skipped,
+                weights,
+            } = interpolation_weights(near, at, count);
+            InterpolationWeights {
+                first: first + skipped,
+                weights,
+            }
+        };
+        let count = INTERPOLATED_STATIONS.min(near.len());
+        StationInterpolation {
+            value: through(count),
+            lower: through(count - 1),
+        }
+    }
+
+    /// The state of a vein with these nodes.
+    fn node_state(&self, nodes: &[NodeState]) -> NodeState {
+        let InterpolationWeights { first, weights } = &self.value;
+        let near = || nodes[*first..].iter().zip(weights);
+        let sum = |of: fn(&NodeState) -> DVec3| -> DVec3 {
+            near().map(|(node, weight)| *weight * of(node)).sum()
+        };
+        let sign = nodes[*first].rotation;
+        let turned =
+            near().map(|(node, weight)| align_quaternion_sign(node.rotation, sign) * *weight);
+        let rotation = turned.reduce(|a, b| a + b).unwrap_or(sign);
+        NodeState {
+            position: sum(|node| node.position),
+            rotation: rotation.normalize(),
+            v: sum(|node| node.v),
+            u: sum(|node| node.u),
+            n: sum(|node| node.n),
+            m: sum(|node| node.m),
+        }
+    }
+
+    /// The error of the position of a vein with these nodes.
+    fn error(&self, nodes: &[NodeState]) -> f64 {
+        let position = |through: &InterpolationWeights| -> DVec3 {
+            let near = nodes[through.first..].iter().zip(&through.weights);
+            near.map(|(node, weight)| *weight * node.position).sum()
+        };
+        INTERPOLATION_SAFETY * position(&self.value).distance(position(&self.lower))
     }
 }
 
-/// The error of positions between the nodes `i` and `i + 1`: what interpolation misses at either of them
-/// from its neighbors, in proportion to the fourth power of the distances.
-fn hermite_error(stations: &[f64], nodes: &[NodeState], length: f64, i: usize) -> f64 {
-    let missed = |k: usize| {
-        if k == 0 || k + 1 >= nodes.len() {
-            return 0.0;
-        }
-        let [before, at, after] = [k - 1, k, k + 1].map(|k| stations[k]);
-        let ends = [&nodes[k - 1], &nodes[k + 1]];
-        let t = (at - before) / (after - before);
-        let there = hermite_node(ends, (after - before) * length, t);
-        let part = (stations[i + 1] - stations[i]) / (after - before);
-        there.position.distance(nodes[k].position) * part.powi(4)
-    };
-    HERMITE_SAFETY * larger(missed(i), missed(i + 1))
-}
+/// A station that is closer to a kink than this, as a fraction of the length, is at it.
+const SAME_KINK_DISTANCE: f64 = 1e-12;
 
 /// Nodes of the finest grid, with all segments halved until there are enough.
 fn finest_grid_stations(shape: &Shape) -> Vec<f64> {
