@@ -156,10 +156,13 @@ impl Physics {
         let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
+        let dynamics = &self.dynamics;
+        let [transverse, polar] =
+            [&dynamics.rotary_inertia[j], &dynamics.polar_inertia[j]].map(around);
         Inertia {
-            mass: length * around(&self.dynamics.density[j]) / self.density_unit + on_points,
-            transverse: length * around(&self.dynamics.rotary_inertia[j]) / rotary,
-            polar_excess: self.dynamics.polar_excess,
+            mass: length * around(&dynamics.density[j]) / self.density_unit + on_points,
+            transverse: length * transverse / rotary,
+            polar_excess: polar / transverse - 1.0,
         }
     }
 

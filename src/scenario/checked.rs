@@ -259,15 +259,15 @@ impl Scenario {
     /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
     /// sections.
     pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        if self.blade.is_none() {
+        let Some(blade) = &self.blade else {
             return self.radii.moduli(rod, sigma);
-        }
-        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
-        let rod = self.rods.get(rod)?;
-        let side = |axis: usize| {
-            let bending = rod.couple_stiffness[axis].at(sigma);
-            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
         };
-        Some(Moduli::for_strip(side(2), side(1)))
+        // H1 = E h t and A3/H1 = l^2/12.
+        let vein = self.rods.get(rod)?;
+        let stretch = vein.force_stiffness[0].at(sigma);
+        let thickness = blade.thickness(rod, sigma);
+        let width = stretch / (blade.young(rod, sigma) * thickness);
+        let lever = (12.0 * vein.couple_stiffness[2].at(sigma) / stretch).sqrt();
+        Some(Moduli::for_strip(width, thickness, lever))
     }
 }

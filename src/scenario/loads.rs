@@ -214,11 +214,10 @@ pub struct Dynamics {
     /// rho I, the moment of inertia per unit reference length about d2 and
     /// about d3, one per rod; positive.
     pub rotary_inertia: Vec<Profile>,
-    /// Excess of the inertia about d1 over `rotary_inertia`, as a fraction of it: 1 if a
-    /// section is given, as for every round one; 0 otherwise, where a vein turns with its
-    /// strip of blade and has the same inertia about all axes, as in the relaxation
-    /// ([`crate::relax`]).
-    pub polar_excess: f64,
+    /// The moment of inertia per unit reference length about d1, one per rod: twice `rotary_inertia` if a
+    /// section is given, that of its strip for a vein of a blade with a mass; otherwise the same as about the other
+    /// axes, as a vein turns with a strip of blade, as in the relaxation ([`crate::relax`]).
+    pub polar_inertia: Vec<Profile>,
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
     pub external_damping: f64,
@@ -310,9 +309,10 @@ impl Dynamics {
         let duration = DEFAULT_MOTION.duration * time;
         let radius = Profile::Constant(DEFAULT_MOTION.radius * scale.length);
         let inertia = |density| round_inertia(density, &radius);
+        let rotary_inertia: Vec<Profile> = density.iter().map(inertia).collect();
         Dynamics {
-            rotary_inertia: density.iter().map(inertia).collect(),
-            polar_excess: 0.0,
+            polar_inertia: rotary_inertia.clone(),
+            rotary_inertia,
             external_damping: critical_damping(&density, time),
             density,
             internal_damping: 0.0,
@@ -396,8 +396,16 @@ pub(super) fn read_dynamics(
         None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
-    let section = read_rotary_inertia(entries, &preset.density)?;
-    let section = section.or_else(|| of_mass(Property::RotaryInertia));
+    let [rotary_inertia, polar_inertia] = match read_rotary_inertia(entries, &preset.density)? {
+        Some(given) => {
+            let polar = given.iter().map(|profile| profile.scaled(2.0)).collect();
+            [given, polar]
+        }
+        None => match [Property::RotaryInertia, Property::PolarInertia].map(of_mass) {
+            [Some(rotary), Some(polar)] => [rotary, polar],
+            _ => [preset.rotary_inertia, preset.polar_inertia],
+        },
+    };
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;
     let output_interval = match entries.given_value(Key::OutputInterval) {
@@ -413,8 +421,8 @@ pub(super) fn read_dynamics(
         check_single_rod_moments(item, rods.len(), &tip_moment.value)?;
     }
     Ok(Dynamics {
-        polar_excess: if section.is_some() { 1.0 } else { 0.0 },
-        rotary_inertia: section.unwrap_or(preset.rotary_inertia),
+        rotary_inertia,
+        polar_inertia,
         external_damping,
         internal_damping,
         duration,

@@ -333,13 +333,7 @@ pub(super) fn read_tissue(
     source: &StiffnessSource,
 ) -> ScenarioResult<Option<Vec<Tissue>>> {
     if let StiffnessSource::Blade { parts, .. } = source {
-        let gap = |[along, across, normal, fold]: [Profile; 4]| Tissue {
-            stiffness: [along, across, normal],
-            fold,
-            contraction: Profile::Constant(0.0),
-        };
-        let of_blade = || parts.tissue_profiles().into_iter().map(gap).collect();
-        return Ok((gaps > 0).then(of_blade));
+        return Ok((gaps > 0).then(|| parts.tissue()));
     }
     let mut tissue = vec![Tissue::default(); gaps];
     let keys = Key::TISSUE.into_iter().chain([Key::TissueContraction]);

@@ -18,7 +18,7 @@ use leafdyn::relax::{
     Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
-    COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
+    AREA, COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
 };
 use leafdyn::scenario::{Stress, Units};
 use leafdyn::study::{Equilibria, FoundEquilibrium};
@@ -393,7 +393,8 @@ fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
         ),
     };
     let mut lines = vec![format!(
-        "at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
+        "of the area {}; at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
+        number_in_unit(format_five_digits(blade.area), units, AREA),
         length(blade.width),
         stiffness(blade.bending),
         stiffness(blade.torsion),
@@ -404,12 +405,12 @@ fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     lines.push(format!(
         "each vein there: a strip {strip} wide, torsion {a1}, bending_2 {a2}, bending_3 {a3}"
     ));
-    if let Some([along, across, normal, fold]) = blade.tissue {
-        let stiffness = |it: f64| number_in_unit(format_five_digits(it), units, FORCE_PER_AREA);
-        let [along, across, normal] = [along, across, normal].map(stiffness);
-        let fold = number_in_unit(format_five_digits(fold), units, FORCE);
+    if let Some(tissue) = blade.tissue {
+        let across = number_in_unit(format_five_digits(tissue.across), units, FORCE_PER_AREA);
+        let fold = number_in_unit(format_five_digits(tissue.fold), units, FORCE);
         lines.push(format!(
-            "tissue there: along {along}, across {across}, normal {normal}, fold {fold}"
+            "tissue there: across {across}, fold {fold}, contraction {}",
+            length(tissue.contraction)
         ));
     }
     if let Some(least) = blade.least_width {

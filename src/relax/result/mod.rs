@@ -556,14 +556,16 @@ pub struct Neighbour {
 pub struct BladeReport {
     /// Width of the blade where it is widest.
     pub width: f64,
-    /// Width of the strip of each vein there.
+    /// The area within its outline.
+    pub area: f64,
+    /// Width of the strip of the vein in the middle there.
     pub strip_width: f64,
     /// A1, A2 and A3 there of the vein in the middle.
     pub couple_stiffness: [f64; 3],
     /// Stiffnesses H1, H2 and H3 there of the vein in the middle.
     pub force_stiffness: [f64; 3],
-    /// k1, k2, k3 and c1 of the tissue beside it there; none of a single vein.
-    pub tissue: Option<[f64; 4]>,
+    /// The tissue beside it there; none of a single vein.
+    pub tissue: Option<BladeTissue>,
     /// Stiffness of the whole blade there against bending out of its surface: the sum of A2.
     pub bending: f64,
     /// And against twisting: the sum of A1.
@@ -585,6 +587,17 @@ pub struct BladeReport {
     /// The numbers of veins up to this one, where it was refined.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub veins_tried: Vec<TriedVeins>,
+}
+
+/// The tissue of a blade in a gap. Along and normal to the veins it is rigid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BladeTissue {
+    /// k2, against a change of the width.
+    pub across: f64,
+    /// c1, against a fold along the veins.
+    pub fold: f64,
+    /// The contraction: Poisson's ratio times the width of the gap.
+    pub contraction: f64,
 }
 
 /// A blade with fewer veins.
@@ -616,7 +629,11 @@ impl BladeReport {
             |profiles: &[crate::scenario::Profile; 3]| profiles.each_ref().map(|of| of.at(sigma));
         let tissue = |all: &Vec<crate::scenario::Tissue>| {
             let gap = &all[middle.min(all.len() - 1)];
-            gap.stiffness_profiles().map(|of| of.at(sigma))
+            BladeTissue {
+                across: gap.stiffness[1].at(sigma),
+                fold: gap.fold.at(sigma),
+                contraction: gap.contraction.at(sigma),
+            }
         };
         let sum = |axis: usize| {
             rods.iter()
@@ -626,9 +643,11 @@ impl BladeReport {
         let masses = rods.iter().zip(&scenario.dynamics.density);
         let mass = masses.map(|(rod, density)| rod.length * density.integral(1.0));
         let width = blade.bearing_width(sigma);
+        let (young, thickness) = (blade.young(middle, sigma), blade.thickness(middle, sigma));
         Some(BladeReport {
             width,
-            strip_width: width / rods.len() as f64,
+            area: blade.area(),
+            strip_width: rods[middle].force_stiffness[0].at(sigma) / (young * thickness),
             couple_stiffness: at(&rods[middle].couple_stiffness),
             force_stiffness: at(&rods[middle].force_stiffness),
             tissue: scenario.tissue.as_ref().map(tissue),

@@ -1,29 +1,33 @@
 //! A leaf from its outline, thickness and moduli: the table `[blade]`.
 //!
 //! A blade of the length L and the width W(x) has N veins, of which vein j lies along
-//! y = eta_j W(x)/2 in the natural leaf. Its strip, vein and tissue together, has the width h = W/N
-//! and the thickness t; with a gap of the width w between two veins,
+//! y = eta_j W(x)/2 in the natural leaf, and of which each has a strip of the width h ([`division`]). The strip and the
+//! gap of the width w between two veins are perpendicular to the veins, and become narrower by the cosine of
+//! their angle to the axis of the blade. With the thickness t, Young's moduli E along the veins and E' across, the shear
+//! modulus G and Poisson's ratio nu,
 //!
 //! | | |
 //! | --- | --- |
 //! | torsion | A1 = G h t^3/3 |
-//! | bending | A2 = E h t^3/12, A3 = E t h^3/12 |
-//! | stretch and shear | H1 = E h t, H2 = H3 = 5/6 G h t |
-//! | tissue | k1 = G t/w, k2 = E' t/w, k3 = 5/6 G t/w, c1 = E' t^3/(12 w) |
+//! | bending | A2 = E h t^3/12, A3 = E t h l^2/12 with the lever l |
+//! | stretch and shear | H1 = E h t, H2 = f G h t, H3 = 5/6 G h t |
+//! | tissue | rigid along (k1) and normal to the veins (k3), k2 = E' t/(D w), c1 = E' t^3/(12 D w) |
+//! | contraction | nu w, with D = 1 - nu^2 E'/E |
+//! | inertia | rho t h, about d1 rho t h (l^2 + t^2)/12, about d2 rho h t^3/12 |
+//!
+//! So veins that slide past each other shear their strips, not the tissue besides, and a strip that bends or stretches
+//! curves or narrows the gaps beside it: a blade is a plate that is bent, stretched and sheared in strips.
 //!
 //! Its surface may be curved at rest about the y axis, kappa(x): a vein at the angle phi to its axis
 //! then has u0_1 = kappa sin(phi) cos(phi) and u0_2 = kappa cos(phi)^2, so that all fit together.
-//!
-//! E is Young's modulus along the veins, E' the one across. A blade of constant width bends as
-//! E W t^3/12 and twists as G W t^3/3, whatever N is, and in its plane as E t W^3/12, if shear
-//! is stiff: for veins in the middle of equal strips whatever N is; if the outermost veins are the
-//! margins, the stiffness in its plane is larger by the part 2/(N - 1) + 1/N^2.
 
+mod division;
 mod spline;
 #[cfg(test)]
 mod tests;
 mod veins;
 
+use crate::scenario::blade::division::StripDivision;
 pub(super) use crate::scenario::blade::spline::Spline;
 pub(super) use crate::scenario::blade::veins::BladeProperty;
 use crate::scenario::blade::veins::{BladeMaterial, BladeOutline, BladePart, BladeVein};
@@ -33,6 +37,7 @@ use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::{EntryValue, Knots};
 use crate::scenario::profile::Profile;
 use crate::scenario::section::read_poisson;
+use crate::scenario::veins::Tissue;
 use glam::{DQuat, DVec3};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -107,14 +112,24 @@ impl Blade {
 
     /// Where vein `j` lies: a fraction of the half width, negative to the right of the midrib.
     pub fn vein_position(&self, j: usize) -> f64 {
-        (2.0 * j as f64 + 1.0 - self.materials.len() as f64) / self.gaps_in_width()
+        self.division().vein_position(j)
     }
 
-    /// How many times the distance of neighbouring veins goes into the width.
-    fn gaps_in_width(&self) -> f64 {
-        let count = self.materials.len();
-        let gaps = if self.edges { count.max(2) - 1 } else { count };
-        gaps as f64
+    /// The distance of neighboring veins, as a fraction of the width.
+    pub fn gap_fraction(&self) -> f64 {
+        self.division().gap()
+    }
+
+    fn division(&self) -> StripDivision {
+        StripDivision {
+            count: self.materials.len(),
+            edges: self.edges,
+        }
+    }
+
+    /// The area within the outline.
+    pub fn area(&self) -> f64 {
+        self.length() * self.outline.width.integral()
     }
 
     /// Whether all veins meet at the tip.
@@ -125,6 +140,16 @@ impl Blade {
     /// The curvature of the surface at rest, over fractions of the length; `None` if it lies flat.
     pub(super) fn curvature(&self) -> Option<&Spline> {
         self.outline.curvature.as_ref()
+    }
+
+    /// E along vein `rod` at a fraction of its length.
+    pub fn young(&self, rod: usize, sigma: f64) -> f64 {
+        self.materials[rod].young.at(sigma)
+    }
+
+    /// The thickness along vein `rod` at a fraction of its length.
+    pub fn thickness(&self, rod: usize, sigma: f64) -> f64 {
+        self.materials[rod].thickness.at(sigma)
     }
 
     /// Whether the mass of every vein is given.
@@ -139,22 +164,24 @@ impl Blade {
 
     /// The veins and the tissue between them.
     pub(super) fn parts(&self) -> BladeParts {
-        let count = self.materials.len();
-        let etas: Vec<f64> = (0..count).map(|j| self.vein_position(j)).collect();
-        let apart = 2.0 / self.gaps_in_width();
+        let (count, division) = (self.materials.len(), self.division());
+        let etas: Vec<f64> = (0..count).map(|j| division.vein_position(j)).collect();
         let alike = |one: usize, other: usize| self.materials[one] == self.materials[other];
         let vein = |j: usize| {
             let material = self.materials[j].clone();
             Arc::new(BladeVein::new(
                 &self.outline,
                 etas[j].abs(),
-                count,
+                division.strip(j),
                 material,
             ))
         };
         let veins = build_with_images(count, alike, vein);
         let gaps_alike = |g: usize, image: usize| alike(g, image + 1) && alike(g + 1, image);
-        let gap = |g: usize| BladePart::from_gap(&veins[g], &veins[g + 1], apart);
+        let gap = |g: usize| {
+            let middle = 0.5 * (etas[g] + etas[g + 1]);
+            BladePart::from_gap(&veins[g], &veins[g + 1], middle, division.gap())
+        };
         BladeParts {
             gaps: build_with_images(count - 1, gaps_alike, gap),
             vein_parts: build_with_images(count, alike, |j| BladePart::from_vein(veins[j].clone())),
@@ -225,10 +252,16 @@ impl BladeParts {
         .collect()
     }
 
-    /// k1, k2, k3 and c1 of the tissue in every gap.
-    pub fn tissue_profiles(&self) -> Vec<[Profile; 4]> {
+    /// The tissue in every gap.
+    pub fn tissue(&self) -> Vec<Tissue> {
         let gap = |part: &Arc<BladePart>| {
-            [0, 1, 2, 3].map(|which| part.profile(BladeProperty::Tissue(which), false))
+            let of = |property| part.profile(property, false);
+            let rigid = || Profile::Constant(f64::INFINITY);
+            Tissue {
+                stiffness: [rigid(), of(BladeProperty::Across), rigid()],
+                fold: of(BladeProperty::Fold),
+                contraction: of(BladeProperty::Contraction),
+            }
         };
         self.gaps.iter().map(gap).collect()
     }
@@ -285,12 +318,59 @@ pub(super) fn read_blade(entries: &Entries, rods: usize) -> ScenarioResult<Optio
     let elevation = entries.value_or_default(Key::Elevation)?;
     let whole = "a blade rises as a whole: give one number";
     elevation.refuse_unless(!elevation.value.is_array(), whole)?;
+    let materials: Vec<BladeMaterial> = materials.collect();
+    check_contraction(entries, &materials)?;
     Ok(Some(Blade {
         elevation: elevation.number()?,
         outline: Arc::new(read_outline(entries)?),
-        edges: entries.value_or_default(Key::Edges)?.switch()?,
-        materials: materials.collect(),
+        edges: read_edges(entries, rods)?,
+        materials,
     }))
+}
+
+/// Reads `blade.edges`; left out, it is true but for two veins, which as margins would be three times too stiff in
+/// their plane.
+fn read_edges(entries: &Entries, rods: usize) -> ScenarioResult<bool> {
+    let edges = entries.value_or_default(Key::Edges)?;
+    if rods != 2 {
+        return edges.switch();
+    }
+    let given = entries.given_value(Key::Edges);
+    let Some(edges) = given else {
+        return Ok(false);
+    };
+    let margins = edges.switch()?;
+    edges.refuse_unless(
+        !margins,
+        "two veins on the margins are three times too stiff in their plane: leave this out, or give more veins",
+    )?;
+    Ok(false)
+}
+
+/// Refuses materials that would become narrower when bent than a plate can: whose 1 - nu^2 E'/E is not positive.
+fn check_contraction(entries: &Entries, materials: &[BladeMaterial]) -> ScenarioResult<()> {
+    for (rod, material) in materials.iter().enumerate() {
+        let steps = OUTLINE_LIMITS.steps_between_points;
+        let places = (0..=steps).map(|k| k as f64 / steps as f64);
+        let places = material.kinks().chain(places);
+        for sigma in places {
+            let local = material.local_material(sigma);
+            if local.contraction_factor() > 0.0 {
+                continue;
+            }
+            let key = match material.young_across.is_some() {
+                true => Key::YoungAcross,
+                false => Key::BladePoisson,
+            };
+            let item = entries.value_or_default(key)?;
+            let most = local.young / local.poisson.powi(2);
+            return Err(item.entry(rod).value_error(format_args!(
+                "with poisson = {} and young = {} Young's modulus across the veins must be less than young/poisson^2 = {most:.4e}",
+                local.poisson, local.young
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn read_outline(entries: &Entries) -> ScenarioResult<BladeOutline> {

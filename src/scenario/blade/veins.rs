@@ -1,6 +1,7 @@
 //! The veins of a blade, and the tissue between two, as profiles along them.
 
 use crate::numbers::{GAUSS_LEGENDRE_RULE, QuadraturePoint, sorted_distinct};
+use crate::scenario::blade::division::{PLATE_SHEAR_FACTOR, Strip};
 use crate::scenario::blade::spline::{Spline, quintic_hermite};
 use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
 use crate::scenario::section::Property;
@@ -15,9 +16,6 @@ const ARC_LENGTH_PANELS: usize = 64;
 /// Equal parts of a vein's length over which an integral along it is summed up.
 const INTEGRATION_PANELS: usize = 32;
 
-/// The factor of transverse shear of a plate (E. Reissner, 1945).
-const PLATE_SHEAR_FACTOR: f64 = 5.0 / 6.0;
-
 /// What follows from a blade for its veins, and for the tissue between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scenario) enum BladeProperty {
@@ -29,10 +27,17 @@ pub(in crate::scenario) enum BladeProperty {
     Rest(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length: the mean of those about d2 and d3.
+    /// Moment of inertia per length about d2, by which a strip resists that its face turns; about d3 the same
+    /// is taken.
     RotaryInertia,
-    /// Of tissue: k1, k2, k3 and c1, by index.
-    Tissue(usize),
+    /// Moment of inertia per length about d1.
+    PolarInertia,
+    /// k2 of tissue.
+    Across,
+    /// c1 of tissue.
+    Fold,
+    /// The contraction of tissue.
+    Contraction,
 }
 
 impl From<Property> for BladeProperty {
@@ -42,12 +47,13 @@ impl From<Property> for BladeProperty {
             Property::Force(axis) => BladeProperty::Force(axis),
             Property::Density => BladeProperty::Density,
             Property::RotaryInertia => BladeProperty::RotaryInertia,
+            Property::PolarInertia => BladeProperty::PolarInertia,
         }
     }
 }
 
 /// Properties of a vein; tissue has fewer.
-const MAX_PROPERTIES: usize = 11;
+const MAX_PROPERTIES: usize = 12;
 
 /// The indices of A1 to A3 and H1 to H3 among the properties of a vein.
 const STIFFNESSES: Range<usize> = 0..6;
@@ -66,7 +72,10 @@ impl BladeProperty {
             BladeProperty::Rest(axis) => REST_CURVATURES.start + axis,
             BladeProperty::Density => DENSITY,
             BladeProperty::RotaryInertia => DENSITY + 1,
-            BladeProperty::Tissue(which) => which,
+            BladeProperty::PolarInertia => DENSITY + 2,
+            BladeProperty::Across => 0,
+            BladeProperty::Fold => 1,
+            BladeProperty::Contraction => 2,
         }
     }
 }
@@ -109,8 +118,8 @@ pub struct BladeVein {
     /// The place of the vein, a fraction of the half width; not negative: the mirror image of a vein is
     /// the same vein.
     eta: f64,
-    /// The width of the blade over that of the vein's strip.
-    strip_count: f64,
+    /// Its strip, where the width is one.
+    strip: Strip,
     material: BladeMaterial,
     /// Arc length of the vein.
     pub length: f64,
@@ -141,6 +150,14 @@ pub struct LocalMaterial {
     pub young: f64,
     pub across: f64,
     pub shear: f64,
+    pub poisson: f64,
+}
+
+impl LocalMaterial {
+    /// 1 - nu^2 E'/E: what a plate that is kept from narrowing is softer by than one that is not.
+    pub fn contraction_factor(&self) -> f64 {
+        1.0 - self.poisson * self.poisson * self.across / self.young
+    }
 }
 
 impl BladeMaterial {
@@ -148,14 +165,13 @@ impl BladeMaterial {
         let young = self.young.at(sigma);
         let across = self.young_across.as_ref();
         let shear = self.shear_modulus.as_ref();
+        let poisson = self.poisson.at(sigma);
         LocalMaterial {
             t: self.thickness.at(sigma),
             young,
             across: across.map_or(young, |it| it.at(sigma)),
-            shear: shear.map_or_else(
-                || young / (2.0 * (1.0 + self.poisson.at(sigma))),
-                |it| it.at(sigma),
-            ),
+            shear: shear.map_or_else(|| young / (2.0 * (1.0 + poisson)), |it| it.at(sigma)),
+            poisson,
         }
     }
 
@@ -179,14 +195,13 @@ impl BladeVein {
     pub fn new(
         outline: &Arc<BladeOutline>,
         eta: f64,
-        count: usize,
+        strip: Strip,
         material: BladeMaterial,
     ) -> BladeVein {
-        let (outline, count) = (outline.clone(), count as f64);
         let mut vein = BladeVein {
-            outline,
+            outline: outline.clone(),
             eta,
-            strip_count: count,
+            strip,
             material,
             length: 0.0,
             places: Vec::new(),
@@ -203,6 +218,12 @@ impl BladeVein {
         let [_, slope, second] = width.value_and_derivatives(x);
         let half = 0.5 * self.eta;
         [half * slope / length, half * second / (length * length)]
+    }
+
+    /// h and l of the strip, perpendicular to the vein, of a blade of this width at the fraction `x` of its length.
+    fn strip_size(&self, width: f64, x: f64) -> [f64; 2] {
+        let perpendicular = width / secant(self.lateral_derivatives(x)[0]);
+        [self.strip.width, self.strip.lever].map(|part| part * perpendicular)
     }
 
     /// The angle of the vein to the axis of the blade, at the base.
@@ -285,31 +306,33 @@ impl BladeVein {
 
     /// A1, A2, A3, H1, H2 and H3 at a fraction of the vein's length, where this material is.
     fn stiffnesses(&self, sigma: f64, material: &LocalMaterial) -> [f64; 6] {
-        let h = self.outline.bearing_width(self.blade_fraction(sigma)) / self.strip_count;
+        let x = self.blade_fraction(sigma);
+        let [h, lever] = self.strip_size(self.outline.bearing_width(x), x);
         let (t, young, shear) = (material.t, material.young, material.shear);
-        let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
+        let flat = h * t.powi(3);
         let [a1, a2, a3] = [
             shear * flat / 3.0,
             young * flat / 12.0,
-            young * upright / 12.0,
+            young * t * h * lever.powi(2) / 12.0,
         ];
-        let across = PLATE_SHEAR_FACTOR * shear * h * t;
-        [a1, a2, a3, young * h * t, across, across]
+        let [h2, h3] = [self.strip.shear_factor, PLATE_SHEAR_FACTOR].map(|f| f * shear * h * t);
+        [a1, a2, a3, young * h * t, h2, h3]
     }
 
-    /// The mass and the moment of inertia per length, of the blade's own width: also where stiffnesses
-    /// follow from a larger one.
-    fn mass_and_inertia(&self, sigma: f64, material: &LocalMaterial) -> [f64; 2] {
-        let width = self
-            .outline
-            .width
-            .value_and_derivatives(self.blade_fraction(sigma))[0]
-            .max(0.0)
-            / self.strip_count;
+    /// The mass per length and its moments of inertia about d2 and d1, of the blade's own width: also where
+    /// stiffnesses follow from a larger one.
+    fn mass_and_inertia(&self, sigma: f64, material: &LocalMaterial) -> [f64; 3] {
+        let x = self.blade_fraction(sigma);
+        let [width, ..] = self.outline.width.value_and_derivatives(x);
+        let [h, lever] = self.strip_size(width.max(0.0), x);
         let density = self.material.mass_density.as_ref();
         let density = density.map_or(0.0, |it| it.at(sigma));
-        let (t, mass) = (material.t, density * width * material.t);
-        [mass, 0.5 * mass * (width * width + t * t) / 12.0]
+        let (t, mass) = (material.t, density * h * material.t);
+        [
+            mass,
+            mass * t * t / 12.0,
+            mass * (lever * lever + t * t) / 12.0,
+        ]
     }
 
     /// The property with this index at a fraction of the vein's length, without the others.
@@ -349,6 +372,8 @@ enum BladePartSource {
     Gap {
         /// The vein that is nearer to the midrib, and the other one.
         veins: [Arc<BladeVein>; 2],
+        /// Where its middle lies: a fraction of the half width.
+        eta: f64,
         /// The width of the gap over that of the blade.
         width_fraction: f64,
     },
@@ -368,9 +393,13 @@ impl BladePart {
         BladePart::new(BladePartSource::Vein(vein))
     }
 
-    /// The tissue between two veins, `apart` being the difference of their fractions of the half
-    /// width.
-    pub fn from_gap(one: &Arc<BladeVein>, other: &Arc<BladeVein>, apart: f64) -> Arc<BladePart> {
+    /// The tissue between two veins, whose middle is at `eta` and whose width is this fraction of the blade's.
+    pub fn from_gap(
+        one: &Arc<BladeVein>,
+        other: &Arc<BladeVein>,
+        eta: f64,
+        width_fraction: f64,
+    ) -> Arc<BladePart> {
         // The gap on the other side of the midrib is then the same part.
         let (near, far) = if one.eta <= other.eta {
             (one, other)
@@ -379,7 +408,8 @@ impl BladePart {
         };
         BladePart::new(BladePartSource::Gap {
             veins: [near.clone(), far.clone()],
-            width_fraction: 0.5 * apart,
+            eta: eta.abs(),
+            width_fraction,
         })
     }
 
@@ -411,22 +441,21 @@ impl BladePart {
             BladePartSource::Vein(vein) => vein.properties(sigma),
             BladePartSource::Gap {
                 veins: [one, other],
+                eta,
                 width_fraction,
             } => {
+                let outline = &one.outline;
                 let x = 0.5 * (one.blade_fraction(sigma) + other.blade_fraction(sigma));
-                let w = width_fraction * one.outline.bearing_width(x);
+                let slope = 0.5 * eta * outline.width.value_and_derivatives(x)[1] / outline.length;
+                let w = width_fraction * outline.bearing_width(x) / secant(slope);
                 let [a, b] = [one, other].map(|vein| vein.material.local_material(sigma));
                 let mean = |of: fn(&LocalMaterial) -> f64| 0.5 * (of(&a) + of(&b));
-                let (t, across) = (mean(|it| it.t), mean(|it| it.across));
-                let along = mean(|it| it.shear) * t / w;
-                let fold = across * t.powi(3) / (12.0 * w);
+                let t = mean(|it| it.t);
+                let across = mean(|it| it.across / it.contraction_factor());
                 let mut all = [0.0; MAX_PROPERTIES];
-                all[..4].copy_from_slice(&[
-                    along,
-                    across * t / w,
-                    PLATE_SHEAR_FACTOR * along,
-                    fold,
-                ]);
+                all[BladeProperty::Across.index()] = across * t / w;
+                all[BladeProperty::Fold.index()] = across * t.powi(3) / (12.0 * w);
+                all[BladeProperty::Contraction.index()] = mean(|it| it.poisson) * w;
                 all
             }
         }

@@ -11,6 +11,9 @@ pub const DIMENSIONLESS: Dimension = [0, 0, 0];
 /// The dimension of positions and displacements.
 pub const LENGTH: Dimension = [1, 0, 0];
 
+/// The dimension of areas.
+pub const AREA: Dimension = [2, 0, 0];
+
 /// The dimension of forces.
 pub const FORCE: Dimension = [0, 1, 0];
 

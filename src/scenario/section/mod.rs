@@ -43,14 +43,15 @@ pub(super) enum Property {
     Force(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length: the mean of those about d2 and d3, which is half of
-    /// that about d1.
+    /// Moment of inertia per length: the mean of those about d2 and d3.
     RotaryInertia,
+    /// Moment of inertia per length about d1.
+    PolarInertia,
 }
 
 impl Property {
-    const ALL: [Property; 8] = {
-        use Property::{Couple, Density, Force, RotaryInertia};
+    const ALL: [Property; 9] = {
+        use Property::{Couple, Density, Force, PolarInertia, RotaryInertia};
         [
             Couple(0),
             Couple(1),
@@ -60,6 +61,7 @@ impl Property {
             Force(2),
             Density,
             RotaryInertia,
+            PolarInertia,
         ]
     };
 
@@ -70,6 +72,7 @@ impl Property {
             Property::Force(axis) => 3 + axis,
             Property::Density => 6,
             Property::RotaryInertia => 7,
+            Property::PolarInertia => 8,
         }
     }
 }
@@ -189,6 +192,7 @@ impl Section {
             Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(sigma) * area,
             Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
+            Property::PolarInertia => self.mass_density.at(sigma) * (second[0] + second[1]),
         }
     }
 

@@ -302,17 +302,20 @@ impl Moduli {
         }
     }
 
-    /// The moduli of a strip of a plate, which twists with the plate: J = w t^3/3.
-    pub(in crate::scenario) fn for_strip(width: f64, thickness: f64) -> Moduli {
+    /// The moduli of a strip of a plate, which twists with the plate, J = w t^3/3, and bends in its plane with this
+    /// lever, I3 = w t lever^2/12.
+    pub(in crate::scenario) fn for_strip(width: f64, thickness: f64, lever: f64) -> Moduli {
         let sides = SectionDimensions {
             outline: SectionOutline::Rectangle,
             width,
             thickness,
             wall: None,
         };
+        let whole = sides.moduli();
         Moduli {
             torsion: 3.0 / (width * thickness * thickness),
-            ..sides.moduli()
+            bending: [whole.bending[0], whole.bending[1] * (width / lever).powi(2)],
+            ..whole
         }
     }
 }
