@@ -226,7 +226,8 @@ fn eigenvalues_are_those_of_a_dense_method() {
     };
     assert_as_dense("three veins", &three_veins(), &on(6, 25));
     let mut round = three_veins();
-    round.dynamics.polar_excess = 1.0;
+    let rotary = &round.dynamics.rotary_inertia;
+    round.dynamics.polar_inertia = rotary.iter().map(|one| one.scaled(2.0)).collect();
     round.dynamics.density = vec![Profile::Constant(7.0); 3];
     assert_as_dense("heavier", &round, &on(6, 25));
     let mut free = three_veins();

@@ -1,4 +1,4 @@
-//! Leaves from an outline: blades of constant width against plates, blades as they grow, and how
+//! Leaves from an outline: narrow blades as beams, blades as they grow, and how
 //! many veins they need.
 
 use leafdyn::relax::Method;
@@ -23,20 +23,13 @@ const YOUNG: f64 = 3e4;
 const POISSON: f64 = 0.3;
 const SHEAR: f64 = YOUNG / (2.0 * (1.0 + POISSON));
 
-/// Forces on the tips of the outermost veins.
-fn on_margins(rods: usize, force: [f64; 3], other: [f64; 3]) -> String {
-    let point = |vein: usize, force: [f64; 3]| {
-        format!("[[load.point]]\nvein = {vein}\nat = 1.0\nforce = {force:?}\n")
-    };
-    point(1, force) + &point(rods, other)
-}
-
-/// However many veins it has, a plate bends as E W t^3/12.
+/// However many veins it has, a plate that does not narrow bends as E W t^3/12.
 #[test]
 fn a_blade_bends_as_a_plate() {
     let load = 1e-9;
     for rods in [1, 5, 9, 17] {
-        let text = strip(rods, true, "") + &format!("load = {{ gravity = [0.0, 0.0, {load}] }}");
+        let more = format!("poisson = 0.0, shear_modulus = {SHEAR}");
+        let text = strip(rods, true, &more) + &format!("load = {{ gravity = [0.0, 0.0, {load}] }}");
         let leaf = settle(&parse(&text), 1e-11);
         let bending = YOUNG * WIDTH * THICKNESS.powi(3) / 12.0;
         let shear = 5.0 / 6.0 * SHEAR * WIDTH * THICKNESS;
@@ -46,52 +39,6 @@ fn a_blade_bends_as_a_plate() {
         for tip in &leaf.tips {
             close("tip", tip.z / deflection, 1.0, 1e-6);
         }
-    }
-}
-
-/// However many veins it has, it twists as G W t^3/3, away from its ends.
-#[test]
-fn a_blade_twists_as_a_plate() {
-    for (rods, edges) in [(5, true), (9, true), (17, true), (5, false), (9, false)] {
-        let gaps = if edges { rods - 1 } else { rods } as f64;
-        let apart = WIDTH * (rods - 1) as f64 / gaps;
-        let torque = 1e-6;
-        let force = torque / apart;
-        let loads = on_margins(rods, [0.0, 0.0, -force], [0.0, 0.0, force]);
-        let leaf = settle(&parse(&(strip(rods, edges, "") + &loads)), 1e-10);
-        let stiffness = SHEAR * WIDTH * THICKNESS.powi(3) / 3.0;
-        let angle = torque / stiffness * LENGTH / 2.0;
-        let nodes = &leaf.shape.rods[rods / 2].nodes;
-        let at = |quarter: usize| (nodes[(nodes.len() - 1) * quarter / 4].rotation * DVec3::Y).z;
-        close("angle", (at(3) - at(1)) / angle, 1.0, 1e-6);
-    }
-}
-
-/// In its plane, if it is stiff against shear, as E t W^3/12: exactly so from veins in the middle of
-/// equal strips, with an error of first order in 1/N from veins of which two are the margins.
-#[test]
-fn a_blade_bends_in_its_plane_as_a_beam() {
-    let beam = YOUNG * THICKNESS * WIDTH.powi(3) / 12.0;
-    for (rods, edges) in [(5, true), (9, true), (17, true), (5, false), (9, false)] {
-        let load = 6e-5 / rods as f64;
-        let more = format!("shear_modulus = {}", 1e4 * YOUNG);
-        let text =
-            strip(rods, edges, &more) + &format!("load = {{ gravity = [0.0, {load}, 0.0] }}");
-        let leaf = settle(&parse(&text), 1e-8);
-        let n = rods as f64;
-        let excess = if edges {
-            2.0 / (n - 1.0) + 1.0 / (n * n)
-        } else {
-            0.0
-        };
-        let deflection = n * load * LENGTH.powi(4) / (8.0 * beam * (1.0 + excess));
-        let base = if edges {
-            WIDTH / 2.0
-        } else {
-            WIDTH / 2.0 * (1.0 - 1.0 / n)
-        };
-        let found = leaf.tips[rods - 1].y - base;
-        close("tip", found / deflection, 1.0, 2e-5);
     }
 }
 
@@ -172,7 +119,7 @@ fn a_blade_under_its_weight_is_its_own_image() {
         .map(|k| blade("").blade.unwrap().width((k as f64 + 0.5) / 1000.0))
         .sum::<f64>()
         / 1000.0;
-    close("weight", reaction / (-weight * mean), 1.0, 1e-2);
+    close("weight", reaction / (-weight * mean), 1.0, 1e-6);
 }
 
 /// Twice as many veins, the same blade: the differences of the tip become small.

@@ -28,6 +28,7 @@ mod no_equilibrium;
 mod objectivity;
 mod order;
 mod path;
+mod plates;
 mod point_moments;
 mod published;
 mod reaction_bars;

@@ -7,6 +7,7 @@ pub mod fit;
 pub mod motion;
 mod pairs;
 pub mod plane;
+pub mod plate;
 pub mod random;
 pub mod real;
 mod relaxing;
