@@ -155,7 +155,7 @@ fn the_least_width_hardly_matters() {
 #[test]
 fn a_blade_by_shooting() {
     let scenario = blade(&format!(
-        "{WEIGHT}; leaf.rods=3; blade.length=4; blade.thickness=0.01; blade.width.value[4]=0.8"
+        "{WEIGHT}; leaf.rods=3; blade.length=3; blade.thickness=0.01; blade.width.value[4]=0.8"
     ));
     let leaf = settle(&scenario, 1e-8);
     let shot = settled(
@@ -202,17 +202,18 @@ fn derivatives_by_the_outline_and_the_material() {
         ("blade.length", 25.0),
         ("blade.young", 5e4),
         ("blade.young_across", 2e4),
+        ("blade.poisson", 0.3),
         ("blade.thickness", 0.03),
         ("leaf.elevation", 0.4),
     ];
     let given = entries(&format!("{WEIGHT}; leaf.rods=5; leaf.elevation=0.4"));
     let base = BaseScenario::from_text(BLADE.into(), "blade".into(), &given).unwrap();
     let names: Vec<ParameterKeys> = keys.iter().map(|(key, _)| key.parse().unwrap()).collect();
-    let leaf = relax_with_sensitivities(&base, &names, &to(1e-7), &mut |_| {}).unwrap();
+    let leaf = relax_with_sensitivities(&base, &names, &to(1e-5), &mut |_| {}).unwrap();
     let found = leaf.sensitivities.unwrap();
     assert_eq!(found.len(), keys.len());
     for ((key, value), found) in keys.into_iter().zip(found) {
-        let step = 1e-3 * value;
+        let step = 1e-2 * value;
         let tip = |value: f64| {
             let change = format!("{WEIGHT}; leaf.rods=5; leaf.elevation=0.4; {key}={value}");
             settle(&blade(&change), 1e-7).tips[0]

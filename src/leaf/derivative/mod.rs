@@ -58,6 +58,7 @@ impl DiscreteLeaf {
                 self.add_base_motion(state, &carriers.segments, j, rod.base, &mut forces);
             }
         }
+        self.add_base_motion_of_cells(state, rate, &mut forces);
         self.add_moment_changes(rate, &mut forces);
         self.add_tissue_and_own_load_changes(state, &neighbors, &mut forces);
         self.add_rigid_strip_changes(&carriers.strips, &neighbors, &mut forces);
@@ -274,6 +275,32 @@ impl DiscreteLeaf {
         let (gradient, load) = (segment.gradient(section), self.load(state, j, 0));
         forces.energy +=
             (gradient.a - load.moment).dot(turn) - (gradient.x + load.force).dot(shift);
+    }
+
+    /// Adds the forces of tissue that contracts as clamped bases move, by the strains of the first segments.
+    fn add_base_motion_of_cells(
+        &self,
+        state: &State,
+        rate: &LeafParameterDerivative,
+        forces: &mut ParameterForces,
+    ) {
+        let still = |rod: &RodParameterDerivative| rod.base == NodeIncrement::default();
+        if rate.rods.iter().all(still) {
+            return;
+        }
+        let nodes = self.moving_nodes();
+        let increment = |rod: usize, i: usize| match i {
+            0 => rate.rods[rod].base.to_array(),
+            _ => [0.0; 6],
+        };
+        for cell in self.contracting_cells().filter(|cell| cell.segment == 0) {
+            self.for_each_cell_response(state, cell, increment, |j, i, load| {
+                if nodes.contains(&i) {
+                    let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
+                    add_to_increment(on, load.moment, load.force);
+                }
+            });
+        }
     }
 }
 

@@ -137,7 +137,7 @@ fn corner_unknown(end: usize, k: usize) -> usize {
 
 impl DiscreteLeaf {
     /// All cells whose strips contract.
-    pub(super) fn contracting_cells(&self) -> impl Iterator<Item = TissueCell> + use<> {
+    pub(in crate::leaf) fn contracting_cells(&self) -> impl Iterator<Item = TissueCell> + use<> {
         let gaps = match self.has_contracting_tissue() {
             true => self.rods() - 1,
             false => 0,
@@ -310,7 +310,7 @@ impl DiscreteLeaf {
 
     /// Calls `add` with the changes of the loads of a cell, as rods, nodes and loads, by increments of its
     /// nodes.
-    pub(super) fn for_each_cell_response(
+    pub(in crate::leaf) fn for_each_cell_response(
         &self,
         state: &State,
         cell: TissueCell,
