@@ -14,12 +14,18 @@ struct OrderTest {
     /// A further column is rejected if it changes the values by more than this part of the change
     /// by the column before it: it has nothing left to remove.
     useless_column_ratio: f64,
+    /// Ratios of the last two changes of a column between which they shrink in proportion: as those of an error
+    /// between the orders 1.5 and 3.5.
+    least_shrinking: f64,
+    most_shrinking: f64,
 }
 
 const ORDER: OrderTest = OrderTest {
     slack: 1.5,
     smallest_first_ratio: 0.68,
     useless_column_ratio: 0.1,
+    least_shrinking: 0.09,
+    most_shrinking: 0.35,
 };
 
 /// Safety factors of the errors that the last changes of a table tell.
@@ -144,12 +150,16 @@ impl Richardson {
             columns -= 1;
         }
         if columns < last {
-            // Its order is not confirmed: the error estimate is its last change.
-            let change = distance(&row[columns], &before[columns]);
-            let error = larger(
-                SAFETY.unproven_order * change,
-                SAFETY.most * correction(columns),
-            );
+            // Its order is not confirmed: the error estimate is its last change, or the sum of all that are to come if
+            // they shrink, though not as those of a ds^2 series.
+            let error = self.shrinking_remainder(columns).unwrap_or_else(|| {
+                let change = distance(&row[columns], &before[columns]);
+                larger(
+                    change,
+                    SAFETY.most / SAFETY.unproven_order * correction(columns),
+                )
+            });
+            let error = SAFETY.unproven_order * error;
             return Some(BestColumn { columns, error });
         }
         // With two grids the only reference is the size of the leaf, one.
@@ -160,6 +170,19 @@ impl Richardson {
             columns,
             error: larger(0.0, safety * correction(last)),
         })
+    }
+
+    /// The sum of the changes of column `m` on all finer grids, if they go on shrinking as the last two do, in
+    /// proportion; `None` if they hardly shrink, or there are less than two.
+    fn shrinking_remainder(&self, m: usize) -> Option<f64> {
+        let [.., coarse, before, row] = self.table.as_slice() else {
+            return None;
+        };
+        let first = distance(before.get(m)?, coarse.get(m)?);
+        // One that is small by chance says less than the one before it.
+        let last = larger(distance(&row[m], &before[m]), ORDER.least_shrinking * first);
+        let ratio = last / first;
+        (ratio < ORDER.most_shrinking).then_some(last * ratio / (1.0 - ratio))
     }
 
     /// The error of the best column of a few numbers that are all of one size, such as the parts of a

@@ -249,8 +249,8 @@ impl BladeVein {
     fn compute_arc_length(&mut self) {
         let even = (0..=ARC_LENGTH_PANELS).map(|k| k as f64 / ARC_LENGTH_PANELS as f64);
         let outline = self.outline.clone();
-        let curved = outline.curvature.iter().flat_map(Spline::knots);
-        let knots = sorted_distinct(outline.width.knots().iter().chain(curved).copied());
+        let curved = outline.curvature.iter().flat_map(Spline::seams);
+        let knots = sorted_distinct(outline.width.seams().iter().chain(curved).copied());
         let edges = sorted_distinct(even.chain(knots.iter().copied()));
         let mut reached = vec![0.0];
         for pair in edges.windows(2) {
