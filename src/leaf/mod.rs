@@ -452,10 +452,10 @@ impl Leaf {
         self.scenario.tissue.is_some()
     }
 
-    /// Whether the tissue in gap `g` narrows where its veins stretch.
-    fn tissue_contracts(&self, g: usize) -> bool {
+    /// Whether the strains of the tissue in gap `g` depend on those of its veins.
+    fn is_tissue_strained_by_veins(&self, g: usize) -> bool {
         let tissue = self.scenario.tissue.as_ref();
-        tissue.is_some_and(|tissue| tissue[g].contraction.max_abs() > 0.0)
+        tissue.is_some_and(|tissue| tissue[g].has_unknown_forces())
     }
 
     /// Stiffness of the tissue in gap `g` at `sigma`.

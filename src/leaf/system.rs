@@ -241,7 +241,7 @@ impl System {
             ],
             cell_blocks: vec![
                 Default::default();
-                if leaf.has_contracting_tissue() {
+                if leaf.has_tissue_cells() {
                     (rods - 1) * n
                 } else {
                     0

@@ -14,18 +14,20 @@
 //! carries no force, or be rigid there: the force is then condensed out with a finite stiffness, a step of
 //! the method of multipliers.
 //!
-//! Tissue that contracts across the veins as they stretch, by Poisson's ratio, has the strains
+//! Tissue that is rigid, or contracts across the veins as they stretch, by Poisson's ratio, has the strains
 //!
-//! e_2 + c (v_1 - v0_1),   theta_1 - c (u_2 - u0_2)
+//! e_2 + c (v_1 - v0_1) - a (v_2 - v0_2),   theta_1 - c (u_2 - u0_2) - a (u_1 - u0_1)
 //!
-//! in place of e_2 and theta_1, with the means of the stretch v_1 and the bend u_2 of both veins:
-//! [`VeinStrain`] has these of a segment, with derivatives by its nodes.
+//! in place of e_2 and theta_1, with the means of the stretch v_1, the shear v_2, the twist u_1 and the bend u_2 of
+//! both veins: [`VeinStrain`] has these of a segment, with derivatives by its nodes. Veins that are slanted against
+//! each other or unequally long are apart by a = e_1 along them in the natural leaf: without what is by their own
+//! strains, the strains are those straight across, as in a plate.
 
 use crate::rod::element::{Element, FirstDerivatives, NodalHessian, UNKNOWNS, nodal_gradient};
 use crate::rod::section::{LaneNodes, LaneSections, NodePair, Section, Wrench};
 use crate::rotation;
 use crate::simd::Vectors;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use nalgebra::SVector;
 use pulp::Scalar;
 
@@ -52,6 +54,8 @@ pub struct TissueStrip {
     /// c: the length by which the strip narrows freely per stretch of its veins, and by which it
     /// folds freely per curvature of theirs.
     pub contraction: f64,
+    /// a: how far its ends are apart along the veins in the natural leaf, if its strains are those straight across.
+    pub offset: f64,
 }
 
 /// The mean strains, less those at rest, of the segments of both veins by which a strip contracts.
@@ -59,8 +63,31 @@ pub struct TissueStrip {
 pub struct ContractingStrains {
     /// v_1 - v0_1.
     pub stretch: f64,
+    /// v_2 - v0_2.
+    pub shear: f64,
+    /// u_1 - u0_1.
+    pub twist: f64,
     /// u_2 - u0_2.
     pub bend: f64,
+}
+
+/// What multiplies [`ContractingStrains`] in the strains of a strip, or the stress by each of them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StrainFactors {
+    /// By the stretch and the shear.
+    pub force: DVec2,
+    /// By the twist and the bend.
+    pub moment: DVec2,
+}
+
+impl ContractingStrains {
+    /// The sum with these factors of stretch and shear, and with those of twist and bend.
+    fn weighted(self, factors: StrainFactors) -> [f64; 2] {
+        [
+            factors.force.dot(DVec2::new(self.stretch, self.shear)),
+            factors.moment.dot(DVec2::new(self.twist, self.bend)),
+        ]
+    }
 }
 
 /// What a strip exerts in its strains across the veins and in its fold.
@@ -125,6 +152,7 @@ impl TissueStrip {
             condensing: DVec3::select(is_infinite(stiffness), rigid, stiffness),
             fold_stiffness: fold,
             contraction: 0.0,
+            offset: 0.0,
             stress_free_gap: middle.inverse() * (ends.x[1] - ends.x[0]),
             stress_free_rotation: rotation::log(ends.q[0].conjugate() * ends.q[1]),
         }
@@ -147,10 +175,20 @@ impl TissueStrip {
 
     /// The strip whose veins are strained so: where it is without force then.
     pub fn contracted(&self, strains: ContractingStrains) -> TissueStrip {
+        let [across, fold] = strains.weighted(self.vein_strain_factors());
         let mut strip = *self;
-        strip.stress_free_gap.y -= self.contraction * strains.stretch;
-        strip.stress_free_rotation.x += self.contraction * strains.bend;
+        strip.stress_free_gap.y -= across;
+        strip.stress_free_rotation.x -= fold;
         strip
+    }
+
+    /// The factors of the strains of its veins in its strain across (by the force) and in its fold (by
+    /// the moment).
+    pub fn vein_strain_factors(&self) -> StrainFactors {
+        StrainFactors {
+            force: DVec2::new(self.contraction, -self.offset),
+            moment: DVec2::new(-self.offset, -self.contraction),
+        }
     }
 
     /// The difference of the data from those of another strip. What is rigid stays so.
@@ -161,6 +199,7 @@ impl TissueStrip {
             stiffness: DVec3::select(rigid, DVec3::ZERO, change),
             condensing: DVec3::ZERO,
             contraction: self.contraction - other.contraction,
+            offset: self.offset - other.offset,
             fold_stiffness: self.fold_stiffness - other.fold_stiffness,
             stress_free_gap: self.stress_free_gap - other.stress_free_gap,
             stress_free_rotation: self.stress_free_rotation - other.stress_free_rotation,
@@ -174,6 +213,7 @@ impl TissueStrip {
         self.stress_free_gap += times * other.stress_free_gap;
         self.stress_free_rotation += times * other.stress_free_rotation;
         self.contraction += times * other.contraction;
+        self.offset += times * other.offset;
     }
 
     /// The sections of the strip as an element.
@@ -389,7 +429,7 @@ fn is_infinite(stiffness: DVec3) -> glam::BVec3 {
     stiffness.cmpeq(DVec3::splat(f64::INFINITY))
 }
 
-/// The stretch v_1 and the bend u_2 of a segment between two nodes, and their derivatives.
+/// The strains by which tissue contracts of a segment between two nodes, and their derivatives.
 pub struct VeinStrain {
     element: Element<Scalar>,
     ds: f64,
@@ -403,35 +443,42 @@ impl VeinStrain {
         let sections = LaneSections::from(section);
         let element = Element::with_strain_forces(&sections, &LaneNodes::from(ends));
         VeinStrain {
-            excess: ContractingStrains {
-                stretch: DVec3::from(element.w).x - section.rest_strain.x,
-                bend: DVec3::from(element.u).y - section.rest_curvature.y,
+            excess: {
+                let v = DVec3::from(element.w) - section.rest_strain;
+                let u = DVec3::from(element.u) - section.rest_curvature;
+                ContractingStrains {
+                    stretch: v.x,
+                    shear: v.y,
+                    twist: u.x,
+                    bend: u.y,
+                }
             },
             element,
             ds: section.ds,
         }
     }
 
-    /// The derivatives of the stretch by the unknowns of the nodes.
-    pub fn stretch_gradient(&self) -> PairGradient {
-        let turned = DVec3::X.cross(DVec3::from(self.element.w) * self.ds);
+    /// The derivatives of the sum of stretch and shear with these factors by the unknowns of the nodes.
+    pub fn force_gradient(&self, factors: DVec2) -> PairGradient {
+        let factors = factors.extend(0.0);
+        let turned = factors.cross(DVec3::from(self.element.w) * self.ds);
         let none = Vectors::from(DVec3::ZERO);
-        let first = (self.element).nodal_derivatives(DVec3::X.into(), turned.into(), none);
+        let first = (self.element).nodal_derivatives(factors.into(), turned.into(), none);
         pair_gradient(first) / self.ds
     }
 
-    /// The derivatives of the bend by the unknowns of the nodes.
-    pub fn bend_gradient(&self) -> PairGradient {
+    /// The derivatives of the sum of twist and bend with these factors by the unknowns of the nodes.
+    pub fn moment_gradient(&self, factors: DVec2) -> PairGradient {
         let none = Vectors::from(DVec3::ZERO);
-        let first = (self.element).nodal_derivatives(none, none, DVec3::Y.into());
+        let first = (self.element).nodal_derivatives(none, none, factors.extend(0.0).into());
         pair_gradient(first) / self.ds
     }
 
-    /// The second derivatives of `stretch` times the stretch plus `bend` times the bend.
-    pub fn hessian(&self, stretch: f64, bend: f64) -> StripHessian {
+    /// The second derivatives of the sum of all strains with these factors.
+    pub fn hessian(&self, factors: StrainFactors) -> StripHessian {
         let mut element = self.element;
-        element.nu = (stretch / self.ds * DVec3::X).into();
-        element.m = (bend / self.ds * DVec3::Y).into();
+        element.nu = (factors.force.extend(0.0) / self.ds).into();
+        element.m = (factors.moment.extend(0.0) / self.ds).into();
         element.w = (DVec3::from(element.w) * self.ds).into();
         // Without stiffness only the forces count.
         let sections = LaneSections::from(&Section {
@@ -609,6 +656,7 @@ mod tests {
             stiffness: strip.stiffness + h * rate.stiffness,
             condensing: strip.stiffness + h * rate.stiffness,
             contraction: 0.0,
+            offset: 0.0,
             fold_stiffness: strip.fold_stiffness + h * rate.fold_stiffness,
             stress_free_gap: strip.stress_free_gap + h * rate.stress_free_gap,
             stress_free_rotation: strip.stress_free_rotation + h * rate.stress_free_rotation,

@@ -5,7 +5,7 @@
 //! E = R^T d and the fold, first component of log(R_a^T R_b), less those of the natural leaf. The relative
 //! rotation enters by the Rodrigues vector g of its half, R^T R_b.
 //!
-//! **Stresses that are unknowns.** Where the tissue contracts across, the stress of E2 acts on the stretch
+//! **Stresses that are unknowns.** Where the tissue is rigid or contracts across, the stress of E2 acts on the stretch
 //! of the veins as well, and that of the fold on their bend: both stresses are unknowns beside n and m,
 //! with compliances. Where the tissue is rigid, E1 or E3 keeps its natural value all along. That holds if
 //! its rate vanishes and if it holds at the base, so that the rate alone is a condition, on n and m. Its
@@ -77,6 +77,8 @@ pub struct GapLaw {
     natural_rates: [f64; 3],
     /// Half the contraction over the length of either vein.
     contraction: [f64; 2],
+    /// Half the natural E1 over the length of either vein, where tissue is strained by its veins.
+    offset: [f64; 2],
 }
 
 impl GapLaw {
@@ -154,15 +156,13 @@ impl<'a> TissueEnergy<'a> {
             let k = mean * length * length / force;
             [k, k, k, mean / force]
         });
-        let has_stresses =
-            |gap: &Tissue| gap.contraction.max_abs() != 0.0 || gap.rigid_strains().contains(&true);
         Some(TissueEnergy {
             scenario,
             stress_free: Natural::new(scenario, scenario.tissue_grown),
             length,
             gaps,
             factors: factors.collect(),
-            has_stresses: gaps.iter().any(has_stresses),
+            has_stresses: gaps.iter().any(Tissue::has_unknown_forces),
         })
     }
 
@@ -193,7 +193,7 @@ impl<'a> TissueEnergy<'a> {
     pub fn law(&self, g: usize, sigma: f64, lambda: f64) -> GapLaw {
         let (gap, factors) = (&self.gaps[g], self.factors[g]);
         let mut law = GapLaw::default();
-        let contracts = gap.contraction.max_abs() != 0.0;
+        let strained_by_veins = gap.has_unknown_forces();
         let rigid = gap.rigid_strains();
         for (i, profile) in gap.stiffness_profiles().into_iter().enumerate() {
             if rigid[i] {
@@ -201,7 +201,7 @@ impl<'a> TissueEnergy<'a> {
                 continue;
             }
             let stiffness = lambda * profile.at(sigma) * factors[i];
-            match contracts && i % 2 == 1 {
+            match strained_by_veins && i % 2 == 1 {
                 true if stiffness > 0.0 => law.compliance[i] = Some(stiffness.recip()),
                 true => (),
                 false => law.stiffness[i] = stiffness,
@@ -219,6 +219,10 @@ impl<'a> TissueEnergy<'a> {
         });
         let gap = GapKinematics::between(&SVector::zeros(), &poses);
         law.natural = gap.strains();
+        if strained_by_veins {
+            let offset = 0.5 * law.natural[0] * self.length;
+            law.offset = rods.map(|rod| offset / rod.length);
+        }
         if rigid.contains(&true) {
             let rates = rods.map(|rod| {
                 let stretch = match self.scenario.tissue_grown {
@@ -318,10 +322,11 @@ impl StressedGap {
     /// The derivatives of the Lagrangian
     ///
     /// ```text
-    /// sum of 1/2 k_i (E_i - natural)^2 + t2 (E2 + c (e_a + e_b)/2) + t4 (fold - c (k_a + k_b)/2) + mu (E' - natural)
+    /// sum of 1/2 k_i (E_i - natural)^2 + mu (E' - natural)
+    ///     + t2 (E2 + c (e_a + e_b)/2 - a (g_a + g_b)/2) + t4 (fold - c (k_a + k_b)/2 - a (w_a + w_b)/2)
     /// ```
     ///
-    /// with the strains e and k of the veins in stretch and bend, t and mu being the stresses that are
+    /// with the natural E1 = a and the strains e, g, w and k of the veins in stretch, shear, twist and bend, t and mu being the stresses that are
     /// unknowns. E' = Q V_b - P V_a - W x E, with V the rates of positions, Q = R^T R_b, P = R^T R_a and W
     /// the rate of R, which is (P U_a + Q U_b)/2 + g/2 x (P U_a - Q U_b).
     fn response<D: DifferentiableNumber>(&self, gap: &GapKinematics<D>) -> GapResponse<D> {
@@ -359,11 +364,15 @@ impl StressedGap {
         };
         let force = lab(by_e);
         let [e1, _, e3] = difference(difference(vb, va), cross(turn, e));
-        let shift = |k: usize| law.contraction[k];
-        let strain_of = |part: fn(&FrameRates) -> f64| {
-            let excess = |k: usize| shift(k) * (part(&self.rates[k]) - part(&self.unstrained[k]));
+        let strain_of = |factors: [f64; 2], part: fn(&FrameRates) -> f64| {
+            let excess = |k: usize| factors[k] * (part(&self.rates[k]) - part(&self.unstrained[k]));
             excess(0) + excess(1)
         };
+        let (contraction, offset) = (law.contraction, law.offset);
+        let across = strain_of(contraction, |rates| rates.position.x)
+            - strain_of(offset, |rates| rates.position.y);
+        let folded = strain_of(contraction, |rates| rates.rotation.y)
+            + strain_of(offset, |rates| rates.rotation.x);
         GapResponse {
             by_pose: [
                 force.map(|f| -f),
@@ -374,9 +383,9 @@ impl StressedGap {
             by_rates: gap.rate_derivatives(law, stresses),
             by_stresses: [
                 e1 - law.natural_rates[0],
-                e[1] - law.natural[1] + strain_of(|rates| rates.position.x),
+                e[1] - law.natural[1] + across,
                 e3 - law.natural_rates[2],
-                strains[3] - law.natural[3] - strain_of(|rates| rates.rotation.y),
+                strains[3] - law.natural[3] - folded,
             ],
         }
     }
@@ -506,9 +515,14 @@ impl<D: DifferentiableNumber> GapKinematics<D> {
             self.rotated(-1.0, mu),
             self.rotated(-1.0, difference(mean, twist)),
         ];
-        for (k, contraction) in law.contraction.into_iter().enumerate() {
-            derivatives[2 * k][0] += contraction * stresses[1];
-            derivatives[2 * k + 1][1] -= contraction * stresses[3];
+        for (k, (contraction, offset)) in law.contraction.into_iter().zip(law.offset).enumerate() {
+            let [position, rotation] = &mut derivatives[2 * k..2 * k + 2] else {
+                continue;
+            };
+            position[0] += contraction * stresses[1];
+            position[1] -= offset * stresses[1];
+            rotation[0] -= offset * stresses[3];
+            rotation[1] -= contraction * stresses[3];
         }
         derivatives
     }
@@ -603,6 +617,7 @@ mod tests {
                 natural: [0.1, 0.4, -0.05, 0.2],
                 natural_rates: [0.3, 0.0, 0.1],
                 contraction: [0.2, 0.3],
+                offset: [0.04, -0.03],
             },
             poses: [
                 pose([0.1, 0.4, -0.2], [0.3, -0.8, 0.5]),

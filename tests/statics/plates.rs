@@ -58,8 +58,6 @@ impl Strip {
     }
 }
 
-const EDGES: [bool; 2] = [false, true];
-
 /// A strip much wider than long, clamped at both ends, one of which moves in the plane: as a linear lattice of the same
 /// rules, computed elsewhere; plane stress has 294.65.
 #[test]
@@ -94,15 +92,17 @@ fn short_strips_shear_as_plane_stress() {
 /// The deflection in the plane under a force on the end, over that of Timoshenko's beam, at aspects down to 2.
 #[test]
 fn strips_bend_in_their_plane_as_timoshenko_beams() {
-    for edges in EDGES {
-        for (aspect, within) in [(2.0, 3.5e-4), (3.0, 1.1e-4), (5.0, 2e-5), (12.0, 1e-5)] {
+    for (edges, factor) in [(false, 1.0), (true, 12.0)] {
+        // Margins have less of the shear than their part of the force.
+        for (aspect, within) in [(2.0, 3.5e-4), (3.0, 1.3e-4), (5.0, 4e-5), (12.0, 1e-5)] {
             let ratio = in_plane_ratio(Strip {
                 rods: 5,
                 length: 2.0 * aspect,
                 edges,
                 ..STRIP
             });
-            assert!((ratio - 1.0).abs() < within, "{edges} {aspect}: {ratio}");
+            let off = (ratio - 1.0).abs();
+            assert!(off < factor * within, "{edges} {aspect}: {ratio}");
         }
     }
     // Two strips and their middles are exactly such a beam.
@@ -168,15 +168,17 @@ fn strips_twist_as_plates() {
         let stiffness = strip.shear * strip.width * strip.thickness.powi(3) / 3.0;
         let angle = torque / stiffness * strip.length / 2.0;
         let nodes = &leaf.shape.rods[rods / 2].nodes;
-        let at = |sigma: f64| {
-            let place = leaf.shape.stations.iter().position(|at| *at == sigma);
-            (nodes[place.expect("a node")].rotation * DVec3::Y).z
-        };
-        close("angle", (at(0.75) - at(0.25)) / angle, 1.0, 1e-5);
+        // Between two stations away from both ends.
+        let stations = &leaf.shape.stations;
+        let [a, b] = [0.25, 0.75].map(|sigma| stations.partition_point(|at| *at < sigma));
+        let turn = |k: usize| (nodes[k].rotation * DVec3::Y).z;
+        let part = 2.0 * (stations[b] - stations[a]);
+        close("angle", (turn(b) - turn(a)) / (part * angle), 1.0, 1e-5);
     }
 }
 
-/// A plate that is wider at its end, with veins that are slanted by up to 0.3, hangs as Ritz has it.
+/// A plate that is narrower at its end, with veins that are slanted by up to 0.3, hangs as Ritz has it, with an error of
+/// second order in their number.
 #[test]
 fn fans_of_slanted_veins_bend_as_plates() {
     let (length, young, poisson, thickness) = (2.0, 1e4, 0.3, 0.004);
@@ -184,7 +186,7 @@ fn fans_of_slanted_veins_bend_as_plates() {
     let load = 1e-9;
     let plate = RitzPlate {
         length,
-        width: |x: f64| 0.4 + 1.2 * x,
+        width: |x: f64| 1.6 - 1.2 * x,
         thickness,
         young: [young; 2],
         poisson,
@@ -196,7 +198,7 @@ fn fans_of_slanted_veins_bend_as_plates() {
             r#"
             name = "fan"
             leaf = {{ rods = {rods} }}
-            blade = {{ length = {length}, width = {{ at = [0.0, 1.0], value = [0.4, 1.6] }}, thickness = {thickness}, young = {young}, poisson = {poisson}, mass_density = 1.0, edges = false }}
+            blade = {{ length = {length}, width = {{ at = [0.0, 1.0], value = [1.6, 0.4] }}, thickness = {thickness}, young = {young}, poisson = {poisson}, mass_density = 1.0, edges = false }}
             load = {{ g = [0.0, 0.0, {:?}] }}
             "#,
             load / thickness
@@ -204,11 +206,10 @@ fn fans_of_slanted_veins_bend_as_plates() {
         settle(&parse(&text), 1e-9).tips[rods / 2].z / wanted - 1.0
     };
     let errors = [5, 9, 17].map(off);
-    println!("{errors:?}");
-    assert!(
-        errors[1].abs() < 6e-3 && errors[2].abs() < 2e-3,
-        "{errors:?}"
-    );
+    assert!(errors[0] < 3.2e-3, "{errors:?}");
+    for pair in errors.windows(2) {
+        assert!((2.7..5.0).contains(&(pair[0] / pair[1])), "{errors:?}");
+    }
 }
 
 /// The six lowest frequencies of cantilever plates at three aspects, within half a per cent of Ritz with 17 veins.
@@ -249,7 +250,6 @@ fn plates_vibrate_as_ritz_has_it() {
         };
         for (rods, edges, within) in [(9, false, 1.1e-2), (17, false, 3e-3), (17, true, 9e-3)] {
             let errors = errors(rods, edges);
-            println!("{aspect} {rods} {edges} {errors:.5?}");
             assert!(
                 errors.iter().all(|error| error.abs() < within),
                 "{aspect} {rods} {edges}: {errors:.5?}"

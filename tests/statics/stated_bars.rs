@@ -29,6 +29,12 @@ const QUANTITIES: [&str; 5] = [
     "eigenvalues",
 ];
 
+/// Tolerances and numbers of modes.
+const ASKED: [(f64, usize); 4] = [(1e-4, 0), (1e-4, 3), (1e-6, 0), (1e-6, 3)];
+
+/// Time for a leaf.
+const LONGEST: Duration = Duration::from_secs(3);
+
 /// Farther from the truth, in lengths, is another equilibrium.
 const ANOTHER: f64 = 0.05;
 
@@ -202,6 +208,94 @@ fn draw(seed: usize) -> Drawn {
     }
 }
 
+/// A random blade in cm and N under its weight: pointed, a fan or a strip, free, gripped at its margins, loaded or in
+/// wind.
+fn draw_blade(seed: usize) -> Drawn {
+    let mut random = Draw(0xb1ad_0000 + seed as u64);
+    let rods = [3, 5, 5, 7, 9][(5.0 * random.even()) as usize];
+    let length = random.log(5.0, 40.0);
+    let width = length * random.log(0.03, 0.4);
+    let thickness = width * random.log(0.005, 0.05);
+    let young = random.log(1e3, 1e6);
+    let (base, beside) = (random.uniform(0.3, 1.0), random.uniform(0.5, 0.95));
+    let pointed = random.chance(0.5);
+    let outline = match random.even() {
+        kind if kind < 0.2 => format!("{width:?}"),
+        _ => format!(
+            "{{ at = [0.0, {:?}, {:?}, 1.0], value = [{:?}, {width:?}, {:?}, {:?}] }}",
+            random.uniform(0.25, 0.45),
+            random.uniform(0.55, 0.8),
+            base * width,
+            beside * width,
+            if pointed { 0.0 } else { 0.4 * width }
+        ),
+    };
+    let wind = random.chance(0.2);
+    let grips = !wind && random.chance(0.3);
+    let loads = random.chance(0.4);
+    // The weight of a strip that bends it, in units of E t^3/(12 L^3).
+    let per_area = random.log(0.1, 15.0) * young * thickness.powi(3) / (12.0 * length.powi(3));
+    let mut text = String::from("units = { length = \"cm\", force = \"N\" }\n");
+    let mut line = |it: String| writeln!(text, "{it}").unwrap();
+    line(format!(
+        "leaf = {{ rods = {rods}, elevation = {:?} }}",
+        random.uniform(-0.5, 1.0)
+    ));
+    line(format!(
+        "blade = {{ length = {length:?}, width = {outline}, thickness = {thickness:?}, young = {young:?}, young_across = {:?}, poisson = {:?}, mass_density = 1e-5, edges = {} }}",
+        young * random.log(0.2, 1.0),
+        random.uniform(0.0, 0.4),
+        random.chance(0.5)
+    ));
+    if random.chance(0.4) {
+        line(format!(
+            "rest.bend_2 = {:?}",
+            random.uniform(-2.0, 2.0) / length
+        ));
+    }
+    line(format!(
+        "load.g = {:?}",
+        random.vector(per_area / thickness / 1e-5, 0)
+    ));
+    if loads {
+        line(format!(
+            "[[load.point]]\nvein = {rods}\nat = {:?}\nforce = {:?}",
+            random.uniform(0.3, 0.9),
+            random.vector(0.2 * per_area * length * width, 0)
+        ));
+    }
+    if wind {
+        line(format!(
+            "[wind]\nvelocity = {:?}\ndensity = {:?}\ndrag = 2.0\nwidth = {:?}",
+            random.vector(1.0, 0),
+            per_area * random.log(0.3, 3.0),
+            width / rods as f64
+        ));
+    }
+    if grips {
+        let moved = [
+            random.uniform(-0.01, 0.0),
+            random.uniform(-0.01, 0.01),
+            random.uniform(-0.05, 0.05),
+        ];
+        line(format!(
+            "[[grip]]\nvein = 1\nat = {:?}\nheld = \"{}\"\nmove = {:?}",
+            random.uniform(0.4, 0.9),
+            if random.chance(0.7) {
+                "pinned"
+            } else {
+                "clamped"
+            },
+            moved.map(|it| it * length)
+        ));
+    }
+    let none = !(grips || wind);
+    Drawn {
+        scenario: parse(&text),
+        kinds: [true, grips, false, wind, false, false, true, none],
+    }
+}
+
 /// What a leaf at rest states: its values, and the bar of each group of them.
 struct Stated {
     values: Vec<f64>,
@@ -285,9 +379,10 @@ struct Table {
 }
 
 impl Table {
-    fn judge(&mut self, seed: usize) {
-        let Drawn { scenario, kinds } = draw(seed);
-        let limit = Duration::from_secs(3);
+    /// Judges a leaf against one at rest to the first of these tolerances that it keeps.
+    fn judge(&mut self, seed: usize, drawn: Drawn, truths: &[f64], asked: &[(f64, usize)]) {
+        let Drawn { scenario, kinds } = drawn;
+        let limit = LONGEST;
         let rest = |tolerance: f64, modes: usize| {
             let mut options = with_modes(modes, to(tolerance));
             options.limit = Limit::with_deadline(Instant::now() + limit);
@@ -297,11 +392,11 @@ impl Table {
             let found = relaxed(&scenario, &options);
             found.outcome.is_success().then_some(found)
         };
-        let Some(truth) = rest(1e-11, 3).or_else(|| rest(1e-10, 3)) else {
+        let Some(truth) = truths.iter().find_map(|tolerance| rest(*tolerance, 3)) else {
             return;
         };
         self.resting += 1;
-        for (tolerance, modes) in [(1e-4, 0), (1e-4, 3), (1e-6, 0), (1e-6, 3)] {
+        for &(tolerance, modes) in asked {
             let Some(leaf) = rest(tolerance, modes) else {
                 continue;
             };
@@ -399,7 +494,7 @@ fn bars_of_random_leaves_of_all_kinds_hold() {
         .filter(|known| !(first..first + count).contains(known));
     (first..first + count)
         .chain(others)
-        .for_each(|seed| table.judge(seed));
+        .for_each(|seed| table.judge(seed, draw(seed), &[1e-11, 1e-10], &ASKED));
     let rows = table.rows();
     println!("{rows}");
     println!("{} rest, {} in others", table.resting, table.others);
@@ -411,6 +506,23 @@ fn bars_of_random_leaves_of_all_kinds_hold() {
     let wrong = table.wrong.join("\n");
     assert!(wrong.is_empty(), "{wrong}");
     assert!(4 * table.resting > 3 * count && table.others <= table.resting / 10);
+}
+
+/// As many blades as `LEAFDYN_BLADE_BARS` says.
+#[test]
+fn bars_of_random_blades_hold() {
+    let mut table = Table::default();
+    let count = asked("LEAFDYN_BLADE_BARS", 6);
+    let first = asked("LEAFDYN_BLADE_BARS_FROM", 0);
+    for seed in first..first + count {
+        let asked = [(1e-3, 3), (1e-4, 3), (1e-6, 3), (1e-7, 0)];
+        table.judge(seed, draw_blade(seed), &[1e-9, 1e-8], &asked);
+    }
+    println!("{}", table.rows());
+    println!("{} rest, {} in others", table.resting, table.others);
+    let wrong = table.wrong.join("\n");
+    assert!(wrong.is_empty(), "{wrong}");
+    assert!(2 * table.resting > count && table.others <= table.resting / 5);
 }
 
 /// The rows of the table in the documents.

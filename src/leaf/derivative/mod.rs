@@ -293,7 +293,7 @@ impl DiscreteLeaf {
             0 => rate.rods[rod].base.to_array(),
             _ => [0.0; 6],
         };
-        for cell in self.contracting_cells().filter(|cell| cell.segment == 0) {
+        for cell in self.tissue_cells().filter(|cell| cell.segment == 0) {
             self.for_each_cell_response(state, cell, increment, |j, i, load| {
                 if nodes.contains(&i) {
                     let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];

@@ -7,11 +7,11 @@ use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::leaf::tissue::strips::{StripPlace, strip_ends};
 use crate::rod::{
-    ContractingStrains, NodeBlock, NodePair, PairGradient, SegmentGradient, StripHessian,
-    StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
+    ContractingStrains, NodeBlock, NodePair, PairGradient, SegmentGradient, StrainFactors,
+    StripHessian, StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
 };
 use crate::rotation;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 
 /// Unknowns of the four nodes of a cell: of the first rod those of a segment, then of the next rod.
@@ -34,20 +34,42 @@ impl CellStrains {
         let [a, b] = self.strains.each_ref().map(|of| of.excess);
         ContractingStrains {
             stretch: 0.5 * (a.stretch + b.stretch),
+            shear: 0.5 * (a.shear + b.shear),
+            twist: 0.5 * (a.twist + b.twist),
             bend: 0.5 * (a.bend + b.bend),
         }
     }
 
-    /// The derivatives of the mean stretch and bend by the unknowns of the four nodes.
-    fn gradients(&self) -> [CellGradient; 2] {
-        let both = |of: fn(&VeinStrain) -> PairGradient| {
+    /// The derivatives of the mean strains by the unknowns of the four nodes.
+    fn gradients(&self) -> MeanStrainGradients {
+        let both = |of: &dyn Fn(&VeinStrain) -> PairGradient| {
             let [a, b] = self.strains.each_ref().map(|vein| 0.5 * of(vein));
             CellGradient::from_fn(|k, _| if k < 12 { a[k] } else { b[k - 12] })
         };
-        [
-            both(VeinStrain::stretch_gradient),
-            both(VeinStrain::bend_gradient),
-        ]
+        MeanStrainGradients {
+            forces: [DVec2::X, DVec2::Y].map(|axis| both(&|vein| vein.force_gradient(axis))),
+            moments: [DVec2::X, DVec2::Y].map(|axis| both(&|vein| vein.moment_gradient(axis))),
+        }
+    }
+}
+
+/// The derivatives of the mean strains of both veins of a cell.
+struct MeanStrainGradients {
+    /// Of the stretch and the shear.
+    forces: [CellGradient; 2],
+    /// Of the twist and the bend.
+    moments: [CellGradient; 2],
+}
+
+impl MeanStrainGradients {
+    /// The derivatives of the sum of stretch and shear with these factors.
+    fn of_forces(&self, factors: DVec2) -> CellGradient {
+        factors.x * self.forces[0] + factors.y * self.forces[1]
+    }
+
+    /// The derivatives of the sum of twist and bend with these factors.
+    fn of_moments(&self, factors: DVec2) -> CellGradient {
+        factors.x * self.moments[0] + factors.y * self.moments[1]
     }
 }
 
@@ -65,12 +87,15 @@ struct CornerStrip {
 
 impl CornerStrip {
     /// The derivatives of the contracted strains across and in the fold by the unknowns of the cell, from
-    /// those of the mean stretch and bend.
-    fn strain_gradients(&self, [stretch, bend]: &[CellGradient; 2]) -> [CellGradient; 2] {
+    /// those of the mean strains.
+    fn strain_gradients(&self, means: &MeanStrainGradients) -> [CellGradient; 2] {
         let StripStrainGradients { across, fold } =
             self.strip.strain_gradients(&self.ends, self.force);
-        let c = self.strip.contraction;
-        let mut gradients = [c * stretch, -c * bend];
+        let factors = self.strip.vein_strain_factors();
+        let mut gradients = [
+            means.of_forces(factors.force),
+            means.of_moments(factors.moment),
+        ];
         for (gradient, own) in gradients.iter_mut().zip([across, fold]) {
             for k in 0..12 {
                 gradient[corner_unknown(self.end, k)] += own[k];
@@ -115,10 +140,10 @@ impl TissueCell {
 /// The part of the tissue in the resultants of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct ContractionResultants {
-    /// Its part of n_1, the force against a stretch.
-    pub stretching: f64,
-    /// Its part of m_2, the moment against a bend about d2.
-    pub bending: f64,
+    /// Its part of n_1 and n_2, the forces against a stretch and a shear in the plane.
+    pub force: DVec2,
+    /// Its part of m_1 and m_2, the moments against a twist and a bend about d2.
+    pub moment: DVec2,
     /// The derivatives of its energy by the nodes of the segment.
     pub gradient: SegmentGradient,
 }
@@ -136,9 +161,9 @@ fn corner_unknown(end: usize, k: usize) -> usize {
 }
 
 impl DiscreteLeaf {
-    /// All cells whose strips contract.
-    pub(in crate::leaf) fn contracting_cells(&self) -> impl Iterator<Item = TissueCell> + use<> {
-        let gaps = match self.has_contracting_tissue() {
+    /// All cells, if strips are strained by their veins.
+    pub(in crate::leaf) fn tissue_cells(&self) -> impl Iterator<Item = TissueCell> + use<> {
+        let gaps = match self.has_tissue_cells() {
             true => self.rods() - 1,
             false => 0,
         };
@@ -146,15 +171,15 @@ impl DiscreteLeaf {
         (0..gaps).flat_map(move |gap| (0..n).map(move |segment| TissueCell { gap, segment }))
     }
 
-    /// The cells next to node `i` in gap `gap`, if strips contract.
+    /// The cells next to node `i` in gap `gap`, if strips are strained by their veins.
     pub(super) fn cells_at_node(
         &self,
         gap: usize,
         i: usize,
     ) -> impl Iterator<Item = TissueCell> + use<> {
         let cells = [i.checked_sub(1), (i < self.segments()).then_some(i)];
-        let contracts = self.has_contracting_tissue();
-        let cells = cells.into_iter().flatten().filter(move |_| contracts);
+        let has_cells = self.has_tissue_cells();
+        let cells = cells.into_iter().flatten().filter(move |_| has_cells);
         cells.map(move |segment| TissueCell { gap, segment })
     }
 
@@ -205,7 +230,7 @@ impl DiscreteLeaf {
         let veins = self.cell_strains(state, cell);
         let gradients = veins.gradients();
         let (mut energy, mut gradient) = (0.0, CellGradient::zeros());
-        let (mut stretching, mut carried, mut bending) = (0.0, 0.0, 0.0);
+        let (mut stresses, mut carried) = (StrainFactors::default(), StrainFactors::default());
         for corner in self.corner_strips(state, cell, &veins, forces) {
             let CornerStrip {
                 strip, ends, force, ..
@@ -218,11 +243,11 @@ impl DiscreteLeaf {
                 }
             }
             let stress = strip.stress(ends, *force);
-            let c = strip.contraction;
+            let factors = strip.vein_strain_factors();
             energy += stress.energy;
-            stretching += c * stress.across;
-            carried += c * stress.carried_across;
-            bending -= c * stress.fold;
+            stresses.force += stress.across * factors.force;
+            stresses.moment += stress.fold * factors.moment;
+            carried.force += stress.carried_across * factors.force;
             if let Some(matrix) = &mut matrix {
                 let [by_across, by_fold] = corner.strain_gradients(&gradients);
                 add_square(matrix, strip.condensing.y, &by_across);
@@ -231,10 +256,14 @@ impl DiscreteLeaf {
                 add_pair(matrix, &geometric, |k| corner_unknown(corner.end, k));
             }
         }
-        gradient += stretching * gradients[0] + bending * gradients[1];
+        gradient += gradients.of_forces(stresses.force) + gradients.of_moments(stresses.moment);
         if let Some(matrix) = matrix {
+            let half = StrainFactors {
+                force: 0.5 * carried.force,
+                moment: 0.5 * stresses.moment,
+            };
             for (vein, strain) in veins.strains.iter().enumerate() {
-                let geometric = strain.hessian(0.5 * carried, 0.5 * bending);
+                let geometric = strain.hessian(half);
                 add_pair(matrix, &geometric, |k| 12 * vein + k);
             }
         }
@@ -291,7 +320,7 @@ impl DiscreteLeaf {
 
     /// The second derivatives of the energy of every cell.
     pub fn cell_stiffness(&self, state: &State) -> impl Iterator<Item = CellStiffness> {
-        self.contracting_cells().map(|cell| CellStiffness {
+        self.tissue_cells().map(|cell| CellStiffness {
             cell,
             matrix: self.cell_matrix(state, cell),
         })
@@ -335,9 +364,8 @@ impl DiscreteLeaf {
         mut write: impl FnMut(usize, DVec3),
     ) {
         let veins = self.cell_strains(state, cell);
-        let [stretch, _] = veins.gradients();
         let all = cell_increments(cell, increment);
-        let stretched = stretch.dot(&all);
+        let strained = veins.gradients().forces.map(|of| of.dot(&all));
         for corner in self.corner_strips(state, cell, &veins, CellForces::Carried) {
             let part = |node: usize| -> Increment {
                 std::array::from_fn(|c| all[corner_unknown(corner.end, 6 * node + c)])
@@ -350,7 +378,8 @@ impl DiscreteLeaf {
             } = &corner;
             let change = strip.force_increment(ends, *force, dx, turns);
             let across = rotation::midpoint(ends.q[0], ends.q[1]) * DVec3::Y;
-            let contracted = strip.condensing.y * strip.contraction * stretched * across;
+            let by_veins = strip.vein_strain_factors().force.dot(strained.into());
+            let contracted = strip.condensing.y * by_veins * across;
             let i = cell.segment + corner.end;
             let weight = self.strip_weight(corner.place, i);
             let number = self.strip_index(corner.place, cell.gap, i);
@@ -358,37 +387,37 @@ impl DiscreteLeaf {
         }
     }
 
-    /// What the tissue bears of the resultants of all segments, rod after rod, as it resists the stretch and the
-    /// bend of the veins by which it contracts; empty unless it does.
+    /// What the tissue bears of the resultants of all segments, rod after rod, as it resists the strains of the
+    /// veins by which it contracts; empty unless it does.
     pub fn contraction_resultants(&self, state: &State) -> Vec<ContractionResultants> {
         let n = self.segments();
         let mut all = Vec::new();
-        if !self.has_contracting_tissue() {
+        if !self.has_tissue_cells() {
             return all;
         }
         // By the strains of each segment, from the cells on either side.
-        let mut sums = vec![[0.0; 2]; self.rods() * n];
-        for cell in self.contracting_cells() {
+        let mut sums = vec![StrainFactors::default(); self.rods() * n];
+        for cell in self.tissue_cells() {
             let veins = self.cell_strains(state, cell);
             for corner in self.corner_strips(state, cell, &veins, CellForces::Strained) {
                 let StripStress { across, fold, .. } =
                     corner.strip.stress(&corner.ends, corner.force);
-                let c = 0.5 * corner.strip.contraction;
+                let factors = corner.strip.vein_strain_factors();
                 for rod in [cell.gap, cell.gap + 1] {
-                    let [stretch, bend] = &mut sums[rod * n + cell.segment];
-                    *stretch += c * across;
-                    *bend -= c * fold;
+                    let sum = &mut sums[rod * n + cell.segment];
+                    sum.force += 0.5 * across * factors.force;
+                    sum.moment += 0.5 * fold * factors.moment;
                 }
             }
         }
-        for ((j, i), [stretch, bend]) in self.rod_index_pairs(0..n).zip(sums) {
+        for ((j, i), StrainFactors { force, moment }) in self.rod_index_pairs(0..n).zip(sums) {
             let section = self.section(j, i);
             let strain = VeinStrain::between(section, &state.ends(j, i));
-            let gradient = stretch * strain.stretch_gradient() + bend * strain.bend_gradient();
+            let gradient = strain.force_gradient(force) + strain.moment_gradient(moment);
             let vector = |first: usize| DVec3::from_slice(&gradient.as_slice()[first..first + 3]);
             all.push(ContractionResultants {
-                stretching: stretch / section.ds,
-                bending: bend / section.ds,
+                force: force / section.ds,
+                moment: moment / section.ds,
                 gradient: SegmentGradient {
                     x: vector(9),
                     a: vector(0),

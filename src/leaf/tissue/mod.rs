@@ -38,7 +38,7 @@ impl DiscreteLeaf {
         if !self.has_tissue() {
             return 0.0;
         }
-        if self.has_contracting_tissue() || self.has_rigid_tissue() {
+        if self.has_tissue_cells() {
             return f64::INFINITY;
         }
         let rate = |j: usize| {
@@ -77,7 +77,7 @@ impl DiscreteLeaf {
                 add(rod, i, load);
             }
         }
-        for cell in self.contracting_cells() {
+        for cell in self.tissue_cells() {
             energy += self.for_each_cell_load(state, cell, &mut add);
         }
         energy
@@ -169,7 +169,7 @@ impl DiscreteLeaf {
         if matrix {
             system.clear_cell_blocks();
         }
-        for cell in self.contracting_cells() {
+        for cell in self.tissue_cells() {
             energy += self.add_cell(state, cell, system, matrix);
         }
         energy
@@ -208,12 +208,12 @@ impl DiscreteLeaf {
             let k = self.strip_index(StripPlace::Node, g, i);
             next.tissue[k] = (force + step * change) / self.grid.node_weight(i);
         }
-        for cell in self.contracting_cells() {
+        for cell in self.tissue_cells() {
             self.advance_cell(state, cell, step, increment, |k, force| {
                 next.tissue[k] = force
             });
         }
-        if self.has_contracting_tissue() {
+        if self.has_tissue_cells() {
             // Interpolated along a gap, both kinds of corners have values at both ends.
             for g in 0..self.rods() - 1 {
                 let n = self.segments();
@@ -241,7 +241,7 @@ impl DiscreteLeaf {
                 force / self.grid.node_weight(it.node);
         }
         let still = |_, _| [0.0; 6];
-        for cell in self.contracting_cells() {
+        for cell in self.tissue_cells() {
             // The state carries none: a step of no length has the forces of the strains.
             self.advance_cell(state, cell, 0.0, still, |k, force| forces[k] = force);
         }
@@ -324,7 +324,7 @@ impl DiscreteLeaf {
         // Each leaf less the first.
         let total: f64 = each.iter().map(|(weight, _)| weight).sum();
         for (weight, leaf) in each.iter().copied().chain([(-total, *first)]) {
-            for cell in leaf.contracting_cells() {
+            for cell in leaf.tissue_cells() {
                 energy += weight
                     * leaf.for_each_cell_load(state, cell, |rod, i, load| {
                         add(rod, i, scaled_wrench(load, weight));
@@ -350,7 +350,7 @@ impl DiscreteLeaf {
             true => [0.0; 6],
             false => shape[state.base(rod) + i],
         };
-        let cells = self.contracting_cells();
+        let cells = self.tissue_cells();
         let cells = cells.map(|cell| self.cell_curvature(state, cell, increment));
         nodes + cells.sum::<f64>()
     }

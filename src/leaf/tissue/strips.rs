@@ -1,7 +1,7 @@
 //! The strips of tissue at the nodes of every gap: how they are made, the forces that they carry, and sections
 //! that are turned against each other by half a turn.
 //!
-//! Tissue that contracts has its strains also from the segments of its veins. Then a node of a gap has
+//! Tissue that is rigid or contracts has its strains also from the segments of its veins. Then a node of a gap has
 //! three strips: one with the forces along and normal to the veins, and one on either side, in the corners
 //! of the cells between two nodes, with the force across and the moment of the fold, and half of the weight:
 //! it depends on the four nodes of its cell alone.
@@ -126,13 +126,13 @@ impl DiscreteLeaf {
     /// resist rotations.
     pub(in crate::leaf) fn tissue_strips(&self, natural: &State) -> Vec<TissueStrip> {
         let n = self.segments();
-        let contracts = (0..self.rods() - 1).any(|g| self.leaf.tissue_contracts(g));
-        let places = &StripPlace::ALL[..if contracts { 3 } else { 1 }];
+        let has_cells = (0..self.rods() - 1).any(|g| self.leaf.is_tissue_strained_by_veins(g));
+        let places = &StripPlace::ALL[..if has_cells { 3 } else { 1 }];
         let strip = |place: StripPlace, g: usize, i: usize| {
             let mut stiffness = self.leaf.tissue_stiffness(g, self.grid.sigma()[i]);
             let k = &mut stiffness.displacement;
             match place {
-                StripPlace::Node if contracts => (k.y, stiffness.fold) = (0.0, 0.0),
+                StripPlace::Node if has_cells => (k.y, stiffness.fold) = (0.0, 0.0),
                 StripPlace::Node => {}
                 StripPlace::Ahead | StripPlace::Behind => (k.x, k.z) = (0.0, 0.0),
             }
@@ -153,8 +153,9 @@ impl DiscreteLeaf {
                 rigid,
                 &strip_ends(natural, g, i),
             );
-            if place != StripPlace::Node {
+            if place != StripPlace::Node && self.leaf.is_tissue_strained_by_veins(g) {
                 strip.contraction = stiffness.contraction;
+                strip.offset = strip.stress_free_gap.x;
             }
             strip
         };
@@ -214,8 +215,8 @@ impl DiscreteLeaf {
         !self.strips.is_empty()
     }
 
-    /// Whether strips contract as their veins are strained.
-    pub(in crate::leaf) fn has_contracting_tissue(&self) -> bool {
+    /// Whether the strips of some gap are strained as their veins are.
+    pub(in crate::leaf) fn has_tissue_cells(&self) -> bool {
         self.strips.len() > (self.rods() - 1) * (self.segments() + 1)
     }
 

@@ -6,7 +6,7 @@ use crate::leaf::{ContractionResultants, DiscreteLeaf, Grid, Leaf, RodFields, St
 use crate::rod::SegmentGradient;
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DQuat, DVec3};
 
 /// Segments of a panel between kinks from which on polynomials along it predict better than cubic
 /// Hermite interpolants.
@@ -493,12 +493,18 @@ pub fn fields_from_node_state(leaf: &Leaf, node: &NodeState) -> RodFields {
     }
 }
 
-/// Takes back the strain that a vein would have by what the tissue bears of its n_1 and m_2 (dimensionless).
-pub fn subtract_tissue_strain(leaf: &Leaf, at: VeinStation, part: DVec2, node: &mut NodeState) {
-    if part != DVec2::ZERO {
+/// Takes back the strains that a vein would have by what the tissue bears of its force and moment
+/// (dimensionless).
+pub fn subtract_tissue_strain(
+    leaf: &Leaf,
+    at: VeinStation,
+    [force, moment]: [DVec3; 2],
+    node: &mut NodeState,
+) {
+    if force != DVec3::ZERO || moment != DVec3::ZERO {
         let section = leaf.section(at.vein, at.sigma, 1.0);
-        node.v.x -= section.compliance.x * part.x;
-        node.u.y -= part.y / (section.couple_stiffness.y * leaf.scale.length);
+        node.v -= section.compliance * force;
+        node.u -= moment / (section.couple_stiffness * leaf.scale.length);
     }
 }
 
@@ -608,13 +614,15 @@ impl<'l> NodalResultants<'l> {
         [force, moment].map(|vector| to_directors * vector)
     }
 
-    /// What the tissue bears of n_1 and of m_2 at node `i` of rod `j`: interpolated between the middles of the
-    /// segments on either side, at the ends from the last two.
-    pub fn of_tissue(&self, j: usize, i: usize) -> DVec2 {
+    /// What the tissue bears of the force and the moment at node `i` of rod `j`: interpolated between the middles
+    /// of the segments on either side, at the ends from the last two.
+    pub fn of_tissue(&self, j: usize, i: usize) -> [DVec3; 2] {
         let (leaf, n) = (self.leaf, self.leaf.segments());
         let part = |i: usize| {
             let of = self.tissue.get(j * n + i);
-            of.map_or(DVec2::ZERO, |of| DVec2::new(of.stretching, of.bending))
+            of.map_or([DVec3::ZERO; 2], |of| {
+                [of.force, of.moment].map(|it| it.extend(0.0))
+            })
         };
         if n == 1 {
             return part(0);
@@ -622,7 +630,8 @@ impl<'l> NodalResultants<'l> {
         let before = i.saturating_sub(1).min(n - 2);
         let [from, to] = [before, before + 1].map(|i| leaf.grid.segment_midpoint(i));
         let weight = (leaf.grid.sigma()[i] - from) / (to - from);
-        part(before).lerp(part(before + 1), weight)
+        let [from, to] = [before, before + 1].map(part);
+        [0, 1].map(|k| from[k].lerp(to[k], weight))
     }
 }
 

@@ -240,11 +240,13 @@ fn stations_of_result(
             let mut node = transfer::node_state_from_fields(leaf, at, fields);
             if resultants.iter().any(NodalResultants::include_tissue) {
                 let stencils = found.stencils(sigma);
-                let part = found.extrapolated_value(|k, _| {
-                    let [value, _] = &stencils[k];
-                    value.value(|i| resultants[k].of_tissue(j, i).extend(0.0))
+                let part = [0, 1].map(|which| {
+                    found.extrapolated_value(|k, _| {
+                        let [value, _] = &stencils[k];
+                        value.value(|i| resultants[k].of_tissue(j, i)[which])
+                    })
                 });
-                transfer::subtract_tissue_strain(leaf, at, part.truncate(), &mut node);
+                transfer::subtract_tissue_strain(leaf, at, part, &mut node);
             }
             node
         });

