@@ -122,19 +122,23 @@ fn a_blade_under_its_weight_is_its_own_image() {
     close("weight", reaction / (-weight * mean), 1.0, 1e-6);
 }
 
-/// Twice as many veins, the same blade: the differences of the tip become small.
+/// Twice as many veins, the same blade: the differences of the tip become small, in second order with veins in the
+/// middle of equal strips.
 #[test]
 fn few_veins_are_enough() {
-    let tip = |rods: usize| settle(&blade(&format!("{WEIGHT}; leaf.rods={rods}")), 1e-7).tips[0];
-    let tips = [3, 5, 9, 17].map(tip);
-    let changes: Vec<f64> = tips
-        .windows(2)
-        .map(|pair| pair[0].distance(pair[1]))
-        .collect();
-    assert!(
-        changes[1] < changes[0] && changes[2] < changes[1] && changes[2] < 2e-3,
-        "{changes:?}"
-    );
+    for (edges, ratio, last) in [(false, 3.5, 1e-3), (true, 1.2, 1.2e-2)] {
+        let tip = |rods: usize| {
+            let change = format!("{WEIGHT}; leaf.rods={rods}; blade.edges={edges}");
+            settle(&blade(&change), 1e-7).tips[0]
+        };
+        let tips = [3, 5, 9, 17].map(tip);
+        let changes: Vec<f64> = tips
+            .windows(2)
+            .map(|pair| pair[0].distance(pair[1]))
+            .collect();
+        let shrink = changes.windows(2).all(|pair| ratio * pair[1] < pair[0]);
+        assert!(shrink && changes[2] < last, "{edges}: {changes:?}");
+    }
 }
 
 /// The width below which stiffnesses are those of a wider blade hardly matters.
@@ -164,7 +168,10 @@ fn a_blade_by_shooting() {
     );
     let bars = [&leaf, &shot].map(|it| it.accuracy.error_estimate.unwrap());
     let apart = distance(&leaf, &shot);
-    assert!(apart < bars[0] + bars[1], "{apart:.1e} {bars:?}");
+    // Rounding in shooting, where perturbations grow along thin strips: with 16 to 100 intervals it differs by so
+    // much.
+    let rounding = 1e-8;
+    assert!(apart < bars[0] + bars[1] + rounding, "{apart:.1e} {bars:?}");
 }
 
 /// Two veins with tissue that keeps their distance and resists shear, of which one has grown by a

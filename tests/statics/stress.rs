@@ -85,7 +85,7 @@ fn a_blade() {
     let text = "
         name = 'blade'
         leaf = { rods = 5 }
-        blade = { length = 1.0, width = 0.05, thickness = 0.002, young = 1e9, edges = false }
+        blade = { length = 1.0, width = 0.05, thickness = 0.002, young = 1e9, poisson = 0.0, edges = false }
         load = { gravity = [0.0, 0.0, -1e-6] }
     ";
     let scenario = Scenario::from_toml(text).unwrap();
