@@ -435,8 +435,9 @@ pub fn check_hinge_equilibrium(scenario: &Scenario) -> Result<(), RelaxError> {
     }
 }
 
-/// Largest distance of two natural tips, over the longest vein, that counts as rounding.
-const SAME_TIP_DISTANCE: f64 = 1e-9;
+/// Largest distance of two natural tips, over the longest vein, that counts as that of the integration of a steep
+/// outline.
+const SAME_TIP_DISTANCE: f64 = 1e-6;
 
 /// Refuses a shared place of the tips of veins that rigid tissue ties and that end apart in the natural leaf:
 /// beside the tip it would have to keep them as far apart as there.

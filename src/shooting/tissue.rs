@@ -97,7 +97,7 @@ impl Tissue {
 }
 
 /// Distance of natural tips, in lengths, up to which they are one.
-const JOINT_DISTANCE: f64 = 1e-9;
+const JOINT_DISTANCE: f64 = 1e-6;
 
 /// Whether the tissue of some gap is rigid along or normal to its veins.
 pub fn has_rigid_tissue(scenario: &Scenario) -> bool {

@@ -202,7 +202,11 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
         .for_each(|(wanted, found)| constant(wanted, found));
     let rigid = Profile::Constant(f64::INFINITY);
     assert!(gap.stiffness[0] == rigid && gap.stiffness[2] == rigid);
-    constant(8e-6 * h * t, &leaf.dynamics.density[0]);
+    constant(8e-6 * h * t, &leaf.dynamics.density[1]);
+    constant(8e-6 * 1.5 * 5.0 / 48.0 * t, &leaf.dynamics.density[0]);
+    let inertia = 8e-6 * h * t / 12.0;
+    constant(inertia * t * t, &leaf.dynamics.rotary_inertia[1]);
+    constant(inertia * (w * w + t * t), &leaf.dynamics.polar_inertia[1]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.
     let leaf = blade_with_overrides("").unwrap();
     let blade = leaf.blade.as_ref().unwrap();
