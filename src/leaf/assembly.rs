@@ -5,7 +5,7 @@
 //! of the fields along the rods were removed.
 
 use crate::leaf::block_tridiagonal::{GroupIncrements, ROTATION_UNKNOWNS, lane_rods, rod_lane};
-use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, group_loads};
+use crate::leaf::discrete::{DiscreteLeaf, GroupLoads, LaneRodLoads, NodeLoad, group_loads};
 use crate::leaf::rod_ode::FieldChange;
 use crate::leaf::state::{State, add_to_increment};
 use crate::leaf::system::{
@@ -159,8 +159,10 @@ impl DiscreteLeaf {
         let n = self.segments();
         let mut largest = 0.0_f64;
         let mut tip = DVec3::ZERO;
+        let tissue = self.tissue_loads(state);
         for j in 0..self.rods() {
-            let turned = self.tissue_load(state, j, 0).moment + self.node_dead_moment(0);
+            let on_tissue = |i: usize| tissue.get(state.base(j) + i).copied().unwrap_or_default();
+            let turned = on_tissue(0).moment + self.node_dead_moment(0);
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
@@ -181,7 +183,7 @@ impl DiscreteLeaf {
                     };
                     largest = larger(largest, larger(force, moment));
                 }
-                let load = self.load(state, j, i + 1);
+                let load = self.load_with_tissue(state, j, i + 1, on_tissue(i + 1));
                 force = load.force - gradient.x;
                 moment = load.moment + self.node_dead_moment(i + 1) - gradient.b;
                 largest = larger(largest, largest_component(segment.gap));
@@ -212,7 +214,8 @@ impl DiscreteLeaf {
         if !(0..self.rods()).any(apart) {
             return 0.0;
         }
-        let of = |j: usize| self.load(state, j, 0).energy - self.tissue_load(state, j, 0).energy;
+        let none = NodeLoad::default();
+        let of = |j: usize| self.load_with_tissue(state, j, 0, none).energy;
         (0..self.rods()).map(of).sum()
     }
 
@@ -220,15 +223,17 @@ impl DiscreteLeaf {
     /// Dead moments on a rod have no potential and are left out.
     pub fn energy(&self, state: &State) -> f64 {
         let n = self.segments();
-        let mut energy = self.base_energy(state);
+        let mut energy = self.base_energy(state) + self.cell_energy(state);
         for (j, i) in self.rod_index_pairs(0..1) {
-            energy += self.tissue_load(state, j, i).energy;
+            energy += self.node_strip_load(state, j, i).energy;
         }
+        let load = |j: usize, i: usize| {
+            self.load_with_tissue(state, j, i, self.node_strip_load(state, j, i))
+        };
         for j in 0..self.rods() {
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
-                energy +=
-                    self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).energy;
+                energy += self.section(j, i).elastic_energy(&segment) + load(j, i + 1).energy;
             }
         }
         energy

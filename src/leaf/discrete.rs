@@ -419,6 +419,17 @@ impl DiscreteLeaf {
 
     /// Dead load, coupling and tissue on node `i` of rod `j`.
     pub fn load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
+        self.load_with_tissue(state, j, i, self.tissue_load(state, j, i))
+    }
+
+    /// The load on node `i` of rod `j`, of which this is that of the tissue.
+    pub fn load_with_tissue(
+        &self,
+        state: &State,
+        j: usize,
+        i: usize,
+        tissue: NodeLoad,
+    ) -> NodeLoad {
         let (k, nodes) = (state.base(j) + i, self.segments() + 1);
         let x = |present: bool, k: usize| state.x[if present { k } else { state.base(j) + i }];
         let (first, last) = (j == 0, j + 1 == self.rods());
@@ -430,7 +441,7 @@ impl DiscreteLeaf {
         let load = LaneRodLoads::load_group(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
         let weights = self.node_weights(i);
         let lanes = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
-        let (tissue, own) = (self.tissue_load(state, j, i), self.own_load_on_node(j, i));
+        let own = self.own_load_on_node(j, i);
         NodeLoad {
             moment: tissue.moment,
             force: DVec3::from(lanes.force) + tissue.force + own,

@@ -31,7 +31,7 @@ pub use crate::leaf::derivative::parameter::{
 };
 pub use crate::leaf::direct::unknowns::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
-pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment};
+pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment, NodeLoad};
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,

@@ -9,7 +9,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale, State};
 use crate::rotation::outer;
-use crate::scenario::{Dynamics, Profile, Schedule};
+use crate::scenario::{Dynamics, PolarInertia, Profile, Schedule};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
@@ -157,12 +157,15 @@ impl Physics {
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         let dynamics = &self.dynamics;
-        let [transverse, polar] =
-            [&dynamics.rotary_inertia[j], &dynamics.polar_inertia[j]].map(around);
+        let transverse = around(&dynamics.rotary_inertia[j]);
+        let polar_excess = match &dynamics.polar_inertia {
+            PolarInertia::Excess(excess) => *excess,
+            PolarInertia::PerLength(polar) => around(&polar[j]) / transverse - 1.0,
+        };
         Inertia {
             mass: length * around(&dynamics.density[j]) / self.density_unit + on_points,
             transverse: length * transverse / rotary,
-            polar_excess: polar / transverse - 1.0,
+            polar_excess,
         }
     }
 

@@ -8,7 +8,7 @@ use crate::numbers::sorted_distinct;
 use crate::scenario::blade::Spline;
 use crate::scenario::checked::Scenario;
 use crate::scenario::format::{Key, TablePath};
-use crate::scenario::loads::PointLoad;
+use crate::scenario::loads::{PointLoad, PolarInertia};
 use crate::scenario::photo::axis_name;
 use crate::scenario::profile::{Profile, Schedule};
 use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
@@ -242,7 +242,9 @@ impl Scenario {
             Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
             Key::Density => quantity_value(dynamics.density.iter()),
             // If given, it would be larger about d1.
-            Key::RotaryInertia if dynamics.polar_inertia == dynamics.rotary_inertia => return None,
+            Key::RotaryInertia if dynamics.polar_inertia == PolarInertia::Excess(0.0) => {
+                return None;
+            }
             Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
             Key::ExternalDamping => number_value(dynamics.external_damping),
             Key::InternalDamping => number_value(dynamics.internal_damping),

@@ -204,6 +204,17 @@ words! {
     }
 }
 
+/// The moment of inertia of rods about d1.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PolarInertia {
+    /// It is larger than that about d2 and d3 by this part of it: 1 if a section is given, as for every
+    /// round one; 0 otherwise, where a vein turns with its strip of blade and has the same inertia about all
+    /// axes, as in the relaxation ([`crate::relax`]).
+    Excess(f64),
+    /// Per unit reference length, one per rod: of veins of a blade, that of their strips.
+    PerLength(Vec<Profile>),
+}
+
 /// How a leaf moves. All quantities are in the units of the scenario, with
 /// its unit of time. L is the longest rod, A the mean bending stiffness
 /// ([`Scale`]), rho the mean of the densities mid-rod.
@@ -214,10 +225,8 @@ pub struct Dynamics {
     /// rho I, the moment of inertia per unit reference length about d2 and
     /// about d3, one per rod; positive.
     pub rotary_inertia: Vec<Profile>,
-    /// The moment of inertia per unit reference length about d1, one per rod: twice `rotary_inertia` if a
-    /// section is given, that of its strip for a vein of a blade with a mass; otherwise the same as about the other
-    /// axes, as a vein turns with a strip of blade, as in the relaxation ([`crate::relax`]).
-    pub polar_inertia: Vec<Profile>,
+    /// The moment of inertia about d1.
+    pub polar_inertia: PolarInertia,
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
     pub external_damping: f64,
@@ -309,10 +318,9 @@ impl Dynamics {
         let duration = DEFAULT_MOTION.duration * time;
         let radius = Profile::Constant(DEFAULT_MOTION.radius * scale.length);
         let inertia = |density| round_inertia(density, &radius);
-        let rotary_inertia: Vec<Profile> = density.iter().map(inertia).collect();
         Dynamics {
-            polar_inertia: rotary_inertia.clone(),
-            rotary_inertia,
+            rotary_inertia: density.iter().map(inertia).collect(),
+            polar_inertia: PolarInertia::Excess(0.0),
             external_damping: critical_damping(&density, time),
             density,
             internal_damping: 0.0,
@@ -396,15 +404,15 @@ pub(super) fn read_dynamics(
         None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
-    let [rotary_inertia, polar_inertia] = match read_rotary_inertia(entries, &preset.density)? {
-        Some(given) => {
-            let polar = given.iter().map(|profile| profile.scaled(2.0)).collect();
-            [given, polar]
+    let round = PolarInertia::Excess(1.0);
+    let given = read_rotary_inertia(entries, &preset.density)?;
+    let (rotary_inertia, polar_inertia) = match (given, of_mass(Property::RotaryInertia)) {
+        (Some(given), _) => (given, round),
+        (None, Some(of_mass)) => {
+            let own = source.polar_inertia().map(PolarInertia::PerLength);
+            (of_mass, own.unwrap_or(round))
         }
-        None => match [Property::RotaryInertia, Property::PolarInertia].map(of_mass) {
-            [Some(rotary), Some(polar)] => [rotary, polar],
-            _ => [preset.rotary_inertia, preset.polar_inertia],
-        },
+        (None, None) => (preset.rotary_inertia, preset.polar_inertia),
     };
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;

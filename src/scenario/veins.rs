@@ -208,6 +208,16 @@ impl StiffnessSource {
         }
     }
 
+    /// The moment of inertia per length about d1 along all veins, if a blade tells it.
+    pub fn polar_inertia(&self) -> Option<Vec<Profile>> {
+        match self {
+            StiffnessSource::Blade { parts, .. } => {
+                Some(parts.profiles(BladeProperty::PolarInertia))
+            }
+            _ => None,
+        }
+    }
+
     /// A property along all veins, as sections or a blade determine it; `None` if numbers are given.
     pub fn property_profiles(&self, property: Property) -> Option<Vec<Profile>> {
         match self {

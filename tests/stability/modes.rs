@@ -4,7 +4,7 @@
 use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Physics;
 use leafdyn::relax::{Mode, relax};
-use leafdyn::scenario::Dynamics;
+use leafdyn::scenario::{Dynamics, PolarInertia};
 use leafdyn_testing::motion::{
     CHAIN, SLENDER, beam, chain, discrete, layered, state_of, three_veins,
 };
@@ -226,8 +226,7 @@ fn eigenvalues_are_those_of_a_dense_method() {
     };
     assert_as_dense("three veins", &three_veins(), &on(6, 25));
     let mut round = three_veins();
-    let rotary = &round.dynamics.rotary_inertia;
-    round.dynamics.polar_inertia = rotary.iter().map(|one| one.scaled(2.0)).collect();
+    round.dynamics.polar_inertia = PolarInertia::Excess(1.0);
     round.dynamics.density = vec![Profile::Constant(7.0); 3];
     assert_as_dense("heavier", &round, &on(6, 25));
     let mut free = three_veins();

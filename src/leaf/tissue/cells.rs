@@ -310,6 +310,17 @@ impl DiscreteLeaf {
         found.energy
     }
 
+    /// The energy of the strips of all cells.
+    pub(in crate::leaf) fn cell_energy(&self, state: &State) -> f64 {
+        let energy = |cell: TissueCell| -> f64 {
+            let veins = self.cell_strains(state, cell);
+            let corners = self.corner_strips(state, cell, &veins, CellForces::Strained);
+            let each = corners.iter().map(|it| it.strip.stress(&it.ends, it.force));
+            each.map(|stress| stress.energy).sum()
+        };
+        self.tissue_cells().map(energy).sum()
+    }
+
     /// The second derivatives of the energy of the strips of a cell.
     fn cell_matrix(&self, state: &State, cell: TissueCell) -> CellMatrix {
         let mut matrix = CellMatrix::zeros();

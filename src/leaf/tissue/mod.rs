@@ -92,8 +92,23 @@ impl DiscreteLeaf {
         });
     }
 
-    /// What the tissue on either side exerts on node `i` of rod `j`.
-    pub(in crate::leaf) fn tissue_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
+    /// The loads of all tissue on all nodes, rod after rod; empty without tissue. Energies are not told by
+    /// nodes.
+    pub fn tissue_loads(&self, state: &State) -> Vec<NodeLoad> {
+        if !self.has_tissue() {
+            return Vec::new();
+        }
+        let mut loads = vec![NodeLoad::default(); state.x.len()];
+        self.for_each_tissue_load(state, |rod, i, added| {
+            let load = &mut loads[state.base(rod) + i];
+            load.moment += added.moment;
+            load.force += added.force;
+        });
+        loads
+    }
+
+    /// What the strips of node `i` of rod `j` exert on it.
+    pub(in crate::leaf) fn node_strip_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
         let mut load = NodeLoad::default();
         if !self.has_tissue() {
             return load;
@@ -110,6 +125,17 @@ impl DiscreteLeaf {
             if end == 0 {
                 load.energy += energy;
             }
+        }
+        load
+    }
+
+    /// What the tissue on either side exerts on node `i` of rod `j`.
+    pub(in crate::leaf) fn tissue_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
+        let mut load = self.node_strip_load(state, j, i);
+        if !self.has_tissue_cells() {
+            return load;
+        }
+        for g in self.adjacent_gaps(j) {
             for cell in self.cells_at_node(g, i) {
                 let energy = self.for_each_cell_load(state, cell, |rod, node, on| {
                     if (rod, node) == (j, i) {
@@ -117,7 +143,7 @@ impl DiscreteLeaf {
                         load.force += on.force;
                     }
                 });
-                if end == 0 {
+                if j == g {
                     // Both nodes of the rod have a part of the cell's.
                     load.energy += 0.5 * energy;
                 }

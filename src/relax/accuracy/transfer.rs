@@ -2,7 +2,9 @@
 //! halved or to any other, restriction, and prediction on a finer grid from several coarser ones by
 //! polynomials through the nearest nodes; strains and stress resultants at the nodes of a state.
 
-use crate::leaf::{ContractionResultants, DiscreteLeaf, Grid, Leaf, RodFields, State, whole_state};
+use crate::leaf::{
+    ContractionResultants, DiscreteLeaf, Grid, Leaf, NodeLoad, RodFields, State, whole_state,
+};
 use crate::rod::SegmentGradient;
 use crate::rotation;
 use crate::shape::{NodeState, RodShape};
@@ -532,6 +534,8 @@ pub struct NodalResultants<'l> {
     pub state: &'l State,
     /// What the tissue bears of those of every segment; empty unless it contracts.
     tissue: Vec<ContractionResultants>,
+    /// The loads of the tissue on all nodes, rod after rod; empty without tissue.
+    tissue_loads: Vec<NodeLoad>,
 }
 
 impl<'l> NodalResultants<'l> {
@@ -542,6 +546,7 @@ impl<'l> NodalResultants<'l> {
             leaf,
             state,
             tissue,
+            tissue_loads: leaf.tissue_loads(state),
         }
     }
 
@@ -584,7 +589,9 @@ impl<'l> NodalResultants<'l> {
         let before = i.checked_sub(1).map(|i| self.segment(j, i));
         let after = (i < n).then(|| self.segment(j, i));
         // The load on the node, without what the tissue exerts as a part of the segments.
-        let (load, end) = (leaf.load(state, j, i), leaf.rigid_end_load(state, j, i));
+        let of_tissue = self.tissue_loads.get(state.base(j) + i).copied();
+        let load = leaf.load_with_tissue(state, j, i, of_tissue.unwrap_or_default());
+        let end = leaf.rigid_end_load(state, j, i);
         let (mut force, mut moment) = (load.force + end.force, load.moment + end.moment);
         if let Some([_, tissue]) = &before {
             (force, moment) = (force + tissue.x, moment + tissue.b);

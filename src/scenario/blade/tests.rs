@@ -1,7 +1,7 @@
 //! What is read of a blade, refused, and written again; and the veins that follow from it.
 
 use crate::natural::Natural;
-use crate::scenario::{Entries, Profile, Scenario};
+use crate::scenario::{Entries, PolarInertia, Profile, Scenario};
 use glam::DVec3;
 use leafdyn_testing::pairs;
 use serde_json::json;
@@ -206,7 +206,10 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
     constant(8e-6 * 1.5 * 5.0 / 48.0 * t, &leaf.dynamics.density[0]);
     let inertia = 8e-6 * h * t / 12.0;
     constant(inertia * t * t, &leaf.dynamics.rotary_inertia[1]);
-    constant(inertia * (w * w + t * t), &leaf.dynamics.polar_inertia[1]);
+    let PolarInertia::PerLength(polar) = &leaf.dynamics.polar_inertia else {
+        panic!("{:?}", leaf.dynamics.polar_inertia);
+    };
+    constant(inertia * (w * w + t * t), &polar[1]);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.
     let leaf = blade_with_overrides("").unwrap();
     let blade = leaf.blade.as_ref().unwrap();

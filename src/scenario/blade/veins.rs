@@ -47,7 +47,6 @@ impl From<Property> for BladeProperty {
             Property::Force(axis) => BladeProperty::Force(axis),
             Property::Density => BladeProperty::Density,
             Property::RotaryInertia => BladeProperty::RotaryInertia,
-            Property::PolarInertia => BladeProperty::PolarInertia,
         }
     }
 }

@@ -43,15 +43,14 @@ pub(super) enum Property {
     Force(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length: the mean of those about d2 and d3.
+    /// Moment of inertia per length: the mean of those about d2 and d3, which is half of
+    /// that about d1.
     RotaryInertia,
-    /// Moment of inertia per length about d1.
-    PolarInertia,
 }
 
 impl Property {
-    const ALL: [Property; 9] = {
-        use Property::{Couple, Density, Force, PolarInertia, RotaryInertia};
+    const ALL: [Property; 8] = {
+        use Property::{Couple, Density, Force, RotaryInertia};
         [
             Couple(0),
             Couple(1),
@@ -61,7 +60,6 @@ impl Property {
             Force(2),
             Density,
             RotaryInertia,
-            PolarInertia,
         ]
     };
 
@@ -72,7 +70,6 @@ impl Property {
             Property::Force(axis) => 3 + axis,
             Property::Density => 6,
             Property::RotaryInertia => 7,
-            Property::PolarInertia => 8,
         }
     }
 }
@@ -192,7 +189,6 @@ impl Section {
             Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(sigma) * area,
             Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
-            Property::PolarInertia => self.mass_density.at(sigma) * (second[0] + second[1]),
         }
     }
 
