@@ -216,7 +216,7 @@ impl DiscreteLeaf {
     }
 
     /// Whether the strips of some gap are strained as their veins are.
-    pub(in crate::leaf) fn has_tissue_cells(&self) -> bool {
+    pub fn has_tissue_cells(&self) -> bool {
         self.strips.len() > (self.rods() - 1) * (self.segments() + 1)
     }
 

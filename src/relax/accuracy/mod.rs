@@ -209,6 +209,13 @@ impl NestedEquilibrium {
         self.convergence_table = self.levels.iter().map(on).collect();
         let ordered = energies(&self.levels).proven_columns();
         self.unresolved = self.convergence_table.change_beyond(ordered);
+        // Three grids show no order of the column before the best one.
+        if let [_, _, finest] = self.levels.as_slice()
+            && finest.leaf.has_tissue_cells()
+        {
+            let before = self.convergence_table.change_of_column_before_best();
+            self.unresolved = larger(self.unresolved, BAR.tissue_fraction * before);
+        }
         let first = segments
             .len()
             .saturating_sub(1 + self.convergence_table.best_column_number());
@@ -428,6 +435,9 @@ fn energies(levels: &[GridLevel]) -> Richardson {
 
 /// What the error bar of positions and energy is made from.
 struct ErrorBar {
+    /// Part of the last change of the column before the best one that the error of this one may be on three grids of
+    /// a leaf whose tissue has layers as thin as its gaps, or an outline that the first of them hardly resolves.
+    tissue_fraction: f64,
     /// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
     /// absolute values.
     amplification: f64,
@@ -453,6 +463,7 @@ struct ErrorBar {
 }
 
 const BAR: ErrorBar = ErrorBar {
+    tissue_fraction: 0.3,
     amplification: 2.0,
     safety: 2.0,
     energy_safety: 3.0,

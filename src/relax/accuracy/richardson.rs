@@ -230,6 +230,15 @@ impl Richardson {
         distance(&self.table[last][m], &self.table[last - 1][m])
     }
 
+    /// The last change from grid to grid of the column with one term less removed than the best one; zero if
+    /// there is none.
+    pub fn change_of_column_before_best(&self) -> f64 {
+        match self.best_column_number() {
+            0 => 0.0,
+            best => self.change(best - 1),
+        }
+    }
+
     /// The last change of the column with so many terms removed, if the best one has more; else
     /// zero.
     pub fn change_beyond(&self, columns: usize) -> f64 {

@@ -160,7 +160,11 @@ pub fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
 
 /// The coarsest grid on which the leaf is loaded slowly.
 fn coarsest_grid(leaf: &Leaf) -> Grid {
-    let mut grid = grid_of(leaf, GRIDS.coarsest);
+    let least = match leaf.scenario().blade {
+        Some(_) => GRIDS.coarsest_of_blade,
+        None => GRIDS.coarsest,
+    };
+    let mut grid = grid_of(leaf, least);
     while grid.segments() < GRIDS.finest_of_loading
         && !resolves_loads(&DiscreteLeaf::new(leaf, grid.clone()))
     {
