@@ -343,7 +343,14 @@ pub(super) fn read_tissue(
     source: &StiffnessSource,
 ) -> ScenarioResult<Option<Vec<Tissue>>> {
     if let StiffnessSource::Blade { parts, .. } = source {
-        return Ok((gaps > 0).then(|| parts.tissue()));
+        let rigid = || Profile::Constant(f64::INFINITY);
+        let gap = |[across, fold, contraction]: [Profile; 3]| Tissue {
+            stiffness: [rigid(), across, rigid()],
+            fold,
+            contraction,
+        };
+        let of_blade = || parts.tissue_profiles().into_iter().map(gap).collect();
+        return Ok((gaps > 0).then(of_blade));
     }
     let mut tissue = vec![Tissue::default(); gaps];
     let keys = Key::TISSUE.into_iter().chain([Key::TissueContraction]);

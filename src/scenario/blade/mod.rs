@@ -37,7 +37,6 @@ use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::{EntryValue, Knots};
 use crate::scenario::profile::Profile;
 use crate::scenario::section::read_poisson;
-use crate::scenario::veins::Tissue;
 use glam::{DQuat, DVec3};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -252,17 +251,14 @@ impl BladeParts {
         .collect()
     }
 
-    /// The tissue in every gap.
-    pub fn tissue(&self) -> Vec<Tissue> {
-        let gap = |part: &Arc<BladePart>| {
-            let of = |property| part.profile(property, false);
-            let rigid = || Profile::Constant(f64::INFINITY);
-            Tissue {
-                stiffness: [rigid(), of(BladeProperty::Across), rigid()],
-                fold: of(BladeProperty::Fold),
-                contraction: of(BladeProperty::Contraction),
-            }
-        };
+    /// k2, c1 and the contraction of the tissue in every gap.
+    pub fn tissue_profiles(&self) -> Vec<[Profile; 3]> {
+        let properties = [
+            BladeProperty::Across,
+            BladeProperty::Fold,
+            BladeProperty::Contraction,
+        ];
+        let gap = |part: &Arc<BladePart>| properties.map(|of| part.profile(of, false));
         self.gaps.iter().map(gap).collect()
     }
 }
