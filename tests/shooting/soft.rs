@@ -81,8 +81,8 @@ fn a_success_is_never_false() {
     assert!((3..10).contains(&succeeded), "{succeeded}");
 }
 
-/// A blade as slender as paper: from the leaf at rest shooting cannot confirm what it resolves no better,
-/// says so after few linearisations, and calls nothing an agreement.
+/// A blade as slender as paper: perturbations grow too much for shooting, which says so at once, and calls nothing an
+/// agreement.
 #[test]
 fn a_slender_blade_is_not_confirmed() {
     let blade = |thickness: f64| {
@@ -98,22 +98,16 @@ fn a_slender_blade_is_not_confirmed() {
         let work = work.map_or_else(|failure| failure.work, |shot| shot.work);
         (found.verdict, work.linearizations)
     };
-    let (verdict, _) = blade(0.004);
+    let (verdict, _) = blade(0.002);
     assert_eq!(verdict, CheckVerdict::Agree);
-    for (thickness, says, most) in [
-        (
-            0.002,
-            "shooting cannot resolve this leaf: perturbations grow 10^2",
-            8,
-        ),
-        (0.0005, "shooting would take too much work", 0),
-    ] {
-        let (verdict, linearizations) = blade(thickness);
-        let CheckVerdict::NotIndependent(why) = verdict else {
-            panic!("{verdict:?}");
-        };
-        let sentence = why.to_string();
-        assert!(sentence.contains(says), "{sentence}");
-        assert!(linearizations <= most, "{linearizations}");
-    }
+    let (verdict, linearizations) = blade(0.0005);
+    let CheckVerdict::NotIndependent(why) = verdict else {
+        panic!("{verdict:?}");
+    };
+    let sentence = why.to_string();
+    assert!(
+        sentence.contains("shooting would take too much work"),
+        "{sentence}"
+    );
+    assert_eq!(linearizations, 0);
 }
