@@ -159,7 +159,7 @@ fn the_least_width_hardly_matters() {
 #[test]
 fn a_blade_by_shooting() {
     let scenario = blade(&format!(
-        "{WEIGHT}; leaf.rods=3; blade.length=3; blade.thickness=0.01; blade.width.value[4]=0.8"
+        "{WEIGHT}; leaf.rods=3; blade.length=3; blade.thickness=0.01; blade.width={{at=[0,0.5,1],value=[0.9,1.6,0.8]}}"
     ));
     let leaf = settle(&scenario, 1e-8);
     let shot = settled(
