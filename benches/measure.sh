@@ -70,7 +70,7 @@ cp out/fig04/chart.svg docs/chart_fig04_5.svg
 leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=35 --seconds 20 --peers out/peers.csv
 cp out/fig04/chart.svg docs/chart_fig04_35.svg
 python benches/peers/turns.py scenarios/paper/fig04.toml --rods 5,21,35
-python benches/peers/turns.py scenarios/study/plate.toml --rods 5 --tolerances 1e-1,1e-2,1e-3,1e-4,1e-5 \
+python benches/peers/turns.py benches/peers/lattice.toml --rods 5 --tolerances 1e-1,1e-2,1e-3,1e-4,1e-5 \
   --peer 'exudyn --segments 20 --load-steps 5' --peer 'exudyn --segments 40 --load-steps 5' --peer 'exudyn --segments 80 --load-steps 5'
 
 # A leaf as one measures it. That others do not come to rest is a result; those that take minutes run once.

@@ -14,11 +14,10 @@ KEYS = {
     "leaf": ["rods", "length", "fan", "base", "joined"],
     "stiffness": ["torsion", "bending_2", "bending_3", "axial", "shear_2", "shear_3"],
     "section": ["shape", "diameter", "width", "thickness", "young", "poisson", "mass_density"],
-    "blade": ["length", "width", "thickness", "young", "young_across", "shear_modulus", "poisson", "mass_density", "edges"],
     "rest": ["twist", "bend_2", "bend_3"],
     "coupling": ["x", "y", "z"],
     "tissue": ["along", "across", "normal", "fold"],
-    "load": ["gravity", "g", "tip_force", "tip_moment"],
+    "load": ["gravity", "tip_force", "tip_moment"],
     "solve": ["tolerance"],
 }
 # Tables on which no equilibrium depends.
@@ -55,61 +54,18 @@ def load(path, overrides):
     return document
 
 
-def strips(document, rods):
-    """The scenario with parallel veins and tissue in place of a [blade] of constant width, as in docs/formats.md."""
-    blade = document["blade"]
-    for key in ("stiffness", "section", "tissue", "rest"):
-        if key in document:
-            raise Refused(f"{key}: not with [blade] here")
-    for key, value in blade.items():
-        if type(value) not in ((bool,) if key == "edges" else (int, float)):
-            raise Refused(f"blade.{key} = {value!r}: not possible here")
-    try:
-        length, width, thickness, young = (blade[key] for key in ("length", "width", "thickness", "young"))
-    except KeyError as missing:
-        raise Refused(f"blade.{missing.args[0]}: missing") from None
-    across = blade.get("young_across", young)
-    shear = blade.get("shear_modulus", young / (2.0 * (1.0 + blade.get("poisson", 0.3))))
-    strip = width / rods
-    gap = width / (rods - 1) if blade.get("edges", True) and rods > 1 else strip
-    mass = blade.get("mass_density", 0.0) * strip * thickness
-    load = dict(document.get("load", {}))
-    weights = zip(load.get("gravity", [0.0] * 3), load.pop("g", [0.0] * 3))
-    load["gravity"] = [float(force + mass * g) for force, g in weights]
-    sides = [(j - 0.5 * (rods - 1)) * gap for j in range(rods)]
-    leaf = {"length": length, "fan": [0.0] * rods, "joined": False, "base": [[0.0, y, 0.0] for y in sides]}
-    stiffness = {
-        "torsion": shear * strip * thickness**3 / 3.0,
-        "bending_2": young * strip * thickness**3 / 12.0,
-        "bending_3": young * thickness * strip**3 / 12.0,
-        "axial": young * strip * thickness,
-        **dict.fromkeys(["shear_2", "shear_3"], 5.0 / 6.0 * shear * strip * thickness),
-    }
-    tissue = {
-        "along": shear * thickness / gap,
-        "across": across * thickness / gap,
-        "normal": 5.0 / 6.0 * shear * thickness / gap,
-        "fold": across * thickness**3 / (12.0 * gap),
-    }
-    rest = {key: value for key, value in document.items() if key not in ("blade", "leaf", "load")}
-    return {**rest, "leaf": {**document["leaf"], **leaf}, "stiffness": stiffness, "tissue": tissue, "load": load}
-
-
 class Leaf:
     """A checked scenario, in its own units. Veins tied by tissue, and those that begin apart, are for programs that
     say so."""
 
     def __init__(self, document, tissue=False):
-        for table in ("blade", "tissue"):
-            if table in document and not tissue:
-                raise Refused(f"{table}: not possible here")
+        if "tissue" in document and not tissue:
+            raise Refused("tissue: not possible here")
         self.document = document
         self.name = document["name"]
         self.rods = rods = self.entry("leaf.rods")
         if type(rods) is not int or rods < 1:
             raise Refused(f"leaf.rods = {rods!r}: must be a whole number, at least 1")
-        if "blade" in document:
-            self.document = strips(document, rods)
         self.joined = self.entry("leaf.joined", True)
         if type(self.joined) is not bool:
             raise Refused(f"leaf.joined = {self.joined!r}: must be true or false")
@@ -127,8 +83,6 @@ class Leaf:
         # A gap is as long as its two rods on average.
         self.gap = 0.5 * (self.length[1:] + self.length[:-1])
         self.gravity = self.vector("load.gravity")
-        if "g" in self.document.get("load", {}):
-            raise Refused("load.g: only with [blade] here")
         self.origin = self.origins()
         if self.origin.any() and (self.joined or not tissue):
             raise Refused("leaf.base: not possible here")

@@ -5,7 +5,7 @@
 In every round each program runs once, and after it leafdyn with every tolerance for a second, so that whatever else the
 machine does meets both. Their settings are those of PEERS, or of --peer:
 
-    python benches/peers/turns.py scenarios/study/plate.toml --rods 5 --tolerances 1e-1,1e-3 --peer 'exudyn --segments 40'
+    python benches/peers/turns.py benches/peers/lattice.toml --rods 5 --tolerances 1e-1,1e-3 --peer 'exudyn --segments 40'
 
 With --tolerances leafdyn runs with these alone, once a round, and is compared with a hundredth of the smallest: where
 its finest grids take long, as with tissue. Prints a table in Markdown: the medians over the rounds, and the
@@ -57,7 +57,7 @@ def summary(folder):
 def longest(relaxed):
     """The length of the longest rod."""
     given = relaxed["input"]
-    return np.max(given.get("blade", given["leaf"])["length"])
+    return np.max(given["leaf"]["length"])
 
 
 def chart(leafdyn, leaf, folder):
