@@ -198,8 +198,7 @@ fn compare_with_fewer_veins(
 
 /// Refuses blades of which no number of fewer veins tells an error.
 fn refuse_short_and_wide(scenario: &Scenario) -> Result<(), VeinsRemark> {
-    let apart = |blade: &Blade| 0.5 * (blade.vein_position(1) - blade.vein_position(0));
-    let gap = |blade: &Blade| blade.width(blade.widest()) * apart(blade);
+    let gap = |blade: &Blade| blade.width(blade.widest()) * blade.gap_fraction();
     let is_wide = |blade: &Blade| gap(blade) > RULES.widest_gap * blade.length();
     match scenario.blade.as_deref().is_some_and(is_wide) {
         true => Err(VeinsRemark::ShortAndWide),

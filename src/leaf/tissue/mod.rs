@@ -98,13 +98,14 @@ impl DiscreteLeaf {
         if !self.has_tissue() {
             return Vec::new();
         }
-        let mut loads = vec![NodeLoad::default(); state.x.len()];
-        self.for_each_tissue_load(state, |rod, i, added| {
-            let load = &mut loads[state.base(rod) + i];
-            load.moment += added.moment;
-            load.force += added.force;
-        });
-        loads
+        let mut loads = vec![Wrench::default(); state.x.len()];
+        self.add_tissue_loads(state, &mut loads);
+        let load = |Wrench { moment, force }| NodeLoad {
+            moment,
+            force,
+            energy: 0.0,
+        };
+        loads.into_iter().map(load).collect()
     }
 
     /// What the strips of node `i` of rod `j` exert on it.

@@ -9,8 +9,10 @@ use crate::rod::{Section, Segment, TissueStrip, Wrench};
 use crate::rotation;
 use glam::DVec3;
 
-/// The same where no force is carried on from one step to the next, in explicit motions: the error by the
-/// finite stiffness is of second order in the length of the segments.
+/// Finite stiffness of rigid tissue in explicit motions, which carry no force on from one step to the next, in units of the
+/// stiffness of the adjacent segments. Its error is of second order in the length of the segments, and
+/// extrapolated with theirs: a tenth takes a third of the steps, and leaves errors
+/// above the bars.
 const ELASTIC_TISSUE_RATIO: f64 = 100.0;
 
 /// The elements of a leaf in a state whose forces are condensed out of its linear equations, and not always
