@@ -1,18 +1,18 @@
 //! Rest on nested grids: on the first grid that resolves the leaf, from its start or from guesses, and on
 //! finer ones until the tolerance is kept by a leaf whose stability is known.
 
-use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, System, half_state};
 use crate::newton::{EquilibriumFailure, NewtonIteration, SolverCounts};
 use crate::numbers::largest;
 use crate::relax::accuracy::transfer::{
     GridLevel, StateOnGrid, predict_on_finer_grid, prolong, restrict,
 };
 use crate::relax::accuracy::{NestedEquilibrium, RelaxationResult};
-use crate::relax::log::WorkLog;
+use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::path::Path;
 use crate::relax::plan::{GRIDS, RelaxationProblem, WORK};
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
-use crate::relax::same_equilibrium::{is_near_guess, is_same_on_two_grids};
+use crate::relax::same_equilibrium::{is_near_guess, is_own_mirror_image, is_same_on_two_grids};
 use crate::relax::solve_on_grid::{
     COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
     find_grid_equilibrium,
@@ -58,6 +58,35 @@ pub fn solve_from_guesses(
 ) -> RelaxationResult {
     let found = solve_on_given_grids(problem, begun, guesses, effort)?;
     refine_to_tolerance(problem, found, effort)
+}
+
+/// Brings the `half` of a leaf to rest from a guess for the whole that is its own mirror image; `None`
+/// unless it comes to a rest in which the whole is stable.
+pub fn solve_half_from_guess<'a>(
+    problem: &RelaxationProblem<'a>,
+    half: &'a Leaf,
+    guess: &StateOnGrid,
+    strategy: Strategy,
+    effort: &mut WorkLog,
+) -> Option<NestedEquilibrium> {
+    if !is_own_mirror_image(half, &guess.state) {
+        return None;
+    }
+    let reduced = problem.reduced_to_half(Some(half));
+    let of_half = StateOnGrid {
+        grid: guess.grid.clone(),
+        state: half_state(half, &guess.state),
+    };
+    let begun = NestedEquilibrium::without_grids(&reduced);
+    let found = solve_from_guesses(&reduced, begun, vec![of_half], effort);
+    let end = match &found {
+        Ok(found) if found.is_stable() => AttemptEnd::Accepted,
+        Ok(_) => AttemptEnd::Unstable,
+        Err(failure) => AttemptEnd::Failed(failure.stop),
+    };
+    effort.log(strategy, Extent::Half, guess.grid.segments(), end);
+    let accepted = found.ok().filter(|_| end == AttemptEnd::Accepted);
+    accepted.map(|found| found.mirrored_to_whole(&reduced))
 }
 
 /// Brings a leaf to rest from initial guesses on these grids alone, whatever their accuracy; stability

@@ -21,7 +21,7 @@ pub(super) struct GridLimits {
     /// eigenvalues have larger errors, of a leaf that comes to rest in the valley it starts in.
     pub coarsest_of_shape: usize,
     /// The coarsest grid of a blade, which is narrow at its tip: with half as many two error bars of 86
-    /// were too low by a factor of two.
+    /// were too low by a factor of two. It is loaded slowly on half as many.
     pub coarsest_of_blade: usize,
     /// The finest grid on which slow loading is repeated until two grids lead to one equilibrium. Twice
     /// as many double the time after which a loading that no two grids confirm is given up.

@@ -332,9 +332,22 @@ pub fn relax_from(
     leaf.place_bases(&mut state);
     leaf.place_held_tips(&mut state);
     let mut effort = WorkLog::new(progress);
+    let guess = StateOnGrid { grid, state };
+    let half = may_solve_half(method).then(|| leaf.mirror_half()).flatten();
+    let by_half = half.as_ref().and_then(|half| {
+        nested_grids::solve_half_from_guess(
+            &problem,
+            half,
+            &guess,
+            Strategy::GivenShape,
+            &mut effort,
+        )
+    });
+    if let Some(found) = by_half {
+        return Ok(equilibrium_with_stability(&problem, Ok(found), clock, &mut effort).result);
+    }
     let begun = NestedEquilibrium::without_grids(&problem);
-    let guesses = vec![StateOnGrid { grid, state }];
-    let found = nested_grids::solve_from_guesses(&problem, begun, guesses, &mut effort);
+    let found = nested_grids::solve_from_guesses(&problem, begun, vec![guess], &mut effort);
     let (settled, end) = match &found {
         Ok(found) if found.is_stable() || how.keep_unstable => (true, AttemptEnd::Accepted),
         Ok(_) => (false, AttemptEnd::Unstable),

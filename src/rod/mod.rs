@@ -35,8 +35,8 @@ pub use crate::rod::section::{
 };
 pub use crate::rod::segment::{Segment, SegmentGradient, SegmentHessian};
 pub use crate::rod::strip::{
-    ContractingStrains, NodeBlock, PairGradient, StrainFactors, StripHessian, StripLoads,
-    StripStrainGradients, StripStress, TissueStrip, VeinStrain,
+    CarryingStrip, ContractingStrains, NodeBlock, PairGradient, StrainFactors, StripHessian,
+    StripLoads, StripStrainGradients, StripStress, TissueStrip, VeinStrain,
 };
 
 /// Largest rotation (radians) between the ends of a segment that its grid resolves.

@@ -131,6 +131,12 @@ struct StripElement {
     sections: LaneSections<Scalar>,
 }
 
+/// A strip between its ends that carries a spatial force, which is condensed out of its energy.
+pub struct CarryingStrip {
+    strip: TissueStrip,
+    element: Element<Scalar>,
+}
+
 /// The strains e along the directors, and the fold theta_1.
 struct StripStrains {
     e: DVec3,
@@ -243,90 +249,24 @@ impl TissueStrip {
 
     /// The strip between these ends, carrying the spatial `force`. In directions without stiffness it
     /// carries none.
-    fn element_with_force(&self, ends: &NodePair, force: DVec3) -> StripElement {
-        let sections = self.sections();
-        let mut element = Element::with_strain_forces(&sections, &LaneNodes::from(ends));
+    pub fn carrying(&self, ends: &NodePair, force: DVec3) -> CarryingStrip {
+        let mut element = Element::with_strain_forces(&self.sections(), &LaneNodes::from(ends));
         let dx = DVec3::from(element.w);
         let stiff = self.stiffness.cmpgt(DVec3::ZERO);
         let carried = DVec3::from(Vectors::from(force).director_components(element.frame));
         let nu = DVec3::select(stiff, carried, DVec3::ZERO);
         let w = DVec3::select(stiff, self.stress_free_gap + nu / self.stiffness, dx);
         (element.nu, element.w, element.gap) = (nu.into(), w.into(), (dx - w).into());
-        StripElement { element, sections }
+        CarryingStrip {
+            strip: *self,
+            element,
+        }
     }
 
     /// The spatial force of its strains between these ends, and in rigid directions that `carried`.
     pub fn force(&self, ends: &NodePair, carried: DVec3) -> DVec3 {
         let element = self.strained_element(ends, carried).element;
         element.nu.from_director_components(element.frame).into()
-    }
-
-    /// The right-hand side for [`TissueStrip::hessian`] if it carries this spatial force, which is condensed
-    /// out.
-    pub fn condensed_loads(&self, ends: &NodePair, force: DVec3) -> [Wrench; 2] {
-        let element = self.element_with_force(ends, force).element;
-        let Element { nu, w, gap, .. } = element;
-        let correction = Vectors::from(self.condensing) * gap;
-        let lawful = Vectors::from(DVec3::ONE - self.rigid_directions()) * gap;
-        let g_mu = nu.cross(w + lawful) - w.cross(correction);
-        nodal_loads(element.nodal_derivatives(nu + correction, g_mu, element.m))
-    }
-
-    /// The residual of the law in rigid directions: a length along each director.
-    pub fn open_gap(&self, ends: &NodePair, force: DVec3) -> DVec3 {
-        self.rigid_directions() * DVec3::from(self.element_with_force(ends, force).element.gap)
-    }
-
-    /// The stress across and in the fold of the strip if it carries this spatial force, which is
-    /// condensed out.
-    pub fn stress(&self, ends: &NodePair, force: DVec3) -> StripStress {
-        let element = self.element_with_force(ends, force).element;
-        let [nu, w, gap, m] = [element.nu, element.w, element.gap, element.m].map(DVec3::from);
-        let across = (nu + self.condensing * gap).y;
-        let strain = (w + gap - self.stress_free_gap).y;
-        let turned = DVec3::from(element.u).x - self.stress_free_rotation.x;
-        StripStress {
-            across,
-            carried_across: nu.y,
-            fold: m.x,
-            energy: 0.5 * (across * strain + m.x * turned),
-        }
-    }
-
-    /// The derivatives of its strains across and in the fold by the unknowns of its nodes, if it
-    /// carries this spatial force.
-    pub fn strain_gradients(&self, ends: &NodePair, force: DVec3) -> StripStrainGradients {
-        let element = self.element_with_force(ends, force).element;
-        let none = Vectors::from(DVec3::ZERO);
-        let turned = -DVec3::from(element.w).cross(DVec3::Y);
-        let across = element.nodal_derivatives(DVec3::Y.into(), turned.into(), none);
-        let fold = element.nodal_derivatives(none, none, DVec3::X.into());
-        StripStrainGradients {
-            across: pair_gradient(across),
-            fold: pair_gradient(fold),
-        }
-    }
-
-    /// The change of the spatial force that it carries for the displacement `dx` of the second node
-    /// against the first and the spatial rotations `turns` of both.
-    pub fn force_increment(
-        &self,
-        ends: &NodePair,
-        force: DVec3,
-        dx: DVec3,
-        turns: [DVec3; 2],
-    ) -> DVec3 {
-        let element = self.element_with_force(ends, force).element;
-        let onto = |v: DVec3| DVec3::from(Vectors::from(v).director_components(element.frame));
-        let [alpha, beta] = turns.map(onto);
-        let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
-        let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
-        let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
-        let turned = (DVec3::ONE - self.rigid_directions()) * nu.cross(mu);
-        let change = self.condensing * (onto(dx) + gap + w.cross(mu)) - turned;
-        Vectors::from(change)
-            .from_director_components(element.frame)
-            .into()
     }
 
     /// The strains of an element.
@@ -384,32 +324,93 @@ impl TissueStrip {
     /// force, which is condensed out.
     pub fn hessian(&self, ends: &NodePair, carried: DVec3) -> StripHessian {
         let force = self.force(ends, carried);
-        self.condensed_hessian(ends, force)
-    }
-
-    /// Second derivatives if it carries this spatial force, which is condensed out: those of its
-    /// energy where the force is that of its strains.
-    pub fn condensed_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
-        let StripElement { element, sections } = self.element_with_force(ends, force);
-        let open = self.rigid_directions().into();
-        let hessian = element.second_strained(&sections, open).nodal_hessian();
-        StripHessian::from(hessian)
+        self.carrying(ends, force).hessian()
     }
 }
 
-impl TissueStrip {
-    /// The part of [`TissueStrip::condensed_hessian`] without that of its stiffness: by the force that it
+impl CarryingStrip {
+    /// The strip, as its veins are strained.
+    pub fn strip(&self) -> &TissueStrip {
+        &self.strip
+    }
+
+    /// The right-hand side for [`CarryingStrip::hessian`].
+    pub fn loads(&self) -> [Wrench; 2] {
+        let (strip, element) = (&self.strip, &self.element);
+        let Element { nu, w, gap, .. } = *element;
+        let correction = Vectors::from(strip.condensing) * gap;
+        let lawful = Vectors::from(DVec3::ONE - strip.rigid_directions()) * gap;
+        let g_mu = nu.cross(w + lawful) - w.cross(correction);
+        nodal_loads(element.nodal_derivatives(nu + correction, g_mu, element.m))
+    }
+
+    /// The residual of the law in rigid directions: a length along each director.
+    pub fn open_gap(&self) -> DVec3 {
+        self.strip.rigid_directions() * DVec3::from(self.element.gap)
+    }
+
+    /// The stress across and in the fold of the strip.
+    pub fn stress(&self) -> StripStress {
+        let (strip, element) = (&self.strip, &self.element);
+        let [nu, w, gap, m] = [element.nu, element.w, element.gap, element.m].map(DVec3::from);
+        let across = (nu + strip.condensing * gap).y;
+        let strain = (w + gap - strip.stress_free_gap).y;
+        let turned = DVec3::from(element.u).x - strip.stress_free_rotation.x;
+        StripStress {
+            across,
+            carried_across: nu.y,
+            fold: m.x,
+            energy: 0.5 * (across * strain + m.x * turned),
+        }
+    }
+
+    /// The derivatives of its strains across and in the fold by the unknowns of its nodes.
+    pub fn strain_gradients(&self) -> StripStrainGradients {
+        let element = &self.element;
+        let none = Vectors::from(DVec3::ZERO);
+        let turned = -DVec3::from(element.w).cross(DVec3::Y);
+        let across = element.nodal_derivatives(DVec3::Y.into(), turned.into(), none);
+        let fold = element.nodal_derivatives(none, none, DVec3::X.into());
+        StripStrainGradients {
+            across: pair_gradient(across),
+            fold: pair_gradient(fold),
+        }
+    }
+
+    /// The change of the spatial force for the displacement `dx` of the second node against the first
+    /// and the spatial rotations `turns` of both.
+    pub fn force_increment(&self, dx: DVec3, turns: [DVec3; 2]) -> DVec3 {
+        let (strip, element) = (&self.strip, &self.element);
+        let onto = |v: DVec3| DVec3::from(Vectors::from(v).director_components(element.frame));
+        let [alpha, beta] = turns.map(onto);
+        let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
+        let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
+        let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
+        let turned = (DVec3::ONE - strip.rigid_directions()) * nu.cross(mu);
+        let change = strip.condensing * (onto(dx) + gap + w.cross(mu)) - turned;
+        Vectors::from(change)
+            .from_director_components(element.frame)
+            .into()
+    }
+
+    /// Second derivatives of its energy, the force being condensed out: those of its energy where the
+    /// force is that of its strains.
+    pub fn hessian(&self) -> StripHessian {
+        self.second_derivatives(&self.strip)
+    }
+
+    /// The part of [`CarryingStrip::hessian`] without that of its stiffness: by the force that it
     /// carries and by the moment of its fold.
-    pub fn geometric_hessian(&self, ends: &NodePair, force: DVec3) -> StripHessian {
-        let StripElement { element, .. } = self.element_with_force(ends, force);
-        let mut without = *self;
+    pub fn geometric_hessian(&self) -> StripHessian {
+        let mut without = self.strip;
         (without.condensing, without.fold_stiffness) = (DVec3::ZERO, 0.0);
-        let open = self.rigid_directions().into();
-        StripHessian::from(
-            element
-                .second_strained(&without.sections(), open)
-                .nodal_hessian(),
-        )
+        self.second_derivatives(&without)
+    }
+
+    fn second_derivatives(&self, with_stiffness: &TissueStrip) -> StripHessian {
+        let open = self.strip.rigid_directions().into();
+        let second = (self.element).second_strained(&with_stiffness.sections(), open);
+        StripHessian::from(second.nodal_hessian())
     }
 }
 
@@ -595,13 +596,15 @@ mod tests {
     fn the_force_carried_becomes_that_of_the_strains() {
         let (strip, ends) = strained();
         let strains = strip.force(&ends, DVec3::ZERO);
-        let same = flat(strip.condensed_loads(&ends, strains));
+        let same = flat(strip.carrying(&ends, strains).loads());
         for (one, other) in same.into_iter().zip(flat(loads(&strip, &ends))) {
             assert!((one - other).abs() < 1e-13, "{one} {other}");
         }
         let wrong = strains + DVec3::new(3.0, -2.0, 1.0);
         let none = [DVec3::ZERO; 2];
-        let change = strip.force_increment(&ends, wrong, DVec3::ZERO, none);
+        let change = strip
+            .carrying(&ends, wrong)
+            .force_increment(DVec3::ZERO, none);
         // The part without stiffness, along d3, is not carried.
         let d3 = rotation::midpoint(ends.q[0], ends.q[1]) * DVec3::Z;
         assert!((wrong + change - strains).cross(d3).length() < 1e-13);
@@ -615,7 +618,7 @@ mod tests {
                 }
                 _ => increment * if k < 6 { -1.0 } else { 1.0 },
             };
-            let found = strip.force_increment(&ends, strains, dx, turns);
+            let found = strip.carrying(&ends, strains).force_increment(dx, turns);
             let expected = DVec3::from_array(
                 [0, 1, 2].map(|c| slope(|h| strip.force(&moved(&ends, k, h), DVec3::ZERO)[c])),
             );

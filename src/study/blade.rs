@@ -5,7 +5,7 @@ use crate::natural::Natural;
 use crate::numbers::largest;
 use crate::relax::{
     Equilibrium, EquilibriumRemark, FewerVeins, Method, Options, Outcome, Progress, RelaxError,
-    SemiImplicit, TriedVeins, VeinsRemark, relax,
+    SemiImplicit, TriedVeins, VeinsRemark, relax, relax_from,
 };
 use crate::run::RefusedOption;
 use crate::scenario::{Blade, Scenario};
@@ -90,8 +90,10 @@ fn compare_with_narrower_ends(base: &BaseScenario, leaf: &mut Equilibrium, optio
     }
     let tolerance = leaf.accuracy.tolerance.max(COMPARED_BLADE_TOLERANCE);
     let narrower = blade_with_number(base, LEAST_WIDTH_KEY, 0.5 * blade.least_width_fraction());
+    // It is nearly where the blade itself is.
+    let there = (leaf.shape.stations.as_slice(), leaf.shape.rods.as_slice());
     let found = (narrower.ok())
-        .and_then(|it| relax(&it, &shape_options(options, tolerance), &mut |_| {}).ok())
+        .and_then(|it| relax_from(&it, there, &shape_options(options, tolerance), &mut |_| {}).ok())
         .filter(|found| found.stable() == Some(true));
     let effect = found.map(|found| largest_distance([scenario, scenario], [leaf, &found]));
     if let Some(report) = &mut leaf.blade {

@@ -7,8 +7,8 @@ use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
 use crate::leaf::tissue::strips::{StripPlace, strip_ends};
 use crate::rod::{
-    ContractingStrains, NodeBlock, NodePair, PairGradient, SegmentGradient, StrainFactors,
-    StripHessian, StripStrainGradients, StripStress, TissueStrip, UNKNOWNS, VeinStrain, Wrench,
+    CarryingStrip, ContractingStrains, NodeBlock, NodePair, PairGradient, SegmentGradient,
+    StrainFactors, StripHessian, StripStrainGradients, StripStress, UNKNOWNS, VeinStrain, Wrench,
 };
 use crate::rotation;
 use glam::{DVec2, DVec3};
@@ -75,8 +75,8 @@ impl MeanStrainGradients {
 
 /// A strip in a corner of a cell, in a state.
 struct CornerStrip {
-    /// The strip as its veins are strained.
-    strip: TissueStrip,
+    /// The strip as its veins are strained, and the force that it carries.
+    carrying: CarryingStrip,
     ends: NodePair,
     /// Whether it is at the first nodes of the cell, or at the last: 0 or 1.
     end: usize,
@@ -89,9 +89,8 @@ impl CornerStrip {
     /// The derivatives of the contracted strains across and in the fold by the unknowns of the cell, from
     /// those of the mean strains.
     fn strain_gradients(&self, means: &MeanStrainGradients) -> [CellGradient; 2] {
-        let StripStrainGradients { across, fold } =
-            self.strip.strain_gradients(&self.ends, self.force);
-        let factors = self.strip.vein_strain_factors();
+        let StripStrainGradients { across, fold } = self.carrying.strain_gradients();
+        let factors = self.carrying.strip().vein_strain_factors();
         let mut gradients = [
             means.of_forces(factors.force),
             means.of_moments(factors.moment),
@@ -209,12 +208,13 @@ impl DiscreteLeaf {
             let ends = strip_ends(state, g, i);
             let carried = self.carried_tissue_force(state, place, g, i);
             let carried = carried.filter(|_| forces == CellForces::Carried);
+            let force = carried.unwrap_or_else(|| strip.force(&ends, DVec3::ZERO));
             CornerStrip {
-                force: carried.unwrap_or_else(|| strip.force(&ends, DVec3::ZERO)),
-                strip,
+                carrying: strip.carrying(&ends, force),
                 ends,
                 end,
                 place,
+                force,
             }
         })
     }
@@ -231,18 +231,16 @@ impl DiscreteLeaf {
         let gradients = veins.gradients();
         let (mut energy, mut gradient) = (0.0, CellGradient::zeros());
         let (mut stresses, mut carried) = (StrainFactors::default(), StrainFactors::default());
+        let mut squares = [(0.0, CellGradient::zeros()); 4];
         for corner in self.corner_strips(state, cell, &veins, forces) {
-            let CornerStrip {
-                strip, ends, force, ..
-            } = &corner;
-            let loads = strip.condensed_loads(ends, *force);
-            for (node, load) in loads.into_iter().enumerate() {
+            let (strip, end) = (corner.carrying.strip(), corner.end);
+            for (node, load) in corner.carrying.loads().into_iter().enumerate() {
                 for c in 0..3 {
-                    gradient[corner_unknown(corner.end, 6 * node + c)] -= load.moment[c];
-                    gradient[corner_unknown(corner.end, 6 * node + 3 + c)] -= load.force[c];
+                    gradient[corner_unknown(end, 6 * node + c)] -= load.moment[c];
+                    gradient[corner_unknown(end, 6 * node + 3 + c)] -= load.force[c];
                 }
             }
-            let stress = strip.stress(ends, *force);
+            let stress = corner.carrying.stress();
             let factors = strip.vein_strain_factors();
             energy += stress.energy;
             stresses.force += stress.across * factors.force;
@@ -250,21 +248,20 @@ impl DiscreteLeaf {
             carried.force += stress.carried_across * factors.force;
             if let Some(matrix) = &mut matrix {
                 let [by_across, by_fold] = corner.strain_gradients(&gradients);
-                add_square(matrix, strip.condensing.y, &by_across);
-                add_square(matrix, strip.fold_stiffness, &by_fold);
-                let geometric = strip.geometric_hessian(ends, *force);
-                add_pair(matrix, &geometric, |k| corner_unknown(corner.end, k));
+                squares[2 * end] = (strip.condensing.y, by_across);
+                squares[2 * end + 1] = (strip.fold_stiffness, by_fold);
+                add_pair(matrix, &corner.carrying.geometric_hessian(), [end, 2 + end]);
             }
         }
         gradient += gradients.of_forces(stresses.force) + gradients.of_moments(stresses.moment);
         if let Some(matrix) = matrix {
+            add_squares(matrix, &squares);
             let half = StrainFactors {
                 force: 0.5 * carried.force,
                 moment: 0.5 * stresses.moment,
             };
             for (vein, strain) in veins.strains.iter().enumerate() {
-                let geometric = strain.hessian(half);
-                add_pair(matrix, &geometric, |k| 12 * vein + k);
+                add_pair(matrix, &strain.hessian(half), [2 * vein, 2 * vein + 1]);
             }
         }
         AssembledCell { energy, gradient }
@@ -315,7 +312,7 @@ impl DiscreteLeaf {
         let energy = |cell: TissueCell| -> f64 {
             let veins = self.cell_strains(state, cell);
             let corners = self.corner_strips(state, cell, &veins, CellForces::Strained);
-            let each = corners.iter().map(|it| it.strip.stress(&it.ends, it.force));
+            let each = corners.iter().map(|it| it.carrying.stress());
             each.map(|stress| stress.energy).sum()
         };
         self.tissue_cells().map(energy).sum()
@@ -385,9 +382,12 @@ impl DiscreteLeaf {
             let dx = displacement_part(&b) - displacement_part(&a);
             let turns = [rotation_part(&a), rotation_part(&b)];
             let CornerStrip {
-                strip, ends, force, ..
+                carrying,
+                ends,
+                force,
+                ..
             } = &corner;
-            let change = strip.force_increment(ends, *force, dx, turns);
+            let (strip, change) = (carrying.strip(), carrying.force_increment(dx, turns));
             let across = rotation::midpoint(ends.q[0], ends.q[1]) * DVec3::Y;
             let by_veins = strip.vein_strain_factors().force.dot(strained.into());
             let contracted = strip.condensing.y * by_veins * across;
@@ -411,9 +411,8 @@ impl DiscreteLeaf {
         for cell in self.tissue_cells() {
             let veins = self.cell_strains(state, cell);
             for corner in self.corner_strips(state, cell, &veins, CellForces::Strained) {
-                let StripStress { across, fold, .. } =
-                    corner.strip.stress(&corner.ends, corner.force);
-                let factors = corner.strip.vein_strain_factors();
+                let StripStress { across, fold, .. } = corner.carrying.stress();
+                let factors = corner.carrying.strip().vein_strain_factors();
                 for rod in [cell.gap, cell.gap + 1] {
                     let sum = &mut sums[rod * n + cell.segment];
                     sum.force += 0.5 * across * factors.force;
@@ -452,27 +451,36 @@ fn cell_increments(
     CellGradient::from_fn(|k, _| nodes[k / UNKNOWNS][k % UNKNOWNS])
 }
 
-/// Adds `times` the product of a gradient with itself, upper triangle.
-fn add_square(matrix: &mut CellMatrix, times: f64, gradient: &CellGradient) {
-    for c in 0..CELL_UNKNOWNS {
-        let factor = times * gradient[c];
-        for r in 0..=c {
-            matrix[(r, c)] += factor * gradient[r];
+/// Adds the products of gradients with themselves, each times a factor, in the blocks of the upper triangle.
+fn add_squares(matrix: &mut CellMatrix, squares: &[(f64, CellGradient); 4]) {
+    for node in 0..4 {
+        for c in UNKNOWNS * node..UNKNOWNS * (node + 1) {
+            let factors = squares.each_ref().map(|(times, of)| times * of[c]);
+            let mut column = matrix.column_mut(c);
+            for r in 0..UNKNOWNS * (node + 1) {
+                let products = factors
+                    .iter()
+                    .zip(squares)
+                    .map(|(factor, (_, of))| factor * of[r]);
+                column[r] += products.sum::<f64>();
+            }
         }
     }
 }
 
-/// Adds second derivatives between two nodes, of which unknown k has the number `at(k)` in the cell, in
-/// ascending order, upper triangle.
-fn add_pair(matrix: &mut CellMatrix, hessian: &StripHessian, at: impl Fn(usize) -> usize) {
-    for c in 0..6 {
-        for r in 0..6 {
-            if r <= c {
-                for (node, block) in hessian.diagonal_blocks.iter().enumerate() {
-                    matrix[(at(6 * node + r), at(6 * node + c))] += block[r][c];
-                }
+/// Adds second derivatives between two of the four nodes of a cell, in the blocks of the upper triangle.
+fn add_pair(matrix: &mut CellMatrix, hessian: &StripHessian, [a, b]: [usize; 2]) {
+    let [first, second] = &hessian.diagonal_blocks;
+    let blocks = [
+        (a, a, first),
+        (b, b, second),
+        (a, b, &hessian.off_diagonal_block),
+    ];
+    for (row, column, block) in blocks {
+        for c in 0..UNKNOWNS {
+            for r in 0..UNKNOWNS {
+                matrix[(UNKNOWNS * row + r, UNKNOWNS * column + c)] += block[r][c];
             }
-            matrix[(at(r), at(6 + c))] += hessian.off_diagonal_block[r][c];
         }
     }
 }

@@ -178,15 +178,15 @@ impl DiscreteLeaf {
             if i < self.first_node() {
                 continue;
             }
-            let force = self.node_tissue_force(state, placed, &ends);
+            let carrying = strip.carrying(&ends, self.node_tissue_force(state, placed, &ends));
             if !state.tissue.is_empty() || strip.is_rigid() {
-                loads = strip.condensed_loads(&ends, force);
+                loads = carrying.loads();
             }
             for (rod, load) in [g, g + 1].into_iter().zip(loads) {
                 system.add_load(rod, i, load);
             }
             if matrix {
-                let hessian = strip.condensed_hessian(&ends, force);
+                let hessian = carrying.hessian();
                 for (rod, own) in [g, g + 1].into_iter().zip(&hessian.diagonal_blocks) {
                     system.add_block(rod, i, own);
                 }
@@ -229,7 +229,8 @@ impl DiscreteLeaf {
                 false => {
                     let [a, b] = [g, g + 1].map(|rod| increment(rod, i));
                     let dx = displacement_part(&b) - displacement_part(&a);
-                    strip.force_increment(&ends, force, dx, [rotation_part(&a), rotation_part(&b)])
+                    let turns = [rotation_part(&a), rotation_part(&b)];
+                    strip.carrying(&ends, force).force_increment(dx, turns)
                 }
             };
             let k = self.strip_index(StripPlace::Node, g, i);

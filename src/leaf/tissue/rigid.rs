@@ -111,7 +111,7 @@ impl DiscreteLeaf {
         let gap = |it: PlacedStrip| {
             let ends = it.ends(state);
             let force = self.node_tissue_force(state, it, &ends);
-            it.strip.open_gap(&ends, force).length()
+            it.strip.carrying(&ends, force).open_gap().length()
         };
         largest(rigid.map(gap))
     }

@@ -1,7 +1,7 @@
 //! The end of the path of slow loading, reached on one grid or, where stability was lost, on two that
 //! agree; and what the leaf comes to from there.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, System, half_state};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, System};
 use crate::newton::{EquilibriumFailure, SolverCounts};
 use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, prolong, transfer};
 use crate::relax::accuracy::{
@@ -9,12 +9,12 @@ use crate::relax::accuracy::{
 };
 use crate::relax::loading::{LoadPath, resolves_loads, veins_cannot_buckle};
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
-use crate::relax::nested_grids::solve_from_guesses;
+use crate::relax::nested_grids::{solve_from_guesses, solve_half_from_guess};
 use crate::relax::path::{Event, Path, PathPosition, Stage};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
-use crate::relax::same_equilibrium::{is_own_mirror_image, is_same_energy, is_same_on_two_grids};
+use crate::relax::same_equilibrium::{is_same_energy, is_same_on_two_grids};
 use crate::relax::solve_on_grid::{GridGuess, InitialGuess, find_grid_equilibrium};
 
 /// The finest requested grid, in segments of the grid from which it is interpolated: on a finer one
@@ -75,32 +75,12 @@ pub fn load_slowly<'a>(
         grid = level.leaf.grid.refined();
         path = Some(followed_path);
         let mut begun = NestedEquilibrium::without_grids(problem);
-        let StateOnGrid { grid: on, state } =
-            state_on_requested_grid(problem, &mut begun.history, level, effort);
-        if let Some(half) = half
-            && is_own_mirror_image(half, &state)
-        {
-            let reduced = problem.reduced_to_half(Some(half));
-            let guesses = vec![StateOnGrid {
-                grid: on.clone(),
-                state: half_state(half, &state),
-            }];
-            let found = solve_from_guesses(
-                &reduced,
-                NestedEquilibrium::without_grids(&reduced),
-                guesses,
-                effort,
-            );
-            let end = end_of(&found, |found| match found.is_stable() {
-                true => AttemptEnd::Accepted,
-                false => AttemptEnd::Unstable,
-            });
-            effort.log(Strategy::SlowLoading, Extent::Half, on.segments(), end);
-            if let (Ok(found), AttemptEnd::Accepted) = (found, end) {
-                let whole = found.mirrored_to_whole(&reduced).with_path(path);
-                return LoadingEnd::with_result(Ok(whole));
-            }
-            begun = NestedEquilibrium::without_grids(problem);
+        let guess = state_on_requested_grid(problem, &mut begun.history, level, effort);
+        let by_half = half.and_then(|half| {
+            solve_half_from_guess(problem, half, &guess, Strategy::SlowLoading, effort)
+        });
+        if let Some(found) = by_half {
+            return LoadingEnd::with_result(Ok(found.with_path(path)));
         }
         let last = grid.segments() > GRIDS.finest_of_loading || problem.segments().is_some();
         let in_valley = RelaxationProblem {
@@ -110,9 +90,8 @@ pub fn load_slowly<'a>(
             },
             ..*problem
         };
-        let segments = on.segments();
-        let guesses = vec![StateOnGrid { grid: on, state }];
-        let followed = solve_from_guesses(&in_valley, begun, guesses, effort);
+        let segments = guess.grid.segments();
+        let followed = solve_from_guesses(&in_valley, begun, vec![guess], effort);
         let (given_up, out_of_time) = (last && problem.segments().is_none(), problem.out_of_time());
         let must_be_accurate = given_up || !out_of_time && !path_is_stable(&path);
         let end = end_of(&followed, |found| {
@@ -160,11 +139,7 @@ pub fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
 
 /// The coarsest grid on which the leaf is loaded slowly.
 fn coarsest_grid(leaf: &Leaf) -> Grid {
-    let least = match leaf.scenario().blade {
-        Some(_) => GRIDS.coarsest_of_blade,
-        None => GRIDS.coarsest,
-    };
-    let mut grid = grid_of(leaf, least);
+    let mut grid = grid_of(leaf, GRIDS.coarsest);
     while grid.segments() < GRIDS.finest_of_loading
         && !resolves_loads(&DiscreteLeaf::new(leaf, grid.clone()))
     {
@@ -250,10 +225,20 @@ pub fn state_on_requested_grid(
     effort: &mut WorkLog,
 ) -> StateOnGrid {
     let Some(segments) = problem.segments() else {
-        return StateOnGrid {
-            grid: arrived.leaf.grid,
-            state: arrived.state,
+        let least = match problem.leaf.scenario().blade {
+            Some(_) => GRIDS.coarsest_of_blade,
+            None => GRIDS.coarsest,
         };
+        let GridLevel {
+            mut leaf,
+            mut state,
+        } = arrived;
+        while leaf.segments() < least {
+            state = prolong(&leaf, &state);
+            leaf = DiscreteLeaf::new(problem.leaf, leaf.grid.refined());
+        }
+        let grid = leaf.grid;
+        return StateOnGrid { grid, state };
     };
     let grid = Grid::new(segments, problem.leaf.kinks());
     let mut finest = arrived;

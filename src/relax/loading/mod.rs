@@ -170,7 +170,15 @@ impl<'w> LoadPath<'w> {
     }
 
     fn follow_stage(&mut self) -> Result<(), EquilibriumFailure> {
-        STEPS.follow(|step| {
+        let sizes = match self.loading.is_short_way() {
+            true => StepSizes {
+                first: 1.0,
+                longest: 1.0,
+                ..STEPS
+            },
+            false => STEPS,
+        };
+        sizes.follow(|step| {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 return StepEnd::Ended(EquilibriumFailure::StepLimit);
             }
@@ -542,6 +550,16 @@ impl<'a> LoadedLeaf<'a> {
                 state.x[tip] += offset.tip_offset(part) - offset.tip_offset(from);
             }
         }
+    }
+
+    /// Whether all that the present stage does is to move tips by less than steps are made for.
+    fn is_short_way(&self) -> bool {
+        let TipMotion::Joining(paths) = &self.tips else {
+            return false;
+        };
+        self.stage == Stage::Joining
+            && !self.whole.coupled()
+            && (paths.iter()).all(|path| path.from.distance(path.to) <= CORRECTION.wanted_drift)
     }
 
     /// Puts the tips of a state predicted for the present part where they are exactly.
