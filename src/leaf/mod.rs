@@ -29,7 +29,7 @@ pub use crate::leaf::derivative::parameter::{
     DenseParameterForces, LeafParameterDerivative, LinearResponse, ParameterForces, Weighted,
     hessian_at_constant_force,
 };
-pub use crate::leaf::direct::unknowns::DirectError;
+pub use crate::leaf::direct::pattern::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment, NodeLoad};
 pub use crate::leaf::mirror::{

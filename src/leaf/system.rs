@@ -14,6 +14,7 @@ use crate::leaf::block_tridiagonal::{
     BlockTridiagonal, GroupIncrements, GroupMasses, RodLane, TipFactor, lane_increment, rod_lane,
     set_lane_increment,
 };
+use crate::leaf::direct::pattern::MatrixPattern;
 use crate::leaf::discrete::{DiscreteLeaf, NodalMoment, NodeMass};
 use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
@@ -24,7 +25,7 @@ use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Number of nodes from which on groups of rods are distributed over threads. Measured: with fewer
 /// nodes waking the threads costs more than it saves.
@@ -154,6 +155,8 @@ pub struct System {
     pub(super) law_forces: Vec<DVec3>,
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
+    /// The pattern with which the matrix was first factorized as a whole.
+    pub(super) pattern: OnceLock<Arc<MatrixPattern>>,
 }
 
 /// The memory of Newton's equations, passed on from one solution to the next: equations of the same
@@ -258,6 +261,7 @@ impl System {
                 .collect(),
             law_forces: Vec::new(),
             moments: DeadMoments::default(),
+            pattern: OnceLock::new(),
         }
     }
 

@@ -9,10 +9,10 @@ use crate::relax::{
 };
 use crate::run::RefusedOption;
 use crate::scenario::{Blade, Scenario};
-use crate::shape::interpolation_weights;
+use crate::shape::{NodeState, RodShape, interpolation_weights};
 use crate::study::judge::SAME_STATION_DISTANCE;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// How the error in veins is estimated.
 struct VeinsRules {
@@ -178,14 +178,21 @@ fn compare_with_fewer_veins(
         let why = error.to_string();
         VeinsRemark::NoSuchBlade { rods, why }
     })?;
+    let (Some(blade), Some(other)) = (&scenario.blade, &fewer.blade) else {
+        let why = "it has no outline".into();
+        return Err(VeinsRemark::NoSuchBlade { rods, why });
+    };
+    // They are nearly where the veins of the blade itself are.
+    let veins = veins_at_rest_between([blade, other], leaf, rods);
+    let there = (leaf.shape.stations.as_slice(), veins.as_slice());
     let finest = leaf.accuracy.tolerance;
     let mut tolerance = finest.max(RULES.first_tolerance);
     loop {
-        let found =
-            relax(&fewer, &shape_options(options, tolerance), &mut |_| {}).map_err(|error| {
-                let why = error.to_string();
-                VeinsRemark::NoSuchBlade { rods, why }
-            })?;
+        let options = shape_options(options, tolerance);
+        let found = relax_from(&fewer, there, &options, &mut |_| {}).map_err(|error| {
+            let why = error.to_string();
+            VeinsRemark::NoSuchBlade { rods, why }
+        })?;
         let compared = compare_veins([scenario, &fewer], [leaf, &found])?;
         let wanted = RULES.grid_error * compared.difference;
         // Beyond the accuracy of the blade itself no difference is seen.
@@ -196,6 +203,51 @@ fn compare_with_fewer_veins(
             .min(RULES.grid_error * tolerance)
             .max(finest);
     }
+}
+
+/// The `rods` veins of another blade of the same outline where they lie in a blade at rest.
+fn veins_at_rest_between(
+    [blade, other]: [&Blade; 2],
+    leaf: &Equilibrium,
+    rods: usize,
+) -> Vec<RodShape> {
+    let etas: Vec<f64> = (0..leaf.rod_count)
+        .map(|j| blade.vein_position(j))
+        .collect();
+    // The fewer carry the forces of all.
+    let share = leaf.rod_count as f64 / rods as f64;
+    let vein = |k: usize| {
+        let across = interpolation_weights(&etas, other.vein_position(k), VEINS_ACROSS);
+        let veins = &leaf.shape.rods[across.first..][..across.weights.len()];
+        let node = |at: usize| {
+            let first = veins[0].nodes[at].rotation;
+            let mut between = NodeState {
+                position: DVec3::ZERO,
+                rotation: DQuat::from_array([0.0; 4]),
+                v: DVec3::ZERO,
+                u: DVec3::ZERO,
+                n: DVec3::ZERO,
+                m: DVec3::ZERO,
+            };
+            for (weight, vein) in across.weights.iter().zip(veins) {
+                let node = &vein.nodes[at];
+                let sign = first.dot(node.rotation).signum();
+                between.position += *weight * node.position;
+                between.rotation = between.rotation + node.rotation * (sign * weight);
+                between.v += *weight * node.v;
+                between.u += *weight * node.u;
+                between.n += share * weight * node.n;
+                between.m += share * weight * node.m;
+            }
+            between.rotation = between.rotation.normalize();
+            between
+        };
+        RodShape {
+            length: veins[0].length,
+            nodes: (0..leaf.shape.stations.len()).map(node).collect(),
+        }
+    };
+    (0..rods).map(vein).collect()
 }
 
 /// Refuses blades of which no number of fewer veins tells an error.

@@ -2,36 +2,36 @@
 //! index, for modes, and for Newton's method at a saddle. On coarse grids vein after vein (`veinwise`),
 //! else by a sparse factorization (`sparse`), in the numbering of `unknowns`.
 
+mod entries;
+pub(super) mod pattern;
 mod sparse;
 #[cfg(test)]
 mod tests;
 pub(super) mod unknowns;
 mod veinwise;
 
-use crate::leaf::direct::sparse::{BunchKaufmanFactors, CholeskyFactors, SymbolicFactorization};
-use crate::leaf::direct::unknowns::{DirectError, UnknownNumbering, for_each_matrix_entry};
+use crate::leaf::direct::entries::for_each_matrix_entry;
+use crate::leaf::direct::pattern::{DirectError, MatrixPattern, SymbolicFactorization};
+use crate::leaf::direct::sparse::{BunchKaufmanFactors, CholeskyFactors};
+use crate::leaf::direct::unknowns::NumberedNodes;
 use crate::leaf::direct::veinwise::CondensedFactors;
 use crate::leaf::state::NodalField;
 use crate::leaf::system::{MassLoad, System};
 use crate::memory;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Largest number of segments of a rod with which the matrix is factorized vein after vein. Measured
 /// with the leaf of Fig. 4: the sparse factorization takes 1 to 3 times as long on 32 segments, 2 to 5
 /// times on 8 and 16; its symbolic part takes about half as long again.
 const MAX_CONDENSED_SEGMENTS: usize = 32;
 
-/// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
-/// symbolic factorization where one is needed.
+/// Direct solutions with the matrices of a leaf on one grid.
 pub struct DirectSolver {
-    unknowns: Arc<UnknownNumbering>,
+    pattern: Arc<MatrixPattern>,
     /// The first node of a rod with equations.
     first: usize,
     /// Whether the matrix is factorized vein after vein, if its pivots allow it.
     uses_condensation: bool,
-    symbolic: OnceLock<Result<Arc<SymbolicFactorization>, DirectError>>,
-    /// Number of border rows, which follow all unknowns.
-    border: usize,
 }
 
 /// The solution of a bordered system.
@@ -45,8 +45,7 @@ pub struct BorderedSolution {
 
 /// The factors of a leaf's matrix.
 pub struct MatrixFactors {
-    unknowns: Arc<UnknownNumbering>,
-    border: usize,
+    pattern: Arc<MatrixPattern>,
     kind: FactorizationKind,
 }
 
@@ -82,16 +81,26 @@ impl DirectSolver {
         border: usize,
     ) -> Result<Self, DirectError> {
         let (rods, n) = (system.rods(), system.nodes());
+        let of = NumberedNodes {
+            rods,
+            nodes: n,
+            joined: system.joined,
+            coupled,
+        };
+        let new = || Arc::new(MatrixPattern::new(of, border));
+        let kept = system.pattern.get_or_init(new);
+        let pattern = match kept.is_of(of, border) {
+            true => Arc::clone(kept),
+            false => new(),
+        };
         let solver = DirectSolver {
-            unknowns: Arc::new(UnknownNumbering::new(system, coupled)),
+            pattern,
             first: system.first_node(),
             uses_condensation: border == 0
                 && coupled != [false; 6]
                 && !system.has_tissue()
                 && system.segments() <= MAX_CONDENSED_SEGMENTS
                 && memory::check_factor_memory(rods * (3 * n).pow(2)).is_ok(),
-            symbolic: OnceLock::new(),
-            border,
         };
         if !solver.uses_condensation {
             solver.symbolic(system)?;
@@ -100,37 +109,39 @@ impl DirectSolver {
     }
 
     fn symbolic(&self, system: &System) -> Result<&Arc<SymbolicFactorization>, DirectError> {
-        let symbolic =
-            || SymbolicFactorization::new(system, &self.unknowns, self.border).map(Arc::new);
-        self.symbolic
-            .get_or_init(symbolic)
-            .as_ref()
-            .map_err(|&error| error)
+        self.pattern.symbolic(|| {
+            let ones =
+                vec![vec![vec![[1.0; 6]; system.nodes()]; system.rods()]; self.pattern.border];
+            let (unknowns, mut pairs) = (&self.pattern.unknowns, Vec::new());
+            for_each_matrix_entry(system, unknowns, &ones, unknowns.count, 0.0, |a, b, _| {
+                pairs.push([a.min(b), a.max(b)]);
+            });
+            pairs
+        })
     }
 
     fn factors(&self, kind: FactorizationKind) -> MatrixFactors {
         MatrixFactors {
-            unknowns: self.unknowns.clone(),
-            border: self.border,
+            pattern: self.pattern.clone(),
             kind,
         }
     }
 
     /// Number of unknowns, with those of the border.
     pub fn size(&self) -> usize {
-        self.unknowns.count + self.border
+        self.pattern.size()
     }
 
     /// The unknowns of the rotation and of the displacement of node `i` of rod `j`.
     /// A joint tip has one displacement for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 6] {
-        self.unknowns.node_numbers(j, i - self.first)
+        self.pattern.unknowns.node_numbers(j, i - self.first)
     }
 
     /// The matrix assembled in `system` times increments: forces, those on a joint tip all
     /// on the first rod's.
     pub fn product(&self, system: &System, increments: &NodalField) -> NodalField {
-        let unknowns = &self.unknowns;
+        let unknowns = &self.pattern.unknowns;
         let mut x = vec![0.0; self.size()];
         for (j, rod) in increments.iter().enumerate() {
             for (i, node) in rod.iter().enumerate() {
@@ -146,7 +157,7 @@ impl DirectSolver {
                 y[b] += k * x[a];
             }
         });
-        let mut forces = self.unknowns.to_field(&y);
+        let mut forces = unknowns.to_field(&y);
         if unknowns.first_tip_unknown.is_some() {
             let others = forces.iter_mut().skip(1);
             others.for_each(|rod| rod[unknowns.nodes - 1][3..].fill(0.0));
@@ -172,7 +183,7 @@ impl DirectSolver {
             return Ok((factors.negative_eigenvalue_count() == 0).then_some(factors));
         }
         let symbolic = self.symbolic(system)?;
-        let cholesky = symbolic.factorize_definite(system, &self.unknowns, shift)?;
+        let cholesky = symbolic.factorize_definite(system, &self.pattern.unknowns, shift)?;
         Ok(cholesky.map(|cholesky| self.factors(FactorizationKind::Cholesky(cholesky))))
     }
 
@@ -184,8 +195,12 @@ impl DirectSolver {
         shift: f64,
     ) -> Result<MatrixFactors, DirectError> {
         let symbolic = self.symbolic(system)?;
-        let kind =
-            FactorizationKind::Sparse(symbolic.factorize(system, &self.unknowns, shift, &[])?);
+        let kind = FactorizationKind::Sparse(symbolic.factorize(
+            system,
+            &self.pattern.unknowns,
+            shift,
+            &[],
+        )?);
         Ok(self.factors(kind))
     }
 
@@ -220,7 +235,7 @@ impl DirectSolver {
                 let symbolic = self.symbolic(system)?;
                 FactorizationKind::Sparse(symbolic.factorize(
                     system,
-                    &self.unknowns,
+                    &self.pattern.unknowns,
                     shift,
                     border,
                 )?)
@@ -243,7 +258,7 @@ impl MatrixFactors {
     /// Solves in place, with unknowns numbered as by [`DirectSolver::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            FactorizationKind::Condensed(condensed) => condensed.solve(&self.unknowns, b),
+            FactorizationKind::Condensed(condensed) => condensed.solve(&self.pattern.unknowns, b),
             FactorizationKind::Sparse(sparse) => sparse.solve(b),
             FactorizationKind::Cholesky(cholesky) => cholesky.solve(b),
         }
@@ -253,7 +268,9 @@ impl MatrixFactors {
     /// vein, and without the last digits of stiff veins: for directions that are orthogonalised.
     pub fn solve_unrefined(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            FactorizationKind::Condensed(condensed) => condensed.solve_unrefined(&self.unknowns, b),
+            FactorizationKind::Condensed(condensed) => {
+                condensed.solve_unrefined(&self.pattern.unknowns, b)
+            }
             FactorizationKind::Sparse(sparse) => sparse.solve(b),
             FactorizationKind::Cholesky(cholesky) => cholesky.solve(b),
         }
@@ -279,8 +296,9 @@ impl MatrixFactors {
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
     /// the border.
     pub fn solve_bordered(&mut self, rhs: &NodalField, below: &[f64]) -> BorderedSolution {
-        let unknowns = self.unknowns.clone();
-        let mut b = vec![0.0; unknowns.count + self.border];
+        let pattern = self.pattern.clone();
+        let unknowns = &pattern.unknowns;
+        let mut b = vec![0.0; pattern.size()];
         for (j, rod) in rhs.iter().enumerate() {
             for (i, rhs) in rod.iter().enumerate() {
                 unknowns.add_node_forces(j, i, rhs, &mut b);

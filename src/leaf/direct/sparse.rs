@@ -1,31 +1,17 @@
 //! Sparse factorizations of a leaf's matrix, with its unknowns ordered by nested dissection: indefinite
 //! ones, also bordered, and definite ones without a search for pivots.
 
-use crate::leaf::direct::unknowns::{
-    DirectError, TrianglePattern, UnknownNumbering, for_each_matrix_entry, lower_triangle,
-};
+use crate::leaf::direct::entries::for_each_matrix_entry;
+use crate::leaf::direct::pattern::{DirectError, SymbolicFactorization};
+use crate::leaf::direct::unknowns::UnknownNumbering;
 use crate::leaf::state::NodalField;
 use crate::leaf::system::System;
-use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky, supernodal,
-};
-use faer::{Conj, MatMut, Par, Side};
+use faer::sparse::linalg::cholesky::supernodal;
+use faer::{Conj, MatMut, Par};
 use std::sync::Arc;
-
-/// The symbolic factorization of a leaf's matrix, bordered or not.
-pub struct SymbolicFactorization {
-    factors: SymbolicCholesky<usize>,
-    /// The lower triangle, summed from the entries of [`for_each_matrix_entry`] in their order.
-    lower: TrianglePattern,
-    /// Number of unknowns, with those of the border.
-    size: usize,
-}
 
 /// L B L^T by Bunch and Kaufman within supernodes.
 pub struct BunchKaufmanFactors {
@@ -59,57 +45,6 @@ impl CholeskyFactors {
 }
 
 impl SymbolicFactorization {
-    /// The symbolic factorization of a leaf's matrix with so many border rows after all unknowns.
-    pub fn new(
-        system: &System,
-        unknowns: &UnknownNumbering,
-        rows: usize,
-    ) -> Result<Self, DirectError> {
-        let border = unknowns.count;
-        let size = border + rows;
-        let (rods, n) = (system.rods(), system.nodes());
-        let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
-        let mut pairs = Vec::new();
-        for_each_matrix_entry(system, unknowns, &ones, border, 0.0, |a, b, _| {
-            pairs.push([a.min(b), a.max(b)]);
-        });
-        let lower = lower_triangle(size, &pairs);
-        // If an ordering is given, faer reads the pattern of the upper triangle.
-        let upper = lower.pattern.transpose().to_col_major();
-        let upper = upper.map_err(|_| DirectError::Memory)?;
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let factors = factorize_symbolic_cholesky(
-            upper.as_ref(),
-            Side::Upper,
-            SymmetricOrdering::Identity,
-            params,
-        )
-        .map_err(|_| DirectError::Memory)?;
-        let symbolic = SymbolicFactorization {
-            factors,
-            lower,
-            size,
-        };
-        memory::check_factor_memory(symbolic.factor_entry_count())
-            .map_err(|_| DirectError::Memory)?;
-        Ok(symbolic)
-    }
-
-    /// Number of stored entries of the factors.
-    pub fn factor_entry_count(&self) -> usize {
-        self.supernodes().len_val()
-    }
-
-    fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
-        match self.factors.raw() {
-            SymbolicCholeskyRaw::Supernodal(symbolic) => symbolic,
-            _ => unreachable!("supernodes are forced"),
-        }
-    }
-
     /// The entries of the lower triangle of the matrix assembled in `system` plus `shift` times the
     /// mass matrix, and of its border.
     fn matrix_entries(

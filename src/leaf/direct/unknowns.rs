@@ -1,20 +1,7 @@
-//! The numbering of the unknowns of a leaf's nodes, by nested dissection or rod after rod, and the
-//! entries of its matrix in that numbering.
+//! The numbering of the unknowns of a leaf's nodes, by nested dissection or rod after rod.
 
-use crate::leaf::block_tridiagonal::{NodeBlocks, RodLane, rod_lane};
 use crate::leaf::state::{Increment, NodalField};
-use crate::leaf::system::System;
-use faer::sparse::SymbolicSparseColMat;
 use std::ops::Range;
-
-/// Why a matrix could not be factorized.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DirectError {
-    /// The factors are too large for the memory that is allowed.
-    Memory,
-    /// A pivot is not a finite number: it has no sign.
-    NotFinite,
-}
 
 /// Shapes of blocks of the grid of rods and nodes that are not dissected further.
 const DISSECTION_LIMITS: DissectionLimits = DissectionLimits {
@@ -30,7 +17,20 @@ struct DissectionLimits {
     width_ratio: f64,
 }
 
+/// The nodes with equations that are numbered, and which of their unknowns couple neighboring rods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NumberedNodes {
+    pub rods: usize,
+    /// Nodes of a rod that have equations.
+    pub nodes: usize,
+    /// Whether all tips are one point that moves.
+    pub joined: bool,
+    /// Unknowns of a node that are coupled with those of the next rod.
+    pub coupled: [bool; 6],
+}
+
 /// The numbering of the unknowns of the nodes.
+#[derive(Debug)]
 pub struct UnknownNumbering {
     /// The unknowns of node i (from the first with equations) of rod j, at j n + i.
     numbers: Vec<[usize; 6]>,
@@ -41,19 +41,23 @@ pub struct UnknownNumbering {
     /// Number of unknowns.
     pub count: usize,
     /// Unknowns of a node that are coupled with those of the next rod.
-    coupled: [bool; 6],
+    pub coupled: [bool; 6],
 }
 
 impl UnknownNumbering {
-    /// Numbers the unknowns by nested dissection of the grid of rods and nodes, the joint tip last, for
-    /// rods that are coupled by the unknowns `coupled` alone.
-    pub fn new(system: &System, coupled: [bool; 6]) -> Self {
-        let (rods, n) = (system.rods(), system.nodes());
+    /// Numbers the unknowns by nested dissection of the grid of rods and nodes, the joint tip last.
+    pub fn new(of: NumberedNodes) -> Self {
+        let NumberedNodes {
+            rods,
+            nodes: n,
+            joined,
+            coupled,
+        } = of;
         let mut order = DissectionOrder {
             numbers: vec![[0; 6]; rods * n],
             count: 0,
             nodes: n,
-            joined: system.joined,
+            joined,
             coupled,
         };
         order.dissect(0..rods, 0..n);
@@ -62,7 +66,7 @@ impl UnknownNumbering {
             mut count,
             ..
         } = order;
-        let tip = system.joined.then_some(count);
+        let tip = joined.then_some(count);
         if let Some(tip) = tip {
             for last in numbers.iter_mut().skip(n - 1).step_by(n) {
                 last[3..].copy_from_slice(&[tip, tip + 1, tip + 2]);
@@ -175,130 +179,5 @@ impl DissectionOrder {
             self.numbers[j * self.nodes + i][c] = self.count;
             self.count += 1;
         }
-    }
-}
-
-/// Calls `add` with row, column and value of the entries of one triangle of K and its border. Some
-/// entries come in several parts; positions and order are the same for all systems of a pattern.
-pub fn for_each_matrix_entry(
-    system: &System,
-    unknowns: &UnknownNumbering,
-    border: &[NodalField],
-    first_border: usize,
-    shift: f64,
-    mut add: impl FnMut(usize, usize, f64),
-) {
-    let n = system.nodes();
-    for j in 0..system.rods() {
-        let RodLane { group, lane } = rod_lane(j);
-        let chain = &system.groups[group].matrix;
-        for i in 0..n {
-            let NodeBlocks { own, next } = chain.node_blocks(i, lane);
-            let mass = system.mass(j, i);
-            let (here, ahead) = (
-                unknowns.node_numbers(j, i),
-                unknowns.node_numbers(j, (i + 1).min(n - 1)),
-            );
-            for r in 0..6 {
-                add(here[r], here[r], shift * mass.of_component(r));
-                for c in r..6 {
-                    add(here[r], here[c], own[r][c]);
-                }
-                for c in 0..if i + 1 < n { 6 } else { 0 } {
-                    add(here[r], ahead[c], next[r][c]);
-                }
-            }
-            if let Some(spring) = system.node_coupling(j, i)
-                && (unknowns.first_tip_unknown.is_none() || i + 1 < n)
-            {
-                let other = unknowns.node_numbers(j + 1, i);
-                for c in (0..3).filter(|&c| unknowns.coupled[3 + c]) {
-                    add(here[3 + c], other[3 + c], -spring[c]);
-                }
-            }
-            if let Some(across) = system.gap_block(j, i) {
-                let other = unknowns.node_numbers(j + 1, i);
-                for (r, row) in across.iter().enumerate() {
-                    for (c, value) in row.iter().enumerate() {
-                        // The displacement of a joint tip meets itself, in either order.
-                        let both = if here[r] == other[c] { 2.0 } else { 1.0 };
-                        add(here[r], other[c], both * value);
-                    }
-                }
-            }
-        }
-        for i in 0..n - 1 {
-            let Some([ahead, crossing]) = system.cell_blocks(j, i) else {
-                break;
-            };
-            let [here, next] = [i, i + 1].map(|i| unknowns.node_numbers(j, i));
-            let [other, beyond] = [i, i + 1].map(|i| unknowns.node_numbers(j + 1, i));
-            for (from, block, to) in [(here, ahead, beyond), (next, crossing, other)] {
-                for (r, row) in block.iter().enumerate() {
-                    for (c, value) in row.iter().enumerate() {
-                        add(from[r], to[c], *value);
-                    }
-                }
-            }
-        }
-        for (k, row) in border.iter().enumerate() {
-            for (i, forces) in row[j].iter().enumerate() {
-                for (at, force) in unknowns.node_numbers(j, i).into_iter().zip(forces) {
-                    add(at, first_border + k, *force);
-                }
-            }
-        }
-    }
-    for k in 0..border.len() {
-        add(first_border + k, first_border + k, 0.0);
-    }
-}
-
-/// The pattern of the lower triangle of a matrix that is a sum of entries.
-pub struct TrianglePattern {
-    /// Rows of the nonzero entries of every column.
-    pub pattern: SymbolicSparseColMat<usize>,
-    /// Position in the pattern of each entry of the sum.
-    pub places: Vec<usize>,
-}
-
-/// The pattern of a lower triangle with entries in these columns and rows, possibly repeated.
-pub fn lower_triangle(size: usize, entries: &[[usize; 2]]) -> TrianglePattern {
-    // Sorted by rows and then, in this order, by columns: the rows of each column ascend.
-    let sorted = |by: usize, order: &mut dyn Iterator<Item = usize>| {
-        let mut ends = vec![0; size + 1];
-        entries.iter().for_each(|entry| ends[entry[by] + 1] += 1);
-        for k in 0..size {
-            ends[k + 1] += ends[k];
-        }
-        let mut sorted = vec![0; entries.len()];
-        for k in order {
-            let end = &mut ends[entries[k][by]];
-            sorted[*end] = k;
-            *end += 1;
-        }
-        (sorted, ends)
-    };
-    let (by_rows, _) = sorted(1, &mut (0..entries.len()));
-    let (sorted, ends) = sorted(0, &mut by_rows.into_iter());
-    let (mut starts, mut rows) = (vec![0], Vec::<usize>::new());
-    let mut places = vec![0; entries.len()];
-    let mut begin = 0;
-    for &end in &ends[..size] {
-        let column = &sorted[begin..end];
-        begin = end;
-        let start = rows.len();
-        for &k in column {
-            let row = entries[k][1];
-            if rows[start..].last() != Some(&row) {
-                rows.push(row);
-            }
-            places[k] = rows.len() - 1;
-        }
-        starts.push(rows.len());
-    }
-    TrianglePattern {
-        pattern: SymbolicSparseColMat::new_checked(size, size, starts, None, rows),
-        places,
     }
 }
