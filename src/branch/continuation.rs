@@ -5,7 +5,7 @@
 //! in between. A branch ends at an end of the range, where it closes, or where no step succeeds.
 
 use crate::branch::convergence::VerificationFailure;
-use crate::branch::correct::SteppedPoint;
+use crate::branch::correct::{SteppedPoint, TangentBefore};
 use crate::branch::critical::{
     CriticalKind, CriticalPoint, locate_critical_points, locate_pitchfork_vertex,
 };
@@ -295,12 +295,17 @@ impl Branch {
     ) -> Result<(), CorrectorFailure> {
         let now = &self.points[self.points.len() - 1];
         let step = self.step;
-        let found = SteppedPoint::step_from(equations, now, step).and_then(|found| {
-            match how.accepts(equations, now, &found, step) {
-                true => Ok(found),
-                false => Err(CorrectorFailure::NotConverged),
-            }
+        let before = self.steps.last().map(|step| TangentBefore {
+            tangent: &self.points[self.points.len() - 2].tangent,
+            step: *step,
         });
+        let found =
+            SteppedPoint::step_from(equations, now, before, step).and_then(|found| {
+                match how.accepts(equations, now, &found, step) {
+                    true => Ok(found),
+                    false => Err(CorrectorFailure::NotConverged),
+                }
+            });
         let mut next = match found {
             Ok(found) => found,
             Err(_) if 0.5 * step >= STEPS.shortest * how.longest_step => {

@@ -11,7 +11,7 @@ use crate::branch::family::{
 };
 use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
-    inject_forces, is_finite, largest, scaled_sum,
+    inject_forces, is_finite, largest, scale_field, scaled_sum,
 };
 use crate::leaf::{DiscreteLeaf, LinearSolveOutcome, NodalField, State, System};
 use crate::newton::ForceConvergence;
@@ -322,15 +322,47 @@ pub(super) struct SteppedPoint {
     pub drift: f64,
 }
 
+/// The tangent of a branch at a point before, and how long ago that was.
+#[derive(Clone, Copy)]
+pub(super) struct TangentBefore<'a> {
+    pub tangent: &'a BranchDirection,
+    /// Length of the step from there.
+    pub step: f64,
+}
+
+impl BranchDirection {
+    /// The direction of the chord of this `step` along a branch with this tangent, which turned from that
+    /// `before` to it, if that is on the same grid.
+    fn bent(&self, before: Option<TangentBefore>, step: f64) -> BranchDirection {
+        let same_grid =
+            |before: &TangentBefore| before.tangent.increments[0].len() == self.increments[0].len();
+        let Some(before) = before.filter(same_grid) else {
+            return self.clone();
+        };
+        let part = 0.5 * step / before.step;
+        let extrapolated = |now: f64, then: f64| now + part * (now - then);
+        let increments = scaled_sum(
+            &scale_field(&self.increments, 1.0 + part),
+            -part,
+            &before.tangent.increments,
+        );
+        BranchDirection {
+            increments,
+            params: [extrapolated(self.params[0], before.tangent.params[0])],
+        }
+    }
+}
+
 impl SteppedPoint {
     /// Makes a step of this length, or a shorter one to the end of the range: beyond the end there
-    /// may be no leaf.
+    /// may be no leaf. It is predicted by the tangent and that of the point `before`.
     pub fn step_from(
         equations: &mut BranchEquations,
         now: &EquilibriumPoint,
+        before: Option<TangentBefore>,
         step: f64,
     ) -> Result<Self, CorrectorFailure> {
-        match step_along_tangent(equations, now, step) {
+        match step_along_branch(equations, now, before, step) {
             Err(CorrectorFailure::OutOfRange(out)) => step_to_range_end(equations, now, step, out),
             found => found,
         }
@@ -358,13 +390,15 @@ impl SteppedPoint {
     }
 }
 
-/// A step of this length along the tangent, corrected in the plane normal to that.
-fn step_along_tangent(
+/// A step of this length along the branch, corrected in the plane normal to its tangent.
+fn step_along_branch(
     equations: &mut BranchEquations,
     now: &EquilibriumPoint,
+    before: Option<TangentBefore>,
     step: f64,
 ) -> Result<SteppedPoint, CorrectorFailure> {
-    let near = equations.displace_along_direction(&now.solution(), &now.tangent, step)?;
+    let along = now.tangent.bent(before, step);
+    let near = equations.displace_along_direction(&now.solution(), &along, step)?;
     let [fraction] = near.params;
     let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
     let drift = larger(

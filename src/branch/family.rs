@@ -218,14 +218,16 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
 /// A leaf on a grid, if requested softened: see [`Leaves::with_regularization`].
 fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+    // A/L^2 of this leaf, in the units of the family.
+    let own = leaf.scenario().scale().force() / leaf.scale.force();
     for section in &mut discrete.sections {
         section.condensing = match softening {
             Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
             None => {
-                let exact = section.compliance.cmpge(DVec3::splat(1.0 / STIFFEST));
+                let exact = (section.compliance).cmpge(DVec3::splat(1.0 / (STIFFEST * own)));
                 let least = section
                     .condensing
-                    .min(DVec3::splat(RIGID_CONDENSING_STIFFNESS));
+                    .min(DVec3::splat(RIGID_CONDENSING_STIFFNESS * own));
                 DVec3::select(exact, section.condensing, least)
             }
         };
@@ -458,13 +460,6 @@ pub(super) fn state_after_step(
     let mut clamped = state.clone();
     place_supports(leaf, &mut clamped);
     let mut next = clamped.clone();
-    if clamped.x == state.x && clamped.q == state.q {
-        // The rounding error in the lengths of nearly rigid segments is scaled down
-        // with the step.
-        system.set_completed(increments, law_forces);
-        leaf.advance(state, system, step, &mut next);
-        return next;
-    }
     let mut increments = scale_field(increments, step);
     let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
     for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {

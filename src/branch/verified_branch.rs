@@ -347,8 +347,8 @@ const MAX_SWITCHING_REDUCTIONS: i32 = 8;
 
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
-/// the first one, at least twice as fine as the stations of the relaxation, on which the index
-/// is that of `rest`.
+/// the first one, at least as fine as the stations of the relaxation, on which the index is that of
+/// `rest`.
 ///
 /// # Errors
 /// The failure on the finest grid, if Newton's method converges on none.
@@ -359,7 +359,7 @@ pub fn begin_branch<'a>(
     segments: Option<usize>,
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST_RELAXATION_GRID);
-    let least = segments.unwrap_or(2 * coarsest);
+    let least = segments.unwrap_or(coarsest);
     find_first_point(family, rest, fraction, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.

@@ -63,6 +63,7 @@ use std::sync::Arc;
 const CONDENSING_LIMITS: CondensingLimits = CondensingLimits {
     of_softest: 1e7,
     of_mean: 1e5,
+    rounding: 1e-5,
 };
 
 struct CondensingLimits {
@@ -70,6 +71,9 @@ struct CondensingLimits {
     of_softest: f64,
     /// Largest stiffness of a leaf with a very soft part, in units of the mean A/L^2.
     of_mean: f64,
+    /// Error of an eigenvalue by rounding (A/(rho L^4); the lowest of a clamped rod is 12) up to which any
+    /// stiffness is allowed.
+    rounding: f64,
 }
 
 /// A leaf with all quantities dimensionless, before discretization.
@@ -419,7 +423,8 @@ impl Leaf {
         .limit_condensing_stiffness(
             share
                 * (CONDENSING_LIMITS.of_softest * self.softest_couple_stiffness)
-                    .max(CONDENSING_LIMITS.of_mean),
+                    .max(CONDENSING_LIMITS.of_mean)
+                    .max(CONDENSING_LIMITS.rounding / f64::EPSILON * width * width),
         )
     }
 
