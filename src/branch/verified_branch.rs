@@ -333,6 +333,9 @@ const FINEST_FIRST_POINT: usize = 512;
 /// the length.
 const SAME_TIPS_TOLERANCE: f64 = 0.02;
 
+/// Nodes of a grid from which on a branch does not begin on one that is finer than its relaxation.
+const MOST_FIRST_NODES: usize = 300;
+
 /// A relaxation on fewer segments counts as one on this many.
 const COARSEST_RELAXATION_GRID: usize = 8;
 
@@ -347,8 +350,8 @@ const MAX_SWITCHING_REDUCTIONS: i32 = 8;
 
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
-/// the first one, at least as fine as the stations of the relaxation, on which the index is that of
-/// `rest`.
+/// the first one on which the index is that of `rest`, at least twice as fine as the stations of the
+/// relaxation or, of a large leaf, as fine.
 ///
 /// # Errors
 /// The failure on the finest grid, if Newton's method converges on none.
@@ -359,7 +362,12 @@ pub fn begin_branch<'a>(
     segments: Option<usize>,
 ) -> Result<(NestedBranchEquations<'a>, EquilibriumPoint), CorrectorFailure> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST_RELAXATION_GRID);
-    let least = segments.unwrap_or(coarsest);
+    let finer = 2 * coarsest;
+    let enough = match rest.rod_count * finer > MOST_FIRST_NODES {
+        true => coarsest,
+        false => finer,
+    };
+    let least = segments.unwrap_or(enough);
     find_first_point(family, rest, fraction, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.

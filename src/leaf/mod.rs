@@ -63,7 +63,7 @@ use std::sync::Arc;
 const CONDENSING_LIMITS: CondensingLimits = CondensingLimits {
     of_softest: 1e7,
     of_mean: 1e5,
-    rounding: 1e-5,
+    rounding_with_rigid_tissue: 1e-5,
 };
 
 struct CondensingLimits {
@@ -72,8 +72,9 @@ struct CondensingLimits {
     /// Largest stiffness of a leaf with a very soft part, in units of the mean A/L^2.
     of_mean: f64,
     /// Error of an eigenvalue by rounding (A/(rho L^4); the lowest of a clamped rod is 12) up to which any
-    /// stiffness is allowed.
-    rounding: f64,
+    /// stiffness is allowed where tissue is rigid: its own forces are condensed out with a larger one, and
+    /// it determines the strains of the veins, whose law would be completed with a dozen solutions.
+    rounding_with_rigid_tissue: f64,
 }
 
 /// A leaf with all quantities dimensionless, before discretization.
@@ -96,6 +97,8 @@ pub struct Leaf {
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest_couple_stiffness: f64,
+    /// The error of an eigenvalue by rounding up to which forces are condensed out with any stiffness.
+    allowed_rounding: f64,
 }
 
 /// The holder of the tips.
@@ -269,6 +272,10 @@ impl Leaf {
             zero_energy_rotations: scenario.zero_energy_rotations(),
             kinks,
             softest_couple_stiffness: softest / scale.stiffness,
+            allowed_rounding: match scenario.tissue.iter().flatten().any(Tissue::is_rigid) {
+                true => CONDENSING_LIMITS.rounding_with_rigid_tissue,
+                false => 0.0,
+            },
             scenario,
         };
         leaf.loads.rod_load_factor = if leaf.scenario.has_own_loads() {
@@ -424,7 +431,7 @@ impl Leaf {
             share
                 * (CONDENSING_LIMITS.of_softest * self.softest_couple_stiffness)
                     .max(CONDENSING_LIMITS.of_mean)
-                    .max(CONDENSING_LIMITS.rounding / f64::EPSILON * width * width),
+                    .max(self.allowed_rounding / f64::EPSILON * width * width),
         )
     }
 

@@ -223,8 +223,8 @@ impl Physics {
 
     /// The largest speed of the air.
     pub fn strongest_wind(&self) -> f64 {
-        let speeds = self.air.iter().flat_map(|velocity| &velocity.value);
-        let speeds = speeds.map(|value| DVec3::from_array(*value).length());
+        let speeds = self.air.iter().flat_map(Schedule::bounds);
+        let speeds = speeds.map(|value| DVec3::from_array(value).length());
         speeds.fold(0.0, f64::max) * self.time_unit / self.scale.length
     }
 
@@ -301,11 +301,9 @@ fn load_schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
 
 /// The knots of everything that varies in time, over the unit of time.
 fn schedule_knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Vec<f64> {
-    let loads = load_schedules(dynamics).into_iter().chain(air);
-    let loads = loads.filter(|load| !load.is_constant());
-    let rest = Some(&dynamics.rest).filter(|rest| !rest.is_constant());
-    let knots = loads.flat_map(|load| &load.at);
-    let knots = knots.chain(rest.into_iter().flat_map(|rest| &rest.at));
+    let (end, loads) = (dynamics.duration, load_schedules(dynamics).into_iter());
+    let knots = loads.chain(air).flat_map(|load| load.knot_times(end));
+    let knots = knots.chain(dynamics.rest.knot_times(end));
     let mut knots: Vec<f64> = knots.map(|time| time / unit).collect();
     knots.sort_by(f64::total_cmp);
     knots

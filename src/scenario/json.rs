@@ -10,7 +10,8 @@ use crate::scenario::checked::Scenario;
 use crate::scenario::format::{Key, TablePath};
 use crate::scenario::loads::{PointLoad, PolarInertia};
 use crate::scenario::photo::axis_name;
-use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::profile::Profile;
+use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
 use crate::scenario::supports::Grip;
 use crate::scenario::veins::{Rod, Tissue};
@@ -410,7 +411,7 @@ fn optional_quantity<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) ->
 }
 
 /// A quantity in time; `None` if the quantity always has its value at rest.
-fn schedule_unless_constant<T: Copy + PartialEq>(
+fn schedule_unless_constant<T: InTime>(
     schedule: &Schedule<T>,
     at_rest: T,
     name: &str,
@@ -420,7 +421,30 @@ fn schedule_unless_constant<T: Copy + PartialEq>(
     (!constant).then(|| schedule_value(schedule, name, written))
 }
 
-fn schedule_value<T: Copy>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
-    let values: Value = of.value.iter().map(|&value| written(value)).collect();
-    json!({ "at": of.at, name: values })
+fn schedule_value<T: InTime>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
+    let through = |knots: &Knots<T>| -> [Value; 2] {
+        let values = knots.value.iter().map(|&value| written(value));
+        [json!(knots.at), values.collect()]
+    };
+    match of {
+        Schedule::Linear(knots) => {
+            let [at, values] = through(knots);
+            json!({ "at": at, name: values })
+        }
+        Schedule::Smooth { knots, .. } => {
+            let [at, values] = through(knots);
+            json!({ "at": at, name: values, "smooth": true })
+        }
+        Schedule::Sine(Sine {
+            mean,
+            amplitude,
+            frequency,
+            phase,
+        }) => json!({
+            "mean": written(*mean),
+            "amplitude": written(*amplitude),
+            "frequency": frequency,
+            "phase": phase,
+        }),
+    }
 }

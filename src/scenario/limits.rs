@@ -9,6 +9,7 @@ use crate::scenario::format::item::{EntryValue, MAGNITUDES};
 use crate::scenario::format::{Key, ValueSchema};
 use crate::scenario::loads::Dynamics;
 use crate::scenario::profile::Profile;
+use crate::scenario::schedule::{InTime, Schedule};
 use crate::scenario::section;
 use crate::scenario::veins::{Rod, Scale, Tissue, longest};
 
@@ -39,6 +40,9 @@ struct LeafLimits {
     outputs: DimensionlessLimit,
     /// Times of loads and factors.
     times: DimensionlessLimit,
+    /// Oscillations in time.
+    periods: DimensionlessLimit,
+    phase: DimensionlessLimit,
     rest_factor: DimensionlessLimit,
     rest_factor_angle: DimensionlessLimit,
     /// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
@@ -124,6 +128,12 @@ const LIMITS: LeafLimits = LeafLimits {
         "the number of outputs: choose a longer output_interval or a shorter duration",
     ),
     times: upper_limit("|t|/T", 1e12, NATURAL_UNITS_REASON),
+    periods: upper_limit(
+        "frequency duration",
+        1e5,
+        "the number of periods, each of which takes some dozens of steps: choose a lower frequency or a shorter duration",
+    ),
+    phase: upper_limit("|phase|", 1e3, "in radians"),
     rest_factor: upper_limit(
         "|factor|",
         1e6,
@@ -371,23 +381,26 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
         let outputs = (dynamics.duration / dynamics.output_interval).floor();
         LIMITS.outputs.check(item, outputs)?;
     }
-    let list = |key, name| {
-        entries
-            .given_value(key)
-            .and_then(|item: EntryValue| item.list(name))
+    let units = TimeUnits {
+        natural: time,
+        duration: dynamics.duration,
     };
-    for (key, at) in [
-        (Key::GravityInTime, &dynamics.gravity.at),
-        (Key::TipForceInTime, &dynamics.tip_force.at),
-        (Key::TipMomentInTime, &dynamics.tip_moment.at),
-        (Key::RestInTime, &dynamics.rest.at),
-    ] {
-        if let Some(list) = list(key, "at") {
-            for (index, at) in at.iter().enumerate() {
-                LIMITS.times.check(list.entry(index), at.abs() / time)?;
-            }
-        }
-    }
+    check_times(
+        entries.given_value(Key::GravityInTime),
+        &dynamics.gravity,
+        units,
+    )?;
+    check_times(
+        entries.given_value(Key::TipForceInTime),
+        &dynamics.tip_force,
+        units,
+    )?;
+    check_times(
+        entries.given_value(Key::TipMomentInTime),
+        &dynamics.tip_moment,
+        units,
+    )?;
+    check_times(entries.given_value(Key::RestInTime), &dynamics.rest, units)?;
     for (key, load, limit) in [
         (Key::GravityInTime, &dynamics.gravity, LIMITS.gravity),
         (Key::TipForceInTime, &dynamics.tip_force, LIMITS.tip_force),
@@ -397,25 +410,78 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
             LIMITS.tip_moment,
         ),
     ] {
-        if let Some(list) = list(key, "value") {
+        if let Some(item) = entries.given_value(key) {
             let unit = smallest_unit(key, rods);
-            for (index, &value) in load.value.iter().enumerate() {
-                limit.check(list.entry(index), vector_norm(value) / unit)?;
+            for (index, value) in load.bounds().into_iter().enumerate() {
+                limit.check(entry_of_bound(item, load, index), vector_norm(value) / unit)?;
             }
         }
     }
-    if let Some(list) = list(Key::RestInTime, "factor") {
+    if let Some(item) = entries.given_value(Key::RestInTime) {
         let angles = (rods.iter())
             .flat_map(|rod| rod.rest_curvature.iter().map(|u| u.max_abs() * rod.length));
         let angle = angles.fold(0.0, f64::max);
-        for (index, factor) in dynamics.rest.value.iter().enumerate() {
-            LIMITS.rest_factor.check(list.entry(index), factor.abs())?;
+        for (index, factor) in dynamics.rest.bounds().into_iter().enumerate() {
+            let entry = entry_of_bound(item, &dynamics.rest, index);
+            LIMITS.rest_factor.check(entry, factor.abs())?;
             LIMITS
                 .rest_factor_angle
-                .check(list.entry(index), factor.abs() * angle)?;
+                .check(entry, factor.abs() * angle)?;
         }
     }
     Ok(())
+}
+
+/// Times of a motion against which those of schedules are limited.
+#[derive(Clone, Copy)]
+struct TimeUnits {
+    natural: f64,
+    duration: f64,
+}
+
+/// Refuses times, and oscillations, that no motion can follow.
+fn check_times<T: InTime>(
+    item: Option<EntryValue>,
+    schedule: &Schedule<T>,
+    units: TimeUnits,
+) -> ScenarioResult<()> {
+    let Some(item) = item else {
+        return Ok(());
+    };
+    match schedule {
+        Schedule::Linear(knots) | Schedule::Smooth { knots, .. } => {
+            let list = item.list("at").unwrap_or(item);
+            for (index, at) in knots.at.iter().enumerate() {
+                LIMITS
+                    .times
+                    .check(list.entry(index), at.abs() / units.natural)?;
+            }
+        }
+        Schedule::Sine(sine) => {
+            let entry = |name| item.list(name).unwrap_or(item);
+            let periods = sine.frequency * units.duration;
+            LIMITS.periods.check(entry("frequency"), periods)?;
+            LIMITS.phase.check(entry("phase"), sine.phase.abs())?;
+        }
+    }
+    Ok(())
+}
+
+/// The entry to which one of the bounds of a schedule belongs.
+fn entry_of_bound<'e, T: InTime>(
+    item: EntryValue<'e>,
+    schedule: &Schedule<T>,
+    index: usize,
+) -> EntryValue<'e> {
+    let known = schedule.knots().is_some_and(|knots| index < knots.at.len());
+    let list = ["value", "factor", "amplitude"]
+        .into_iter()
+        .find_map(|name| item.list(name));
+    match (list, known) {
+        (Some(list), true) => list.entry(index),
+        (Some(list), false) => list,
+        (None, _) => item,
+    }
 }
 
 fn check_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
@@ -549,11 +615,13 @@ fn check_wind(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
         entries.value_or_default(Key::WindVelocity)?,
         scenario.natural_time(),
     );
-    for at in &wind.velocity.at {
-        LIMITS.times.check(item, at.abs() / time)?;
-    }
+    let units = TimeUnits {
+        natural: time,
+        duration: scenario.dynamics.duration,
+    };
+    check_times(Some(item), &wind.velocity, units)?;
     let velocity = scenario.unit(Key::WindVelocity);
-    for speed in wind.velocity.value.iter().map(|&value| vector_norm(value)) {
+    for speed in wind.velocity.bounds().into_iter().map(vector_norm) {
         LIMITS.wind_velocity.check(item, speed / velocity)?;
         for (rod, width) in scenario.rods.iter().zip(&wind.width) {
             let pressure = 0.5 * wind.density * wind.drag * speed * speed;

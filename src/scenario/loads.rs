@@ -6,7 +6,8 @@ use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::profile::Profile;
+use crate::scenario::schedule::Schedule;
 use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
@@ -426,7 +427,7 @@ pub(super) fn read_dynamics(
     let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
     let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
     if let Some(item) = entries.given_value(Key::TipMomentInTime) {
-        check_single_rod_moments(item, rods.len(), &tip_moment.value)?;
+        check_single_rod_moments(item, rods.len(), &tip_moment.bounds())?;
     }
     Ok(Dynamics {
         rotary_inertia,

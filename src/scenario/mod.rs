@@ -13,6 +13,7 @@ mod photo;
 mod plausibility;
 mod profile;
 mod read;
+mod schedule;
 mod section;
 mod supports;
 #[cfg(test)]
@@ -47,8 +48,9 @@ pub(crate) use crate::scenario::plausibility::{
     LARGEST_PLAUSIBLE_STRETCH, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
 };
-pub use crate::scenario::profile::{DerivedProfile, Profile, Schedule};
+pub use crate::scenario::profile::{DerivedProfile, Profile};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
+pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 pub use crate::scenario::section::{Moduli, Radii, Stress};
 pub use crate::scenario::supports::{Clamp, Grip, HeldTip, SupportKind};
 pub use crate::scenario::veins::{Rod, Scale, Tissue, longest};

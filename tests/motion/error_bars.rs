@@ -133,10 +133,8 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
     match kind {
         4 => {
             let blow = [0; 3].map(|_| random.uniform(-3.0, 3.0));
-            dynamics.tip_force = Schedule {
-                at: vec![0.0, 0.1, 0.25],
-                value: vec![[0.0; 3], blow, [0.0; 3]],
-            };
+            dynamics.tip_force =
+                Schedule::linear(vec![0.0, 0.1, 0.25], vec![[0.0; 3], blow, [0.0; 3]]);
             dynamics.start = MotionStart::AtRest;
         }
         5 => {
@@ -148,10 +146,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
             });
         }
         6 => {
-            dynamics.rest = Schedule {
-                at: vec![0.0, 1.0],
-                value: vec![0.2, random.uniform(0.5, 1.5)],
-            };
+            dynamics.rest = Schedule::linear(vec![0.0, 1.0], vec![0.2, random.uniform(0.5, 1.5)]);
             dynamics.start = MotionStart::AtRest;
         }
         _ => {}

@@ -7,10 +7,10 @@ use leafdyn_testing::{DVec3, Leaf, Schedule, table};
 
 /// A pulse that rises from nothing at time `at`, to a peak after a quarter of its `width`.
 fn pulse(at: f64, width: f64, impulse: [f64; 3]) -> Schedule<[f64; 3]> {
-    Schedule {
-        at: vec![at, at + 0.25 * width, at + width],
-        value: vec![[0.0; 3], impulse.map(|part| 2.0 * part / width), [0.0; 3]],
-    }
+    Schedule::linear(
+        vec![at, at + 0.25 * width, at + width],
+        vec![[0.0; 3], impulse.map(|part| 2.0 * part / width), [0.0; 3]],
+    )
 }
 
 fn momentum(leaf: &Leaf, segments: usize, snapshot: &Snapshot) -> DVec3 {
@@ -78,10 +78,7 @@ fn short_and_long_steps_agree() {
     loaded[0].dynamics.gravity = pulse(0.1007, width, [0.1, -0.3, 0.4]);
     loaded[1].dynamics.tip_force = pulse(0.1007, width, [0.02, -0.03, 0.03]);
     loaded[2].dynamics.tip_moment = pulse(0.1007, width, [0.001, -0.002, 0.003]);
-    loaded[3].dynamics.rest = Schedule {
-        at: vec![0.1007, 0.1008, 0.1011],
-        value: vec![1.0, 60.0, 1.0],
-    };
+    loaded[3].dynamics.rest = Schedule::linear(vec![0.1007, 0.1008, 0.1011], vec![1.0, 60.0, 1.0]);
     for scenario in loaded {
         // Impulses of rest curvatures are exact by the explicit method only.
         let fixed = match scenario.dynamics.rest.is_constant() {
@@ -122,10 +119,7 @@ fn short_and_long_steps_agree() {
 fn jumps_are_as_short_as_steps_can_be() {
     let mut scenario = twisted_rod();
     let force = [0.01, 0.02, -0.01];
-    let jump = |width: f64| Schedule {
-        at: vec![0.1037, 0.1037 + width],
-        value: vec![[0.0; 3], force],
-    };
+    let jump = |width: f64| Schedule::linear(vec![0.1037, 0.1037 + width], vec![[0.0; 3], force]);
     let mut tip = |width: f64| {
         scenario.dynamics.tip_force = jump(width);
         let leaf = Leaf::new(&scenario);

@@ -136,10 +136,10 @@ fn a_cantilever_across_the_wind_bends_out_of_it() {
 /// A leaf of three veins in gusts from the side, as the wind changes its slope.
 fn in_gusts() -> Scenario {
     let mut leaf = three_veins();
-    let velocity = Schedule {
-        at: vec![0.0, 0.7, 2.0],
-        value: vec![[0.0; 3], [2.0, 3.0, 4.0], [1.0, -3.0, 5.0]],
-    };
+    let velocity = Schedule::linear(
+        vec![0.0, 0.7, 2.0],
+        vec![[0.0; 3], [2.0, 3.0, 4.0], [1.0, -3.0, 5.0]],
+    );
     leaf.wind = Some(air(velocity, 0.8, 3));
     leaf.wind.as_mut().unwrap().width[1] = Profile::Linear {
         at: vec![0.0, 0.25, 1.0],

@@ -16,18 +16,12 @@ use crate::{iterated, largest, nodes, paper_leaf, settled};
 
 /// Linear from zero at time 0 to `value` at time `until`, then constant.
 pub fn ramp(until: f64, value: [f64; 3]) -> Schedule<[f64; 3]> {
-    Schedule {
-        at: vec![0.0, until],
-        value: vec![[0.0; 3], value],
-    }
+    Schedule::linear(vec![0.0, until], vec![[0.0; 3], value])
 }
 
 /// Rest shapes whose curvature grows so many times until time 2.
 pub fn curling(times: f64) -> Schedule<f64> {
-    Schedule {
-        at: vec![0.0, 2.0],
-        value: vec![1.0, times],
-    }
+    Schedule::linear(vec![0.0, 2.0], vec![1.0, times])
 }
 
 /// External and internal damping.

@@ -160,10 +160,7 @@ mod tests {
         let count = |at: &[f64], velocity: &[[f64; 3]]| {
             let mut windy = scenario();
             windy.wind = Some(Wind {
-                velocity: Schedule {
-                    at: at.to_vec(),
-                    value: velocity.to_vec(),
-                },
+                velocity: Schedule::linear(at.to_vec(), velocity.to_vec()),
                 density: 1.2,
                 drag: 2.0,
                 width: Vec::new(),

@@ -6,7 +6,8 @@ use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten_exce
 use crate::scenario::format::path::EntryPath;
 use crate::scenario::format::source::{intended_number, number_of_value};
 use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
-use crate::scenario::profile::{Profile, Schedule};
+use crate::scenario::profile::Profile;
+use crate::scenario::schedule::{InTime, Schedule, Sine};
 use std::fmt::Display;
 use std::str::FromStr;
 use toml::Value;
@@ -24,11 +25,12 @@ const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
 const ONE_PER_KNOT: &str = "one per entry of at";
 const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
 const PROFILE_FORM: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
-const FACTOR_SCHEDULE_FORM: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
+const FACTOR_SCHEDULE_FORM: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }, with smooth = true \
+     without kinks, or { mean = 1.0, amplitude = 0.5, frequency = 2.0, phase = 0.0 }";
 const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
      { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
-const LOAD_SCHEDULE_FORM: &str =
-    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const LOAD_SCHEDULE_FORM: &str = "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }, with smooth = true without \
+     kinks, or { mean = [0.0, 0.0, -1.0], amplitude = [0.0, 0.1, 0.0], frequency = 2.0, phase = 0.0 }";
 const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
 /// The value of a key, or a part of it.
@@ -355,15 +357,64 @@ impl<'e> EntryValue<'e> {
         Ok(Profile::Linear { at, value })
     }
 
-    /// A factor at given times.
+    /// A factor that may change in time.
     pub fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
-        let [at, factor] = self.knots_and_values("factor", FACTOR_SCHEDULE_FORM)?;
-        let at = at.increasing_numbers(false)?;
-        let value = factor.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
-        let value = value
-            .map(|item| item.number())
+        self.schedule("factor", FACTOR_SCHEDULE_FORM, |item| item.number())
+    }
+
+    /// A quantity in time: through values, which have this `name`, or a sine. `form` describes both.
+    fn schedule<T: InTime>(
+        &self,
+        name: &'static str,
+        form: &str,
+        value: impl Fn(&EntryValue<'e>) -> ScenarioResult<T>,
+    ) -> ScenarioResult<Schedule<T>> {
+        let Some(table) = self.value.as_table() else {
+            return Err(self.value_error(format_args!("must be a table: {form}")));
+        };
+        let is_sine = ["amplitude", "frequency"]
+            .iter()
+            .any(|key| table.contains_key(*key));
+        let named = match name == "factor" && table.contains_key("value") {
+            true => "value",
+            false => name,
+        };
+        let allowed: &[&str] = match is_sine {
+            true => &["amplitude", "frequency", "phase", "mean"],
+            false => &["at", named, "smooth"],
+        };
+        if let Some(key) = table.keys().find(|key| !allowed.contains(&key.as_str())) {
+            let key = shorten_excerpt(key);
+            return Err(self.value_error(format_args!("unknown key {key}: {form}")));
+        }
+        let part = |name| {
+            self.list(name)
+                .ok_or_else(|| self.value_error(format_args!("{name} is missing: {form}")))
+        };
+        if is_sine {
+            let number = |name| {
+                self.list(name)
+                    .map_or(Ok(0.0), |item| item.number_in(NumberRange::Finite))
+            };
+            return Ok(Schedule::Sine(Sine {
+                mean: self.list("mean").map_or(Ok(T::ZERO), |item| value(&item))?,
+                amplitude: value(&part("amplitude")?)?,
+                frequency: part("frequency")?.number_in(NumberRange::Positive)?,
+                phase: number("phase")?,
+            }));
+        }
+        let at = part("at")?.increasing_numbers(false)?;
+        let list = part(named)?.list_of_length(at.len(), ONE_PER_KNOT, "a list")?;
+        let values: Vec<T> = list
+            .map(|item| value(&item))
             .collect::<ScenarioResult<_>>()?;
-        Ok(Schedule { at, value })
+        match self
+            .list("smooth")
+            .map_or(Ok(false), |item| item.switch())?
+        {
+            true => Ok(Schedule::smooth(at, values)),
+            false => Ok(Schedule::linear(at, values)),
+        }
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
@@ -488,13 +539,7 @@ impl<'e> EntryValue<'e> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
-        let [at, value] = self.knots_and_values("value", LOAD_SCHEDULE_FORM)?;
-        let at = at.increasing_numbers(false)?;
-        let value = value.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
-        let value = value
-            .map(|item| item.vector())
-            .collect::<ScenarioResult<_>>()?;
-        Ok(Schedule { at, value })
+        self.schedule("value", LOAD_SCHEDULE_FORM, |item| item.vector())
     }
 
     /// A place along a rod: a fraction of its length, greater than 0.

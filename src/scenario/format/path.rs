@@ -8,7 +8,15 @@ use std::fmt;
 use toml::Value;
 
 /// Lists that the table of a profile or a schedule can have.
-const LIST_NAMES: [&str; 3] = ["at", "value", "factor"];
+const LIST_NAMES: [&str; 7] = [
+    "at",
+    "value",
+    "factor",
+    "amplitude",
+    "mean",
+    "frequency",
+    "phase",
+];
 
 const COMPONENT_INDICES_HINT: &str = "x, y, z have the indices 0, 1, 2";
 
@@ -151,6 +159,8 @@ impl EntryPath {
             {
                 Err(COMPONENT_INDICES_HINT.into())
             }
+            _ if matches!(self.list, Some("frequency" | "phase")) => Ok(()),
+            ValueSchema::FactorInTime if matches!(self.list, Some("amplitude" | "mean")) => Ok(()),
             _ if self.list.is_some() && self.indices[0].is_none() => list(),
             _ => Ok(()),
         }
