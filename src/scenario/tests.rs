@@ -129,6 +129,11 @@ fn what_is_written_is_read_again_as_the_same() {
         load.distributed=[[0, 0, 1e-4], [0, 0, 0], [0, 1e-5, 0]] =>
         load.distributed={at = [0, 1], value = [[[0, 0, 0], [0, 0, 1e-4]], [[0, 0, 0], [0, 0, 0]], [[0, 0, 0], [1e-4, 0, 0]]]} =>
         wind.velocity={at = [0, 1], value = [[0, 0, 0], [0.01, 0, 0]]} =>
+        wind.velocity={amplitude = [0.01, 0, 0], frequency = 2} =>
+        dynamics.tip_force={mean = [0, 1e-5, 0], amplitude = [0, 0, 1e-5], frequency = 2.0, phase = 1.5} =>
+        dynamics.tip_force={at = [0, 1, 2], value = [[0, 0, 0], [0, 0, 1e-5], [0, 1e-5, 0]], smooth = true} =>
+        dynamics.rest={mean = 1, amplitude = 0.5, frequency = 0.1} =>
+        dynamics.rest={at = [0, 1], value = [1, 2], smooth = true} =>
         leaf.base=[0.1, 0, 0]; load.gravity=[0, 0, -1e-4] =>
         tissue.along=0; tissue.across=0; tissue.fold=0 =>
     ";

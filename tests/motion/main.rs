@@ -1,6 +1,7 @@
 //! Motion in time: orders, energies, momenta, stiff leaves.
 
 mod damping;
+mod driven;
 mod energy;
 mod error_bars;
 mod grips;
