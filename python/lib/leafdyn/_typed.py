@@ -15,11 +15,16 @@ Vectors: TypeAlias = Union[Sequence[Numbers], NDArray[Any]]
 
 
 class Profile(TypedDict, total=False):
-    """Values along a rod, or in time."""
+    """Values along a rod, or in time; or a sine in time."""
 
     at: Numbers
     value: Numbers | Sequence[Numbers]
     factor: Numbers
+    smooth: bool
+    mean: float | Numbers
+    amplitude: float | Numbers
+    frequency: float
+    phase: float
 
 
 class BladeTable(TypedDict, total=False):

@@ -93,12 +93,12 @@ fn entry_schema(key: Key) -> Value {
         ValueSchema::Fan => json!({ "anyOf": [
             { "enum": ["paper", "symmetric"] }, list_schema(number_schema(NumberRange::Finite)),
         ] }),
-        ValueSchema::VectorInTime => profile_schema("value", list_schema(vector_schema())),
+        ValueSchema::VectorInTime => schedule_schema(&["value"], vector_schema()),
         ValueSchema::VectorOrInTime => {
-            json!({ "anyOf": [vector_schema(), profile_schema("value", list_schema(vector_schema()))] })
+            json!({ "anyOf": [vector_schema(), schedule_schema(&["value"], vector_schema())] })
         }
         ValueSchema::FactorInTime => {
-            profile_schema("factor", list_schema(number_schema(NumberRange::Finite)))
+            schedule_schema(&["factor", "value"], number_schema(NumberRange::Finite))
         }
     };
     entry["description"] = json!(key.description());
@@ -134,6 +134,27 @@ fn list_schema(of: Value) -> Value {
 
 fn vector_schema() -> Value {
     json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
+}
+
+/// A quantity in time: times and the values there, under one of these names, or a sine.
+fn schedule_schema(names: &[&str], value: Value) -> Value {
+    let through = names.iter().map(|name| {
+        let mut knots = profile_schema(name, list_schema(value.clone()));
+        knots["properties"]["smooth"] = json!({ "type": "boolean" });
+        knots
+    });
+    let sine = json!({
+        "type": "object",
+        "properties": {
+            "mean": value,
+            "amplitude": value,
+            "frequency": number_schema(NumberRange::Positive),
+            "phase": number_schema(NumberRange::Finite),
+        },
+        "required": ["amplitude", "frequency"],
+        "additionalProperties": false,
+    });
+    json!({ "anyOf": through.chain([sine]).collect::<Vec<_>>() })
 }
 
 /// Knots or times, and the values there.
