@@ -299,6 +299,11 @@ impl Branch {
             tangent: &self.points[self.points.len() - 2].tangent,
             step: *step,
         });
+        // Where a branch turns sharply, how it did tells nothing of how it will.
+        let before = before.filter(|before| {
+            before.is_on_grid_of(now)
+                && equations.direction_product(before.tangent, &now.tangent) > STEPS.growth_cosine
+        });
         let found =
             SteppedPoint::step_from(equations, now, before, step).and_then(|found| {
                 match how.accepts(equations, now, &found, step) {

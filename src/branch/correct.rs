@@ -318,7 +318,7 @@ pub(super) struct SteppedPoint {
     pub point: EquilibriumPoint,
     /// Length of the step along the tangent at its start.
     pub step: f64,
-    /// Distance between the predicted and the corrected point.
+    /// Distance of the point from that along the tangent.
     pub drift: f64,
 }
 
@@ -330,25 +330,27 @@ pub(super) struct TangentBefore<'a> {
     pub step: f64,
 }
 
+impl TangentBefore<'_> {
+    /// Whether it is on the grid of a point.
+    pub fn is_on_grid_of(&self, point: &EquilibriumPoint) -> bool {
+        self.tangent.increments[0].len() == point.tangent.increments[0].len()
+    }
+}
+
 impl BranchDirection {
     /// The direction of the chord of this `step` along a branch with this tangent, which turned from that
-    /// `before` to it, if that is on the same grid.
-    fn bent(&self, before: Option<TangentBefore>, step: f64) -> BranchDirection {
-        let same_grid =
-            |before: &TangentBefore| before.tangent.increments[0].len() == self.increments[0].len();
-        let Some(before) = before.filter(same_grid) else {
-            return self.clone();
-        };
+    /// `before` to it.
+    fn bent(&self, before: TangentBefore, step: f64) -> BranchDirection {
         let part = 0.5 * step / before.step;
-        let extrapolated = |now: f64, then: f64| now + part * (now - then);
         let increments = scaled_sum(
             &scale_field(&self.increments, 1.0 + part),
             -part,
             &before.tangent.increments,
         );
+        let [now, then] = [self.params[0], before.tangent.params[0]];
         BranchDirection {
             increments,
-            params: [extrapolated(self.params[0], before.tangent.params[0])],
+            params: [now + part * (now - then)],
         }
     }
 }
@@ -397,13 +399,16 @@ fn step_along_branch(
     before: Option<TangentBefore>,
     step: f64,
 ) -> Result<SteppedPoint, CorrectorFailure> {
-    let along = now.tangent.bent(before, step);
-    let near = equations.displace_along_direction(&now.solution(), &along, step)?;
+    let bent = before.map(|before| now.tangent.bent(before, step));
+    let along = bent.as_ref().unwrap_or(&now.tangent);
+    let near = equations.displace_along_direction(&now.solution(), along, step)?;
     let [fraction] = near.params;
     let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
+    // How far a branch turns in a step is told by its tangent.
+    let straight = equations.displace_along_direction(&now.solution(), &now.tangent, step)?;
     let drift = larger(
-        near.state.largest_displacement_to(&point.state),
-        (point.fraction - fraction).abs(),
+        straight.state.largest_displacement_to(&point.state),
+        (point.fraction - straight.params[0]).abs(),
     );
     Ok(SteppedPoint { point, step, drift })
 }

@@ -49,6 +49,7 @@ impl DiscreteLeaf {
         let mut total = AssemblyTotals {
             energy: self.add_tissue(state, system, MATRIX)
                 + self.add_own_loads(state, system)
+                + self.add_base_springs(state, system, MATRIX)
                 + self.base_energy(state),
             largest_turn: 0.0,
         };
@@ -162,7 +163,9 @@ impl DiscreteLeaf {
         let tissue = self.tissue_loads(state);
         for j in 0..self.rods() {
             let on_tissue = |i: usize| tissue.get(state.base(j) + i).copied().unwrap_or_default();
-            let turned = on_tissue(0).moment + self.node_dead_moment(0);
+            let turned = on_tissue(0).moment
+                + self.node_dead_moment(0)
+                + self.base_spring_load(state, j).moment;
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
@@ -215,7 +218,9 @@ impl DiscreteLeaf {
             return 0.0;
         }
         let none = NodeLoad::default();
-        let of = |j: usize| self.load_with_tissue(state, j, 0, none).energy;
+        let of = |j: usize| {
+            self.load_with_tissue(state, j, 0, none).energy - self.base_spring_load(state, j).energy
+        };
         (0..self.rods()).map(of).sum()
     }
 
@@ -226,6 +231,7 @@ impl DiscreteLeaf {
         let mut energy = self.base_energy(state) + self.cell_energy(state);
         for (j, i) in self.rod_index_pairs(0..1) {
             energy += self.node_strip_load(state, j, i).energy;
+            energy += self.base_spring_load(state, j).energy;
         }
         let load = |j: usize, i: usize| {
             self.load_with_tissue(state, j, i, self.node_strip_load(state, j, i))

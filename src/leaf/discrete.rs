@@ -442,10 +442,14 @@ impl DiscreteLeaf {
         let weights = self.node_weights(i);
         let lanes = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
         let own = self.own_load_on_node(j, i);
+        let spring = match i {
+            0 => self.base_spring_load(state, j),
+            _ => NodeLoad::default(),
+        };
         NodeLoad {
-            moment: tissue.moment,
+            moment: tissue.moment + spring.moment,
             force: DVec3::from(lanes.force) + tissue.force + own,
-            energy: f64::from(lanes.energy) + tissue.energy - own.dot(state.x[k]),
+            energy: f64::from(lanes.energy) + tissue.energy + spring.energy - own.dot(state.x[k]),
         }
     }
 

@@ -9,7 +9,7 @@
 use crate::leaf::Leaf;
 use crate::leaf::rod_ode::{FieldChange, RodFields};
 use crate::leaf::state::State;
-use crate::scenario::{Profile, Rod, Scenario, SupportKind};
+use crate::scenario::{BaseSupport, Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -43,7 +43,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
     let unmatched = distributed.is_some()
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
-        || *base_held != SupportKind::Clamped;
+        || *base_held != BaseSupport::Clamped;
     let weights = |(a, b): (usize, usize)| {
         let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);
         own == [image[0], -image[1], image[2]]

@@ -8,6 +8,7 @@
 //! the differential equations of the rods, which the grid approximates.
 
 mod assembly;
+mod base_springs;
 mod block_tridiagonal;
 mod derivative;
 mod direct;
@@ -53,7 +54,7 @@ use crate::rod::Section;
 use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{
-    Clamp, Dynamics, Profile, Rod, Scenario, SupportKind, Tissue, ZeroEnergyRotation, longest,
+    BaseSupport, Clamp, Dynamics, Profile, Rod, Scenario, Tissue, ZeroEnergyRotation, longest,
 };
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -91,6 +92,8 @@ pub struct Leaf {
     pub tip_support: Option<TipSupport>,
     /// Whether hinges hold the bases.
     hinged: bool,
+    /// Moment per radian of the springs at the bases; empty without any.
+    base_turn_stiffness: Vec<f64>,
     /// Turns of veins without resistance.
     zero_energy_rotations: Vec<ZeroEnergyRotation>,
     /// Fractions of the length where some profile has a kink, ascending.
@@ -220,7 +223,7 @@ fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
         .map(|pair| pair[0].base_position().distance(pair[1].base_position()));
     let width = apart.sum::<f64>() / length;
     let mut edges = Vec::new();
-    if has_layer && scenario.base_held == SupportKind::Clamped && width > CLAMP_LAYER.least_width {
+    if has_layer && scenario.base_held == BaseSupport::Clamped && width > CLAMP_LAYER.least_width {
         let mut part = CLAMP_LAYER.first_part * width;
         let mut edge = 0.0;
         while part < CLAMP_LAYER.largest_part {
@@ -268,7 +271,8 @@ impl Leaf {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
-            hinged: scenario.base_held == SupportKind::Pinned,
+            hinged: scenario.base_held != BaseSupport::Clamped,
+            base_turn_stiffness: scenario.base_turn_stiffness.clone(),
             zero_energy_rotations: scenario.zero_energy_rotations(),
             kinks,
             softest_couple_stiffness: softest / scale.stiffness,
@@ -448,7 +452,18 @@ impl Leaf {
         self.tip_support.is_some() || !self.scenario.grips.is_empty()
     }
 
-    /// Whether hinges hold the bases: they stay in their places, and turn freely.
+    /// The moment per radian of the spring at the base of rod `j`; zero without one.
+    pub fn base_turn_stiffness(&self, j: usize) -> f64 {
+        let own = self.base_turn_stiffness.get(j);
+        own.map_or(0.0, |own| own / self.scale.moment())
+    }
+
+    /// Whether the bases turn freely on their hinges.
+    pub fn turns_freely(&self) -> bool {
+        self.hinged && self.base_turn_stiffness.is_empty()
+    }
+
+    /// Whether hinges hold the bases: they stay in their places, and turn freely or against springs.
     #[inline]
     pub fn hinged(&self) -> bool {
         self.hinged

@@ -489,7 +489,7 @@ impl DiscreteLeaf {
                 now: state.q[state.base(j)],
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
-            let moments = (!self.leaf.hinged()).then(|| rods.clone().map(moment).sum());
+            let moments = (!self.leaf.turns_freely()).then(|| rods.clone().map(moment).sum());
             let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.leaf.scale.length;

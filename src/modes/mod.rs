@@ -621,7 +621,7 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         let [a, b] = [j, j + 1].map(|rod| displacement_part(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.node_coupling(j, i) * (b - a));
     }
-    sum + leaf.tissue_curvature(state, shape)
+    sum + leaf.tissue_curvature(state, shape) + leaf.base_spring_curvature(state, shape)
 }
 
 /// The contribution of second derivatives with respect to rotations, at constant force.

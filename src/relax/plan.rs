@@ -192,11 +192,11 @@ impl<'a> RelaxationProblem<'a> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
+        // What is held is moved to its holder by a method of its own; without loads leaves turn on hinges.
         self.options.route == Route::Loading
             && !released
             && !self.leaf.has_placed_supports()
-            && !self.leaf.hinged()
+            && !self.leaf.turns_freely()
             && self.leaf.loads != Loads::default()
             && !self.leaf.loads.has_moments()
     }
@@ -210,7 +210,7 @@ impl<'a> RelaxationProblem<'a> {
         settles
             && self.options.route == Route::Loading
             && !self.leaf.has_placed_supports()
-            && !self.leaf.hinged()
+            && !self.leaf.turns_freely()
             && !self.leaf.loads.has_moments()
             && !self.out_of_time()
     }

@@ -8,7 +8,7 @@ use crate::scenario::loads::{Dynamics, PointLoad, Weight, Wind, natural_time_uni
 use crate::scenario::photo::Photo;
 use crate::scenario::profile::Profile;
 use crate::scenario::section::{Moduli, Radii};
-use crate::scenario::supports::{Grip, HeldTip, SupportKind};
+use crate::scenario::supports::{BaseSupport, Grip, HeldTip};
 use crate::scenario::veins::{Rod, Scale, Tissue};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -28,7 +28,10 @@ pub struct Scenario {
     /// The blade that the veins and the tissue follow from, if a blade is given in place of them.
     pub blade: Option<Arc<Blade>>,
     /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
-    pub base_held: SupportKind,
+    pub base_held: BaseSupport,
+    /// The moment per radian by which the base of each rod is held in its natural direction; empty unless bases
+    /// are elastic.
+    pub base_turn_stiffness: Vec<f64>,
     /// Whether all tips share one point.
     pub joined: bool,
     /// Coupling stiffness of each gap between neighbouring rods along the lab

@@ -142,6 +142,8 @@ impl Scenario {
             Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
             Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
             Key::BaseHeld => json!(self.base_held),
+            Key::BaseTurnStiffness if self.base_turn_stiffness.is_empty() => return None,
+            Key::BaseTurnStiffness => number_or_list(self.base_turn_stiffness.iter().copied()),
             Key::Fan => list_value(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => json!(self.joined),
             Key::RestStretch => quantity_value(self.rods.iter().map(|rod| &rod.rest_stretch)),

@@ -190,7 +190,7 @@ impl Entries {
         let rods = read_veins(self, rods, &source)?;
         let joined = read_joined(self, source.blade())?;
         let coupling = read_coupling(self, rods.len() - 1)?;
-        let base_held = supports::read_base_support(self)?;
+        let bases = supports::read_base_support(self, rods.len())?;
         let tissue = read_tissue(self, rods.len() - 1, &source)?;
         let weights = loads::read_weights(self, rods.len())?;
         let g = loads::read_gravity_acceleration(self)?;
@@ -214,7 +214,8 @@ impl Entries {
             rods,
             radii: source.radii(),
             blade: source.blade().cloned(),
-            base_held,
+            base_held: bases.held,
+            base_turn_stiffness: bases.turn_stiffness,
             joined,
             coupling,
             tissue,

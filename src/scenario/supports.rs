@@ -20,6 +20,18 @@ words! {
     }
 }
 
+words! {
+    /// What is held of the bases.
+    pub enum BaseSupport {
+        /// The positions and the directions.
+        Clamped = "clamped",
+        /// The positions; directions are free, as on hinges.
+        Pinned = "pinned",
+        /// The positions, and the directions by springs.
+        Elastic = "elastic",
+    }
+}
+
 /// How far holders may take a leaf from its natural shape.
 struct SupportLimits {
     /// Largest distance of a held tip from the base, in lengths of the longest rod with its growth.
@@ -179,15 +191,43 @@ impl EntryValue<'_> {
     }
 }
 
-/// Reads `leaf.base_held`.
-pub(super) fn read_base_support(entries: &Entries) -> ScenarioResult<SupportKind> {
+/// What is held of the bases.
+pub(super) struct HeldBases {
+    pub held: BaseSupport,
+    /// The stiffness of the spring of each rod; empty unless bases are elastic.
+    pub turn_stiffness: Vec<f64>,
+}
+
+/// Reads `leaf.base_held` and `leaf.base_turn_stiffness` of so many rods.
+pub(super) fn read_base_support(entries: &Entries, rods: usize) -> ScenarioResult<HeldBases> {
     let item = entries.value_or_default(Key::BaseHeld)?;
-    let held = item.support_kind()?;
+    let held = item.word(
+        "must be \"clamped\" (positions and directions are held), \"pinned\" (positions alone) or \"elastic\" \
+         (directions by springs)",
+    )?;
     item.refuse_unless(
-        held == SupportKind::Clamped || entries.value_or_default(Key::Clamped)?.switch()?,
+        held == BaseSupport::Clamped || entries.value_or_default(Key::Clamped)?.switch()?,
         "contradicts dynamics.clamped = false, a base that is free: leave one of them out",
     )?;
-    Ok(held)
+    let springs = entries.given_value(Key::BaseTurnStiffness);
+    let turn_stiffness = match (held, springs) {
+        (BaseSupport::Elastic, Some(springs)) => springs.number_for_each(rods)?,
+        (BaseSupport::Elastic, None) => {
+            return Err(item.value_error(
+                "needs leaf.base_turn_stiffness, the moment per radian of the springs at the bases",
+            ));
+        }
+        (_, Some(springs)) => {
+            return Err(
+                springs.value_error("belongs to bases that give: add leaf.base_held = \"elastic\"")
+            );
+        }
+        (_, None) => Vec::new(),
+    };
+    Ok(HeldBases {
+        held,
+        turn_stiffness,
+    })
 }
 
 /// Reads `[[grip]]` of a leaf of these rods. `shared`: whether the tip is one that several rods

@@ -17,7 +17,7 @@ mod tests;
 use crate::rotation::angle_about;
 use crate::scenario::checked::Scenario;
 use crate::scenario::profile::Profile;
-use crate::scenario::supports::{Grip, SupportKind};
+use crate::scenario::supports::{BaseSupport, Grip, SupportKind};
 use crate::scenario::veins::{Rod, Tissue, longest};
 use glam::{DQuat, DVec3};
 use std::ops::Range;
@@ -165,7 +165,7 @@ impl Scenario {
     /// The groups of veins that can turn without resistance: in wind only those that spin.
     pub fn zero_energy_rotations(&self) -> Vec<ZeroEnergyRotation> {
         let mut rotations = Vec::new();
-        let hinged = self.base_held == SupportKind::Pinned;
+        let hinged = self.base_held == BaseSupport::Pinned;
         for rods in self.tied_groups() {
             let windy = self.wind.is_some();
             let between_clamps = self.axis_between_clamps(rods.clone()).filter(|_| !windy);
@@ -245,7 +245,7 @@ impl Scenario {
     /// Moments that keep a leaf from resting: on a group of veins that turns as a rigid body while no
     /// force does work, their sum about the axis is not zero.
     pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
-        if self.base_held != SupportKind::Pinned || self.wind.is_some() {
+        if self.base_held != BaseSupport::Pinned || self.wind.is_some() {
             return None;
         }
         self.tied_groups().into_iter().find_map(|group| {
@@ -303,7 +303,7 @@ impl Scenario {
             let points = |apart: Vec<DVec3>| self.support_line(&group, &apart).is_some();
             !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
         };
-        let hinged = self.base_held == SupportKind::Pinned && self.wind.is_none();
+        let hinged = self.base_held == BaseSupport::Pinned && self.wind.is_none();
         hinged && self.tied_groups().into_iter().any(free)
     }
 
@@ -369,10 +369,10 @@ impl Scenario {
         let clamps = self.held_tip.as_ref().and_then(|tip| tip.clamps.as_ref());
         let clamp = clamps.map(|clamps| clamps[group.start].rotation() * DVec3::X);
         // Where grips hold a vein depends on how it begins in the natural leaf.
-        let free = self.base_held == SupportKind::Pinned && grips.clone().next().is_none();
+        let free = self.base_held == BaseSupport::Pinned && grips.clone().next().is_none();
         let axis = match self.base_held {
-            SupportKind::Pinned if free => clamp?,
-            SupportKind::Pinned if !gripped && clamp.is_none() => return None,
+            BaseSupport::Pinned if free => clamp?,
+            BaseSupport::Pinned if !gripped && clamp.is_none() => return None,
             _ => tangent(rods.first()?),
         };
         let in_line = |direction: DVec3| direction.distance(axis) <= TOLERANCES.equality;

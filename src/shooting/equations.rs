@@ -21,9 +21,10 @@
 mod tests;
 
 use crate::rod::Wrench;
+use crate::rotation;
 use crate::rotation::Pose;
 use crate::run::Limit;
-use crate::scenario::{Profile, Scenario, SupportKind, ZeroEnergyRotation, longest};
+use crate::scenario::{BaseSupport, Profile, Scenario, ZeroEnergyRotation, longest};
 use crate::shape::NodeState;
 use crate::shooting::rod_state::{RodState, STATE_SIZE, SlopeDerivatives, rotation_difference};
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
@@ -175,7 +176,7 @@ impl<'a> BoundaryValueProblem<'a> {
                     })
                 })
                 .collect(),
-            hinged: scenario.base_held == SupportKind::Pinned,
+            hinged: scenario.base_held != BaseSupport::Clamped,
             softest_couple_stiffness: softest,
             turnings: scenario.zero_energy_rotations(),
             arcs: rest_arcs(scenario, &lengths),
@@ -507,16 +508,56 @@ impl BoundaryValueProblem<'_> {
         }
     }
 
-    /// The state at the base nearest to a given one: a hinge carries no moment.
+    /// Whether the bases turn freely on their hinges.
+    pub fn turns_freely(&self) -> bool {
+        self.scenario.base_held == BaseSupport::Pinned
+    }
+
+    /// The stiffness of the spring at the base of rod `j`; zero without one.
+    fn base_turn_stiffness(&self, j: usize) -> f64 {
+        let own = self.scenario.base_turn_stiffness.get(j);
+        own.map_or(0.0, |own| own / self.scenario.scale().moment())
+    }
+
+    /// The moment of the rod at a base with the rotation `q`: none at a hinge, that of its spring at an
+    /// elastic one.
+    fn base_moment(&self, j: usize, q: DQuat) -> DVec3 {
+        match self.base_turn_stiffness(j) {
+            0.0 => DVec3::ZERO,
+            stiffness => stiffness * rotation::log(q * self.scenario.base(j).1.conjugate()),
+        }
+    }
+
+    /// The derivative of the [moment at the base](Self::constrained_base) of rod `j` by the rotation of that.
+    pub fn base_moment_rate(&self, j: usize, q: DQuat) -> DMat3 {
+        let turn = rotation::log(q * self.scenario.base(j).1.conjugate());
+        let crossed = cross_matrix(turn);
+        let half = 0.5 * turn.length();
+        let k = match half < 1e-2 {
+            true => 1.0 / 12.0 + half * half / 180.0,
+            false => (1.0 - half / half.tan()) / (4.0 * half * half),
+        };
+        self.base_turn_stiffness(j) * (DMat3::IDENTITY - 0.5 * crossed + k * crossed * crossed)
+    }
+
+    /// The state at the base nearest to a given one: a hinge carries no moment, or that of its spring.
     pub fn constrained_base(&self, j: usize, rod: &RodState) -> RodState {
         let clamped = self.base(j, rod.n, rod.m);
         match self.hinged {
             true => RodState {
                 q: rod.q,
-                m: DVec3::ZERO,
+                m: self.base_moment(j, rod.q),
                 ..clamped
             },
             false => clamped,
+        }
+    }
+
+    /// Puts the bases of all rods in a flat state where the conditions there hold.
+    pub fn constrain_bases(&self, y: &mut [f64]) {
+        for j in 0..self.rods() {
+            let rod = RodState::from_flat_state(y, j);
+            self.constrained_base(j, &rod).write_flat_state(y, j);
         }
     }
 

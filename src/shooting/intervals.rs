@@ -169,11 +169,12 @@ pub struct GroupResponse {
 /// Pairs of interval and rod that a thread processes between progress reports.
 const PAIRS_PER_CHUNK: usize = 4;
 
-/// The responses of all rods over all intervals, in parallel. `proceed` is called with the part
+/// The responses of all rods over all intervals, of which the first begins at this `base`, in parallel. `proceed` is called with the part
 /// that is done, and returns whether to continue.
 pub fn responses(
     equations: &BoundaryValueProblem,
     integrated: &[IntegratedInterval],
+    base: &[f64],
     proceed: &mut dyn FnMut(f64) -> bool,
 ) -> Option<Vec<GroupResponse>> {
     let rods = equations.rods();
@@ -190,9 +191,20 @@ pub fn responses(
             match task < rods {
                 true => {
                     let first = equations.first_free_component();
-                    perturbation_responses::<6>(equations, steps, j, first)
+                    let rods = coupled_rods(equations, j);
+                    let mut all = Perturbations::<6>::unit_perturbations(rods, j, first);
+                    if first == 3 {
+                        // With a base turns the moment of its spring.
+                        let q = RodState::from_flat_state(base, j).q;
+                        all.add_moments_of_rotations(j, equations.base_moment_rate(j, q));
+                    }
+                    perturbation_responses(equations, steps, all)
                 }
-                false => perturbation_responses::<PERTURBATION_SIZE>(equations, steps, j, 0),
+                false => {
+                    let rods = coupled_rods(equations, j);
+                    let all = Perturbations::<PERTURBATION_SIZE>::unit_perturbations(rods, j, 0);
+                    perturbation_responses(equations, steps, all)
+                }
             }
         });
         found.par_extend(some);
@@ -241,11 +253,8 @@ pub fn sensitivities(
 fn perturbation_responses<const W: usize>(
     equations: &BoundaryValueProblem,
     steps: &[LinearStep],
-    j: usize,
-    first: usize,
+    mut perturbations: Perturbations<W>,
 ) -> GroupResponse {
-    let mut perturbations =
-        Perturbations::<W>::unit_perturbations(coupled_rods(equations, j), j, first);
     for step in steps {
         perturbations.propagate(equations, step);
     }

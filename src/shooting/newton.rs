@@ -189,12 +189,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         };
         memory::check_shooting_memory(equations.rods(), nodes.states.len())?;
         let first = &mut nodes.states[0];
-        for j in 0..equations.rods() {
-            let rod = RodState::from_flat_state(first, j);
-            equations
-                .constrained_base(j, &rod)
-                .write_flat_state(first, j);
-        }
+        equations.constrain_bases(first);
         Ok(ShootingNewton {
             equations,
             units: PerturbationUnits::new(equations, near),
@@ -329,7 +324,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
-        let responses = responses(self.equations, &integrated, &mut |part| {
+        let base = self.nodes.states[0].clone();
+        let responses = responses(self.equations, &integrated, &base, &mut |part| {
             self.report(part);
             !self.equations.limit.reached()
         });
@@ -397,8 +393,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                 now: bases(j).q,
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
-            let clamped = self.equations.first_free_component() == 6;
-            let moments = clamped.then(|| rods.clone().map(|j| bases(j).m).sum());
+            let held = !self.equations.turns_freely();
+            let moments = held.then(|| rods.clone().map(|j| bases(j).m).sum());
             let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.equations.length_unit;
@@ -482,6 +478,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         for (y, increment) in nodes.states.iter_mut().zip(step) {
             self.units.advance(y, increment, factor);
         }
+        self.equations.constrain_bases(&mut nodes.states[0]);
         nodes
     }
 }

@@ -87,6 +87,17 @@ impl<const W: usize> Perturbations<W> {
         }
     }
 
+    /// Adds, to perturbations of rod `j` of which the first three are rotations, the changes of the moment
+    /// that go with these.
+    pub fn add_moments_of_rotations(&mut self, j: usize, rate: DMat3) {
+        let first = PERTURBATION_SIZE * (j - self.rods.start) + 9;
+        for k in 0..3 {
+            for (c, change) in rate.col(k).to_array().into_iter().enumerate() {
+                self.entries[(first + c) * W + k] += change;
+            }
+        }
+    }
+
     /// The rows of all rods.
     pub fn rows(&self) -> &[[f64; W]] {
         self.entries.as_chunks().0

@@ -3,7 +3,7 @@
 
 use crate::homotopy::{StepEnd, StepSizes};
 use crate::run::UnmodelledFeature;
-use crate::scenario::{Scenario, SupportKind, longest};
+use crate::scenario::{BaseSupport, Scenario, longest};
 use crate::shape::{Difference, equally_spaced};
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::LeafTrajectory;
@@ -96,7 +96,7 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
             "a joint leaf with rigid tissue (tissue.along, tissue.normal) is led to rest by the relaxation",
         );
     }
-    if scenario.base_held == SupportKind::Pinned {
+    if scenario.base_held != BaseSupport::Clamped {
         // Without loads the leaf of arcs turns about its hinges.
         return from_arcs("a leaf on hinges (leaf.base_held) is led to rest by the relaxation");
     }

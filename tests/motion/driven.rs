@@ -154,9 +154,9 @@ fn a_shaken_cantilever_swings_as_its_transfer_function_says() {
 /// Both methods, on one grid, of a rod whose shear and rotary inertia count.
 #[test]
 fn both_methods_follow_an_oscillating_force() {
-    let rod = shaken(1e-3, 1e3, 0.9);
+    let rod = shaken(1e-2, 300.0, 0.9);
     let [explicit, implicit] = BOTH.map(|scheme| {
-        let [long, short] = [2e-3, 1e-3].map(|h| height(scheme, &rod, 8, h, 5.0));
+        let [long, short] = [1e-3, 5e-4].map(|h| height(scheme, &rod, 8, h, 5.0));
         short + (short - long) / 3.0
     });
     let off = (explicit - implicit).abs() / explicit.abs();
@@ -193,14 +193,7 @@ fn a_free_rod_has_the_momentum_of_the_oscillation() {
     let (grid, physics) = (discrete(&leaf, 4), Physics::new(&leaf));
     let omega = 2.0 * PI * 0.7;
     for until in [0.31, 1.7] {
-        // At the end of a step velocities are those in its middle.
-        let snapshot = at(
-            Scheme::SemiImplicit,
-            &leaf,
-            &released(&leaf, 4),
-            1e-3,
-            until,
-        );
+        let snapshot = at(Scheme::Explicit, &leaf, &released(&leaf, 4), 2e-3, until);
         let nodes = grid.rod_index_pairs(0..=4);
         let masses = nodes.map(|(j, i)| physics.inertia(&grid, j, i).mass);
         let momenta = masses.zip(&snapshot.velocity);
@@ -209,7 +202,7 @@ fn a_free_rod_has_the_momentum_of_the_oscillation() {
         let impulse = (0.2_f64.cos() - (omega * until + 0.2).cos()) / omega;
         let exact = impulse * DVec3::new(0.02, -0.1, 0.05);
         let off = gained.distance(exact) / exact.length();
-        assert!(off < 1e-4, "{until}: {off:e}");
+        assert!(off < 1e-9, "{until}: {off:e}");
     }
 }
 
@@ -287,7 +280,10 @@ fn schedules_that_make_no_sense_are_refused() {
     };
     assert!(Scenario::from_toml(&text("amplitude = [0, 0, 1e-3], frequency = 2.0")).is_ok());
     for (force, why) in [
-        ("amplitude = [0, 0, 1], frequency = 0", "positive"),
+        (
+            "amplitude = [0, 0, 1], frequency = 0",
+            "must be greater than 0",
+        ),
         ("amplitude = [0, 0, 1]", "frequency is missing"),
         ("frequency = 1.0", "amplitude is missing"),
         (

@@ -7,7 +7,7 @@
 use crate::report::numbers::format_four_digits;
 use ListEntryOwner::*;
 use glam::DVec3;
-use leafdyn::scenario::{Key, Scenario, Schedule, SupportKind, Units};
+use leafdyn::scenario::{BaseSupport, Key, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
 
 /// Arrows of loads.
@@ -161,7 +161,11 @@ pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
                 part: ParsedKey::Base,
                 vein,
                 at: [0.0; 2],
-                held: scenario.base_held,
+                // An elastic base is drawn as the hinge that it would be without its spring.
+                held: match scenario.base_held {
+                    BaseSupport::Clamped => SupportKind::Clamped,
+                    BaseSupport::Pinned | BaseSupport::Elastic => SupportKind::Pinned,
+                },
             });
         }
     }

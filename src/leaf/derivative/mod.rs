@@ -386,6 +386,7 @@ impl DiscreteLeaf {
             return;
         }
         self.add_own_load_changes(state, each, forces);
+        self.add_base_spring_changes(state, each, forces);
         let terms: Vec<_> = each.iter().map(|it| (it.weight, &it.term)).collect();
         forces.energy += self.for_each_tissue_change(state, &terms, |j, i, load| {
             if nodes.contains(&i) {
@@ -393,6 +394,24 @@ impl DiscreteLeaf {
                 add_to_increment(on, load.moment, load.force);
             }
         });
+    }
+
+    /// Adds the changes of the springs at the bases, in their stiffness and their natural direction.
+    fn add_base_spring_changes(
+        &self,
+        state: &State,
+        each: &[Weighted<DiscreteLeaf>],
+        forces: &mut ParameterForces,
+    ) {
+        let count = self.moving_nodes().len();
+        for j in (0..self.rods()).filter(|_| self.has_base_springs()) {
+            for Weighted { weight, term } in each {
+                let load = term.base_spring_load(state, j);
+                forces.energy += *weight * load.energy;
+                let base = &mut forces.rod_forces_mut(j, count)[0];
+                add_to_increment(base, *weight * load.moment, DVec3::ZERO);
+            }
+        }
     }
 
     /// Adds the effect of changes of the stress-free state on rigid tissue.

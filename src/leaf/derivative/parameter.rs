@@ -31,7 +31,8 @@ pub struct LeafParameterDerivative<'s> {
     pub(super) moments: Vec<PointMoment>,
     /// Rate of the place of the tips' holder, if that moves.
     pub(super) held: Option<TipSupportDerivative>,
-    /// The leaves that differ in the number, if they have tissue, loads of single veins, or grips.
+    /// The leaves that differ in the number, if they have tissue, springs at the bases, loads of single veins, or
+    /// grips.
     pub(super) weighted_leaves: Vec<Weighted<Leaf>>,
 }
 
@@ -134,6 +135,7 @@ impl<'s> LeafParameterDerivative<'s> {
             moments: moment_rates(terms, scale.moment()),
             held: TipSupportDerivative::new(leaf, terms),
             weighted_leaves: match leaf.has_tissue()
+                || leaf.hinged() && !leaf.turns_freely()
                 || terms
                     .iter()
                     .any(|it| it.term.has_own_loads() || !it.term.grips.is_empty())

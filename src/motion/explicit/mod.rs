@@ -612,7 +612,9 @@ impl AppliedLoads {
         layout: PackLayout,
     ) -> Option<Self> {
         let wind = WindDrag::new(leaf, physics);
-        if !leaf.has_tissue() && leaf.loads.rod_load_factor == 0.0 && wind.is_none() {
+        let springs = leaf.leaf.hinged() && !leaf.leaf.turns_freely();
+        let dead = leaf.loads.rod_load_factor != 0.0;
+        if !leaf.has_tissue() && !dead && !springs && wind.is_none() {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -667,6 +669,7 @@ impl AppliedLoads {
         self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
+        leaf.add_base_spring_moments(&self.state, &mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
             let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);
             let velocity = |k: usize| now[k] + air.extrapolation * (now[k] - earlier[k]);

@@ -64,7 +64,14 @@ impl StableStep {
                 "coupling"
             };
         }
-        let coupling = coupling + tissue;
+        let springs = leaf.base_spring_frequency_bound(|j| {
+            let inertia = physics.inertia(leaf, j, 0);
+            inertia.transverse.min(inertia.polar())
+        });
+        if springs > strains.max(coupling).max(tissue) {
+            limit = "the springs at the bases";
+        }
+        let coupling = coupling + tissue + springs;
         let all = strains + coupling;
         let friction = physics.retardation * strains;
         let drag =

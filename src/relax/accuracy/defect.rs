@@ -429,8 +429,8 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
             (node.m.x, node.m.z) = (0.0, 0.0);
         }
     }
-    for rod in known.iter_mut().filter(|_| leaf.leaf.hinged()) {
-        rod[0].m = DVec3::ZERO;
+    for (j, rod) in known.iter_mut().enumerate().filter(|_| leaf.leaf.hinged()) {
+        rod[0].m = leaf.leaf.base_spring_moment(j, rod[0].q);
     }
     let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
     let held = leaf.leaf.tip_support.as_ref();

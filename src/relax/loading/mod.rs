@@ -290,7 +290,10 @@ impl<'w> LoadPath<'w> {
         }
         for j in 0..last.rods() {
             let base = last.base(j);
-            (self.next.x[base], self.next.q[base]) = (last.x[base], last.q[base]);
+            self.next.x[base] = last.x[base];
+            if !self.loading.leaf.leaf.hinged() {
+                self.next.q[base] = last.q[base];
+            }
         }
         self.loading.place_tips(&mut self.next);
     }

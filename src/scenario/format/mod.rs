@@ -68,8 +68,10 @@ keys! {
     Base "leaf.base": VectorPerRod, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// angles of the rods at the base above the x-y plane, in radians.
     Elevation "leaf.elevation": PerRod(Finite), [0, 0, 0], Default("0.0");
-    /// how the bases are held: "clamped", or "pinned", by hinges that leave their directions free.
+    /// how the bases are held: "clamped"; "pinned", by hinges that leave their directions free; or "elastic", their directions by springs.
     BaseHeld "leaf.base_held": Text, [0, 0, 0], Default("\"clamped\"");
+    /// of elastic bases, the moment per angle by which a base has turned from its natural direction.
+    BaseTurnStiffness "leaf.base_turn_stiffness": PerRod(Positive), [1, 1, 0], Derived;
     /// A1, against torsion.
     Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// A2, against bending about d2: up and down, out of the leaf's surface.

@@ -1,0 +1,121 @@
+//! Bases that give: springs that hold the directions of hinged bases. A spring of the stiffness c whose
+//! base has turned by the rotation vector theta from its natural direction has the energy c theta^2/2.
+
+use crate::leaf::Leaf;
+use crate::leaf::discrete::{DiscreteLeaf, NodeLoad};
+use crate::leaf::state::{Increment, State, rotation_part};
+use crate::leaf::system::System;
+use crate::rod::Wrench;
+use crate::rotation::{self, outer};
+use glam::{DMat3, DQuat, DVec3};
+
+/// Squared turns below which the series of a function of them is used.
+const SMALL_SQUARED_TURN: f64 = 1e-4;
+
+impl Leaf {
+    /// The moment of rod `j` at a base with the rotation `q`: that of its spring, or none.
+    pub fn base_spring_moment(&self, j: usize, q: DQuat) -> DVec3 {
+        let turn = rotation::log(q * self.base_pose(j).rotation.conjugate());
+        self.base_turn_stiffness(j) * turn
+    }
+}
+
+impl DiscreteLeaf {
+    /// Whether springs hold the directions of the bases.
+    pub(super) fn has_base_springs(&self) -> bool {
+        self.leaf.hinged() && !self.leaf.turns_freely()
+    }
+
+    /// The rotation vector by which the base of rod `j` has turned from its natural direction, along the lab
+    /// axes.
+    fn base_turn(&self, state: &State, j: usize) -> DVec3 {
+        let natural = self.leaf.base_pose(j).rotation;
+        rotation::log(state.q[state.base(j)] * natural.conjugate())
+    }
+
+    /// The moment and the energy of the spring at the base of rod `j`.
+    pub fn base_spring_load(&self, state: &State, j: usize) -> NodeLoad {
+        let stiffness = self.leaf.base_turn_stiffness(j);
+        if stiffness == 0.0 {
+            return NodeLoad::default();
+        }
+        let turn = self.base_turn(state, j);
+        NodeLoad {
+            moment: -stiffness * turn,
+            energy: 0.5 * stiffness * turn.length_squared(),
+            ..NodeLoad::default()
+        }
+    }
+
+    /// The second derivatives of the energy of the spring at the base of rod `j` by the rotation of the base,
+    /// the symmetric part of those of its moment: c (1 + k [theta]^2) with k = (1 - theta/2 cot(theta/2))/theta^2.
+    fn base_spring_stiffness(&self, state: &State, j: usize) -> DMat3 {
+        let turn = self.base_turn(state, j);
+        let square = turn.length_squared();
+        let k = match square < SMALL_SQUARED_TURN {
+            true => 1.0 / 12.0 + square / 720.0,
+            false => {
+                let half = 0.5 * square.sqrt();
+                (1.0 - half / half.tan()) / square
+            }
+        };
+        let twice_crossed = outer(turn, turn) - DMat3::from_diagonal(DVec3::splat(square));
+        self.leaf.base_turn_stiffness(j) * (DMat3::IDENTITY + k * twice_crossed)
+    }
+
+    /// Adds the springs to an assembled system, to its matrix if wanted; returns their energy.
+    pub(super) fn add_base_springs(&self, state: &State, system: &mut System, matrix: bool) -> f64 {
+        if !self.has_base_springs() {
+            return 0.0;
+        }
+        let mut energy = 0.0;
+        for j in 0..self.rods() {
+            let NodeLoad {
+                moment,
+                energy: own,
+                ..
+            } = self.base_spring_load(state, j);
+            energy += own;
+            system.add_load(
+                j,
+                0,
+                Wrench {
+                    moment,
+                    force: DVec3::ZERO,
+                },
+            );
+            if matrix {
+                system.add_rotation_spring(j, 0, self.base_spring_stiffness(state, j));
+            }
+        }
+        energy
+    }
+
+    /// Adds the moments of the springs to those on all nodes.
+    pub fn add_base_spring_moments(&self, state: &State, nodes: &mut [Wrench]) {
+        if self.has_base_springs() {
+            for j in 0..self.rods() {
+                nodes[state.base(j)].moment += self.base_spring_load(state, j).moment;
+            }
+        }
+    }
+
+    /// Second derivatives of the energy of the springs along a shape of all nodes.
+    pub fn base_spring_curvature(&self, state: &State, shape: &[Increment]) -> f64 {
+        if !self.has_base_springs() {
+            return 0.0;
+        }
+        let curvature = |j: usize| {
+            let turn = rotation_part(&shape[state.base(j)]);
+            turn.dot(self.base_spring_stiffness(state, j) * turn)
+        };
+        (0..self.rods()).map(curvature).sum()
+    }
+
+    /// The largest squared frequency that a spring could give its base alone, with this least inertia of
+    /// each base about an axis across.
+    pub fn base_spring_frequency_bound(&self, inertia: impl Fn(usize) -> f64) -> f64 {
+        let of = |j: usize| self.leaf.base_turn_stiffness(j) / inertia(j);
+        (0..self.rods()).map(of).fold(0.0, f64::max)
+    }
+}
