@@ -2,7 +2,9 @@
 //! refused and written.
 
 use crate::scenario::format::entries::Entries;
-use crate::scenario::{EntryPath, Key, Profile, Scenario, SupportKind, Tissue, schema};
+use crate::scenario::{
+    BaseSupport, EntryPath, Key, Profile, Scenario, SupportKind, Tissue, schema,
+};
 use leafdyn_testing::pairs;
 use serde_json::{Value, json};
 
@@ -75,7 +77,7 @@ fn all_that_is_given_arrives() {
     assert_eq!(leaf.rods[2].base, [0.0, 0.1, 0.0]);
     assert_eq!(
         (leaf.rods[1].elevation, leaf.base_held),
-        (0.3, SupportKind::Pinned)
+        (0.3, BaseSupport::Pinned)
     );
     let gap = |across: f64| Tissue {
         stiffness: [20.0, across, 0.0].map(Profile::Constant),

@@ -245,7 +245,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::scenario::{Scenario, SupportKind};
+    use crate::scenario::{BaseSupport, Scenario};
     use crate::shooting::rod_state::{RodState, rotation_difference};
 
     const END: f64 = 0.8;
@@ -408,7 +408,7 @@ mod tests {
     #[test]
     fn at_the_base_six_components_are_perturbed() {
         let mut scenario = three();
-        for (held, free) in [(SupportKind::Clamped, 6), (SupportKind::Pinned, 3)] {
+        for (held, free) in [(BaseSupport::Clamped, 6), (BaseSupport::Pinned, 3)] {
             scenario.base_held = held;
             let equations = BoundaryValueProblem::new(&scenario);
             let all = linear::<PERTURBATION_SIZE>(&equations, (1, 0));

@@ -237,3 +237,78 @@ fn branches_of_a_leaf_that_can_turn_meet_its_relaxations() {
         }
     }
 }
+
+/// A straight column whose base a spring holds.
+const ROOTED: &str = r#"
+    name = "rooted"
+    leaf = { rods = 1, length = 1.0, fan = [0.0], base_held = "elastic", base_turn_stiffness = 1.0 }
+    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 3.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    load = { tip_force = [0.0, 0.0, 0.0] }
+    dynamics = { density = 1.0, rotary_inertia = 1e-10 }
+"#;
+
+/// The root of a function that changes its sign between these.
+fn root(f: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
+    let sign = f(low).signum();
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        match f(middle).signum() == sign {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    low
+}
+
+/// k L tan(k L) = c L/EI, P = EI k^2 (S. Timoshenko and J. Gere, Theory of elastic stability).
+#[test]
+fn columns_on_elastic_roots_buckle_where_they_should() {
+    for spring in [0.2, 1.0, 8.0] {
+        let k = root(|k| k * k.sin() - spring * k.cos(), [1e-6, 0.5 * PI]);
+        let entries = format!("leaf.base_turn_stiffness={spring}");
+        let last = -1.5 * k * k;
+        let found = follow(
+            ROOTED,
+            &entries,
+            &format!("load.tip_force[0]=0..{last}"),
+            false,
+        );
+        changes_at(&entries, &found, &[(-k * k, 1)], 1e-7 * k * k);
+    }
+}
+
+/// Frequencies of a beam on a spring: w'' = c w' at the base.
+#[test]
+fn beams_on_elastic_roots_vibrate_as_they_should() {
+    for spring in [0.2, 1.0, 8.0] {
+        // w = a (cosh bx - cos bx) + d sinh bx + e sin bx.
+        let condition = |b: f64| {
+            let (cosh, sinh, cos, sin) = (b.cosh(), b.sinh(), b.cos(), b.sin());
+            // From 2 a b = c (d + e), with d = 2 a b/c - e.
+            let a = 2.0 * b / spring;
+            let bending = [(cosh + cos) + a * sinh, -sinh - sin];
+            let shear = [(sinh - sin) + a * cosh, -cosh - cos];
+            bending[0] * shear[1] - bending[1] * shear[0]
+        };
+        let known = [[0.1, 1.9], [3.3, 4.72], [6.5, 7.87]].map(|within| {
+            let b = root(condition, within);
+            b * b / (2.0 * PI)
+        });
+        let text = base(
+            ROOTED,
+            &format!("leaf.base_turn_stiffness={spring}; stiffness.bending_3=1e4"),
+        );
+        let options = Options {
+            modes: 3,
+            mode_shapes: true,
+            ..to(1e-8)
+        };
+        let leaf = settled(text.scenario(), &options);
+        let modes = leaf.stability.modes.as_ref().unwrap();
+        for (mode, known) in modes.iter().zip(known) {
+            let found = mode.frequency().unwrap();
+            let off = (found / known - 1.0).abs();
+            assert!(off < 1e-6, "{spring}: {found} for {known}");
+        }
+    }
+}

@@ -7,6 +7,7 @@ mod coming_to_rest;
 mod corrections;
 mod derivatives;
 mod doubts;
+mod elastic_bases;
 mod elastica;
 mod error_estimate;
 mod error_in_veins;

@@ -146,6 +146,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
     let rods = 1 + number % 4;
     let joined = !number.is_multiple_of(3);
     let hinged = number >= HINGED;
+    let elastic = hinged && number % 4 == 3;
     // Round veins spin on hinges.
     let round = hinged && number % 5 == 2;
     let (stiffness, its_keys) = stiffness(&mut draw, number + usize::from(round), rods);
@@ -165,6 +166,11 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         tip_keys,
         apart_keys,
         grip_keys,
+        if elastic {
+            "leaf.base_turn_stiffness"
+        } else {
+            ""
+        },
     ];
     let text = format!(
         r#"
@@ -174,6 +180,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         {apart}
         {grips}
         leaf.base_held = "{}"
+        {}
         leaf.rods = {rods}
         leaf.joined = {joined}
         leaf.length = {:?}
@@ -184,7 +191,16 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         load.tip_force = {:?}
         dynamics = {{ density = 1.3, rotary_inertia = 0.01 }}
         "#,
-        if hinged { "pinned" } else { "clamped" },
+        match (hinged, elastic) {
+            (_, true) => "elastic",
+            (true, false) => "pinned",
+            (false, false) => "clamped",
+        },
+        if elastic {
+            "leaf.base_turn_stiffness = 1.7"
+        } else {
+            ""
+        },
         draw.list(rods, 0.8, 1.2),
         draw.list(rods, -0.7, 0.7),
         draw.list(rods, -0.5, 0.5),

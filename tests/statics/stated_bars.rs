@@ -66,9 +66,14 @@ fn draw(seed: usize) -> Drawn {
     let lengths: Vec<f64> = (0..rods)
         .map(|_| length * random.uniform(0.9, 1.1))
         .collect();
-    let base_held = if hinges { "pinned" } else { "clamped" };
+    let elastic = !hinges && seed % 3 == 1;
+    let base_held = match (hinges, elastic) {
+        (true, _) => "pinned\"",
+        (false, true) => "elastic\", base_turn_stiffness = SPRING",
+        (false, false) => "clamped\"",
+    };
     line(format!(
-        "leaf = {{ rods = {rods}, length = {}, fan = {}, joined = {joined}, base_held = \"{base_held}\", elevation = {:?} }}",
+        "leaf = {{ rods = {rods}, length = {}, fan = {}, joined = {joined}, base_held = \"{base_held}, elevation = {:?} }}",
         list(lengths.clone()),
         list(angles.clone()),
         random.uniform(-0.2, 0.2)
@@ -202,8 +207,10 @@ fn draw(seed: usize) -> Drawn {
             ));
         }
     }
+    // A spring as stiff as half of the vein to twenty of them.
+    let spring = a / length * 0.5 * 40.0_f64.powf((seed % 7) as f64 / 6.0);
     Drawn {
-        scenario: parse(&text),
+        scenario: parse(&text.replace("SPRING", &format!("{spring:?}"))),
         kinds,
     }
 }

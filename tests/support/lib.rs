@@ -24,7 +24,7 @@ pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
 pub use leafdyn::relax::{Equilibrium, Limit, Method, NodeState, Options, Outcome, RodShape};
-use leafdyn::scenario::{Dynamics, Radii, Rod, SupportKind, Units};
+use leafdyn::scenario::{BaseSupport, Dynamics, Radii, Rod, Units};
 pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::BaseScenario;
@@ -282,7 +282,8 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
         radii: Radii::default(),
-        base_held: SupportKind::Clamped,
+        base_held: BaseSupport::Clamped,
+        base_turn_stiffness: Vec::new(),
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
         tissue: None,

@@ -82,6 +82,7 @@ class LeafTable(TypedDict, total=False):
 
     base: Numbers | Vectors
     base_held: str
+    base_turn_stiffness: float | Numbers
     elevation: float | Numbers
     fan: str | Numbers
     joined: bool

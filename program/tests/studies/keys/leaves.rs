@@ -65,6 +65,19 @@ moment = [0.1, 0.2, 0.2]
         boundary: None,
     },
     TestLeaf {
+        name: "rooted",
+        text: "
+leaf = { rods = 2, length = 1.0, fan = \"symmetric\", base_held = \"elastic\", base_turn_stiffness = 2.0 }
+coupling = { x = 1.0, y = 2.0, z = 1.5 }
+[load]
+gravity = [0.1, 0.2, -0.6]
+tip_force = [0.1, 0.2, -0.3]
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "pulled",
         text: "
 leaf = { rods = 1, length = 1.0, fan = [0.2] }

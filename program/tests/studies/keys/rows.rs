@@ -56,6 +56,7 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::Base => always("veins", "leaf.base=[[0.0,-0.1,0.0],[0.05,0.1,0.02]]"),
         Key::Elevation => smooth("blade", "leaf.elevation=0.42"),
         Key::BaseHeld => always("pulled", "leaf.base_held=pinned"),
+        Key::BaseTurnStiffness => smooth("rooted", "leaf.base_turn_stiffness=1.9"),
         Key::Torsion => smooth("veins", "stiffness.torsion=0.75"),
         Key::Bending2 => smooth("veins", "stiffness.bending_2=0.85"),
         Key::Bending3 => smooth("veins", "stiffness.bending_3=1.25"),
