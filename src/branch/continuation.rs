@@ -41,6 +41,10 @@ const STEPS: StepControl = StepControl {
     largest_prediction_error: 0.5,
 };
 
+/// The part of the rate of the parameter by which it may have changed in the last step for the next one to be
+/// predicted by both tangents.
+const LARGEST_BENT_RATE_CHANGE: f64 = 0.1;
+
 /// A step grows only if Newton's method needs at most so many iterations.
 const STEP_GROWTH_ITERATIONS: usize = 4;
 
@@ -299,10 +303,12 @@ impl Branch {
             tangent: &self.points[self.points.len() - 2].tangent,
             step: *step,
         });
-        // Where a branch turns sharply, how it did tells nothing of how it will.
+        // Where a branch turns sharply, or is about to turn back, how it did tells nothing of how it will.
         let before = before.filter(|before| {
+            let [then, rate] = [before.tangent, &now.tangent].map(|tangent| tangent.params[0]);
             before.is_on_grid_of(now)
                 && equations.direction_product(before.tangent, &now.tangent) > STEPS.growth_cosine
+                && (rate - then).abs() < LARGEST_BENT_RATE_CHANGE * rate.abs()
         });
         let found =
             SteppedPoint::step_from(equations, now, before, step).and_then(|found| {

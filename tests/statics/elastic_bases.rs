@@ -97,7 +97,7 @@ fn the_order_is_two() {
         let text = leaf("base_held = \"elastic\", base_turn_stiffness = 1.3")
             .replace("joined = false", &format!("joined = {joined}"));
         let scenario = parse(&text);
-        let tip = |segments: usize| settled(&scenario, &iterated(1e-13, segments)).tips[0];
+        let tip = |segments: usize| settled(&scenario, &iterated(1e-12, segments)).tips[0];
         let [a, b, c, d] = [8, 16, 32, 64].map(tip);
         for ratio in [a.distance(b) / b.distance(c), b.distance(c) / c.distance(d)] {
             assert!((3.7..4.3).contains(&ratio), "{joined}: {ratio}");
