@@ -446,7 +446,8 @@ pub(super) struct CompletedIncrements<'s> {
 }
 
 /// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
-/// segments at a clamp depend on all of its displacement, however short the step.
+/// segments at a clamp depend on all of its displacement, however short the step. So do those of all
+/// segments on the change of their law, where that differs between the leaf of the state and this one.
 pub(super) fn state_after_step(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -460,6 +461,13 @@ pub(super) fn state_after_step(
     let mut clamped = state.clone();
     place_supports(leaf, &mut clamped);
     let mut next = clamped.clone();
+    if clamped.x == state.x && clamped.q == state.q && !leaf.law_differs(state) {
+        // The rounding error in the lengths of nearly rigid segments is scaled down
+        // with the step.
+        system.set_completed(increments, law_forces);
+        leaf.advance(state, system, step, &mut next);
+        return next;
+    }
     let mut increments = scale_field(increments, step);
     let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
     for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {

@@ -25,6 +25,9 @@ use glam::DVec3;
 /// Largest missing part of the law of a segment, 1 - C k, by rounding.
 const MISSING_LAW_ROUNDING: f64 = 1e-12;
 
+/// The largest gap of a segment in a state at rest, in lengths of the leaf, that is attributed to rounding.
+const LARGEST_ROUNDED_GAP: f64 = 1e-11;
+
 /// Limits of the iteration for the missing lengths. A force is undetermined where the law closes less
 /// than the fraction `singular_value_limit` of the length that a step misses: at a stiffness of
 /// 10^12 A/L^2 it closes 10^-7 on branches, where k is 10^5.
@@ -55,6 +58,16 @@ impl DiscreteLeaf {
         let mut segments = self.rod_index_pairs(0..self.segments());
         segments.any(|(j, i)| {
             self.missing_law_fraction(j, i) * self.completed_components(j, i, false) != DVec3::ZERO
+        })
+    }
+
+    /// Whether the forces in a state, which is that of another leaf, are not those of this one by more than
+    /// rounding.
+    pub fn law_differs(&self, state: &State) -> bool {
+        let n = self.segments();
+        let mut segments = self.rod_index_pairs(0..n);
+        segments.any(|(j, i)| {
+            self.segment(state, j, i, state.n[j * n + i]).gap.length() > LARGEST_ROUNDED_GAP
         })
     }
 

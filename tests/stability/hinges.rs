@@ -3,6 +3,7 @@
 
 use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::motion::Physics;
+use leafdyn::relax::Mode;
 use leafdyn_testing::branch::{changes_at, follow};
 use leafdyn_testing::motion::{discrete, state_of};
 use leafdyn_testing::vibration::Linear;
@@ -276,7 +277,7 @@ fn columns_on_elastic_roots_buckle_where_they_should() {
         let entries = format!("leaf.base_turn_stiffness={spring}");
         let vary = format!("load.tip_force[0]=0..{}", 1.05 * loads[1].0);
         let found = follow(ROOTED, &entries, &vary, false);
-        changes_at(&entries, &found, &loads, 1e-7 * loads[1].0.abs());
+        changes_at(&entries, &found, &loads, 3e-7 * loads[0].0.abs());
     }
 }
 
@@ -300,16 +301,17 @@ fn beams_on_elastic_roots_vibrate_as_they_should() {
             &format!("leaf.base_turn_stiffness={spring}; stiffness.bending_3=1e4"),
         );
         let options = Options {
-            modes: 3,
+            modes: 6,
             mode_shapes: true,
             ..to(1e-8)
         };
         let leaf = settled(text.scenario(), &options);
         let modes = leaf.stability.modes.as_ref().unwrap();
-        for (mode, known) in modes.iter().zip(known) {
-            let found = mode.frequency().unwrap();
-            let off = (found / known - 1.0).abs();
-            assert!(off < 1e-6, "{spring}: {found} for {known}");
+        // Beside those in which the column sways as a whole about the axis in which it is stiff.
+        for known in known {
+            let off = |mode: &Mode| (mode.frequency().unwrap() / known - 1.0).abs();
+            let nearest = modes.iter().map(off).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-6, "{spring}: {nearest:e} off {known}");
         }
     }
 }
