@@ -12,7 +12,7 @@ use crate::scenario::loads::{PointLoad, PolarInertia};
 use crate::scenario::photo::axis_name;
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
-use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
+use crate::scenario::section::{HollowSection, Property, Section, SectionOutline, ShearLaw};
 use crate::scenario::supports::Grip;
 use crate::scenario::veins::{Rod, Tissue};
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -323,7 +323,14 @@ impl SerializedSections<'_> {
                 quantity_value(hollow.iter().map(HollowSection::profile))
             }
             Key::Young => of(|section| &section.young),
-            Key::Poisson => of(|section| &section.poisson),
+            Key::Poisson | Key::SectionShearModulus => {
+                let law = &self.sections.first()?.shear;
+                let is_modulus = matches!(law, ShearLaw::Modulus(_));
+                if is_modulus != (key == Key::SectionShearModulus) {
+                    return None;
+                }
+                of(|section| section.shear.profile())
+            }
             Key::MassDensity if self.density => of(|section| &section.mass_density),
             _ => return None,
         })

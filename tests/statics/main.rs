@@ -40,6 +40,7 @@ mod rigid_tissue;
 mod rollup;
 mod section;
 mod sensitivities;
+mod shear_modulus;
 mod soft_leaves;
 mod stated_bars;
 mod stiffness;

@@ -1,7 +1,7 @@
 //! Stiffnesses and masses of a rod from its material and the size of its section: the table `[section]`.
 //!
 //! With the area S, the second moments I2 and I3 about d2 and d3 and the shear
-//! modulus G = E/(2 (1 + nu)):
+//! modulus G, which is given or that of an isotropic material, E/(2 (1 + nu)):
 //!
 //! | | |
 //! | --- | --- |
@@ -14,6 +14,7 @@
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
 //! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`.
+//! They depend on Poisson's ratio, for which a given G stands as well: see [`ShearLaw::equivalent_poisson`].
 
 mod outline;
 
@@ -91,6 +92,55 @@ impl HollowSection {
     }
 }
 
+/// What gives the shear modulus of a material besides Young's modulus.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ShearLaw {
+    /// Poisson's ratio of an isotropic material.
+    Poisson(Profile),
+    /// The shear modulus itself.
+    Modulus(Profile),
+}
+
+impl ShearLaw {
+    pub fn profile(&self) -> &Profile {
+        match self {
+            ShearLaw::Poisson(profile) | ShearLaw::Modulus(profile) => profile,
+        }
+    }
+
+    /// The shear modulus at a fraction of the length, where Young's modulus is `young`.
+    fn modulus(&self, young: f64, sigma: f64) -> f64 {
+        match self {
+            ShearLaw::Poisson(poisson) => young / (2.0 * (1.0 + poisson.at(sigma))),
+            ShearLaw::Modulus(modulus) => modulus.at(sigma),
+        }
+    }
+
+    /// Poisson's ratio of the isotropic material with the same shear factors.
+    ///
+    /// A bent rod contracts across by its ratio nu along the fibers. In the compatibility of its shear
+    /// stresses that is a term 2 nu G/E, which is nu'/(1 + nu') in an isotropic rod of the ratio nu'. A
+    /// given G says nu = E/(2 G) - 1 if the material is isotropic, which it is not where that is more
+    /// than 1/2. Then nu is taken to be 1/2: with G = E/20 another one, from 0 on, changes the shear
+    /// factors by less than 1 %.
+    fn equivalent_poisson(&self, young: f64, sigma: f64) -> f64 {
+        match self {
+            ShearLaw::Poisson(poisson) => poisson.at(sigma),
+            ShearLaw::Modulus(modulus) => {
+                let ratio = modulus.at(sigma) / young;
+                let isotropic = 0.5 / ratio - 1.0;
+                match isotropic <= LARGEST_POISSON {
+                    true => isotropic,
+                    false => ratio / (1.0 - ratio),
+                }
+            }
+        }
+    }
+}
+
+/// Largest Poisson's ratio of isotropic materials: that of incompressible ones.
+const LARGEST_POISSON: f64 = 0.5;
+
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Section {
@@ -99,7 +149,7 @@ pub(super) struct Section {
     pub thickness: Profile,
     pub hollow: Option<HollowSection>,
     pub young: Profile,
-    pub poisson: Profile,
+    pub shear: ShearLaw,
     /// Mass per volume; zero where it is not given.
     pub mass_density: Profile,
     /// Fractions inside (0, 1) where the slope of a property may jump.
@@ -114,7 +164,8 @@ impl Section {
         outline: SectionOutline,
         [width, thickness]: [Profile; 2],
         hollow: Option<HollowSection>,
-        [young, poisson, mass_density]: [Profile; 3],
+        shear: ShearLaw,
+        [young, mass_density]: [Profile; 2],
     ) -> Section {
         let mut section = Section {
             outline,
@@ -122,7 +173,7 @@ impl Section {
             thickness,
             hollow,
             young,
-            poisson,
+            shear,
             mass_density,
             kinks: Vec::new(),
             extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
@@ -146,11 +197,11 @@ impl Section {
             thickness,
             hollow,
             young,
-            poisson,
+            shear,
             mass_density,
             ..
         } = self;
-        let all = [width, thickness, young, poisson, mass_density];
+        let all = [width, thickness, young, shear.profile(), mass_density];
         all.into_iter()
             .chain(hollow.iter().map(HollowSection::profile))
     }
@@ -178,15 +229,15 @@ impl Section {
     /// A property at a fraction of the length.
     fn property_value(&self, property: Property, sigma: f64) -> f64 {
         let sides = self.dimensions_at(sigma);
-        let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
-        let shear = young / (2.0 * (1.0 + poisson));
+        let young = self.young.at(sigma);
+        let shear = self.shear.modulus(young, sigma);
         let area = sides.area();
         let second = sides.second_moments();
         match property {
             Property::Couple(0) => shear * sides.torsion_constant(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
-            Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
+            Property::Force(axis) => self.shear_factors_at(sigma)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(sigma) * area,
             Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
         }
@@ -203,10 +254,14 @@ impl Section {
     /// Cowper's factors for both shear forces, at the knots and between them.
     fn shear_factors(&self) -> impl Iterator<Item = f64> {
         let fractions = self.fractions();
-        fractions.flat_map(|sigma| {
-            self.dimensions_at(sigma)
-                .shear_factors(self.poisson.at(sigma))
-        })
+        fractions.flat_map(|sigma| self.shear_factors_at(sigma))
+    }
+
+    /// Cowper's factors for both shear forces at a fraction of the length.
+    fn shear_factors_at(&self, sigma: f64) -> [f64; 2] {
+        let young = self.young.at(sigma);
+        let poisson = self.shear.equivalent_poisson(young, sigma);
+        self.dimensions_at(sigma).shear_factors(poisson)
     }
 
     /// The knots, and places between them.
@@ -323,17 +378,18 @@ pub(super) fn read_sections(
     let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
     let hollow = read_hollow(entries, outline, [&width, &thickness])?;
     let young = quantity(Key::Young)?;
-    let poisson = read_poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+    let shear = read_shear_law(entries, rods)?;
     let mass_density = match entries.given_value(Key::MassDensity) {
         Some(item) => item.profile_per_rod(rods)?,
         None => vec![Profile::Constant(0.0); rods],
     };
-    let all = [&width, &thickness, &young, &poisson, &mass_density];
+    let all = [&width, &thickness, &young, &mass_density];
     let mut sections: Vec<Arc<Section>> = Vec::with_capacity(rods);
     for rod in 0..rods {
         let own = |rod: usize| hollow.as_ref().map(|hollow| &hollow[rod]);
         let same = rod > 0
             && all.iter().all(|values| values[rod] == values[rod - 1])
+            && shear[rod] == shear[rod - 1]
             && own(rod) == own(rod - 1);
         sections.push(match sections.last() {
             Some(last) if same => last.clone(),
@@ -341,7 +397,8 @@ pub(super) fn read_sections(
                 outline,
                 [&width, &thickness].map(|side| side[rod].clone()),
                 own(rod).cloned(),
-                [&young, &poisson, &mass_density].map(|value| value[rod].clone()),
+                shear[rod].clone(),
+                [&young, &mass_density].map(|value| value[rod].clone()),
             )),
         });
     }
@@ -352,17 +409,35 @@ pub(super) fn read_sections(
 /// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
 fn check_shear_factors(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     for (rod, section) in sections.iter().enumerate() {
-        entries
-            .value_or_default(Key::Poisson)?
-            .entry(rod)
-            .refuse_unless(
-                section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+        let (key, change) = match section.shear {
+            ShearLaw::Poisson(_) => (Key::Poisson, "a negative ratio: choose a larger one"),
+            ShearLaw::Modulus(_) => (
+                Key::SectionShearModulus,
+                "more than half of section.young: choose a smaller one",
+            ),
+        };
+        entries.value_or_default(key)?.entry(rod).refuse_unless(
+            section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+            format_args!(
                 "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
-             so flat a section with a negative ratio: choose a larger one, or give the \
-             stiffnesses in place of a section",
-            )?;
+                 so flat a section with {change}, or give the stiffnesses in place of a section"
+            ),
+        )?;
     }
     Ok(())
+}
+
+/// What gives the shear modulus of every rod.
+fn read_shear_law(entries: &Entries, rods: usize) -> ScenarioResult<Vec<ShearLaw>> {
+    let Some(item) = entries.given_value(Key::SectionShearModulus) else {
+        let poisson = read_poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+        return Ok(poisson.into_iter().map(ShearLaw::Poisson).collect());
+    };
+    let twice = "section.poisson is given, too, from which the shear modulus follows as well: leave \
+         one of them out";
+    item.refuse_unless(entries.given_value(Key::Poisson).is_none(), twice)?;
+    let modulus = item.profile_per_rod(rods)?;
+    Ok(modulus.into_iter().map(ShearLaw::Modulus).collect())
 }
 
 /// The outline of a section, and the keys of its two sides, along d2 and along d3.
@@ -441,7 +516,7 @@ pub(super) fn read_poisson(item: EntryValue, rods: usize) -> ScenarioResult<Vec<
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();
         item.entry(rod).refuse_unless(
-            profile.min() > -1.0 && -most <= 0.5,
+            profile.min() > -1.0 && -most <= LARGEST_POISSON,
             "must be greater than -1 and at most 0.5, as of every isotropic material",
         )?;
     }
@@ -456,9 +531,10 @@ mod tests {
 
     fn section(outline: SectionOutline, width: f64, thickness: f64, poisson: f64) -> Section {
         let constant = Profile::Constant;
-        let material = [constant(2.0), constant(poisson), constant(3.0)];
+        let shear = ShearLaw::Poisson(constant(poisson));
         let sides = [constant(width), constant(thickness)];
-        Section::new(outline, sides, None, material)
+        let material = [constant(2.0), constant(3.0)];
+        Section::new(outline, sides, None, shear, material)
     }
 
     #[track_caller]
