@@ -43,6 +43,7 @@ mod sensitivities;
 mod shear_modulus;
 mod soft_leaves;
 mod stated_bars;
+mod steps;
 mod stiffness;
 mod stress;
 mod taut_rods;

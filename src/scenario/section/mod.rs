@@ -23,13 +23,18 @@ use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
+use crate::scenario::profile::{
+    DerivedProfile, Profile, RodPlace, RodProperties, Side, knot_places,
+};
 use crate::scenario::section::outline::SectionDimensions;
 pub(super) use crate::scenario::section::outline::SectionOutline;
 pub use crate::scenario::section::outline::{Moduli, Stress};
 use std::any::Any;
 use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// A kink closer to a fraction of the length than this is there.
+const SAME_KINK_DISTANCE: f64 = 1e-12;
 
 /// Steps between two knots at which the extremes of a property are looked for: properties are smooth
 /// between knots.
@@ -108,11 +113,11 @@ impl ShearLaw {
         }
     }
 
-    /// The shear modulus at a fraction of the length, where Young's modulus is `young`.
-    fn modulus(&self, young: f64, sigma: f64) -> f64 {
+    /// The shear modulus at a place where Young's modulus is `young`.
+    fn modulus(&self, young: f64, place: RodPlace) -> f64 {
         match self {
-            ShearLaw::Poisson(poisson) => young / (2.0 * (1.0 + poisson.at(sigma))),
-            ShearLaw::Modulus(modulus) => modulus.at(sigma),
+            ShearLaw::Poisson(poisson) => young / (2.0 * (1.0 + poisson.at(place))),
+            ShearLaw::Modulus(modulus) => modulus.at(place),
         }
     }
 
@@ -123,11 +128,11 @@ impl ShearLaw {
     /// given G says nu = E/(2 G) - 1 if the material is isotropic, which it is not where that is more
     /// than 1/2. Then nu is taken to be 1/2: with G = E/20 another one, from 0 on, changes the shear
     /// factors by less than 1 %.
-    fn equivalent_poisson(&self, young: f64, sigma: f64) -> f64 {
+    fn equivalent_poisson(&self, young: f64, place: RodPlace) -> f64 {
         match self {
-            ShearLaw::Poisson(poisson) => poisson.at(sigma),
+            ShearLaw::Poisson(poisson) => poisson.at(place),
             ShearLaw::Modulus(modulus) => {
-                let ratio = modulus.at(sigma) / young;
+                let ratio = modulus.at(place) / young;
                 let isotropic = 0.5 / ratio - 1.0;
                 match isotropic <= LARGEST_POISSON {
                     true => isotropic,
@@ -152,7 +157,7 @@ pub(super) struct Section {
     pub shear: ShearLaw,
     /// Mass per volume; zero where it is not given.
     pub mass_density: Profile,
-    /// Fractions inside (0, 1) where the slope of a property may jump.
+    /// Fractions inside (0, 1) where the slope of a property may jump; twice where the property may.
     kinks: Vec<f64>,
     /// Least and largest value of every property, where they change along the rod: else the
     /// profiles are constant.
@@ -178,12 +183,13 @@ impl Section {
             kinks: Vec::new(),
             extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
         };
-        let profiles = section.profiles();
-        section.kinks = sorted_distinct(profiles.flat_map(Profile::kinks).copied());
+        let knots = knot_places(section.profiles());
+        let inner = knots[1..knots.len() - 1].iter();
+        section.kinks = inner.map(|place| place.sigma).collect();
         let varies = !section.is_constant();
-        for sigma in section.fractions().filter(|_| varies) {
+        for place in section.places().filter(|_| varies) {
             for property in Property::ALL {
-                let value = section.property_value(property, sigma);
+                let value = section.property_value(property, place);
                 let [least, most] = &mut section.extremes[property.index()];
                 (*least, *most) = (least.min(value), most.max(value));
             }
@@ -212,34 +218,36 @@ impl Section {
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
-    /// The sides of the section at a fraction of the length.
-    fn dimensions_at(&self, sigma: f64) -> SectionDimensions {
-        let (width, thickness) = (self.width.at(sigma), self.thickness.at(sigma));
+    /// The sides of the section at a place.
+    fn dimensions_at(&self, place: impl Into<RodPlace>) -> SectionDimensions {
+        let place = place.into();
+        let (width, thickness) = (self.width.at(place), self.thickness.at(place));
         SectionDimensions {
             outline: self.outline,
             width,
             thickness,
             wall: self.hollow.as_ref().map(|hollow| match hollow {
-                HollowSection::Wall(wall) => wall.at(sigma),
-                HollowSection::Bore(inner) => 0.5 * (width - inner.at(sigma)),
+                HollowSection::Wall(wall) => wall.at(place),
+                HollowSection::Bore(inner) => 0.5 * (width - inner.at(place)),
             }),
         }
     }
 
-    /// A property at a fraction of the length.
-    fn property_value(&self, property: Property, sigma: f64) -> f64 {
-        let sides = self.dimensions_at(sigma);
-        let young = self.young.at(sigma);
-        let shear = self.shear.modulus(young, sigma);
+    /// A property at a place.
+    fn property_value(&self, property: Property, place: impl Into<RodPlace>) -> f64 {
+        let place = place.into();
+        let sides = self.dimensions_at(place);
+        let young = self.young.at(place);
+        let shear = self.shear.modulus(young, place);
         let area = sides.area();
         let second = sides.second_moments();
         match property {
             Property::Couple(0) => shear * sides.torsion_constant(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
-            Property::Force(axis) => self.shear_factors_at(sigma)[axis - 1] * shear * area,
-            Property::Density => self.mass_density.at(sigma) * area,
-            Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
+            Property::Force(axis) => self.shear_factors_at(place)[axis - 1] * shear * area,
+            Property::Density => self.mass_density.at(place) * area,
+            Property::RotaryInertia => 0.5 * self.mass_density.at(place) * (second[0] + second[1]),
         }
     }
 
@@ -253,31 +261,42 @@ impl Section {
 
     /// Cowper's factors for both shear forces, at the knots and between them.
     fn shear_factors(&self) -> impl Iterator<Item = f64> {
-        let fractions = self.fractions();
-        fractions.flat_map(|sigma| self.shear_factors_at(sigma))
+        self.places().flat_map(|place| self.shear_factors_at(place))
     }
 
-    /// Cowper's factors for both shear forces at a fraction of the length.
-    fn shear_factors_at(&self, sigma: f64) -> [f64; 2] {
-        let young = self.young.at(sigma);
-        let poisson = self.shear.equivalent_poisson(young, sigma);
-        self.dimensions_at(sigma).shear_factors(poisson)
+    /// Cowper's factors for both shear forces at a place.
+    fn shear_factors_at(&self, place: RodPlace) -> [f64; 2] {
+        let young = self.young.at(place);
+        let poisson = self.shear.equivalent_poisson(young, place);
+        self.dimensions_at(place).shear_factors(poisson)
     }
 
     /// The knots, and places between them.
-    fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
-        let edges = [&[0.0], self.kinks.as_slice(), &[1.0]].concat();
+    fn places(&self) -> impl Iterator<Item = RodPlace> + use<> {
+        let edges = sorted_distinct([&[0.0], self.kinks.as_slice(), &[1.0]].concat());
         (0..edges.len() - 1).flat_map(move |panel| {
-            let (from, to) = (edges[panel], edges[panel + 1]);
-            (0..=STEPS_BETWEEN_KNOTS)
-                .map(move |k| from + k as f64 / STEPS_BETWEEN_KNOTS as f64 * (to - from))
+            let ends = [edges[panel], edges[panel + 1]];
+            (0..=STEPS_BETWEEN_KNOTS).map(move |k| {
+                let part = k as f64 / STEPS_BETWEEN_KNOTS as f64;
+                RodPlace::within(ends[0] + part * (ends[1] - ends[0]), ends)
+            })
         })
+    }
+
+    /// The sides on which the section is another one at a fraction of the length: both where it jumps.
+    fn sides_at(&self, sigma: f64) -> &'static [Side] {
+        let here = |kink: &f64| (kink - sigma).abs() <= SAME_KINK_DISTANCE;
+        let mut pairs = self.kinks.windows(2);
+        match pairs.any(|pair| pair[0] == pair[1] && here(&pair[0])) {
+            true => &[Side::Base, Side::Tip],
+            false => &[Side::Base],
+        }
     }
 }
 
 impl RodProperties for Section {
-    fn value_at(&self, property: usize, sigma: f64) -> f64 {
-        self.property_value(Property::ALL[property], sigma)
+    fn value_at(&self, property: usize, place: RodPlace) -> f64 {
+        self.property_value(Property::ALL[property], place)
     }
 
     fn extremes(&self, property: usize) -> [f64; 2] {
@@ -319,9 +338,14 @@ impl Radii {
         Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
     }
 
-    /// The moduli of the section of a rod at a fraction of its length.
-    pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        Some(self.0.get(rod)?.dimensions_at(sigma).moduli())
+    /// The moduli of the section of a rod at a fraction of its length: of both sections where it jumps.
+    pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Vec<Moduli> {
+        let sections = self.0.get(rod).into_iter();
+        let sides = |section: &'_ Arc<Section>| {
+            let of = |side: &Side| section.dimensions_at(RodPlace::new(sigma, *side)).moduli();
+            section.sides_at(sigma).iter().map(of).collect::<Vec<_>>()
+        };
+        sections.flat_map(sides).collect()
     }
 
     /// The larger side of the section of a rod, where that is largest.
@@ -485,12 +509,10 @@ fn read_hollow(
     let profiles = item.profile_per_rod(width.len())?;
     for (rod, profile) in profiles.iter().enumerate() {
         let sides = [&width[rod], &thickness[rod]];
-        let knots = [0.0, 1.0].into_iter();
-        let inner = sides.into_iter().chain([profile]).flat_map(Profile::kinks);
         // Between knots all are linear.
-        for sigma in knots.chain(inner.copied()) {
-            let side = sides.map(|side| side.at(sigma));
-            let (value, least) = (profile.at(sigma), side[0].min(side[1]));
+        for place in knot_places(sides.into_iter().chain([profile])) {
+            let side = sides.map(|side| side.at(place));
+            let (value, least) = (profile.at(place), side[0].min(side[1]));
             match bore {
                 Some(_) => item.entry(rod).refuse_unless(
                     value < least,
