@@ -8,7 +8,7 @@
 //! II.10) to double precision; integrations with step control elsewhere use them, too.
 
 pub use crate::rotation::Pose;
-use crate::scenario::{Profile, Rod, Scenario};
+use crate::scenario::{Profile, Rod, RodPlace, Scenario};
 use glam::{DQuat, DVec3};
 
 /// Largest rotation in a step, in radians: its error is rounding.
@@ -116,7 +116,8 @@ impl StepEnd {
         };
         for i in 0..STAGES {
             let q = combine(&slopes, STAGE_WEIGHTS[i]).rotation.normalize();
-            let at = self.sigma + STAGE_NODES[i] * width;
+            let end = self.sigma + width;
+            let at = RodPlace::within(self.sigma + STAGE_NODES[i] * width, [self.sigma, end]);
             let u = DVec3::from_array(Profile::values_of_three(&rod.rest_curvature, at));
             let spin = 0.5 * rod.length * u;
             let stretch = if grown { rod.rest_stretch.at(at) } else { 1.0 };

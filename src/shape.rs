@@ -125,6 +125,14 @@ pub struct InterpolationWeights {
     pub weights: Vec<f64>,
 }
 
+impl InterpolationWeights {
+    /// The interpolated value of what nodes have.
+    pub fn weighted_sum(&self, nodes: &[NodeState], of: impl Fn(&NodeState) -> DVec3) -> DVec3 {
+        let near = nodes[self.first..].iter().zip(&self.weights);
+        near.map(|(node, weight)| *weight * of(node)).sum()
+    }
+}
+
 /// Interpolation at `at` by the polynomial through `count` neighboring `nodes`.
 pub fn interpolation_weights(nodes: &[f64], at: f64, count: usize) -> InterpolationWeights {
     let count = count.min(nodes.len());

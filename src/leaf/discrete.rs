@@ -15,11 +15,11 @@ use crate::natural::Natural;
 use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip};
 use crate::rotation;
-use crate::scenario::Profile;
+use crate::scenario::{Profile, RodPlace};
 use crate::simd::{GROUP, Lanes, NumberGroup, Vectors, group_components};
 use glam::DVec3;
 use pulp::{Scalar, Simd};
-use std::ops::Range;
+use std::ops::{Add, Mul, Range};
 
 /// Radius of gyration of a vein with the tissue it carries, in units of the leaf's length: its
 /// rotary inertia per unit length and mass is the square. A thin rod's own is smaller, but a
@@ -611,6 +611,19 @@ impl Grid {
     /// Width of segment `i` as a fraction of the length.
     pub fn segment_width(&self, i: usize) -> f64 {
         self.widths[i]
+    }
+
+    /// The integral of a density over the halves of both segments at node `i`, by its values there: of
+    /// each half on its own side where the density jumps.
+    pub fn node_integral<T>(&self, i: usize, density: impl Fn(RodPlace) -> T) -> T
+    where
+        T: Copy + PartialEq + Add<Output = T> + Mul<f64, Output = T>,
+    {
+        let [base, tip] = RodPlace::both_sides(self.sigma[i]).map(density);
+        if base == tip || i == 0 || i == self.segments() {
+            return base * self.node_weight(i);
+        }
+        base * (0.5 * self.widths[i - 1]) + tip * (0.5 * self.widths[i])
     }
 
     /// Trapezoidal weight of node `i` as a fraction of the length.

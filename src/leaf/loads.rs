@@ -5,11 +5,12 @@
 //! in `system`.
 
 use crate::leaf::block_tridiagonal::rod_lane;
-use crate::leaf::discrete::{DiscreteLeaf, NodalMoment};
+use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment};
 use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
+use crate::scenario::RodPlace;
 use glam::DVec3;
 
 /// A dead moment on the point at the fraction `sigma` of a single rod, along the lab axes.
@@ -182,13 +183,13 @@ impl DiscreteLeaf {
 const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
 
 impl Leaf {
-    /// Load of rod `j` alone at `sigma`, its weight and load along it, per unit of sigma; without
+    /// Load of rod `j` alone at a place, its weight and load along it, per unit of sigma; without
     /// forces on points.
-    pub fn own_load_density(&self, j: usize, sigma: f64) -> DVec3 {
-        let s = self.scenario();
-        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+    pub fn own_load_density(&self, j: usize, place: impl Into<RodPlace>) -> DVec3 {
+        let (s, place) = (self.scenario(), place.into());
+        let weight = DVec3::from_array(s.weight(j).at(place)) - DVec3::from_array(s.gravity);
         let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
-            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(place)))
         });
         (weight + along) * (self.share(j) * s.rods[j].length / self.scale.force())
     }
@@ -204,14 +205,39 @@ impl Leaf {
     }
 }
 
+impl Grid {
+    /// Load of rod `j` of a leaf alone, without forces on points, on the halves of both segments at node
+    /// `i`.
+    pub(super) fn own_load_around_node(&self, leaf: &Leaf, j: usize, i: usize) -> DVec3 {
+        self.node_integral(i, |place| leaf.own_load_density(j, place))
+    }
+}
+
 impl DiscreteLeaf {
+    /// By how much the load of rod `j` alone on the half segment before its node `i` exceeds the part that
+    /// the width of this half is of the node's: zero unless the load jumps there.
+    pub fn own_load_jump_before(&self, j: usize, i: usize) -> DVec3 {
+        if self.own_loads.is_empty() || i == 0 || i == self.segments() {
+            return DVec3::ZERO;
+        }
+        let sides = RodPlace::both_sides(self.grid.sigma()[i]);
+        let [base, tip] = sides.map(|place| self.leaf.own_load_density(j, place));
+        if base == tip {
+            return DVec3::ZERO;
+        }
+        let half = 0.5 * self.grid.segment_width(i - 1);
+        let part = half / self.grid.node_weight(i);
+        let all = self.grid.own_load_around_node(&self.leaf, j, i);
+        self.rod_load_factor() * (half * base - part * all)
+    }
+
     /// Loads of single veins on all nodes, rod after rod; empty if there are none.
     pub(super) fn nodal_own_loads(&self, leaf: &Leaf) -> Vec<DVec3> {
         if leaf.loads.rod_load_factor == 0.0 {
             return Vec::new();
         }
-        let (n, sigma) = (self.segments(), self.grid.sigma());
-        let node = |(j, i)| self.grid.node_weight(i) * leaf.own_load_density(j, sigma[i]);
+        let n = self.segments();
+        let node = |(j, i)| self.grid.own_load_around_node(leaf, j, i);
         let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
         for PointForce { rod, sigma, force } in leaf.point_forces() {
             loads[rod * (n + 1) + self.grid.nearest_node(sigma)] += force;

@@ -54,7 +54,8 @@ use crate::rod::Section;
 use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{
-    BaseSupport, Clamp, Dynamics, Profile, Rod, Scenario, Tissue, ZeroEnergyRotation, longest,
+    BaseSupport, Clamp, Dynamics, Profile, Rod, RodPlace, Scenario, Tissue, ZeroEnergyRotation,
+    longest,
 };
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -418,16 +419,16 @@ impl Leaf {
             .all(constant)
     }
 
-    /// Section of rod `j` at `sigma`, for a segment that is the fraction `width` of the rod.
-    pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
-        let rod = self.rod(j);
-        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p, sigma));
+    /// Section of rod `j` at a place, for a segment that is the fraction `width` of the rod.
+    pub fn section(&self, j: usize, place: impl Into<RodPlace>, width: f64) -> Section {
+        let (rod, place) = (self.rod(j), place.into());
+        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p, place));
         let share = self.share(j);
         Section {
             ds: self.length(j) * width,
             couple_stiffness: share * at(&rod.couple_stiffness) / self.scale.stiffness,
             rest_curvature: at(&rod.rest_curvature) * self.scale.length,
-            rest_strain: DVec3::X * rod.rest_stretch.at(sigma),
+            rest_strain: DVec3::X * rod.rest_stretch.at(place),
             compliance: (share * at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }

@@ -16,6 +16,7 @@ use crate::leaf::discrete::{
 use crate::natural::{Natural, Pose, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::rod::{NodePair, Section, StripLoads, TissueStrip};
 use crate::rotation::{Quaternions, directors};
+use crate::scenario::RodPlace;
 use crate::simd::{
     GROUP, GroupKernel, Lanes, NumberGroup, Vectors, group_components, run, widest_arch,
 };
@@ -126,7 +127,7 @@ impl<'a> RodIntegrator<'a> {
             }),
             fields,
         };
-        integrator.look_up_laws_at(0.0);
+        integrator.look_up_laws_at(0.0.into());
         integrator
     }
 
@@ -186,8 +187,9 @@ impl<'a> RodIntegrator<'a> {
     fn step(&mut self, sigma: f64, h: f64) {
         for i in 0..STAGES {
             self.set_stage(h, STAGE_WEIGHTS[i]);
+            let place = RodPlace::within(sigma + STAGE_NODES[i] * h, [sigma, sigma + h]);
             if !self.uniform {
-                self.look_up_laws_at(sigma + STAGE_NODES[i] * h);
+                self.look_up_laws_at(place);
             }
             let mut kernel = SlopeKernel {
                 stage: &self.stage,
@@ -196,8 +198,8 @@ impl<'a> RodIntegrator<'a> {
                 out: &mut self.slopes[i],
             };
             run(self.arch, &mut kernel);
-            self.add_tissue(sigma + STAGE_NODES[i] * h, i);
-            self.add_own_loads(sigma + STAGE_NODES[i] * h, i);
+            self.add_tissue(place.sigma, i);
+            self.add_own_loads(place, i);
         }
         self.set_stage(h, &RESULT_WEIGHTS);
         std::mem::swap(&mut self.fields, &mut self.stage.fields);
@@ -257,13 +259,13 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
-    /// Adds the loads of single veins to the slopes of a stage, at `sigma`.
-    fn add_own_loads(&mut self, sigma: f64, stage: usize) {
+    /// Adds the loads of single veins to the slopes of a stage, at a place.
+    fn add_own_loads(&mut self, place: RodPlace, stage: usize) {
         if self.leaf.loads.rod_load_factor == 0.0 {
             return;
         }
         for j in 0..self.leaf.rods() {
-            let force = self.leaf.rod_load_factor() * self.leaf.leaf.own_load_density(j, sigma);
+            let force = self.leaf.rod_load_factor() * self.leaf.leaf.own_load_density(j, place);
             let RodLane { group, lane } = rod_lane(j);
             let slopes = &mut self.slopes[stage][group];
             for c in 0..3 {
@@ -300,11 +302,11 @@ impl<'a> RodIntegrator<'a> {
         run(self.arch, &mut kernel);
     }
 
-    /// Looks up the constitutive laws of all rods at one sigma.
-    fn look_up_laws_at(&mut self, sigma: f64) {
+    /// Looks up the constitutive laws of all rods at one place.
+    fn look_up_laws_at(&mut self, place: RodPlace) {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
-            let sections = lane_rods(g, rods).map(|j| leaf.section(j, sigma, 1.0));
+            let sections = lane_rods(g, rods).map(|j| leaf.section(j, place, 1.0));
             group_laws(sections.each_ref())
         };
         self.laws.clear();

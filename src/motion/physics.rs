@@ -7,9 +7,9 @@
 //! each of which half of it is applied: of second order in the length of the segments, and its power
 //! is that of the mean velocity.
 
-use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale, State};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, Scale, State};
 use crate::rotation::outer;
-use crate::scenario::{Dynamics, PolarInertia, Profile, Schedule};
+use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
@@ -149,9 +149,10 @@ impl Physics {
         let length = leaf.grid.node_weight(i) * leaf.leaf.length(j) * leaf.leaf.share(j);
         let rotary = self.density_unit * self.scale.length * self.scale.length;
         // Where a blade ends in a point its last node has the inertia of the stretch around it.
+        let weight = leaf.grid.node_weight(i);
         let around = |of: &Profile| match of.at(sigma) > 0.0 {
-            true => of.at(sigma),
-            false => of.at((0.5 * leaf.grid.node_weight(i) - sigma).abs()),
+            true => mean_around_node(&leaf.grid, i, of),
+            false => of.at((0.5 * weight - sigma).abs()),
         };
         let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
@@ -288,6 +289,15 @@ impl Physics {
     /// Whether rest curvatures ever differ from the leaf's own.
     pub fn rest_curvature_differs(&self) -> bool {
         self.constant_rest_factor != Some(1.0)
+    }
+}
+
+/// The mean of a profile over the halves of both segments at a node, by its values there.
+fn mean_around_node(grid: &Grid, i: usize, profile: &Profile) -> f64 {
+    let [base, tip] = RodPlace::both_sides(grid.sigma()[i]).map(|place| profile.at(place));
+    match base == tip {
+        true => base,
+        false => grid.node_integral(i, |place| profile.at(place)) / grid.node_weight(i),
     }
 }
 

@@ -129,6 +129,14 @@ impl Scenario {
         kinks
     }
 
+    /// Fractions inside (0, 1) where a stiffness or a rest shape jumps, and with it the strains of a rod.
+    pub fn strain_jumps(&self) -> Vec<f64> {
+        let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
+        let pairs = profiles.flat_map(|profile| profile.kinks().windows(2));
+        let jumps = pairs.filter(|pair| pair[0] == pair[1]);
+        sorted_distinct(jumps.map(|pair| pair[0]))
+    }
+
     /// Whether all tips are held: as `[tip]` says, or by grips.
     pub fn holds_all_tips(&self) -> bool {
         let gripped = |vein: usize| {
@@ -258,19 +266,18 @@ impl Scenario {
         [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])
     }
 
-    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
-    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
-    /// sections.
-    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        let Some(blade) = &self.blade else {
+    /// The moduli of a rod's section at a fraction of its length, of both sections where it jumps; of a
+    /// blade those of the strip of a vein, as wide as its stiffnesses are computed from. None if
+    /// stiffnesses are given in place of sections.
+    pub fn moduli(&self, rod: usize, sigma: f64) -> Vec<Moduli> {
+        let (Some(blade), Some(vein)) = (&self.blade, self.rods.get(rod)) else {
             return self.radii.moduli(rod, sigma);
         };
         // H1 = E h t and A3/H1 = l^2/12.
-        let vein = self.rods.get(rod)?;
         let stretch = vein.force_stiffness[0].at(sigma);
         let thickness = blade.thickness(rod, sigma);
         let width = stretch / (blade.young(rod, sigma) * thickness);
         let lever = (12.0 * vein.couple_stiffness[2].at(sigma) / stretch).sqrt();
-        Some(Moduli::for_strip(width, thickness, lever))
+        vec![Moduli::for_strip(width, thickness, lever)]
     }
 }

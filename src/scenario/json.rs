@@ -4,15 +4,14 @@
 #[cfg(test)]
 mod tests;
 
-use crate::numbers::sorted_distinct;
 use crate::scenario::blade::Spline;
 use crate::scenario::checked::Scenario;
 use crate::scenario::format::{Key, TablePath};
 use crate::scenario::loads::{PointLoad, PolarInertia};
 use crate::scenario::photo::axis_name;
-use crate::scenario::profile::Profile;
+use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
-use crate::scenario::section::{HollowSection, Property, Section, SectionOutline};
+use crate::scenario::section::{HollowSection, Property, Section, SectionOutline, ShearLaw};
 use crate::scenario::supports::Grip;
 use crate::scenario::veins::{Rod, Tissue};
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -323,7 +322,14 @@ impl SerializedSections<'_> {
                 quantity_value(hollow.iter().map(HollowSection::profile))
             }
             Key::Young => of(|section| &section.young),
-            Key::Poisson => of(|section| &section.poisson),
+            Key::Poisson | Key::SectionShearModulus => {
+                let law = &self.sections.first()?.shear;
+                let is_modulus = matches!(law, ShearLaw::Modulus(_));
+                if is_modulus != (key == Key::SectionShearModulus) {
+                    return None;
+                }
+                of(|section| section.shear.profile())
+            }
             Key::MassDensity if self.density => of(|section| &section.mass_density),
             _ => return None,
         })
@@ -368,17 +374,20 @@ fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
         let constant = |rod: &[Profile; 3]| rod.each_ref().map(|profile| profile.at(0.0));
         return vector_or_list(rods.iter().map(constant));
     }
-    let kinks = rods.iter().flatten().flat_map(Profile::kinks);
-    let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
+    let places = knot_places(rods.iter().flatten());
     let values = |rod: &[Profile; 3]| -> Value {
-        let knot = |&sigma: &f64| list_value(rod.each_ref().map(|profile| profile.at(sigma)));
-        at.iter().map(knot).collect()
+        let knot = |&place: &RodPlace| list_value(rod.each_ref().map(|profile| profile.at(place)));
+        places.iter().map(knot).collect()
     };
     let value = match rods.iter().all(|rod| *rod == rods[0]) {
         true => values(&rods[0]),
         false => rods.iter().map(values).collect(),
     };
-    json!({ "at": at, "value": value })
+    json!({ "at": fractions(&places), "value": value })
+}
+
+fn fractions(places: &[RodPlace]) -> Vec<f64> {
+    places.iter().map(|place| place.sigma).collect()
 }
 
 /// A quantity of all rods, in the shortest form.
@@ -387,14 +396,13 @@ fn quantity_value<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
-    let kinks = profiles.iter().flat_map(|profile| profile.kinks());
-    let at = sorted_distinct([0.0, 1.0].iter().chain(kinks).copied());
-    let values = |profile: &Profile| list_value(at.iter().map(|&sigma| profile.at(sigma)));
+    let places = knot_places(profiles.iter().copied());
+    let values = |profile: &Profile| list_value(places.iter().map(|&place| profile.at(place)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
         false => profiles.iter().map(|profile| values(profile)).collect(),
     };
-    json!({ "at": at, "value": value })
+    json!({ "at": fractions(&places), "value": value })
 }
 
 /// A quantity along a blade.

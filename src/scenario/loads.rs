@@ -1,12 +1,11 @@
 //! Loads on a leaf and its motion: weight, loads on points and along veins, wind (the table `[wind]`),
 //! and the mass, damping, duration and loads in time of a motion (the table `[dynamics]`).
 
-use crate::numbers::sorted_distinct;
 use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::profile::Profile;
+use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::schedule::Schedule;
 use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
@@ -37,12 +36,12 @@ pub struct Weight<'s> {
 }
 
 impl Weight<'_> {
-    /// The weight per length at a fraction of the length.
-    pub fn at(&self, sigma: f64) -> [f64; 3] {
+    /// The weight per length at a place.
+    pub fn at(&self, place: impl Into<RodPlace>) -> [f64; 3] {
         let Some((g, mass)) = self.of_mass else {
             return self.even;
         };
-        let mass = mass.at(sigma);
+        let mass = mass.at(place);
         [0, 1, 2].map(|axis| self.even[axis] + mass * g[axis])
     }
 }
@@ -359,13 +358,15 @@ pub(super) fn natural_time_unit(scale: Scale, density: &[Profile]) -> f64 {
 /// both profiles, and linear between them. Where the radius varies the exact value is a
 /// cubic, which lies below: more knots of the radius reduce the difference.
 fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
-    let at_fraction = |sigma: f64| density.at(sigma) * radius.at(sigma).powi(2) / 4.0;
+    let inertia = |place: RodPlace| density.at(place) * radius.at(place).powi(2) / 4.0;
     if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {
-        return Profile::Constant(at_fraction(0.0));
+        return Profile::Constant(inertia(0.0.into()));
     }
-    let at = sorted_distinct([&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat());
-    let value = at.iter().map(|&sigma| at_fraction(sigma)).collect();
-    Profile::Linear { at, value }
+    let places = knot_places([density, radius]);
+    Profile::Linear {
+        at: places.iter().map(|place| place.sigma).collect(),
+        value: places.into_iter().map(inertia).collect(),
+    }
 }
 
 /// Reads `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.

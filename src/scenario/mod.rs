@@ -48,7 +48,7 @@ pub(crate) use crate::scenario::plausibility::{
     LARGEST_PLAUSIBLE_STRETCH, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
 };
-pub use crate::scenario::profile::{DerivedProfile, Profile};
+pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 pub use crate::scenario::section::{Moduli, Radii, Stress};

@@ -6,13 +6,65 @@ use std::fmt::Debug;
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 
+/// The side of a jump of a profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Towards the base.
+    Base,
+    /// Towards the tip.
+    Tip,
+}
+
+/// A fraction of a rod's length and, where a profile jumps there, the side. A fraction alone is on the
+/// side of the base.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RodPlace {
+    /// The fraction of the length.
+    pub sigma: f64,
+    /// The side on which a value that jumps there is meant.
+    pub side: Side,
+}
+
+impl RodPlace {
+    /// A place on one side of a fraction of the length.
+    pub fn new(sigma: f64, side: Side) -> Self {
+        RodPlace { sigma, side }
+    }
+
+    /// Both sides of a fraction of the length.
+    pub fn both_sides(sigma: f64) -> [Self; 2] {
+        [Side::Base, Side::Tip].map(|side| RodPlace::new(sigma, side))
+    }
+
+    /// A place of an interval between jumps, which may lie at one of its ends: seen from inside. The
+    /// interval may lead to the tip or to the base.
+    pub fn within(sigma: f64, [from, to]: [f64; 2]) -> Self {
+        let is_near_from = (sigma - from).abs() < (sigma - to).abs();
+        let side = match is_near_from == (from < to) {
+            true => Side::Tip,
+            false => Side::Base,
+        };
+        RodPlace::new(sigma, side)
+    }
+}
+
+impl From<f64> for RodPlace {
+    fn from(sigma: f64) -> Self {
+        RodPlace::new(sigma, Side::Base)
+    }
+}
+
+/// A jump this close to a place, as a fraction of the length, is there: nodes of grids and ends of steps
+/// are within rounding of the jump, or at another knot within the tolerance of places that are the same.
+const SAME_JUMP_DISTANCE: f64 = 4e-12;
+
 /// A quantity along a rod, over the fraction sigma = s/L of the rod's length.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// The same value everywhere; may be infinite where the quantity allows it.
     Constant(f64),
-    /// Linear between knots, of which there are at least two: `at` rises strictly from 0 to 1;
-    /// same length as `value`.
+    /// Linear between knots, of which there are at least two: `at` rises from 0 to 1; same length as
+    /// `value`. Two equal knots inside are a jump.
     Linear {
         /// Fractions of the length.
         at: Vec<f64>,
@@ -26,19 +78,20 @@ pub enum Profile {
 
 /// Properties along a rod that follow from one description of it, each with an index.
 pub(super) trait RodProperties: Debug + Send + Sync + UnwindSafe + RefUnwindSafe {
-    /// A property at the fraction `sigma` of the length.
-    fn value_at(&self, property: usize, sigma: f64) -> f64;
+    /// A property at a place.
+    fn value_at(&self, property: usize, place: RodPlace) -> f64;
 
-    /// Three properties at the fraction `sigma` of the length, if their common part can be computed
-    /// once: the same values as one by one.
-    fn three_values_at(&self, _properties: [usize; 3], _sigma: f64) -> Option<[f64; 3]> {
+    /// Three properties at a place, if their common part can be computed once: the same values as one by
+    /// one.
+    fn three_values_at(&self, _properties: [usize; 3], _place: RodPlace) -> Option<[f64; 3]> {
         None
     }
 
     /// The least and the largest value of a property along the rod.
     fn extremes(&self, property: usize) -> [f64; 2];
 
-    /// Fractions strictly inside (0, 1) where the slope of a property may jump.
+    /// Fractions strictly inside (0, 1) where the slope of a property may jump, ascending; twice where
+    /// the property itself may.
     fn kinks(&self) -> &[f64];
 
     /// Fractions strictly inside (0, 1) where a higher derivative may jump.
@@ -75,8 +128,8 @@ impl DerivedProfile {
         }
     }
 
-    fn at(&self, sigma: f64) -> f64 {
-        self.factor * self.source.value_at(self.property, sigma)
+    fn at(&self, place: RodPlace) -> f64 {
+        self.factor * self.source.value_at(self.property, place)
     }
 }
 
@@ -88,13 +141,24 @@ impl PartialEq for DerivedProfile {
 }
 
 impl Profile {
-    /// The value at the fraction `sigma` in [0, 1].
-    pub fn at(&self, sigma: f64) -> f64 {
+    /// The value at a place, or at a fraction in [0, 1].
+    pub fn at(&self, place: impl Into<RodPlace>) -> f64 {
+        let place = place.into();
+        let RodPlace { sigma, side } = place;
         match self {
             Profile::Constant(value) => *value,
             Profile::Linear { at, value } => {
                 let right = at.partition_point(|&knot| knot < sigma);
                 let right = right.clamp(1, at.len() - 1);
+                let jumps = |k: usize| at.get(k + 1) == Some(&at[k]);
+                let near = |k: usize| (at[k] - sigma).abs() <= SAME_JUMP_DISTANCE;
+                match side {
+                    Side::Base if right > 1 && near(right - 1) && jumps(right - 2) => {
+                        return value[right - 2];
+                    }
+                    Side::Tip if near(right) && jumps(right) => return value[right + 1],
+                    _ => {}
+                }
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
                 if t >= 1.0 {
                     // The sum below would lose a small value next to a large one.
@@ -102,12 +166,13 @@ impl Profile {
                 }
                 value[right - 1] + t.max(0.0) * (value[right] - value[right - 1])
             }
-            Profile::Derived(derived) => derived.at(sigma),
+            Profile::Derived(derived) => derived.at(place),
         }
     }
 
-    /// The values of three profiles at the fraction `sigma`: what they have in common is computed once.
-    pub fn values_of_three(profiles: &[Profile; 3], sigma: f64) -> [f64; 3] {
+    /// The values of three profiles at a place: what they have in common is computed once.
+    pub fn values_of_three(profiles: &[Profile; 3], place: impl Into<RodPlace>) -> [f64; 3] {
+        let place = place.into();
         if let [
             Profile::Derived(first),
             Profile::Derived(second),
@@ -120,12 +185,12 @@ impl Profile {
                 .all(|one| Arc::ptr_eq(&one.source, &first.source))
             {
                 let properties = all.map(|one| one.property);
-                if let Some(values) = first.source.three_values_at(properties, sigma) {
+                if let Some(values) = first.source.three_values_at(properties, place) {
                     return [0, 1, 2].map(|k| all[k].factor * values[k]);
                 }
             }
         }
-        profiles.each_ref().map(|profile| profile.at(sigma))
+        profiles.each_ref().map(|profile| profile.at(place))
     }
 
     /// The integral over fractions from 0 to `sigma` in [0, 1].
@@ -155,7 +220,7 @@ impl Profile {
         }
     }
 
-    /// Fractions strictly inside (0, 1) where the slope may jump.
+    /// Fractions strictly inside (0, 1) where the slope may jump, ascending; twice where the value may.
     pub fn kinks(&self) -> &[f64] {
         match self {
             Profile::Constant(_) => &[],
@@ -215,6 +280,22 @@ impl Profile {
     }
 }
 
+/// The ends of a rod and the kinks of some profiles along it, ascending; where one of them jumps both
+/// sides. Where profiles are linear between their kinks, their values here determine them.
+pub(super) fn knot_places<'p>(profiles: impl IntoIterator<Item = &'p Profile>) -> Vec<RodPlace> {
+    let (mut all, mut jumps) = (vec![0.0, 1.0], Vec::new());
+    for kinks in profiles.into_iter().map(Profile::kinks) {
+        all.extend(kinks);
+        let pairs = kinks.windows(2).filter(|pair| pair[0] == pair[1]);
+        jumps.extend(pairs.map(|pair| pair[0]));
+    }
+    let places = |sigma: f64| {
+        let count = if jumps.contains(&sigma) { 2 } else { 1 };
+        RodPlace::both_sides(sigma).into_iter().take(count)
+    };
+    sorted_distinct(all).into_iter().flat_map(places).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,5 +330,31 @@ mod tests {
         assert_eq!((tent.max_abs(), tent.min()), (6.0, -6.0));
         // A small value at a knot is not lost next to large ones.
         assert_eq!(linear([0.0, 0.5, 1.0], [1e9, 1e-9, 1e9]).at(0.5), 1e-9);
+    }
+
+    /// Also within rounding of the jump, on either side of it.
+    #[test]
+    fn a_jump_has_two_values() {
+        let step = linear([0.0, 0.5, 0.5, 1.0], [1.0, 3.0, 5.0, 4.0]);
+        for sigma in [0.5_f64.next_down(), 0.5, 0.5_f64.next_up()] {
+            let sides = RodPlace::both_sides(sigma).map(|place| step.at(place));
+            assert!((sides[0] - 3.0).abs() < 1e-14 && (sides[1] - 5.0).abs() < 1e-14);
+        }
+        assert_eq!(
+            [0.0, 0.25, 0.75, 1.0].map(|sigma| step.at(sigma)),
+            [1.0, 2.0, 4.5, 4.0]
+        );
+        assert_eq!(
+            [0.5, 0.75, 1.0].map(|sigma| step.integral(sigma)),
+            [1.0, 2.1875, 3.25]
+        );
+        assert_eq!((step.max_abs(), step.min()), (5.0, 1.0));
+        let places = knot_places([&step, &linear([0.0, 0.25, 1.0], [1.0, 2.0, 3.0])]);
+        let fractions: Vec<f64> = places.iter().map(|place| place.sigma).collect();
+        assert_eq!(fractions, [0.0, 0.25, 0.5, 0.5, 1.0]);
+        let towards = |ends: [f64; 2]| RodPlace::within(0.5, ends).side;
+        let [base, tip] = [Side::Base, Side::Tip];
+        assert_eq!([[0.0, 0.5], [0.5, 1.0]].map(towards), [base, tip]);
+        assert_eq!([[0.5, 0.0], [1.0, 0.5]].map(towards), [base, tip]);
     }
 }

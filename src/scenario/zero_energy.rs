@@ -16,7 +16,7 @@ mod tests;
 
 use crate::rotation::angle_about;
 use crate::scenario::checked::Scenario;
-use crate::scenario::profile::Profile;
+use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::supports::{BaseSupport, Grip, SupportKind};
 use crate::scenario::veins::{Rod, Tissue, longest};
 use glam::{DQuat, DVec3};
@@ -405,9 +405,8 @@ impl Scenario {
     fn distributed_at_knots(&self, vein: usize) -> impl Iterator<Item = [f64; 3]> {
         let loads = self.distributed.iter().map(move |all| &all[vein]);
         loads.flat_map(|load| {
-            let inner = load.iter().flat_map(|one| one.kinks()).copied();
-            let knots = [0.0, 1.0].into_iter().chain(inner);
-            knots.map(|sigma| load.each_ref().map(|one| one.at(sigma)))
+            let knots = knot_places(load).into_iter();
+            knots.map(|place| load.each_ref().map(|one| one.at(place)))
         })
     }
 
@@ -446,10 +445,9 @@ fn are_nearly_equal(a: f64, b: f64) -> bool {
 fn is_round(rod: &Rod) -> bool {
     let alike = |a: &Profile, b: &Profile| {
         let steps = TOLERANCES.profile_steps;
-        let even = (0..=steps).map(|i| i as f64 / steps as f64);
-        let kinks = a.kinks().iter().chain(b.kinks()).copied();
-        even.chain(kinks)
-            .all(|sigma| are_nearly_equal(a.at(sigma), b.at(sigma)))
+        let even = (0..=steps).map(|i| RodPlace::from(i as f64 / steps as f64));
+        even.chain(knot_places([a, b]))
+            .all(|place| are_nearly_equal(a.at(place), b.at(place)))
     };
     let [_, bending_2, bending_3] = &rod.couple_stiffness;
     let [_, shear_2, shear_3] = &rod.force_stiffness;

@@ -24,7 +24,7 @@ use crate::rod::Wrench;
 use crate::rotation;
 use crate::rotation::Pose;
 use crate::run::Limit;
-use crate::scenario::{BaseSupport, Profile, Scenario, ZeroEnergyRotation, longest};
+use crate::scenario::{BaseSupport, Profile, RodPlace, Scenario, ZeroEnergyRotation, longest};
 use crate::shape::NodeState;
 use crate::shooting::rod_state::{RodState, STATE_SIZE, SlopeDerivatives, rotation_difference};
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
@@ -241,19 +241,19 @@ impl<'a> BoundaryValueProblem<'a> {
         }
     }
 
-    /// Solves for the tissue of the leaf in the flat state `y` at `sigma`; without tissue `state` remains
+    /// Solves for the tissue of the leaf in the flat state `y` at a place; without tissue `state` remains
     /// empty.
-    pub fn solve_tissue(&self, sigma: f64, y: &[f64], state: &mut TissueState) {
+    pub fn solve_tissue(&self, place: RodPlace, y: &[f64], state: &mut TissueState) {
         if let Some(tissue) = &self.tissue {
-            let section = |j| self.section(j, sigma, &RodState::from_flat_state(y, j));
+            let section = |j| self.section(j, place, &RodState::from_flat_state(y, j));
             let sections = (0..self.rods()).map(section);
-            state.solve(tissue, sigma, self.load_lambda, sections);
+            state.solve(tissue, place, self.load_lambda, sections);
         }
     }
 
-    /// The law of rod `j` at `sigma`, in this state.
-    fn section(&self, j: usize, sigma: f64, rod: &RodState) -> RodSection {
-        let (law, length) = (self.material(j, sigma), self.lengths[j]);
+    /// The law of rod `j` at a place, in this state.
+    fn section(&self, j: usize, place: RodPlace, rod: &RodState) -> RodSection {
+        let (law, length) = (self.material(j, place), self.lengths[j]);
         let directors = rod.q.conjugate();
         RodSection {
             pose: rod.pose(),
@@ -285,6 +285,12 @@ impl<'a> BoundaryValueProblem<'a> {
         before.copied().unwrap_or(to)
     }
 
+    /// Whether a profile may jump at a fraction of the length.
+    pub fn has_kink_at(&self, sigma: f64) -> bool {
+        let mut kinks = self.kinks.iter();
+        kinks.any(|kink| (kink - sigma).abs() < FRACTION_TOLERANCE)
+    }
+
     /// The veins that can turn without resistance, if the leaf has its own shape at rest.
     pub fn turnings(&self) -> &[ZeroEnergyRotation] {
         match self.load_lambda == 1.0 && self.softening_lambda == 1.0 {
@@ -293,16 +299,16 @@ impl<'a> BoundaryValueProblem<'a> {
         }
     }
 
-    fn material(&self, j: usize, sigma: f64) -> SectionLaw {
+    fn material(&self, j: usize, place: RodPlace) -> SectionLaw {
         let rod = &self.scenario.rods[j];
-        let at = |p: &[Profile; 3]| DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma));
+        let at = |p: &[Profile; 3]| DVec3::new(p[0].at(place), p[1].at(place), p[2].at(place));
         let mut stiffness = at(&rod.couple_stiffness);
         if self.softening_lambda < 1.0 {
             let stiffest = stiffness.max_element();
             stiffness = stiffest * (stiffness / stiffest).powf(self.softening_lambda);
         }
         let (arc, part) = (self.arcs.get(j), self.load_lambda);
-        let stretch = rod.rest_stretch.at(sigma);
+        let stretch = rod.rest_stretch.at(place);
         // The scenario's own law without rounding errors.
         let (rest_strain, rest_curvature) = match part == 1.0 {
             true => (
@@ -327,13 +333,15 @@ impl<'a> BoundaryValueProblem<'a> {
         }
     }
 
-    /// All rods at `sigma` in the units of the scenario, from a flat state.
+    /// All rods at `sigma` in the units of the scenario, from a flat state; strains that jump there are
+    /// those towards the base.
     pub fn node_states(&self, sigma: f64, y: &[f64]) -> Vec<NodeState> {
+        let place = RodPlace::from(sigma);
         let mut tissue = TissueState::default();
-        self.solve_tissue(sigma, y, &mut tissue);
+        self.solve_tissue(place, y, &mut tissue);
         let node = |j: usize| {
             let rod = RodState::from_flat_state(y, j);
-            let section = self.section(j, sigma, &rod);
+            let section = self.section(j, place, &rod);
             let all = tissue
                 .rods
                 .get(j)
@@ -354,15 +362,15 @@ impl<'a> BoundaryValueProblem<'a> {
         (0..self.rods()).map(node).collect()
     }
 
-    /// Slopes of the flat state `y` at `sigma`; `tissue` becomes that of the leaf there.
+    /// Slopes of the flat state `y` at a place; `tissue` becomes that of the leaf there.
     pub fn write_slopes(
         &self,
-        sigma: f64,
+        place: RodPlace,
         y: &[f64],
         tissue: &mut TissueState,
         slopes: &mut [f64],
     ) {
-        self.solve_tissue(sigma, y, tissue);
+        self.solve_tissue(place, y, tissue);
         let mut energy = tissue.energy;
         let mut pull = DVec3::ZERO;
         for j in 0..self.rods() {
@@ -371,7 +379,7 @@ impl<'a> BoundaryValueProblem<'a> {
                 Some(rod) => (rod.section, rod.carried, rod.by_pose),
                 None => {
                     let none = Wrench::default();
-                    (self.section(j, sigma, &rod), none, none)
+                    (self.section(j, place, &rod), none, none)
                 }
             };
             let rates = section.rates(&carried);
@@ -380,7 +388,7 @@ impl<'a> BoundaryValueProblem<'a> {
             let m = section.resultants.moment - carried.moment;
             energy += 0.5
                 * (n.dot(section.compliance.position * n) + m.dot(section.compliance.rotation * m));
-            let gravity = self.gravity + self.own_load(j, sigma);
+            let gravity = self.gravity + self.own_load(j, place);
             energy -= self.load_lambda * length * gravity.dot(rod.r);
             let mut load = self.load_lambda * length * gravity - pull;
             pull = DVec3::ZERO;
@@ -407,7 +415,7 @@ impl<'a> BoundaryValueProblem<'a> {
     pub fn derivatives(
         &self,
         j: usize,
-        sigma: f64,
+        place: RodPlace,
         y: &[f64],
         tissue: &TissueState,
     ) -> SlopeDerivatives {
@@ -415,7 +423,7 @@ impl<'a> BoundaryValueProblem<'a> {
         let (section, rates) = match tissue.rods.get(j) {
             Some(rod) => (rod.section, rod.rates()),
             None => {
-                let section = self.section(j, sigma, &rod);
+                let section = self.section(j, place, &rod);
                 (section, section.rates(&Wrench::default()))
             }
         };
@@ -586,14 +594,14 @@ impl BoundaryValueProblem<'_> {
 impl BoundaryValueProblem<'_> {
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is
     /// distributed along it.
-    fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+    fn own_load(&self, j: usize, place: RodPlace) -> DVec3 {
         if !self.own_loads {
             return DVec3::ZERO;
         }
         let s = self.scenario;
-        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+        let weight = DVec3::from_array(s.weight(j).at(place)) - DVec3::from_array(s.gravity);
         let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
-            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(place)))
         });
         (weight + along) * (self.length_unit / self.force_unit)
     }

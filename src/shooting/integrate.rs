@@ -5,6 +5,7 @@ use crate::natural::{
     ERROR_WEIGHTS_3, ERROR_WEIGHTS_5, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES,
 };
 use crate::numbers::{larger, largest};
+use crate::scenario::{RodPlace, Side};
 use crate::shape::RodShape;
 use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE};
 use crate::shooting::rod_state::{RodState, STATE_SIZE};
@@ -177,10 +178,11 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         for i in 1..STAGES {
             let (before, after) = self.slopes.split_at_mut(i);
             weighted_slope_sum(&self.y, h, STAGE_WEIGHTS[i], before, &mut self.stages[i]);
-            let sigma = self.sigma + STAGE_NODES[i] * h;
+            let ends = [self.sigma, self.sigma + h];
+            let place = RodPlace::within(self.sigma + STAGE_NODES[i] * h, ends);
             let stage = &self.stages[i];
             self.equations
-                .write_slopes(sigma, stage, &mut self.tissue, &mut after[0]);
+                .write_slopes(place, stage, &mut self.tissue, &mut after[0]);
         }
         self.evaluations += STAGES - 1;
         weighted_slope_sum(&self.y, h, &RESULT_WEIGHTS, &self.slopes, &mut self.next);
@@ -211,11 +213,11 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         self.evaluations += 1;
     }
 
-    /// The slopes of the present state.
+    /// The slopes of the present state, from which the next step begins.
     fn evaluate_first_slopes(&mut self) {
-        let slopes = &mut self.slopes[0];
+        let (place, slopes) = (RodPlace::new(self.sigma, Side::Tip), &mut self.slopes[0]);
         self.equations
-            .write_slopes(self.sigma, &self.y, &mut self.tissue, slopes);
+            .write_slopes(place, &self.y, &mut self.tissue, slopes);
     }
 }
 
@@ -299,7 +301,21 @@ pub struct ResultantSizes {
 pub struct LeafTrajectory {
     sigma: Vec<f64>,
     states: Vec<Vec<f64>>,
-    slopes: Vec<Vec<f64>>,
+    slopes: Vec<StationSlopes>,
+}
+
+/// Slopes of the state on both sides of a station, which differ where a profile jumps.
+#[derive(Clone, Debug)]
+struct StationSlopes {
+    before: Vec<f64>,
+    /// `None` where no profile has a kink: they are the same.
+    beyond: Option<Vec<f64>>,
+}
+
+impl StationSlopes {
+    fn beyond(&self) -> &[f64] {
+        self.beyond.as_deref().unwrap_or(&self.before)
+    }
 }
 
 impl LeafTrajectory {
@@ -324,9 +340,16 @@ impl LeafTrajectory {
         let mut tissue = TissueState::default();
         let slopes = (sigma.iter().zip(&states))
             .map(|(&sigma, y)| {
-                let mut slopes = vec![0.0; y.len()];
-                equations.write_slopes(sigma, y, &mut tissue, &mut slopes);
-                slopes
+                let mut on_side = |side: Side| {
+                    let mut slopes = vec![0.0; y.len()];
+                    let place = RodPlace::new(sigma, side);
+                    equations.write_slopes(place, y, &mut tissue, &mut slopes);
+                    slopes
+                };
+                StationSlopes {
+                    before: on_side(Side::Base),
+                    beyond: equations.has_kink_at(sigma).then(|| on_side(Side::Tip)),
+                }
             })
             .collect();
         LeafTrajectory {
@@ -438,7 +461,7 @@ impl LeafTrajectory {
         let h = self.sigma[i] - self.sigma[i - 1];
         let t = (sigma - self.sigma[i - 1]) / h;
         let (a, b) = (&self.states[i - 1], &self.states[i]);
-        let (da, db) = (&self.slopes[i - 1], &self.slopes[i]);
+        let (da, db) = (self.slopes[i - 1].beyond(), &self.slopes[i].before);
         let rise = t * t * (3.0 - 2.0 * t);
         let (left, right) = (h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0));
         (0..a.len())

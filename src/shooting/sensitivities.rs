@@ -3,6 +3,7 @@
 //! itself.
 
 use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
+use crate::scenario::RodPlace;
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
 use crate::shooting::rod_state::{PERTURBATION_SIZE, SlopeDerivatives};
@@ -45,9 +46,9 @@ impl LinearStep {
         };
         let mut state = TissueState::default();
         for (y, node) in integrator.stages.iter().zip(STAGE_NODES) {
-            let sigma = begin + node * width;
-            equations.solve_tissue(sigma, y, &mut state);
-            let of_rods = (0..rods).map(|j| equations.derivatives(j, sigma, y, &state));
+            let place = RodPlace::within(begin + node * width, [begin, integrator.sigma]);
+            equations.solve_tissue(place, y, &mut state);
+            let of_rods = (0..rods).map(|j| equations.derivatives(j, place, y, &state));
             linear.derivatives.extend(of_rods);
             let tangents: Vec<GapTangent> = state.tangents().collect();
             linear.tissue.extend(tangents.iter().map(|gap| gap.by_pose));

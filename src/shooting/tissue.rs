@@ -18,7 +18,7 @@
 use crate::natural::Natural;
 use crate::rod::Wrench;
 use crate::rotation::Pose;
-use crate::scenario::{BaseSupport, Profile, Scenario, Tissue, longest};
+use crate::scenario::{BaseSupport, Profile, RodPlace, Scenario, Tissue, longest};
 use glam::{DQuat, DVec3};
 use nalgebra::{SMatrix, SVector};
 use num_dual::{DualNum, jacobian};
@@ -189,8 +189,8 @@ impl<'a> TissueEnergy<'a> {
         normal.then(|| strains()[1].abs() / self.length)
     }
 
-    /// The tissue of gap `g` at `sigma`, its finite stiffnesses multiplied by `lambda`.
-    pub fn law(&self, g: usize, sigma: f64, lambda: f64) -> GapLaw {
+    /// The tissue of gap `g` at a place, its finite stiffnesses multiplied by `lambda`.
+    pub fn law(&self, g: usize, place: RodPlace, lambda: f64) -> GapLaw {
         let (gap, factors) = (&self.gaps[g], self.factors[g]);
         let mut law = GapLaw::default();
         let strained_by_veins = gap.has_unknown_forces();
@@ -200,7 +200,7 @@ impl<'a> TissueEnergy<'a> {
                 law.compliance[i] = Some(0.0);
                 continue;
             }
-            let stiffness = lambda * profile.at(sigma) * factors[i];
+            let stiffness = lambda * profile.at(place) * factors[i];
             match strained_by_veins && i % 2 == 1 {
                 true if stiffness > 0.0 => law.compliance[i] = Some(stiffness.recip()),
                 true => (),
@@ -208,10 +208,10 @@ impl<'a> TissueEnergy<'a> {
             }
         }
         let rods = [g, g + 1].map(|j| &self.scenario.rods[j]);
-        let contraction = 0.5 * gap.contraction.at(sigma);
+        let contraction = 0.5 * gap.contraction.at(place);
         law.contraction = rods.map(|rod| contraction / rod.length);
         let poses = [g, g + 1].map(|j| {
-            let pose = self.stress_free.vein_pose(j, sigma);
+            let pose = self.stress_free.vein_pose(j, place.sigma);
             Pose {
                 position: pose.position / self.length,
                 ..pose
@@ -226,10 +226,10 @@ impl<'a> TissueEnergy<'a> {
         if rigid.contains(&true) {
             let rates = rods.map(|rod| {
                 let stretch = match self.scenario.tissue_grown {
-                    true => rod.rest_stretch.at(sigma),
+                    true => rod.rest_stretch.at(place),
                     false => 1.0,
                 };
-                let bend = Profile::values_of_three(&rod.rest_curvature, sigma);
+                let bend = Profile::values_of_three(&rod.rest_curvature, place);
                 FrameRates {
                     position: DVec3::X * (stretch * rod.length / self.length),
                     rotation: DVec3::from_array(bend) * rod.length,

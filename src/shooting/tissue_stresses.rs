@@ -8,6 +8,7 @@
 
 use crate::rod::Wrench;
 use crate::rotation::Pose;
+use crate::scenario::RodPlace;
 use crate::shooting::rod_state::PERTURBATION_SIZE;
 use crate::shooting::tissue::{
     FrameRates, GAP_STRAINS, GapTangent, PAIR_PERTURBATION_SIZE, StressedGap, TissueEnergy,
@@ -80,7 +81,7 @@ impl TissueState {
     pub fn solve(
         &mut self,
         tissue: &TissueEnergy,
-        sigma: f64,
+        place: RodPlace,
         lambda: f64,
         sections: impl Iterator<Item = RodSection>,
     ) {
@@ -95,7 +96,7 @@ impl TissueState {
             .extend(self.rods.windows(2).enumerate().map(|(g, rods)| {
                 let rods = [rods[0].section, rods[1].section];
                 StressedGap {
-                    law: tissue.law(g, sigma, lambda),
+                    law: tissue.law(g, place, lambda),
                     poses: rods.map(|rod| rod.pose),
                     rates: rods.map(|rod| rod.rates(&Wrench::default())),
                     unstrained: rods.map(|rod| rod.unstrained),

@@ -2,7 +2,7 @@
 //! the boundary-value solution is that of the relaxation there too.
 
 use leafdyn::internals::shooting::ShootingFailureReason;
-use leafdyn::scenario::PointLoad;
+use leafdyn::scenario::{PointLoad, Tissue};
 use leafdyn_testing::*;
 
 /// Veins that taper, with a soft joint, and curl at rest from half their length on.
@@ -54,6 +54,42 @@ fn relaxation_and_both_ways_of_shooting_agree() {
     }
 }
 
+/// Profiles that jump, each at its own place, between veins tied by coupling and by tissue.
+#[test]
+fn profiles_with_steps_agree() {
+    let mut leaf = fig04(3);
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        let step = 0.25 + 0.2 * j as f64;
+        rod.couple_stiffness[1] = linear(&[0.0, step, step, 1.0], &[2.0, 1.5, 0.6, 0.4]);
+        rod.couple_stiffness[0] = linear(&[0.0, 0.5, 0.5, 1.0], &[1.0, 1.0, 0.3, 0.3]);
+        rod.force_stiffness[0] = linear(&[0.0, 0.7, 0.7, 1.0], &[100.0, 80.0, 30.0, 50.0]);
+        rod.rest_curvature[1] = linear(&[0.0, 0.5, 0.5, 1.0], &[0.0, 0.5, 1.5, 1.0]);
+        rod.rest_stretch = linear(&[0.0, step, step, 1.0], &[1.0, 1.05, 0.95, 1.0]);
+    }
+    let load = |size: f64| linear(&[0.0, 0.6, 0.6, 1.0], &[0.0, size, -size, 0.5 * size]);
+    let vein = [load(0.1), load(-0.2), load(0.4)];
+    leaf.distributed = Some(vec![vein; 3]);
+    leaf.g = [0.0, 0.1, -0.2];
+    leaf.dynamics.density = vec![linear(&[0.0, 0.45, 0.45, 1.0], &[1.0, 2.0, 0.5, 0.5]); 3];
+    all_agree("coupled", &leaf);
+    all_agree("unequal", &unequal(leaf.clone()));
+    for contraction in [0.0, 0.1] {
+        let mut tied = leaf.clone();
+        tied.tissue = Some(vec![
+            Tissue {
+                stiffness: [2.0, 3.0, 4.0].map(Profile::Constant),
+                fold: Profile::Constant(0.3),
+                contraction: Profile::Constant(contraction),
+            };
+            2
+        ]);
+        let relaxed = settle(&tied, 1e-7);
+        let near = shot_near(&tied, &relaxed);
+        let off = apart(&tied, &relaxed.shape.rods, &near.rods).position;
+        assert!(off <= estimate(&relaxed), "{contraction}: {off:e}");
+    }
+}
+
 /// Angles beyond half a turn: the quaternion at the base is the one with w >= 0,
 /// as it is of the relaxed leaf.
 #[test]
@@ -72,29 +108,34 @@ fn angles_beyond_a_turn() {
 /// stations and ends of intervals that ought to be equal.
 #[test]
 fn kinks_and_stations_a_rounding_error_apart() {
-    let with_kinks = |kinks: [f64; 3]| {
+    let with_kinks = |steps: bool, kinks: [f64; 3]| {
         let mut leaf = fig04(3);
         for (rod, at) in leaf.rods.iter_mut().zip(kinks) {
-            rod.couple_stiffness[1] = linear(&[0.0, at, 1.0], &[1.0, 0.5, 2.0]);
+            rod.couple_stiffness[1] = match steps {
+                true => linear(&[0.0, at, at, 1.0], &[1.0, 0.5, 1.5, 2.0]),
+                false => linear(&[0.0, at, 1.0], &[1.0, 0.5, 2.0]),
+            };
         }
         leaf
     };
-    let leaf = with_kinks([0.3; 3]);
-    let relaxed = settle(&leaf, 1e-10);
-    for kinks in [[0.3; 3], [0.3, 0.1 + 0.2, 0.3 - 1e-16]] {
-        let leaf = with_kinks(kinks);
-        let near = shot_near(&leaf, &relaxed);
-        agree("from rest", &leaf, &relaxed, &near, 1e-9);
-        for intervals in [10, 20, 30] {
-            let over = found(&leaf, shoot_over(Some(intervals), &leaf, &relaxed));
-            agree("over intervals", &leaf, &relaxed, &over, 1e-9);
+    for steps in [false, true] {
+        let leaf = with_kinks(steps, [0.3; 3]);
+        let relaxed = settle(&leaf, 1e-10);
+        for kinks in [[0.3; 3], [0.3, 0.1 + 0.2, 0.3 - 1e-16]] {
+            let leaf = with_kinks(steps, kinks);
+            let near = shot_near(&leaf, &relaxed);
+            agree("from rest", &leaf, &relaxed, &near, 1e-9);
+            for intervals in [10, 20, 30] {
+                let over = found(&leaf, shoot_over(Some(intervals), &leaf, &relaxed));
+                agree("over intervals", &leaf, &relaxed, &over, 1e-9);
+            }
+            let stations: Vec<f64> = (0..=20).map(|i| 1.0 - 0.05 * (20 - i) as f64).collect();
+            let alone = shot_alone(&leaf, &stations);
+            assert_eq!(alone.stations, stations);
+            assert!(alone.rods.iter().all(|rod| rod.nodes.len() == 21));
+            let off = alone.rods[0].nodes[20].position - relaxed.tips[0];
+            assert!(off.length() < 1e-9, "{off}");
         }
-        let stations: Vec<f64> = (0..=20).map(|i| 1.0 - 0.05 * (20 - i) as f64).collect();
-        let alone = shot_alone(&leaf, &stations);
-        assert_eq!(alone.stations, stations);
-        assert!(alone.rods.iter().all(|rod| rod.nodes.len() == 21));
-        let off = alone.rods[0].nodes[20].position - relaxed.tips[0];
-        assert!(off.length() < 1e-9, "{off}");
     }
 }
 

@@ -85,6 +85,11 @@ fn what_cannot_be_a_section_is_refused() {
         shape = "circle", diameter = 0.1, young = 1, poisson = 0.6 => at most 0.5
         shape = "circle", diameter = 0.1, young = 1, poisson = -1 => greater than -1
         shape = "ellipse", width = 0.4, thickness = 0.1, poisson = -0.44, young = 1 => section.poisson = -0.44: gives a shear factor
+        shape = "circle", diameter = 0.1, young = 1, poisson = 0.3, shear_modulus = 0.4 => section.shear_modulus = 0.4: section.poisson is given, too
+        shape = "circle", diameter = 0.1, young = 1, shear_modulus = 0 => must be greater than 0
+        shape = "circle", diameter = 0.1, young = 1, shear_modulus = [0.4] => must have 2
+        shape = "circle", diameter = 0.1, young = 1, shear_modulus = [0.4, -1] => section.shear_modulus, entry 2 = -1: must be greater than 0
+        shape = "ellipse", width = 0.4, thickness = 0.1, shear_modulus = 0.9, young = 1 => section.shear_modulus = 0.9: gives a shear factor
         shape = "circle", diameter = 1e-20, young = 1e-10 => choose other units
         shape = "circle", diameter = [0.1], young = 1 => must have 2
         shape = "circle", diameter = [0.1, 1e5], young = 1 => A_max/A

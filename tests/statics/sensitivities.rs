@@ -28,6 +28,10 @@ fn stiffness(draw: &mut Draw, number: usize, rods: usize) -> Part {
             ),
             "stiffness.torsion stiffness.bending_2 stiffness.axial stiffness.shear_3",
         ),
+        3 if number.is_multiple_of(2) => (
+            "section = { shape = \"rectangle\", width = 0.2, thickness = 0.1, young = 2e4, shear_modulus = 2e3 }".into(),
+            "section.young section.width section.thickness section.shear_modulus",
+        ),
         3 => (
             "section = { shape = \"rectangle\", width = 0.2, thickness = 0.1, young = 2e4, poisson = 0.3 }".into(),
             "section.young section.width section.thickness section.poisson",

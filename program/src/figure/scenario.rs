@@ -345,6 +345,7 @@ const KEY_WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("section.wall", "thickness of the wall", Veins),
     ("section.young", "Young's modulus", Veins),
     ("section.poisson", "Poisson's ratio", Veins),
+    ("section.shear_modulus", "shear modulus", Veins),
     ("section.mass_density", "mass per volume", Veins),
     ("blade.length", "length of the blade", Plain),
     ("blade.width", "width of the blade", Plain),

@@ -176,7 +176,7 @@ fn profiles() {
     let table = r#"
         bending_3 = { at = [0.1, 0.5, 1.0], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & entry 1 = 0.1: must start at 0
         bending_3 = { at = [0.0, 0.5, 0.9], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & entry 3 = 0.9: must end at 1
-        bending_3 = { at = [0.0, 0.0, 1.0], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & entry 2 = 0.0: must be greater than the entry before it, 0
+        bending_3 = { at = [0.0, 0.0, 1.0], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & entry 2 = 0.0: a step at the base has no side before it
         bending_3 = { at = [0.0, 2.0, 1.0], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & entry 3 = 1.0: must be greater than the entry before it, 2
         bending_3 = { at = [0.0], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & at least two knots
         bending_3 = { at = [], value = [1.0, 0.5, 0.1] } => leaf.toml:11: stiffness.bending_3, at & at least two knots

@@ -142,6 +142,7 @@ class SectionTable(TypedDict, total=False):
     mass_density: float | Numbers | Profile
     poisson: float | Numbers | Profile
     shape: str
+    shear_modulus: float | Numbers | Profile
     thickness: float | Numbers | Profile
     wall: float | Numbers | Profile
     width: float | Numbers | Profile

@@ -336,12 +336,11 @@ impl DiscreteLeaf {
 
     /// The change of the loads of rod `j` alone on its node `i`.
     fn own_load_rate(&self, rate: &LeafParameterDerivative, j: usize, i: usize) -> DVec3 {
-        let sigma = self.grid.sigma()[i];
         let on = |leaf: &Leaf| {
             let points = leaf.point_forces();
             let here = points.filter(|it| (it.rod, self.grid.nearest_node(it.sigma)) == (j, i));
             let points: DVec3 = here.map(|it| it.force).sum();
-            self.grid.node_weight(i) * leaf.own_load_density(j, sigma) + points
+            self.grid.own_load_around_node(leaf, j, i) + points
         };
         rate.weighted_leaves
             .iter()

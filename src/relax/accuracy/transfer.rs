@@ -603,6 +603,7 @@ impl<'l> NodalResultants<'l> {
             (None, Some([next, _])) => (next.x + force, moment - next.a),
             (Some([before, _]), _) => {
                 // The part of the nodal load that belongs to the left half-cell.
+                let jump = leaf.own_load_jump_before(j, i);
                 let left = leaf.grid.segment_width(i - 1);
                 let right = if i < n {
                     leaf.grid.segment_width(i)
@@ -614,7 +615,7 @@ impl<'l> NodalResultants<'l> {
                     false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
                 };
                 let part = left / (left + right);
-                (before.x - part * force, before.b - part * moment)
+                (before.x - part * force - jump, before.b - part * moment)
             }
             (None, None) => (DVec3::ZERO, DVec3::ZERO),
         };

@@ -194,6 +194,16 @@ impl NestedEquilibrium {
     }
 }
 
+/// The stress with the largest equivalent one, by a force and a moment along the directors, in the
+/// sections at one place.
+fn largest_stress(moduli: &[Moduli], n: DVec3, m: DVec3) -> Option<Stress> {
+    let stresses = moduli.iter().map(|it| it.stress(n, m));
+    stresses.reduce(|one, other| match other.equivalent > one.equivalent {
+        true => other,
+        false => one,
+    })
+}
+
 /// The largest stresses of a leaf in each of its sections, at its stations. As JSON the place where
 /// the equivalent stress is largest of all: `stress` in `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -218,7 +228,8 @@ impl Stresses {
         let stress = |(j, rod): (usize, &RodShape)| -> Option<Vec<Stress>> {
             let nodes = stations.iter().zip(&rod.nodes);
             let at = |(sigma, node): (&f64, &crate::shape::NodeState)| {
-                Some(scenario.moduli(j, *sigma)?.stress(node.n, node.m))
+                let moduli = scenario.moduli(j, *sigma);
+                largest_stress(&moduli, node.n, node.m)
             };
             nodes.map(at).collect()
         };
@@ -254,8 +265,11 @@ impl Stresses {
         };
         let moduli = scenario.moduli(self.vein - 1, self.sigma);
         let along_all = |size: f64| DVec3::splat(size);
-        let error = moduli.map(|it| it.stress(along_all(force), along_all(moment)).equivalent);
-        Stresses { error, ..self }
+        let error = largest_stress(&moduli, along_all(force), along_all(moment));
+        Stresses {
+            error: error.map(|it| it.equivalent),
+            ..self
+        }
     }
 
     /// The stresses with the error of a leaf that was integrated along its rods to these stations, from those of its
@@ -275,12 +289,16 @@ impl Stresses {
                 .min(nodes);
             let fields = &estimate.rods[j][i];
             let along = |it: DVec3| fields.q.conjugate() * it;
-            let moduli = scenario.moduli(j, station)?;
+            let moduli = scenario.moduli(j, station);
+            if moduli.is_empty() {
+                return None;
+            }
             let at = |place: usize| {
                 let off = estimate.errors[j][place];
                 let force = along(off.force - off.rotation.cross(fields.n)) * scale.force();
                 let moment = along(off.moment - off.rotation.cross(fields.m)) * scale.moment();
-                safety * moduli.stress(force, moment).equivalent
+                let stress = largest_stress(&moduli, force, moment);
+                safety * stress.map_or(0.0, |it| it.equivalent)
             };
             let place = i * places / nodes;
             let next = (i * places).div_ceil(nodes);
@@ -317,15 +335,15 @@ impl Stresses {
         }
         let sigma = found.levels[0].leaf.grid.sigma();
         let rods = self.rods.len();
-        let moduli: Option<Vec<Moduli>> = (0..rods)
+        let moduli: Vec<Vec<Moduli>> = (0..rods)
             .flat_map(|j| sigma.iter().map(move |at| scenario.moduli(j, *at)))
             .collect();
-        let Some(moduli) = moduli else {
+        if moduli.iter().any(Vec::is_empty) {
             return self;
-        };
+        }
         let stress = |k: usize, [n, m]: [DVec3; 2]| {
-            let stress = moduli[k].stress(n * scale.force(), m * scale.moment());
-            DVec3::new(stress.normal, stress.shear, stress.equivalent)
+            let stress = largest_stress(&moduli[k], n * scale.force(), m * scale.moment());
+            stress.map_or(DVec3::ZERO, |it| DVec3::from_array(it.to_array()))
         };
         let nodes = || (0..rods).flat_map(|j| (0..sigma.len()).map(move |i| (j, i)));
         let on = |level: &GridLevel| -> Vec<DVec3> {

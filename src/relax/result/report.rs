@@ -577,7 +577,7 @@ impl Equilibrium {
         };
         let mut between = 0.0_f64;
         let tied = (scenario.tissue.iter().flatten()).any(Tissue::has_unknown_forces);
-        let kinks = scenario.kinks();
+        let (kinks, strain_jumps) = (scenario.kinks(), scenario.strain_jumps());
         let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
         let mut rest = to.as_slice();
         for (i, &station) in stations.iter().enumerate() {
@@ -607,7 +607,7 @@ impl Equilibrium {
             };
             let Some(found) = found else {
                 for at in points {
-                    let through = StationInterpolation::new(stations, &kinks, *at);
+                    let through = StationInterpolation::new(stations, [&kinks, &strain_jumps], *at);
                     for (interpolated, rod) in rods.iter_mut().zip(known) {
                         interpolated.push(through.node_state(&rod.nodes));
                         if at_rest {
@@ -651,20 +651,23 @@ const INTERPOLATION_SAFETY: f64 = 2.0;
 /// Polynomials through the stations nearest to a place between two kinks.
 struct StationInterpolation {
     value: InterpolationWeights,
+    /// Of strains: those of the first station are on the other side if they jump there.
+    strains: InterpolationWeights,
     /// Through one station less.
     lower: InterpolationWeights,
 }
 
 impl StationInterpolation {
-    /// To the place `at`, between `kinks` that are stations.
-    fn new(stations: &[f64], kinks: &[f64], at: f64) -> Self {
+    /// To the place `at`, between `kinks` that are stations, at some of which strains jump.
+    fn new(stations: &[f64], [kinks, strain_jumps]: [&[f64]; 2], at: f64) -> Self {
         let panel = kinks.partition_point(|kink| *kink < at);
         let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
         let high = kinks.get(panel).copied().unwrap_or(1.0);
         let node = |at: f64| stations.partition_point(|it| *it < at - SAME_KINK_DISTANCE);
         let (first, last) = (node(low), node(high).min(stations.len() - 1));
-        let near = &stations[first..=last];
-        let through = |count: usize| {
+        let through = |first: usize, less: usize| {
+            let near = &stations[first..=last];
+            let count = (INTERPOLATED_STATIONS - less).min(near.len() - less);
             let InterpolationWeights {
                 first: skipped,
                 weights,
@@ -674,10 +677,13 @@ impl StationInterpolation {
                 weights,
             }
         };
-        let count = INTERPOLATED_STATIONS.min(near.len());
+        let jumps = strain_jumps
+            .iter()
+            .any(|jump| (jump - low).abs() <= SAME_KINK_DISTANCE);
         StationInterpolation {
-            value: through(count),
-            lower: through(count - 1),
+            value: through(first, 0),
+            strains: through(first + usize::from(jumps), 0),
+            lower: through(first, 1),
         }
     }
 
@@ -685,9 +691,8 @@ impl StationInterpolation {
     fn node_state(&self, nodes: &[NodeState]) -> NodeState {
         let InterpolationWeights { first, weights } = &self.value;
         let near = || nodes[*first..].iter().zip(weights);
-        let sum = |of: fn(&NodeState) -> DVec3| -> DVec3 {
-            near().map(|(node, weight)| *weight * of(node)).sum()
-        };
+        let sum = |of: fn(&NodeState) -> DVec3| self.value.weighted_sum(nodes, of);
+        let strain = |of: fn(&NodeState) -> DVec3| self.strains.weighted_sum(nodes, of);
         let sign = nodes[*first].rotation;
         let turned =
             near().map(|(node, weight)| align_quaternion_sign(node.rotation, sign) * *weight);
@@ -695,8 +700,8 @@ impl StationInterpolation {
         NodeState {
             position: sum(|node| node.position),
             rotation: rotation.normalize(),
-            v: sum(|node| node.v),
-            u: sum(|node| node.u),
+            v: strain(|node| node.v),
+            u: strain(|node| node.u),
             n: sum(|node| node.n),
             m: sum(|node| node.m),
         }
@@ -705,8 +710,7 @@ impl StationInterpolation {
     /// The error of the position of a vein with these nodes.
     fn error(&self, nodes: &[NodeState]) -> f64 {
         let position = |through: &InterpolationWeights| -> DVec3 {
-            let near = nodes[through.first..].iter().zip(&through.weights);
-            near.map(|(node, weight)| *weight * node.position).sum()
+            through.weighted_sum(nodes, |node| node.position)
         };
         INTERPOLATION_SAFETY * position(&self.value).distance(position(&self.lower))
     }

@@ -3,7 +3,7 @@
 use crate::numbers::{GAUSS_LEGENDRE_RULE, QuadraturePoint, sorted_distinct};
 use crate::scenario::blade::division::{PLATE_SHEAR_FACTOR, Strip};
 use crate::scenario::blade::spline::{Spline, quintic_hermite};
-use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
+use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, RodProperties};
 use crate::scenario::section::Property;
 use std::any::Any;
 use std::ops::Range;
@@ -474,7 +474,7 @@ impl BladePart {
 }
 
 impl RodProperties for BladePart {
-    fn value_at(&self, property: usize, sigma: f64) -> f64 {
+    fn value_at(&self, property: usize, RodPlace { sigma, .. }: RodPlace) -> f64 {
         match &self.source {
             BladePartSource::Vein(vein) => vein.property(property, sigma),
             BladePartSource::Gap { .. } => self.properties(sigma)[property],
@@ -482,7 +482,11 @@ impl RodProperties for BladePart {
     }
 
     /// Three stiffnesses, or three rest curvatures, of a vein.
-    fn three_values_at(&self, properties: [usize; 3], sigma: f64) -> Option<[f64; 3]> {
+    fn three_values_at(
+        &self,
+        properties: [usize; 3],
+        RodPlace { sigma, .. }: RodPlace,
+    ) -> Option<[f64; 3]> {
         let BladePartSource::Vein(vein) = &self.source else {
             return None;
         };

@@ -41,6 +41,17 @@ pub(in crate::scenario) struct EntryValue<'e> {
     pub value: &'e Value,
 }
 
+/// What a list of increasing numbers is.
+#[derive(Clone, Copy, PartialEq)]
+enum KnotKind {
+    /// Times, which rise strictly.
+    Times,
+    /// Fractions of the length from 0 to 1, which rise strictly.
+    Fractions,
+    /// Fractions of the length from 0 to 1, of which two equal ones inside are a step.
+    FractionsWithSteps,
+}
+
 /// The knots of a profile: fractions of the length from 0 to 1, and the numbers there.
 pub(in crate::scenario) struct Knots {
     pub at: Vec<f64>,
@@ -320,7 +331,7 @@ impl<'e> EntryValue<'e> {
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
         let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
-        let at = at.increasing_numbers(true)?;
+        let at = at.increasing_numbers(self.profile_knots())?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.list_entries(&needed)?;
         if (list.next()).is_none_or(|first| !first.value.is_array()) {
@@ -330,10 +341,19 @@ impl<'e> EntryValue<'e> {
         lists.map(|list| list.linear_profile(&at)).collect()
     }
 
-    /// The knots of a profile along the leaf.
+    /// What the knots of a profile of this key may be: a blade, whose veins and tissue follow from one
+    /// smooth surface, has no steps.
+    fn profile_knots(&self) -> KnotKind {
+        match self.key().table() {
+            "blade" => KnotKind::Fractions,
+            _ => KnotKind::FractionsWithSteps,
+        }
+    }
+
+    /// The knots of a profile along the leaf, without steps.
     pub fn knots(&self) -> ScenarioResult<Knots> {
         let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
-        let at = at.increasing_numbers(true)?;
+        let at = at.increasing_numbers(KnotKind::Fractions)?;
         let list = value.list_of_length(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = list
             .map(|item| item.number())
@@ -403,7 +423,7 @@ impl<'e> EntryValue<'e> {
                 phase: number("phase")?,
             }));
         }
-        let at = part("at")?.increasing_numbers(false)?;
+        let at = part("at")?.increasing_numbers(KnotKind::Times)?;
         let list = part(named)?.list_of_length(at.len(), ONE_PER_KNOT, "a list")?;
         let values: Vec<T> = list
             .map(|item| value(&item))
@@ -417,8 +437,9 @@ impl<'e> EntryValue<'e> {
         }
     }
 
-    /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    fn increasing_numbers(&self, fractions: bool) -> ScenarioResult<Vec<f64>> {
+    /// Increasing numbers: fractions of the length from 0 to 1, or times.
+    fn increasing_numbers(&self, kind: KnotKind) -> ScenarioResult<Vec<f64>> {
+        let fractions = kind != KnotKind::Times;
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -435,12 +456,19 @@ impl<'e> EntryValue<'e> {
             let next = item.number_in(NumberRange::Finite)?;
             let starts = !fractions || !at.is_empty() || next == 0.0;
             item.refuse_unless(starts, "must start at 0 (the base)")?;
-            if let Some(before) = at.last() {
+            if kind == KnotKind::FractionsWithSteps && at.last() == Some(&next) {
+                refuse_misplaced_step(&item, &at)?;
+            } else if let Some(before) = at.last() {
                 item.refuse_unless(
                     next > *before,
                     format_args!(
-                        "must be greater than the entry before it, {before}: \
-                         {what} rise strictly (write a step as a steep ramp)"
+                        "must be greater than the entry before it, {before}: {what} rise{}",
+                        match kind {
+                            KnotKind::FractionsWithSteps => {
+                                ", and two equal ones, next to each other, are a step"
+                            }
+                            _ => " strictly (write a step as a steep ramp)",
+                        }
                     ),
                 )?;
             }
@@ -513,7 +541,7 @@ impl<'e> EntryValue<'e> {
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
         let [at, value] = self.knots_and_values("value", VECTOR_PROFILE_FORM)?;
-        let at = at.increasing_numbers(true)?;
+        let at = at.increasing_numbers(self.profile_knots())?;
         let profiles = |list: EntryValue| -> ScenarioResult<[Profile; 3]> {
             let each = list.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
             let each: Vec<[f64; 3]> = each
@@ -564,4 +592,19 @@ impl<'e> EntryValue<'e> {
         self.refuse_unless(from < to, "must rise from the base to the tip")?;
         Ok([from, to])
     }
+}
+
+/// Refuses an entry that equals the last of those `before` it unless both are a step: two equal
+/// fractions between the base and the tip.
+fn refuse_misplaced_step(item: &EntryValue, before: &[f64]) -> ScenarioResult<()> {
+    let last = before.len() - 1;
+    let problem = match before[last] {
+        0.0 => "a step at the base has no side before it: leave out the first entry and its value",
+        1.0 => "a step at the tip has no side beyond it: leave out this entry and its value",
+        here if last > 0 && before[last - 1] == here => {
+            "is the third of equal entries: a step is two, the values before it and beyond it"
+        }
+        _ => return Ok(()),
+    };
+    Err(item.value_error(problem))
 }

@@ -100,6 +100,8 @@ keys! {
     Young "section.young": Quantity(Positive), [-2, 1, 0], Required("0.3");
     /// nu, Poisson's ratio.
     Poisson "section.poisson": Quantity(Finite), [0, 0, 0], Default("0.3");
+    /// G, shear modulus, in place of Poisson's ratio.
+    SectionShearModulus "section.shear_modulus": Quantity(Positive), [-2, 1, 0], Derived;
     /// mass per volume.
     MassDensity "section.mass_density": Quantity(Positive), [-4, 1, 2], Derived;
     /// length of a blade, from its base to its tip.

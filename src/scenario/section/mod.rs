@@ -1,7 +1,7 @@
 //! Stiffnesses and masses of a rod from its material and the size of its section: the table `[section]`.
 //!
 //! With the area S, the second moments I2 and I3 about d2 and d3 and the shear
-//! modulus G = E/(2 (1 + nu)):
+//! modulus G, which is given or that of an isotropic material, E/(2 (1 + nu)):
 //!
 //! | | |
 //! | --- | --- |
@@ -14,6 +14,7 @@
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
 //! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`.
+//! They depend on Poisson's ratio, for which a given G stands as well: see [`ShearLaw::equivalent_poisson`].
 
 mod outline;
 
@@ -22,13 +23,18 @@ use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
-use crate::scenario::profile::{DerivedProfile, Profile, RodProperties};
+use crate::scenario::profile::{
+    DerivedProfile, Profile, RodPlace, RodProperties, Side, knot_places,
+};
 use crate::scenario::section::outline::SectionDimensions;
 pub(super) use crate::scenario::section::outline::SectionOutline;
 pub use crate::scenario::section::outline::{Moduli, Stress};
 use std::any::Any;
 use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// A kink closer to a fraction of the length than this is there.
+const SAME_KINK_DISTANCE: f64 = 1e-12;
 
 /// Steps between two knots at which the extremes of a property are looked for: properties are smooth
 /// between knots.
@@ -91,6 +97,55 @@ impl HollowSection {
     }
 }
 
+/// What gives the shear modulus of a material besides Young's modulus.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ShearLaw {
+    /// Poisson's ratio of an isotropic material.
+    Poisson(Profile),
+    /// The shear modulus itself.
+    Modulus(Profile),
+}
+
+impl ShearLaw {
+    pub fn profile(&self) -> &Profile {
+        match self {
+            ShearLaw::Poisson(profile) | ShearLaw::Modulus(profile) => profile,
+        }
+    }
+
+    /// The shear modulus at a place where Young's modulus is `young`.
+    fn modulus(&self, young: f64, place: RodPlace) -> f64 {
+        match self {
+            ShearLaw::Poisson(poisson) => young / (2.0 * (1.0 + poisson.at(place))),
+            ShearLaw::Modulus(modulus) => modulus.at(place),
+        }
+    }
+
+    /// Poisson's ratio of the isotropic material with the same shear factors.
+    ///
+    /// A bent rod contracts across by its ratio nu along the fibers. In the compatibility of its shear
+    /// stresses that is a term 2 nu G/E, which is nu'/(1 + nu') in an isotropic rod of the ratio nu'. A
+    /// given G says nu = E/(2 G) - 1 if the material is isotropic, which it is not where that is more
+    /// than 1/2. Then nu is taken to be 1/2: with G = E/20 another one, from 0 on, changes the shear
+    /// factors by less than 1 %.
+    fn equivalent_poisson(&self, young: f64, place: RodPlace) -> f64 {
+        match self {
+            ShearLaw::Poisson(poisson) => poisson.at(place),
+            ShearLaw::Modulus(modulus) => {
+                let ratio = modulus.at(place) / young;
+                let isotropic = 0.5 / ratio - 1.0;
+                match isotropic <= LARGEST_POISSON {
+                    true => isotropic,
+                    false => ratio / (1.0 - ratio),
+                }
+            }
+        }
+    }
+}
+
+/// Largest Poisson's ratio of isotropic materials: that of incompressible ones.
+const LARGEST_POISSON: f64 = 0.5;
+
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Section {
@@ -99,10 +154,10 @@ pub(super) struct Section {
     pub thickness: Profile,
     pub hollow: Option<HollowSection>,
     pub young: Profile,
-    pub poisson: Profile,
+    pub shear: ShearLaw,
     /// Mass per volume; zero where it is not given.
     pub mass_density: Profile,
-    /// Fractions inside (0, 1) where the slope of a property may jump.
+    /// Fractions inside (0, 1) where the slope of a property may jump; twice where the property may.
     kinks: Vec<f64>,
     /// Least and largest value of every property, where they change along the rod: else the
     /// profiles are constant.
@@ -114,7 +169,8 @@ impl Section {
         outline: SectionOutline,
         [width, thickness]: [Profile; 2],
         hollow: Option<HollowSection>,
-        [young, poisson, mass_density]: [Profile; 3],
+        shear: ShearLaw,
+        [young, mass_density]: [Profile; 2],
     ) -> Section {
         let mut section = Section {
             outline,
@@ -122,17 +178,18 @@ impl Section {
             thickness,
             hollow,
             young,
-            poisson,
+            shear,
             mass_density,
             kinks: Vec::new(),
             extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
         };
-        let profiles = section.profiles();
-        section.kinks = sorted_distinct(profiles.flat_map(Profile::kinks).copied());
+        let knots = knot_places(section.profiles());
+        let inner = knots[1..knots.len() - 1].iter();
+        section.kinks = inner.map(|place| place.sigma).collect();
         let varies = !section.is_constant();
-        for sigma in section.fractions().filter(|_| varies) {
+        for place in section.places().filter(|_| varies) {
             for property in Property::ALL {
-                let value = section.property_value(property, sigma);
+                let value = section.property_value(property, place);
                 let [least, most] = &mut section.extremes[property.index()];
                 (*least, *most) = (least.min(value), most.max(value));
             }
@@ -146,11 +203,11 @@ impl Section {
             thickness,
             hollow,
             young,
-            poisson,
+            shear,
             mass_density,
             ..
         } = self;
-        let all = [width, thickness, young, poisson, mass_density];
+        let all = [width, thickness, young, shear.profile(), mass_density];
         all.into_iter()
             .chain(hollow.iter().map(HollowSection::profile))
     }
@@ -161,34 +218,36 @@ impl Section {
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
-    /// The sides of the section at a fraction of the length.
-    fn dimensions_at(&self, sigma: f64) -> SectionDimensions {
-        let (width, thickness) = (self.width.at(sigma), self.thickness.at(sigma));
+    /// The sides of the section at a place.
+    fn dimensions_at(&self, place: impl Into<RodPlace>) -> SectionDimensions {
+        let place = place.into();
+        let (width, thickness) = (self.width.at(place), self.thickness.at(place));
         SectionDimensions {
             outline: self.outline,
             width,
             thickness,
             wall: self.hollow.as_ref().map(|hollow| match hollow {
-                HollowSection::Wall(wall) => wall.at(sigma),
-                HollowSection::Bore(inner) => 0.5 * (width - inner.at(sigma)),
+                HollowSection::Wall(wall) => wall.at(place),
+                HollowSection::Bore(inner) => 0.5 * (width - inner.at(place)),
             }),
         }
     }
 
-    /// A property at a fraction of the length.
-    fn property_value(&self, property: Property, sigma: f64) -> f64 {
-        let sides = self.dimensions_at(sigma);
-        let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
-        let shear = young / (2.0 * (1.0 + poisson));
+    /// A property at a place.
+    fn property_value(&self, property: Property, place: impl Into<RodPlace>) -> f64 {
+        let place = place.into();
+        let sides = self.dimensions_at(place);
+        let young = self.young.at(place);
+        let shear = self.shear.modulus(young, place);
         let area = sides.area();
         let second = sides.second_moments();
         match property {
             Property::Couple(0) => shear * sides.torsion_constant(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
-            Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
-            Property::Density => self.mass_density.at(sigma) * area,
-            Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
+            Property::Force(axis) => self.shear_factors_at(place)[axis - 1] * shear * area,
+            Property::Density => self.mass_density.at(place) * area,
+            Property::RotaryInertia => 0.5 * self.mass_density.at(place) * (second[0] + second[1]),
         }
     }
 
@@ -202,27 +261,42 @@ impl Section {
 
     /// Cowper's factors for both shear forces, at the knots and between them.
     fn shear_factors(&self) -> impl Iterator<Item = f64> {
-        let fractions = self.fractions();
-        fractions.flat_map(|sigma| {
-            self.dimensions_at(sigma)
-                .shear_factors(self.poisson.at(sigma))
-        })
+        self.places().flat_map(|place| self.shear_factors_at(place))
+    }
+
+    /// Cowper's factors for both shear forces at a place.
+    fn shear_factors_at(&self, place: RodPlace) -> [f64; 2] {
+        let young = self.young.at(place);
+        let poisson = self.shear.equivalent_poisson(young, place);
+        self.dimensions_at(place).shear_factors(poisson)
     }
 
     /// The knots, and places between them.
-    fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
-        let edges = [&[0.0], self.kinks.as_slice(), &[1.0]].concat();
+    fn places(&self) -> impl Iterator<Item = RodPlace> + use<> {
+        let edges = sorted_distinct([&[0.0], self.kinks.as_slice(), &[1.0]].concat());
         (0..edges.len() - 1).flat_map(move |panel| {
-            let (from, to) = (edges[panel], edges[panel + 1]);
-            (0..=STEPS_BETWEEN_KNOTS)
-                .map(move |k| from + k as f64 / STEPS_BETWEEN_KNOTS as f64 * (to - from))
+            let ends = [edges[panel], edges[panel + 1]];
+            (0..=STEPS_BETWEEN_KNOTS).map(move |k| {
+                let part = k as f64 / STEPS_BETWEEN_KNOTS as f64;
+                RodPlace::within(ends[0] + part * (ends[1] - ends[0]), ends)
+            })
         })
+    }
+
+    /// The sides on which the section is another one at a fraction of the length: both where it jumps.
+    fn sides_at(&self, sigma: f64) -> &'static [Side] {
+        let here = |kink: &f64| (kink - sigma).abs() <= SAME_KINK_DISTANCE;
+        let mut pairs = self.kinks.windows(2);
+        match pairs.any(|pair| pair[0] == pair[1] && here(&pair[0])) {
+            true => &[Side::Base, Side::Tip],
+            false => &[Side::Base],
+        }
     }
 }
 
 impl RodProperties for Section {
-    fn value_at(&self, property: usize, sigma: f64) -> f64 {
-        self.property_value(Property::ALL[property], sigma)
+    fn value_at(&self, property: usize, place: RodPlace) -> f64 {
+        self.property_value(Property::ALL[property], place)
     }
 
     fn extremes(&self, property: usize) -> [f64; 2] {
@@ -264,9 +338,14 @@ impl Radii {
         Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
     }
 
-    /// The moduli of the section of a rod at a fraction of its length.
-    pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
-        Some(self.0.get(rod)?.dimensions_at(sigma).moduli())
+    /// The moduli of the section of a rod at a fraction of its length: of both sections where it jumps.
+    pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Vec<Moduli> {
+        let sections = self.0.get(rod).into_iter();
+        let sides = |section: &'_ Arc<Section>| {
+            let of = |side: &Side| section.dimensions_at(RodPlace::new(sigma, *side)).moduli();
+            section.sides_at(sigma).iter().map(of).collect::<Vec<_>>()
+        };
+        sections.flat_map(sides).collect()
     }
 
     /// The larger side of the section of a rod, where that is largest.
@@ -323,17 +402,18 @@ pub(super) fn read_sections(
     let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
     let hollow = read_hollow(entries, outline, [&width, &thickness])?;
     let young = quantity(Key::Young)?;
-    let poisson = read_poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+    let shear = read_shear_law(entries, rods)?;
     let mass_density = match entries.given_value(Key::MassDensity) {
         Some(item) => item.profile_per_rod(rods)?,
         None => vec![Profile::Constant(0.0); rods],
     };
-    let all = [&width, &thickness, &young, &poisson, &mass_density];
+    let all = [&width, &thickness, &young, &mass_density];
     let mut sections: Vec<Arc<Section>> = Vec::with_capacity(rods);
     for rod in 0..rods {
         let own = |rod: usize| hollow.as_ref().map(|hollow| &hollow[rod]);
         let same = rod > 0
             && all.iter().all(|values| values[rod] == values[rod - 1])
+            && shear[rod] == shear[rod - 1]
             && own(rod) == own(rod - 1);
         sections.push(match sections.last() {
             Some(last) if same => last.clone(),
@@ -341,7 +421,8 @@ pub(super) fn read_sections(
                 outline,
                 [&width, &thickness].map(|side| side[rod].clone()),
                 own(rod).cloned(),
-                [&young, &poisson, &mass_density].map(|value| value[rod].clone()),
+                shear[rod].clone(),
+                [&young, &mass_density].map(|value| value[rod].clone()),
             )),
         });
     }
@@ -352,17 +433,35 @@ pub(super) fn read_sections(
 /// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
 fn check_shear_factors(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     for (rod, section) in sections.iter().enumerate() {
-        entries
-            .value_or_default(Key::Poisson)?
-            .entry(rod)
-            .refuse_unless(
-                section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+        let (key, change) = match section.shear {
+            ShearLaw::Poisson(_) => (Key::Poisson, "a negative ratio: choose a larger one"),
+            ShearLaw::Modulus(_) => (
+                Key::SectionShearModulus,
+                "more than half of section.young: choose a smaller one",
+            ),
+        };
+        entries.value_or_default(key)?.entry(rod).refuse_unless(
+            section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+            format_args!(
                 "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
-             so flat a section with a negative ratio: choose a larger one, or give the \
-             stiffnesses in place of a section",
-            )?;
+                 so flat a section with {change}, or give the stiffnesses in place of a section"
+            ),
+        )?;
     }
     Ok(())
+}
+
+/// What gives the shear modulus of every rod.
+fn read_shear_law(entries: &Entries, rods: usize) -> ScenarioResult<Vec<ShearLaw>> {
+    let Some(item) = entries.given_value(Key::SectionShearModulus) else {
+        let poisson = read_poisson(entries.value_or_default(Key::Poisson)?, rods)?;
+        return Ok(poisson.into_iter().map(ShearLaw::Poisson).collect());
+    };
+    let twice = "section.poisson is given, too, from which the shear modulus follows as well: leave \
+         one of them out";
+    item.refuse_unless(entries.given_value(Key::Poisson).is_none(), twice)?;
+    let modulus = item.profile_per_rod(rods)?;
+    Ok(modulus.into_iter().map(ShearLaw::Modulus).collect())
 }
 
 /// The outline of a section, and the keys of its two sides, along d2 and along d3.
@@ -410,12 +509,10 @@ fn read_hollow(
     let profiles = item.profile_per_rod(width.len())?;
     for (rod, profile) in profiles.iter().enumerate() {
         let sides = [&width[rod], &thickness[rod]];
-        let knots = [0.0, 1.0].into_iter();
-        let inner = sides.into_iter().chain([profile]).flat_map(Profile::kinks);
         // Between knots all are linear.
-        for sigma in knots.chain(inner.copied()) {
-            let side = sides.map(|side| side.at(sigma));
-            let (value, least) = (profile.at(sigma), side[0].min(side[1]));
+        for place in knot_places(sides.into_iter().chain([profile])) {
+            let side = sides.map(|side| side.at(place));
+            let (value, least) = (profile.at(place), side[0].min(side[1]));
             match bore {
                 Some(_) => item.entry(rod).refuse_unless(
                     value < least,
@@ -441,7 +538,7 @@ pub(super) fn read_poisson(item: EntryValue, rods: usize) -> ScenarioResult<Vec<
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();
         item.entry(rod).refuse_unless(
-            profile.min() > -1.0 && -most <= 0.5,
+            profile.min() > -1.0 && -most <= LARGEST_POISSON,
             "must be greater than -1 and at most 0.5, as of every isotropic material",
         )?;
     }
@@ -456,9 +553,10 @@ mod tests {
 
     fn section(outline: SectionOutline, width: f64, thickness: f64, poisson: f64) -> Section {
         let constant = Profile::Constant;
-        let material = [constant(2.0), constant(poisson), constant(3.0)];
+        let shear = ShearLaw::Poisson(constant(poisson));
         let sides = [constant(width), constant(thickness)];
-        Section::new(outline, sides, None, material)
+        let material = [constant(2.0), constant(3.0)];
+        Section::new(outline, sides, None, shear, material)
     }
 
     #[track_caller]

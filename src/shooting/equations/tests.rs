@@ -73,7 +73,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     let mut y = vec![0.0; equations.state_size()];
     rod.write_flat_state(&mut y, 0);
     let (sigma, length) = (0.3, equations.lengths[0]);
-    let law = equations.material(0, sigma);
+    let law = equations.material(0, sigma.into());
     let load = length * equations.gravity;
     let (value, slope): (SVector<f64, 12>, SMatrix<f64, 12, 12>) = jacobian(
         |z: SVector<_, 12>| paper(z, &rod, &law, length, load),
@@ -82,7 +82,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
 
     let mut slopes = vec![0.0; equations.state_size()];
     let mut tissue = TissueState::default();
-    equations.write_slopes(sigma, &y, &mut tissue, &mut slopes);
+    equations.write_slopes(sigma.into(), &y, &mut tissue, &mut slopes);
     let part = |k: usize| DVec3::new(value[3 * k], value[3 * k + 1], value[3 * k + 2]);
     let found = |k: usize| DVec3::from_slice(&slopes[k..]);
     assert!((found(0) - part(0)).length() < 1e-14);
@@ -93,7 +93,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     assert!((found(7) - part(2)).length() < 1e-14);
     assert!((found(10) - part(3)).length() < 1e-14);
 
-    let d = equations.derivatives(0, sigma, &y, &tissue);
+    let d = equations.derivatives(0, sigma.into(), &y, &tissue);
     let none = DMat3::ZERO;
     // Of R turned further by theta and of its rate w: theta' = dw + w x theta.
     let blocks = [

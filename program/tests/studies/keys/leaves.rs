@@ -157,6 +157,18 @@ load = { tip_force = [0.1, 0.2, -0.3], g = [0.0, 5.0, -9.0] }
         boundary: None,
     },
     TestLeaf {
+        name: "fibrous",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+section = { shape = \"rectangle\", width = 0.2, thickness = 0.1, young = 1e5, shear_modulus = 5e3, mass_density = 2.0 }
+rest = { bend_3 = 0.8 }
+load = { tip_force = [0.1, 0.6, -3.0], g = [0.0, 5.0, -9.0] }
+",
+        vary: ["load.tip_force[2]=-3.0..-3.1", "load.g[2]=-9.0..-9.2"],
+        free: ["section.shear_modulus", "section.young"],
+        boundary: None,
+    },
+    TestLeaf {
         name: "blade",
         text: "
 leaf = { rods = 3, elevation = 0.4 }

@@ -71,6 +71,7 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::Wall => smooth("walled", "section.wall=0.021"),
         Key::Young => smooth("oval", "section.young=1.05e5"),
         Key::Poisson => smooth("oval", "section.poisson=0.35"),
+        Key::SectionShearModulus => smooth("fibrous", "section.shear_modulus=5.5e3"),
         Key::MassDensity => smooth("oval", "section.mass_density=2.1"),
         Key::BladeLength => smooth("blade", "blade.length=25.5"),
         Key::BladeWidth => always(
