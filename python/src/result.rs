@@ -4,7 +4,9 @@ use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::relax::{Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses};
+use leafdyn::relax::{
+    BaseReaction, Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses,
+};
 use leafdyn::scenario::{Scenario, Stress};
 use leafdyn_program::files::{self, FileError, FileKind, ResultDocument, WrittenResult};
 use pyo3::exceptions::{PyKeyError, PyOSError};
@@ -113,6 +115,13 @@ impl Files {
     fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
         save(py, &*self.result, &self.input, &folder, &kinds)
     }
+}
+
+/// The force on a base, or on all, and the moment if there is one.
+fn force_and_moment<'py>(py: Python<'py>, on_base: &BaseReaction) -> PyResult<ForceAndMoment<'py>> {
+    let force = array(py, flat([on_base.force]), &[3])?;
+    let moment = on_base.moment.map(|moment| array(py, flat([moment]), &[3]));
+    Ok((force, moment.transpose()?))
 }
 
 /// See [`Leaf::position_changes`].
@@ -255,6 +264,27 @@ impl Leaf {
             Ok((force, moment.transpose()?))
         };
         self.found.grip_reactions.iter().map(reaction).collect()
+    }
+
+    /// Of every base the force that its support feels, and the moment unless it is hinged.
+    fn base_reactions<'py>(&self, py: Python<'py>) -> PyResult<Vec<ForceAndMoment<'py>>> {
+        let bases = self.found.base_reactions.iter();
+        bases.map(|base| force_and_moment(py, base)).collect()
+    }
+
+    /// The force that the supports of all bases feel, and the moment; none where nothing was found.
+    fn base_reaction<'py>(&self, py: Python<'py>) -> PyResult<Option<ForceAndMoment<'py>>> {
+        let all = self.found.base_reaction.as_ref();
+        all.map(|all| force_and_moment(py, all)).transpose()
+    }
+
+    /// Bounds on the errors of force and moment on all bases, then on every base; none where they are not
+    /// known.
+    fn base_reaction_errors(&self) -> Vec<[Option<f64>; 2]> {
+        let bounds = |it: &BaseReaction| [it.error, it.moment_error];
+        let all = self.found.base_reaction.as_ref().map_or([None; 2], bounds);
+        let bases = self.found.base_reactions.iter();
+        iter::once(all).chain(bases.map(bounds)).collect()
     }
 
     /// Bounds on the errors of the force and of the moments at the tip, then of the force and of the

@@ -33,9 +33,15 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
     for name in (
         "name method outcome success remark remark_code doubts rods joined segments tolerance residual energy stable "
         "negative_eigenvalues neutral_directions path path_events error_estimate tip_reaction_error "
-        "tip_reaction_moments_error grip_reaction_errors error_in_veins error_in_veins_remark"
+        "tip_reaction_moments_error grip_reaction_errors base_reaction_error base_reaction_errors error_in_veins "
+        "error_in_veins_remark"
     ).split():
         assert getattr(again, name) == getattr(leaf, name), name
+    on_bases = [[it.base_reaction, *it.base_reactions] for it in (again, leaf)]
+    for one, two in zip(*on_bases, strict=True):
+        assert one is not None and two is not None
+        assert np.array_equal(one[0], two[0])
+        assert (one[1] is None) == (two[1] is None) and (one[1] is None or np.array_equal(one[1], two[1]))
     assert repr(again) == repr(leaf)
     assert not again.positions.flags.writeable
     assert again.figure() == leaf.figure()

@@ -68,6 +68,21 @@ def test_a_held_tip_pushes_back() -> None:
     assert leafdyn.relax(fan(1), set={"leaf.fan": [0.0]}).tip_reaction is None
 
 
+def test_the_bases_bear_the_leaf() -> None:
+    leaf = leafdyn.relax(fan(3))
+    assert leaf.base_reaction is not None
+    force, moment = leaf.base_reaction
+    said = leaf.to_dict()["base_reaction"]
+    assert force.tolist() == said["force"]
+    assert moment.tolist() == said["moment"]
+    assert leaf.base_reaction_error == [said["error"], said["moment_error"]]
+    assert np.allclose(sum(on_base for on_base, _ in leaf.base_reactions), force, atol=1e-5)
+    assert len(leaf.base_reaction_errors) == 3
+    hinge = {"leaf.rods": 1, "leaf.fan": [0.0], "leaf.base_held": "pinned"}
+    ((_, none),) = leafdyn.relax(fan(1), set=hinge).base_reactions
+    assert none is None
+
+
 def test_a_grip_that_travels_is_pushed_back() -> None:
     vein = {**fan(1), "tip": {"held": "clamped", "position": [0.9, 0.0, 0.0]}}
     vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}

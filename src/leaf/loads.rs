@@ -92,6 +92,17 @@ impl DiscreteLeaf {
         .collect()
     }
 
+    /// The sum of the dead moments on points that are left to the clamp of the base.
+    pub fn dead_moment_on_clamp(&self) -> DVec3 {
+        if self.loads.dead_moment_factor == 0.0 {
+            return DVec3::ZERO;
+        }
+        let points = self.leaf.point_dead_moments();
+        let clamped = points.filter(|it| self.grid.nearest_node(it.sigma) < self.first_node());
+        let sum: DVec3 = clamped.map(|it| it.moment).sum();
+        self.load_factor * self.loads.dead_moment_factor * sum
+    }
+
     /// Whether dead moments act.
     pub fn has_moments(&self) -> bool {
         self.dead_moments().next().is_some()

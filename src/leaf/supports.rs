@@ -164,6 +164,23 @@ impl DiscreteLeaf {
         reactions
     }
 
+    /// What every rod exerts on the support of its base: the force, and the moment about the base, which
+    /// of a hinge is zero.
+    pub fn base_reactions(&self, state: &State) -> Vec<Wrench> {
+        let on_base = |j: usize| {
+            let own = self.unbalanced_node_load(state, j, 0);
+            let tissue = self.rigid_end_load(state, j, 0);
+            Wrench {
+                force: own.force + tissue.force,
+                moment: match self.leaf.hinged() {
+                    true => DVec3::ZERO,
+                    false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
+                },
+            }
+        };
+        (0..self.rods()).map(on_base).collect()
+    }
+
     /// The forces on all supports that are placed: on the holder of the tips, if any, and on every grip.
     pub fn support_forces(&self, state: &State) -> Vec<DVec3> {
         let tips = self

@@ -46,7 +46,7 @@ pub use crate::relax::request::{
 };
 pub use crate::relax::rest::relax_from;
 pub(crate) use crate::relax::rest::{RelaxedLeaf, relax_on_grids};
-pub use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
+pub use crate::relax::result::forces::{BaseReaction, GripReaction, Reaction, Stresses};
 pub(crate) use crate::relax::result::serialize_index;
 pub use crate::relax::result::{
     Accuracy, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, FewerVeins,

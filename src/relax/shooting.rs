@@ -8,16 +8,17 @@ use crate::relax::request::{
     MAX_INTERVALS, Options, Progress, RelaxError, SemiImplicit, ShootingVariant,
 };
 use crate::relax::rest::relax_on_grids;
-use crate::relax::result::forces::{Reaction, Stresses};
+use crate::relax::result::forces::{BaseReactions, Reaction, Stresses};
 use crate::relax::result::report::{RunEnd, neutral_directions};
 use crate::relax::result::{
     Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability, report,
 };
 use crate::relax::solve_on_grid::coarsest;
 use crate::relax::stability::index_near;
+use crate::rod::Wrench;
 use crate::run::{Instant, RefusedOption, UnmodelledFeature};
-use crate::scenario::{Scenario, longest};
-use crate::shape::{RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
+use crate::scenario::{Scenario, SupportKind, longest};
+use crate::shape::{NodeState, RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
 use crate::shooting::{ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::{memory, shooting};
 use glam::DVec3;
@@ -215,6 +216,23 @@ fn shoot(
     let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
     let tip_force_sum = tips.iter().map(|node| node.rotation * node.n).sum();
+    let on_bases = errors.map(|errors| {
+        let bases = || rods.iter().map(|rod| &rod.nodes[0]);
+        let places: Vec<DVec3> = bases().map(|base| base.position).collect();
+        let hinged = scenario.base_held == SupportKind::Pinned;
+        let wrench = |base: &NodeState| Wrench {
+            force: base.rotation * base.n,
+            moment: match hinged {
+                true => DVec3::ZERO,
+                false => base.rotation * base.m,
+            },
+        };
+        let wrenches: Vec<Wrench> = bases().map(wrench).collect();
+        BaseReactions::from_each(&places, &wrenches, hinged, [errors.force, errors.moment])
+    });
+    let (base_reactions, base_reaction) = on_bases.map_or((Vec::new(), None), |on_bases| {
+        (on_bases.each, Some(on_bases.all))
+    });
     let rods_at_own = rods_at_stations(&own, &stations, &rods);
     Equilibrium {
         scenario: scenario.name.clone(),
@@ -227,6 +245,8 @@ fn shoot(
         tips: tips.iter().take(listed).map(|node| node.position).collect(),
         tip_force_sum,
         grip_reactions: Vec::new(),
+        base_reactions,
+        base_reaction,
         reaction: scenario.held_tip.as_ref().map(|held| Reaction {
             force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
             // Every rod has its part of the error.

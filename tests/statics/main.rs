@@ -2,6 +2,7 @@
 
 mod arch;
 mod balance;
+mod base_reactions;
 mod blade;
 mod coming_to_rest;
 mod corrections;

@@ -39,12 +39,12 @@ const LONGEST: Duration = Duration::from_secs(3);
 const ANOTHER: f64 = 0.05;
 
 /// A random leaf in cm and N, and which of [`KINDS`] it has.
-struct Drawn {
-    scenario: Scenario,
-    kinds: [bool; KINDS.len()],
+pub struct Drawn {
+    pub scenario: Scenario,
+    pub kinds: [bool; KINDS.len()],
 }
 
-fn draw(seed: usize) -> Drawn {
+pub fn draw(seed: usize) -> Drawn {
     let mut random = Draw(0x5eed_0000 + seed as u64);
     let rods = 1 + random.uniform(0.0, 4.0) as usize;
     let single = rods == 1;
@@ -217,7 +217,7 @@ fn draw(seed: usize) -> Drawn {
 
 /// A random blade in cm and N under its weight: pointed, a fan or a strip, free, gripped at its margins, loaded or in
 /// wind.
-fn draw_blade(seed: usize) -> Drawn {
+pub fn draw_blade(seed: usize) -> Drawn {
     let mut random = Draw(0xb1ad_0000 + seed as u64);
     let rods = [3, 5, 5, 7, 9][(5.0 * random.even()) as usize];
     let length = random.log(5.0, 40.0);

@@ -12,13 +12,13 @@ use crate::report::numbers::{
 };
 use crate::report::table::{LabelledLines, label_first_line};
 use glam::DVec3;
-use leafdyn::numbers::{format_two_digits, largest};
+use leafdyn::numbers::{format_two_digits, larger, largest};
 use leafdyn::relax::{
     Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
     Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
 };
 use leafdyn::scenario::units::{
-    AREA, COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
+    AREA, COUPLE_STIFFNESS, Dimension, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
 };
 use leafdyn::scenario::{Stress, Units};
 use leafdyn::study::{Equilibria, FoundEquilibrium};
@@ -59,6 +59,7 @@ impl ReportedResult for Equilibrium {
             let energy = format_as_accurate(self, energy, energy);
             lines.push(("energy", number_in_unit(energy, units, ENERGY)));
         }
+        lines.extend(base_line(self, units).map(|base| ("base", base)));
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
@@ -198,6 +199,41 @@ fn reaction_text(
         .to_array()
         .map(|it| format_within_error(it, error))
         .join(", ")
+}
+
+/// Part of a force or a moment down to which components on bases are told.
+const BASE_PRECISION: f64 = 1e-5;
+
+/// The force on the supports of all bases, and the moment.
+fn base_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
+    let on_base = (equilibrium.base_reaction).filter(|_| equilibrium.outcome.is_at_rest())?;
+    let text = |vector: DVec3, error: Option<f64>, size: f64, unit: Dimension| {
+        let error = error.unwrap_or(0.0).max(BASE_PRECISION * size);
+        let text = format_position(vector.to_array(), decimals_for_error(error));
+        number_in_unit(text, units, unit)
+    };
+    let (force, longest) = (on_base.force, equilibrium.shape.longest());
+    let moment = on_base.moment.unwrap_or_default();
+    let size = larger(force.length(), moment.length() / longest);
+    let force = text(force, on_base.error, size, FORCE);
+    let moment = text(moment, on_base.moment_error, size * longest, ENERGY);
+    let bases = || {
+        equilibrium
+            .shape
+            .rods
+            .iter()
+            .map(|rod| rod.nodes[0].position)
+    };
+    let apart = bases().any(|place| Some(place) != bases().next());
+    let hinged = equilibrium
+        .base_reactions
+        .iter()
+        .all(|it| it.moment.is_none());
+    Some(match (apart, hinged) {
+        (true, _) => format!("{force} on its supports, with the moment {moment} about their mean"),
+        (false, true) => format!("{force} on its hinge"),
+        (false, false) => format!("{force} on its support, with the moment {moment}"),
+    })
 }
 
 /// What was solved for, and what of the rods' strains matters.

@@ -129,6 +129,32 @@ class Equilibrium(Viewed):
         return self._core.grip_reactions()
 
     @computed
+    def base_reactions(self) -> list[tuple[Array, Array | None]]:
+        """Of every vein the force that the support of its base feels, shape (3,), along the lab axes, and the moment about
+        the base; no moment on a hinge."""
+        return self._core.base_reactions()
+
+    @computed
+    def base_reaction(self) -> tuple[Array, Array] | None:
+        """The force that the supports of all bases feel together, shape (3,), as a balance below them would show it, and
+        the moment about the mean of the bases; none where shooting found no solution."""
+        return self._core.base_reaction()
+
+    @computed
+    def _base_errors(self) -> list[list[float | None]]:
+        return self._core.base_reaction_errors()
+
+    @property
+    def base_reaction_error(self) -> list[float | None]:
+        """Bounds on the errors of force and moment of `base_reaction`; none where they are not known."""
+        return self._base_errors[0]
+
+    @property
+    def base_reaction_errors(self) -> list[list[float | None]]:
+        """Bounds on the errors of every base's force and moment; none where there is none, or on a single grid."""
+        return self._base_errors[1:]
+
+    @computed
     def _reaction_errors(self) -> list[list[float | None]]:
         return self._core.reaction_errors()
 
@@ -426,6 +452,9 @@ _LATER = (
     "_veins",
     "_reaction",
     "grip_reactions",
+    "base_reactions",
+    "base_reaction",
+    "_base_errors",
     "_reaction_errors",
     "_modes",
     "_mode_shapes",

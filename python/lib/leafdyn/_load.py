@@ -143,6 +143,7 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
     eigenvalues = said.get("lowest_eigenvalues")
     errors = [math.inf if bound is None else bound for bound in said.get("eigenvalue_errors") or []]
     blade = said.get("blade") or {}
+    on_bases, on_all = said.get("base_reactions") or [], said.get("base_reaction")
     tips = [said["tip"]] if said["tip"] is not None else said["tips"]
     entries = said.get("sensitivities") or []
     nowhere = np.empty((0, 0, 3))
@@ -171,13 +172,13 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "curves": positions,
         "curve_stations": stations,
         "sensitivities": {entry["key"]: Sensitivity(entry, np.empty(0), nowhere, None) for entry in entries},
-        "grip_reactions": [
-            (_array(grip["force"]), None if grip.get("moment") is None else _array(grip["moment"]))
-            for grip in said.get("grip_reactions") or []
-        ],
+        "grip_reactions": [_force_and_moment(grip) for grip in said.get("grip_reactions") or []],
+        "base_reactions": [_force_and_moment(base) for base in on_bases],
+        "base_reaction": None if on_all is None else _force_and_moment(on_all),
+        "_base_errors": [_force_and_moment_errors(base) for base in (on_all or {}, *on_bases)],
         "_reaction_errors": [
             [said.get("tip_reaction_error"), said.get("tip_reaction_moments_error")],
-            *([grip.get("error"), grip.get("moment_error")] for grip in said.get("grip_reactions") or []),
+            *(_force_and_moment_errors(grip) for grip in said.get("grip_reactions") or []),
         ],
     }
     if "tip_force_sum" in said:
@@ -200,6 +201,14 @@ _SCALARS = (
 def _array(numbers: Any) -> NDArray[np.float64]:
     """An array; none is not a number."""
     return np.array(numbers, dtype=np.float64)
+
+
+def _force_and_moment(said: Said) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    return _array(said["force"]), None if said.get("moment") is None else _array(said["moment"])
+
+
+def _force_and_moment_errors(said: Said) -> list[float | None]:
+    return [said.get("error"), said.get("moment_error")]
 
 
 def _reaction(said: Said) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:

@@ -13,7 +13,7 @@ use crate::relax::remark::{
     serialize_remark,
 };
 use crate::relax::request::Method;
-use crate::relax::result::forces::{GripReaction, Reaction, Stresses};
+use crate::relax::result::forces::{BaseReaction, GripReaction, Reaction, Stresses};
 use crate::relax::saddle::Saddle;
 use crate::scenario::{Blade, Scenario};
 use crate::shape::{RodShape, Undulation, serialize_tips};
@@ -311,6 +311,12 @@ pub struct Equilibrium {
     /// What it exerts on every grip.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub grip_reactions: Vec<GripReaction>,
+    /// What it exerts on the support of every base; empty where shooting found no solution.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub base_reactions: Vec<BaseReaction>,
+    /// What it exerts on the supports of all bases; `None` where shooting found no solution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base_reaction: Option<BaseReaction>,
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,

@@ -65,6 +65,7 @@ pub fn equilibrium(
     let error_estimate = error.map(|error| (error + added_error) * scale.length);
     let DrawnCenterlines { grid, lines } = centerlines(found, finest);
     let energy = found.energy();
+    let on_bases = found.base_reactions();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = found
         .levels
@@ -84,6 +85,8 @@ pub fn equilibrium(
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: found.reaction(),
         grip_reactions: found.grip_reactions(),
+        base_reactions: on_bases.each,
+        base_reaction: Some(on_bases.all),
         stability: Stability {
             negative_eigenvalues: found.index,
             neutral_directions: neutral_directions(scenario, &rods),
