@@ -165,7 +165,7 @@ impl DiscreteLeaf {
     }
 
     /// What every rod exerts on the support of its base: the force, and the moment about the base, which
-    /// of a hinge is zero.
+    /// of a hinge is zero, or that of its spring.
     pub fn base_reactions(&self, state: &State) -> Vec<Wrench> {
         let on_base = |j: usize| {
             let own = self.unbalanced_node_load(state, j, 0);
@@ -173,7 +173,7 @@ impl DiscreteLeaf {
             Wrench {
                 force: own.force + tissue.force,
                 moment: match self.leaf.hinged() {
-                    true => DVec3::ZERO,
+                    true => -self.base_spring_load(state, j).moment,
                     false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
                 },
             }

@@ -17,7 +17,7 @@ use crate::relax::solve_on_grid::coarsest;
 use crate::relax::stability::index_near;
 use crate::rod::Wrench;
 use crate::run::{Instant, RefusedOption, UnmodelledFeature};
-use crate::scenario::{Scenario, SupportKind, longest};
+use crate::scenario::{BaseSupport, Scenario, longest};
 use crate::shape::{NodeState, RodShape, STATION_TOLERANCE, Undulation, equally_spaced};
 use crate::shooting::{ShootingFailureReason, ShootingSolution, ShootingStart};
 use crate::{memory, shooting};
@@ -219,7 +219,7 @@ fn shoot(
     let on_bases = errors.map(|errors| {
         let bases = || rods.iter().map(|rod| &rod.nodes[0]);
         let places: Vec<DVec3> = bases().map(|base| base.position).collect();
-        let hinged = scenario.base_held == SupportKind::Pinned;
+        let hinged = scenario.base_held == BaseSupport::Pinned;
         let wrench = |base: &NodeState| Wrench {
             force: base.rotation * base.n,
             moment: match hinged {

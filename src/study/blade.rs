@@ -233,7 +233,7 @@ fn veins_at_rest_between(
                 let node = &vein.nodes[at];
                 let sign = first.dot(node.rotation).signum();
                 between.position += *weight * node.position;
-                between.rotation = between.rotation + node.rotation * (sign * weight);
+                between.rotation += node.rotation * (sign * weight);
                 between.v += *weight * node.v;
                 between.u += *weight * node.u;
                 between.n += share * weight * node.n;

@@ -246,6 +246,10 @@ fn scenes() -> Vec<Scenario> {
         parse(&format!("{CLAMPED}\n{pinned}")),
         parse(&format!("{CLAMPED}\n{grips}")),
         parse(HINGED),
+        parse(&HINGED.replace(
+            "\"pinned\"",
+            "\"elastic\", base_turn_stiffness = [0.8, 2.0, 0.3]",
+        )),
         parse(&format!("{HINGED}\n{clamped}")),
         parse(&format!("{ROD}\n{grips}")),
         parse(&format!("{ROD}\n{clamped}")),

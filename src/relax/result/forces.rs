@@ -154,7 +154,7 @@ struct IntegratedBases {
 
 impl IntegratedBases {
     fn new(leaf: &DiscreteLeaf, FieldErrors { estimate, safety }: FieldErrors) -> Self {
-        let on_clamp = |moment: DVec3| match leaf.leaf.hinged() {
+        let on_clamp = |moment: DVec3| match leaf.leaf.turns_freely() {
             true => DVec3::ZERO,
             false => moment,
         };
@@ -367,7 +367,7 @@ impl NestedEquilibrium {
     /// What the leaf exerts on the supports of its bases.
     pub fn base_reactions(&self) -> BaseReactions {
         let leaf = &self.levels[0].leaf;
-        let (scale, hinged) = (leaf.leaf.scale, leaf.leaf.hinged());
+        let (scale, hinged) = (leaf.leaf.scale, leaf.leaf.turns_freely());
         let places: Vec<DVec3> = (0..leaf.rods())
             .map(|j| leaf.leaf.base_pose(j).position)
             .collect();
