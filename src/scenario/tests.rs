@@ -259,7 +259,7 @@ fn what_cannot_be_is_refused() {
         leaf.base=[[0, 0, 0]] => has 1 entries: must have 3
         leaf.base=[1e9, 0, 0] => gives |base|/L
         leaf.elevation=[0.1, 0.2] => must have 3
-        leaf.base_held=free => must be "pinned"
+        leaf.base_held=free => must be "clamped"
         tissue.along=-1 => must not be negative
         tissue.along=[1, 2, 3] => has 3 entries: must have 2, one per gap
         tissue.across=1e30 => gives k L^4/A
