@@ -227,7 +227,11 @@ fn loads_and_factors_in_time() {
         gravity = { at = [0], value = [[0, 1]] } => dynamics.gravity, value, entry 1 = [0, 1]: has 2 entries: must have 3, one per axis
         tip_force = { at = [0,\n 1], value = [[0, 0, 1],\n [0, nan, 1]] } => leaf.toml:22: dynamics.tip_force, value, entry 2, component 2 = nan: must be a finite number
         rest = 2.0 => dynamics.rest = 2.0: must be a table: a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }
-        rest = { at = [0], value = [1] } => unknown key value: a factor in time is
+        rest = { at = [0], values = [1] } => unknown key values: a factor in time is
+        rest = { at = [0], value = [1, 2] } => dynamics.rest, value = [1, 2]: has 2 entries: must have 1, one per entry of at
+        rest = { amplitude = [1], frequency = 1 } => dynamics.rest, amplitude = [1]: must be a number
+        gravity = { amplitude = 1, frequency = 1 } => dynamics.gravity, amplitude = 1: must be a list of three numbers [x, y, z]
+        gravity = { amplitude = [0, 0, 1], frequency = inf } => dynamics.gravity, frequency = inf: must be a finite number
         rest = { at = [0], factor = 1 } => dynamics.rest, factor = 1: must be a list of numbers
         rest = { at = [0, 1], factor = [1, true] } => dynamics.rest, factor, entry 2 = true: must be a number
         [dynamics.rest]\nat = [0, 1] => leaf.toml:20: dynamics.rest = & factor is missing

@@ -379,13 +379,15 @@ impl<'e> EntryValue<'e> {
 
     /// A factor that may change in time.
     pub fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
-        self.schedule("factor", FACTOR_SCHEDULE_FORM, |item| item.number())
+        self.schedule(["factor", LIST_OF_NUMBERS], FACTOR_SCHEDULE_FORM, |item| {
+            item.number()
+        })
     }
 
-    /// A quantity in time: through values, which have this `name`, or a sine. `form` describes both.
+    /// A quantity in time: through values, a list of this name and form, or a sine. `form` describes both.
     fn schedule<T: InTime>(
         &self,
-        name: &'static str,
+        [name, values]: [&'static str; 2],
         form: &str,
         value: impl Fn(&EntryValue<'e>) -> ScenarioResult<T>,
     ) -> ScenarioResult<Schedule<T>> {
@@ -424,7 +426,7 @@ impl<'e> EntryValue<'e> {
             }));
         }
         let at = part("at")?.increasing_numbers(KnotKind::Times)?;
-        let list = part(named)?.list_of_length(at.len(), ONE_PER_KNOT, "a list")?;
+        let list = part(named)?.list_of_length(at.len(), ONE_PER_KNOT, values)?;
         let values: Vec<T> = list
             .map(|item| value(&item))
             .collect::<ScenarioResult<_>>()?;
@@ -567,7 +569,7 @@ impl<'e> EntryValue<'e> {
         if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
-        self.schedule("value", LOAD_SCHEDULE_FORM, |item| item.vector())
+        self.schedule(["value", VECTORS], LOAD_SCHEDULE_FORM, |item| item.vector())
     }
 
     /// A place along a rod: a fraction of its length, greater than 0.
