@@ -24,7 +24,7 @@ single-shooting shooting shooting-from-rest check chart | gripped | does not tak
 relax explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit page figures | windy gripped-in-wind | does not take wind
 check single-shooting shooting shooting-from-rest | gripped-in-wind | does not take grips
 single-shooting shooting | jaws pinned | a tip that is held (tip.held)
-single-shooting shooting | leaf.base_held leaf.base_turn_stiffness | a leaf on hinges
+single-shooting shooting | leaf.base_held rooted | a leaf on hinges
 single-shooting shooting | leaf.base | veins that begin apart
 explicit | twisted | dead moments without a potential
 margin | twisted | has no potential, hence no barrier
