@@ -196,7 +196,7 @@ impl ForceConvergence {
         let rounding = FORCES.strain_rounding * leaf.segments() as f64 * stiffness;
         ForceConvergence {
             nearly_rigid: leaf.is_nearly_rigid(),
-            is_indeterminate: leaf.leaf.has_placed_supports(),
+            is_indeterminate: leaf.leaf.has_placed_supports() || leaf.has_rigid_tissue(),
             missed_strain: f64::INFINITY,
             stiffness,
             rounding,

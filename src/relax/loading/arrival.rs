@@ -229,16 +229,19 @@ pub fn state_on_requested_grid(
             Some(_) => GRIDS.coarsest_of_blade,
             None => GRIDS.coarsest,
         };
-        let GridLevel {
-            mut leaf,
-            mut state,
-        } = arrived;
-        while leaf.segments() < least {
-            state = prolong(&leaf, &state);
-            leaf = DiscreteLeaf::new(problem.leaf, leaf.grid.refined());
-        }
-        let grid = leaf.grid;
-        return StateOnGrid { grid, state };
+        let GridLevel { leaf, state } = arrived;
+        // A grid of its own: a refined one has as many segments, but others between the kinks.
+        let own = grid_of(problem.leaf, least);
+        return match leaf.segments() < own.segments() {
+            true => StateOnGrid {
+                state: transfer(&leaf, &state, &own),
+                grid: own,
+            },
+            false => StateOnGrid {
+                grid: leaf.grid,
+                state,
+            },
+        };
     };
     let grid = Grid::new(segments, problem.leaf.kinks());
     let mut finest = arrived;
