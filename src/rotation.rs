@@ -144,6 +144,27 @@ pub fn log(q: DQuat) -> DVec3 {
     w.scale(sigma + sigma).into()
 }
 
+/// Squared rotation angle below which [`log_rate`] uses a series.
+const SMALL_SQUARED_ANGLE: f64 = 1e-4;
+
+/// The derivative of the rotation vector theta of a rotation, [`log`], by further rotations about fixed axes:
+/// 1 - \[theta\]/2 + k \[theta\]^2 with k = (1 - theta/2 cot(theta/2))/theta^2. Its symmetric part is that
+/// without \[theta\]/2, and theta is its eigenvector.
+pub fn log_rate(theta: DVec3) -> DMat3 {
+    let square = theta.length_squared();
+    let k = match square < SMALL_SQUARED_ANGLE {
+        true => 1.0 / 12.0 + square / 720.0,
+        false => {
+            let half = 0.5 * square.sqrt();
+            (1.0 - half / half.tan()) / square
+        }
+    };
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    let [x, y, z] =
+        axes.map(|axis| axis - 0.5 * theta.cross(axis) + k * theta.cross(theta.cross(axis)));
+    DMat3::from_cols(x, y, z)
+}
+
 /// The matrix a b^T.
 #[inline]
 pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
@@ -329,6 +350,20 @@ mod tests {
     use std::f64::consts::PI;
 
     const AXIS: DVec3 = DVec3::new(0.48, -0.6, 0.64);
+
+    /// Of small angles and large ones, against differences.
+    #[test]
+    fn the_rate_of_a_rotation_vector() {
+        for size in [1e-3, 0.5, 2.5] {
+            let theta = size * DVec3::new(0.6, -0.48, 0.64);
+            let rate = log_rate(theta);
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let turned = |h: f64| log(exp(h * axis) * exp(theta));
+                let slope = (turned(1e-5) - turned(-1e-5)) / 2e-5;
+                assert!(slope.distance(rate * axis) < 1e-9, "{size} {axis}");
+            }
+        }
+    }
 
     #[test]
     fn log_undoes_exp_up_to_half_a_turn() {

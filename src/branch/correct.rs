@@ -405,7 +405,10 @@ fn step_along_branch(
     let [fraction] = near.params;
     let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
     // How far a branch turns in a step is told by its tangent.
-    let straight = equations.displace_along_direction(&now.solution(), &now.tangent, step)?;
+    let straight = match bent {
+        Some(_) => equations.displace_along_direction(&now.solution(), &now.tangent, step)?,
+        None => near,
+    };
     let drift = larger(
         straight.state.largest_displacement_to(&point.state),
         (point.fraction - straight.params[0]).abs(),

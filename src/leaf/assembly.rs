@@ -218,9 +218,7 @@ impl DiscreteLeaf {
             return 0.0;
         }
         let none = NodeLoad::default();
-        let of = |j: usize| {
-            self.load_with_tissue(state, j, 0, none).energy - self.base_spring_load(state, j).energy
-        };
+        let of = |j: usize| self.load_with_tissue(state, j, 0, none).energy;
         (0..self.rods()).map(of).sum()
     }
 

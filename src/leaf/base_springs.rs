@@ -6,31 +6,25 @@ use crate::leaf::discrete::{DiscreteLeaf, NodeLoad};
 use crate::leaf::state::{Increment, State, rotation_part};
 use crate::leaf::system::System;
 use crate::rod::Wrench;
-use crate::rotation::{self, outer};
+use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Squared turns below which the series of a function of them is used.
-const SMALL_SQUARED_TURN: f64 = 1e-4;
-
 impl Leaf {
+    /// The rotation vector, along the lab axes, from the natural direction of the base of rod `j` to `q`.
+    fn base_turn(&self, j: usize, q: DQuat) -> DVec3 {
+        rotation::log(q * self.base_pose(j).rotation.conjugate())
+    }
+
     /// The moment of rod `j` at a base with the rotation `q`: that of its spring, or none.
     pub fn base_spring_moment(&self, j: usize, q: DQuat) -> DVec3 {
-        let turn = rotation::log(q * self.base_pose(j).rotation.conjugate());
-        self.base_turn_stiffness(j) * turn
+        self.base_turn_stiffness(j) * self.base_turn(j, q)
     }
 }
 
 impl DiscreteLeaf {
     /// Whether springs hold the directions of the bases.
-    pub(super) fn has_base_springs(&self) -> bool {
-        self.leaf.hinged() && !self.leaf.turns_freely()
-    }
-
-    /// The rotation vector by which the base of rod `j` has turned from its natural direction, along the lab
-    /// axes.
-    fn base_turn(&self, state: &State, j: usize) -> DVec3 {
-        let natural = self.leaf.base_pose(j).rotation;
-        rotation::log(state.q[state.base(j)] * natural.conjugate())
+    pub fn has_base_springs(&self) -> bool {
+        self.leaf.has_base_springs()
     }
 
     /// The moment and the energy of the spring at the base of rod `j`.
@@ -39,7 +33,7 @@ impl DiscreteLeaf {
         if stiffness == 0.0 {
             return NodeLoad::default();
         }
-        let turn = self.base_turn(state, j);
+        let turn = self.leaf.base_turn(j, state.q[state.base(j)]);
         NodeLoad {
             moment: -stiffness * turn,
             energy: 0.5 * stiffness * turn.length_squared(),
@@ -48,19 +42,10 @@ impl DiscreteLeaf {
     }
 
     /// The second derivatives of the energy of the spring at the base of rod `j` by the rotation of the base,
-    /// the symmetric part of those of its moment: c (1 + k [theta]^2) with k = (1 - theta/2 cot(theta/2))/theta^2.
+    /// the symmetric part of those of its moment.
     fn base_spring_stiffness(&self, state: &State, j: usize) -> DMat3 {
-        let turn = self.base_turn(state, j);
-        let square = turn.length_squared();
-        let k = match square < SMALL_SQUARED_TURN {
-            true => 1.0 / 12.0 + square / 720.0,
-            false => {
-                let half = 0.5 * square.sqrt();
-                (1.0 - half / half.tan()) / square
-            }
-        };
-        let twice_crossed = outer(turn, turn) - DMat3::from_diagonal(DVec3::splat(square));
-        self.leaf.base_turn_stiffness(j) * (DMat3::IDENTITY + k * twice_crossed)
+        let rate = rotation::log_rate(self.leaf.base_turn(j, state.q[state.base(j)]));
+        0.5 * self.leaf.base_turn_stiffness(j) * (rate + rate.transpose())
     }
 
     /// Adds the springs to an assembled system, to its matrix if wanted; returns their energy.

@@ -419,7 +419,13 @@ impl DiscreteLeaf {
 
     /// Dead load, coupling and tissue on node `i` of rod `j`.
     pub fn load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
-        self.load_with_tissue(state, j, i, self.tissue_load(state, j, i))
+        let mut load = self.load_with_tissue(state, j, i, self.tissue_load(state, j, i));
+        if i == 0 {
+            let spring = self.base_spring_load(state, j);
+            load.moment += spring.moment;
+            load.energy += spring.energy;
+        }
+        load
     }
 
     /// The load on node `i` of rod `j`, of which this is that of the tissue.
@@ -442,14 +448,10 @@ impl DiscreteLeaf {
         let weights = self.node_weights(i);
         let lanes = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
         let own = self.own_load_on_node(j, i);
-        let spring = match i {
-            0 => self.base_spring_load(state, j),
-            _ => NodeLoad::default(),
-        };
         NodeLoad {
-            moment: tissue.moment + spring.moment,
+            moment: tissue.moment,
             force: DVec3::from(lanes.force) + tissue.force + own,
-            energy: f64::from(lanes.energy) + tissue.energy + spring.energy - own.dot(state.x[k]),
+            energy: f64::from(lanes.energy) + tissue.energy - own.dot(state.x[k]),
         }
     }
 

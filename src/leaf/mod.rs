@@ -459,9 +459,14 @@ impl Leaf {
         own.map_or(0.0, |own| own / self.scale.moment())
     }
 
+    /// Whether springs hold the directions of the bases.
+    pub fn has_base_springs(&self) -> bool {
+        !self.base_turn_stiffness.is_empty()
+    }
+
     /// Whether the bases turn freely on their hinges.
     pub fn turns_freely(&self) -> bool {
-        self.hinged && self.base_turn_stiffness.is_empty()
+        self.hinged && !self.has_base_springs()
     }
 
     /// Whether hinges hold the bases: they stay in their places, and turn freely or against springs.

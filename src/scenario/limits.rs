@@ -131,7 +131,7 @@ const LIMITS: LeafLimits = LeafLimits {
     periods: upper_limit(
         "frequency duration",
         1e5,
-        "the number of periods, each of which takes some dozens of steps: choose a lower frequency or a shorter duration",
+        "the number of periods, each of which takes at least eight steps: choose a lower frequency or a shorter duration",
     ),
     phase: upper_limit("|phase|", 1e3, "in radians"),
     rest_factor: upper_limit(

@@ -530,22 +530,17 @@ impl BoundaryValueProblem<'_> {
     /// The moment of the rod at a base with the rotation `q`: none at a hinge, that of its spring at an
     /// elastic one.
     fn base_moment(&self, j: usize, q: DQuat) -> DVec3 {
-        match self.base_turn_stiffness(j) {
-            0.0 => DVec3::ZERO,
-            stiffness => stiffness * rotation::log(q * self.scenario.base(j).1.conjugate()),
-        }
+        self.base_turn_stiffness(j) * self.base_turn(j, q)
+    }
+
+    /// The rotation vector from the natural direction of the base of rod `j` to `q`.
+    fn base_turn(&self, j: usize, q: DQuat) -> DVec3 {
+        rotation::log(q * self.scenario.base(j).1.conjugate())
     }
 
     /// The derivative of the [moment at the base](Self::constrained_base) of rod `j` by the rotation of that.
     pub fn base_moment_rate(&self, j: usize, q: DQuat) -> DMat3 {
-        let turn = rotation::log(q * self.scenario.base(j).1.conjugate());
-        let crossed = cross_matrix(turn);
-        let half = 0.5 * turn.length();
-        let k = match half < 1e-2 {
-            true => 1.0 / 12.0 + half * half / 180.0,
-            false => (1.0 - half / half.tan()) / (4.0 * half * half),
-        };
-        self.base_turn_stiffness(j) * (DMat3::IDENTITY - 0.5 * crossed + k * crossed * crossed)
+        self.base_turn_stiffness(j) * rotation::log_rate(self.base_turn(j, q))
     }
 
     /// The state at the base nearest to a given one: a hinge carries no moment, or that of its spring.

@@ -211,9 +211,7 @@ fn veins_at_rest_between(
     leaf: &Equilibrium,
     rods: usize,
 ) -> Vec<RodShape> {
-    let etas: Vec<f64> = (0..leaf.rod_count)
-        .map(|j| blade.vein_position(j))
-        .collect();
+    let etas = vein_positions(blade, leaf.rod_count);
     // The fewer carry the forces of all.
     let share = leaf.rod_count as f64 / rods as f64;
     let vein = |k: usize| {
@@ -284,15 +282,18 @@ fn compare_veins(
     }
 }
 
+/// Where so many veins of a blade lie across it, as fractions of its half width.
+fn vein_positions(blade: &Blade, rods: usize) -> Vec<f64> {
+    (0..rods).map(|j| blade.vein_position(j)).collect()
+}
+
 /// The largest distance between equal places of two forms of a blade: of the veins of the second from
 /// where these lie in the first, at stations in common.
 fn largest_distance([whole, other]: [&Scenario; 2], [leaf, found]: [&Equilibrium; 2]) -> f64 {
     let (Some(blade), Some(other)) = (&whole.blade, &other.blade) else {
         return f64::NAN;
     };
-    let etas: Vec<f64> = (0..leaf.rod_count)
-        .map(|j| blade.vein_position(j))
-        .collect();
+    let etas = vein_positions(blade, leaf.rod_count);
     let vein = |k: usize| {
         // Across the veins by a cubic; where there is a vein it is that.
         let across = interpolation_weights(&etas, other.vein_position(k), VEINS_ACROSS);

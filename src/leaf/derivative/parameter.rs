@@ -135,7 +135,7 @@ impl<'s> LeafParameterDerivative<'s> {
             moments: moment_rates(terms, scale.moment()),
             held: TipSupportDerivative::new(leaf, terms),
             weighted_leaves: match leaf.has_tissue()
-                || leaf.hinged() && !leaf.turns_freely()
+                || leaf.has_base_springs()
                 || terms
                     .iter()
                     .any(|it| it.term.has_own_loads() || !it.term.grips.is_empty())

@@ -612,9 +612,8 @@ impl AppliedLoads {
         layout: PackLayout,
     ) -> Option<Self> {
         let wind = WindDrag::new(leaf, physics);
-        let springs = leaf.leaf.hinged() && !leaf.leaf.turns_freely();
         let dead = leaf.loads.rod_load_factor != 0.0;
-        if !leaf.has_tissue() && !dead && !springs && wind.is_none() {
+        if !leaf.has_tissue() && !dead && !leaf.has_base_springs() && wind.is_none() {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
