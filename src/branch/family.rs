@@ -6,7 +6,9 @@
 //! the new value of the parameter has them.
 
 use crate::branch::points::{scale_field, scaled_sum};
-use crate::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, NodalField, Scale, State, System};
+use crate::leaf::{
+    DirectSolver, DiscreteLeaf, Grid, Leaf, NodalField, Scale, State, System, displacement_part,
+};
 use crate::run::Limit;
 use crate::scenario::Scenario;
 use glam::DVec3;
@@ -473,9 +475,8 @@ pub(super) fn state_after_step(
     for (j, i) in leaf.rod_index_pairs(leaf.moving_nodes()) {
         let free = leaf.node_freedom(j, i);
         let increment = &mut increments[j][i - leaf.first_node()];
-        if !free.displacement {
-            increment[3..].fill(0.0);
-        }
+        let displacement = free.of_displacement(displacement_part(increment));
+        increment[3..].copy_from_slice(&displacement.to_array());
         if !free.rotation {
             increment[..3].fill(0.0);
         }

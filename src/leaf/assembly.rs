@@ -49,7 +49,7 @@ impl DiscreteLeaf {
         let mut total = AssemblyTotals {
             energy: self.add_tissue(state, system, MATRIX)
                 + self.add_own_loads(state, system)
-                + self.add_base_springs(state, system, MATRIX)
+                + self.add_springs(state, system, MATRIX)
                 + self.base_energy(state),
             largest_turn: 0.0,
         };
@@ -165,42 +165,32 @@ impl DiscreteLeaf {
             let on_tissue = |i: usize| tissue.get(state.base(j) + i).copied().unwrap_or_default();
             let turned = on_tissue(0).moment
                 + self.node_dead_moment(0)
-                + self.base_spring_load(state, j).moment;
+                + self.spring_load(state, j, 0).moment;
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
                 let gradient = segment.gradient(self.section(j, i));
                 if i >= self.first_node() {
-                    let unbalanced =
-                        self.unbalanced_size(j, force + gradient.x, moment - gradient.a);
                     let free = self.freedom_without_tip_support(j, i);
-                    let force = if free.displacement {
-                        unbalanced.force
-                    } else {
-                        0.0
-                    };
-                    let moment = if free.rotation {
-                        unbalanced.moment
-                    } else {
-                        0.0
-                    };
-                    largest = larger(largest, larger(force, moment));
+                    let on_node = free.of_wrench(Wrench {
+                        moment: moment - gradient.a,
+                        force: force + gradient.x,
+                    });
+                    let unbalanced = self.unbalanced_size(j, on_node.force, on_node.moment);
+                    largest = larger(largest, larger(unbalanced.force, unbalanced.moment));
                 }
                 let load = self.load_with_tissue(state, j, i + 1, on_tissue(i + 1));
-                force = load.force - gradient.x;
-                moment = load.moment + self.node_dead_moment(i + 1) - gradient.b;
+                let springs = self.spring_load(state, j, i + 1);
+                force = load.force + springs.force - gradient.x;
+                moment = load.moment + springs.moment + self.node_dead_moment(i + 1) - gradient.b;
                 largest = larger(largest, largest_component(segment.gap));
             }
-            let unbalanced = self.unbalanced_size(j, force, moment);
             // The holder balances the remaining force on a held tip.
-            let free = self.freedom_without_tip_support(j, n);
-            match &self.leaf.tip_support {
-                _ if !free.rotation => continue,
-                _ if !free.displacement => {}
-                Some(held) if held.clamps.is_some() => continue,
-                Some(_) => {}
-                None if self.leaf.joined() => tip += force,
-                None => largest = larger(largest, unbalanced.force),
+            let on_tip = self.node_freedom(j, n).of_wrench(Wrench { moment, force });
+            let unbalanced = self.unbalanced_size(j, on_tip.force, on_tip.moment);
+            match self.leaf.joined() {
+                true => tip += on_tip.force,
+                false => largest = larger(largest, unbalanced.force),
             }
             largest = larger(largest, unbalanced.moment);
         }
@@ -229,8 +219,8 @@ impl DiscreteLeaf {
         let mut energy = self.base_energy(state) + self.cell_energy(state);
         for (j, i) in self.rod_index_pairs(0..1) {
             energy += self.node_strip_load(state, j, i).energy;
-            energy += self.base_spring_load(state, j).energy;
         }
+        energy += self.spring_energy(state);
         let load = |j: usize, i: usize| {
             self.load_with_tissue(state, j, i, self.node_strip_load(state, j, i))
         };

@@ -9,6 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
+use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
 use crate::leaf::{GrippedNode, Leaf, Loads};
 use crate::natural::Natural;
@@ -57,6 +58,8 @@ pub struct DiscreteLeaf {
     pub(super) point_moments: Vec<NodalMoment>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
+    /// Springs of supports that give.
+    pub(super) springs: NodeSprings,
     /// Factor of all loads: one, except during continuation in the loads.
     pub load_factor: f64,
     /// Loads that all rods share, before the factor.
@@ -142,15 +145,16 @@ impl DiscreteLeaf {
             own_loads: Vec::new(),
             point_moments: Vec::new(),
             grips: Vec::new(),
+            springs: NodeSprings::default(),
             load_factor: 1.0,
             loads: leaf.loads,
         };
         discrete.own_loads = discrete.nodal_own_loads(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
-        let gripped = !leaf.scenario().grips.is_empty();
-        if leaf.has_tissue() || gripped {
+        if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
             discrete.grips = discrete.find_gripped_nodes(&natural);
+            discrete.springs = discrete.springs_from(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
                     true => discrete.tissue_strips(&natural),
@@ -417,13 +421,14 @@ impl DiscreteLeaf {
         self.rod_load(j).tip + self.point_force_at(j, 1.0)
     }
 
-    /// Dead load, coupling and tissue on node `i` of rod `j`.
+    /// Dead load, coupling, tissue and springs on node `i` of rod `j`.
     pub fn load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
         let mut load = self.load_with_tissue(state, j, i, self.tissue_load(state, j, i));
-        if i == 0 {
-            let spring = self.base_spring_load(state, j);
-            load.moment += spring.moment;
-            load.energy += spring.energy;
+        if self.has_springs() {
+            let springs = self.spring_load(state, j, i);
+            load.moment += springs.moment;
+            load.force += springs.force;
+            load.energy += springs.energy;
         }
         load
     }

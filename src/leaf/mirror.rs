@@ -34,6 +34,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         distributed,
         points,
         grips,
+        foundation,
         wind,
         dynamics,
         ..
@@ -56,6 +57,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         && tip_force[1] == 0.0
         && pairs(rods.len()).all(|(a, b)| are_images(&rods[a], &rods[b]))
         && pairs(coupling.len()).all(|(a, b)| coupling[a] == coupling[b])
+        && (foundation.iter()).all(|of| pairs(rods.len()).all(|(a, b)| of[a] == of[b]))
         && tissue.as_ref().is_none_or(|tissue| {
             // Tissue that the plane cuts would be turned by half of the leaf alone.
             rods.len() % 2 == 1 && pairs(tissue.len()).all(|(a, b)| tissue[a] == tissue[b])

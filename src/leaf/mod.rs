@@ -8,11 +8,11 @@
 //! the differential equations of the rods, which the grid approximates.
 
 mod assembly;
-mod base_springs;
 mod block_tridiagonal;
 mod derivative;
 mod direct;
 mod discrete;
+mod elastic_supports;
 mod law;
 mod loads;
 mod mirror;
@@ -20,6 +20,7 @@ mod mirror;
 mod not_a_number;
 mod rod_ode;
 mod solve;
+mod springs;
 mod state;
 mod supports;
 mod system;
@@ -39,6 +40,7 @@ pub use crate::leaf::mirror::{
 };
 pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFields};
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
+pub use crate::leaf::springs::SpringEnd;
 pub use crate::leaf::state::{
     Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
 };
@@ -57,7 +59,7 @@ use crate::scenario::{
     BaseSupport, Clamp, Dynamics, Profile, Rod, RodPlace, Scenario, Tissue, ZeroEnergyRotation,
     longest,
 };
-use glam::{DQuat, DVec3};
+use glam::{BVec3, DQuat, DVec3};
 use std::sync::Arc;
 
 /// Limits of the stiffness in stretch and shear with which segment forces are condensed out. A
@@ -132,7 +134,9 @@ pub struct GrippedNode {
     pub node: usize,
     /// Position in which the node is held.
     pub position: DVec3,
-    /// Rotation in which the node is held, if it is.
+    /// The lab axes along which the position is held rigidly.
+    pub held_axes: BVec3,
+    /// Rotation in which the node is held rigidly, if it is.
     pub rotation: Option<DQuat>,
 }
 

@@ -12,32 +12,63 @@ use crate::leaf::assembly::largest_component;
 use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, rod_lane};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, NodeIncrement, State};
-use crate::leaf::system::{HeldComponents, System};
+use crate::leaf::system::{ComponentSet, HeldComponents, System};
 use crate::leaf::{GrippedNode, Leaf};
 use crate::rod::{UNKNOWNS, Wrench};
 use crate::rotation::outer;
-use crate::scenario::{BaseRotations, Grip, SupportKind, ZeroEnergyRotation};
+use crate::scenario::{BaseRotations, SupportKind, ZeroEnergyRotation};
 use crate::simd::NumberGroup;
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 use std::borrow::Cow;
 
-/// Whether supports allow a node to rotate, and to be displaced.
+/// Whether supports allow a node to rotate, and along which lab axes to be displaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeFreedom {
     pub rotation: bool,
-    pub displacement: bool,
+    pub displacement: BVec3,
 }
 
 impl NodeFreedom {
     /// The freedom of a node without support.
     pub const FREE: NodeFreedom = NodeFreedom {
         rotation: true,
-        displacement: true,
+        displacement: BVec3::TRUE,
     };
 
     /// Whether the node is clamped.
     pub fn is_fixed(self) -> bool {
-        !self.rotation && !self.displacement
+        !self.rotation && !self.displacement.any()
+    }
+
+    /// The components of a displacement, or of a force, along the axes along which the node is free.
+    pub fn of_displacement(self, vector: DVec3) -> DVec3 {
+        DVec3::select(self.displacement, vector, DVec3::ZERO)
+    }
+
+    /// What no support balances of a force and a moment on the node.
+    pub fn of_wrench(self, on_node: Wrench) -> Wrench {
+        Wrench {
+            moment: if self.rotation {
+                on_node.moment
+            } else {
+                DVec3::ZERO
+            },
+            force: self.of_displacement(on_node.force),
+        }
+    }
+
+    /// The components of the node's increment that are zero.
+    fn held_components(self) -> ComponentSet {
+        let mut held = ComponentSet::NONE;
+        if !self.rotation {
+            held = held | ComponentSet::ROTATION;
+        }
+        for axis in 0..3 {
+            if !self.displacement.test(axis) {
+                held = held | ComponentSet::displacement_along(axis);
+            }
+        }
+        held
     }
 }
 
@@ -48,23 +79,23 @@ pub(super) struct UnbalancedSize {
 }
 
 impl DiscreteLeaf {
-    /// The nodes that grips hold: where they are in the stress-free state `natural`, moved by the
-    /// displacements of the grips.
+    /// The nodes of grips: where they are in the stress-free state `natural`, moved by the displacements of
+    /// the grips.
     pub(super) fn find_gripped_nodes(&self, natural: &State) -> Vec<GrippedNode> {
         let length = self.leaf.scale.length;
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
-            let Grip { vein, at, .. } = *grip;
-            let [from, to] = at.map(|sigma| self.grid.nearest_node(sigma));
+            let [from, to] = grip.at.map(|sigma| self.grid.nearest_node(sigma));
             let moved = DVec3::from_array(grip.displacement) / length;
             (from..=to).map(move |node| {
-                let k = natural.base(vein) + node;
+                let k = natural.base(grip.vein) + node;
                 GrippedNode {
                     grip: number,
-                    rod: vein,
+                    rod: grip.vein,
                     node,
                     position: natural.x[k] + moved,
-                    rotation: (grip.held == SupportKind::Clamped).then_some(natural.q[k]),
+                    held_axes: BVec3::from_array(grip.rigid_axes()),
+                    rotation: grip.holds_directions().then_some(natural.q[k]),
                 }
             })
         });
@@ -83,19 +114,15 @@ impl DiscreteLeaf {
 
     /// What hinges and grips hold of the nodes of rod `j` with equations.
     pub(super) fn held_inner_components(&self, j: usize) -> impl Iterator<Item = HeldComponents> {
-        let held = move |node: usize, first: usize| HeldComponents {
+        let held = move |node: usize| HeldComponents {
             rod: j,
             node,
-            components: first..6,
+            components: self.freedom_without_tip_support(j, node).held_components(),
         };
-        let hinge = (0..1)
-            .filter(|_| self.leaf.hinged())
-            .map(move |base| held(base, 3));
-        let grips = self.rod_grips(j).map(move |grip| {
-            let first = if grip.rotation.is_some() { 0 } else { 3 };
-            held(grip.node, first)
-        });
-        hinge.chain(grips)
+        let hinge = (0..1).filter(|_| self.leaf.hinged());
+        hinge
+            .chain(self.rod_grips(j).map(|grip| grip.node))
+            .map(held)
     }
 
     /// What base and grips allow to node `i` of rod `j`.
@@ -103,14 +130,14 @@ impl DiscreteLeaf {
         if i == 0 {
             return NodeFreedom {
                 rotation: self.leaf.hinged(),
-                displacement: false,
+                displacement: BVec3::FALSE,
             };
         }
         let here = |it: &&GrippedNode| (it.rod, it.node) == (j, i);
         match self.grips.iter().find(here) {
             Some(held) => NodeFreedom {
                 rotation: held.rotation.is_none(),
-                displacement: false,
+                displacement: !held.held_axes,
             },
             None => NodeFreedom::FREE,
         }
@@ -121,7 +148,7 @@ impl DiscreteLeaf {
         match &self.leaf.tip_support {
             Some(held) if i == self.segments() => NodeFreedom {
                 rotation: held.clamps.is_none(),
-                displacement: false,
+                displacement: BVec3::FALSE,
             },
             _ if i > 0 && self.grips.is_empty() => NodeFreedom::FREE,
             _ => self.freedom_without_tip_support(j, i),
@@ -133,7 +160,7 @@ impl DiscreteLeaf {
         self.leaf.place_held_tips(state);
         for held in &self.grips {
             let k = state.base(held.rod) + held.node;
-            state.x[k] = held.position;
+            state.x[k] = DVec3::select(held.held_axes, held.position, state.x[k]);
             if let Some(rotation) = held.rotation {
                 state.q[k] = rotation;
             }
@@ -152,13 +179,35 @@ impl DiscreteLeaf {
         };
         let middles: Vec<DVec3> = (0..grips.len()).map(middle).collect();
         let mut reactions = vec![Wrench::default(); grips.len()];
+        let mut add = |grip: usize, at: DVec3, load: Wrench, turns: bool| {
+            let on_grip = &mut reactions[grip];
+            on_grip.force += load.force;
+            if grips[grip].held == SupportKind::Clamped {
+                on_grip.moment += (at - middles[grip]).cross(load.force);
+            }
+            if turns {
+                on_grip.moment += load.moment;
+            }
+        };
         for held in &self.grips {
             let load = self.unbalanced_node_load(state, held.rod, held.node);
-            let on_grip = &mut reactions[held.grip];
-            on_grip.force += load.force;
-            if held.rotation.is_some() {
-                let arm = held.position - middles[held.grip];
-                on_grip.moment += load.moment + arm.cross(load.force);
+            let free = self.freedom_without_tip_support(held.rod, held.node);
+            let on_grip = Wrench {
+                force: load.force - free.of_displacement(load.force),
+                moment: load.moment,
+            };
+            let k = state.base(held.rod) + held.node;
+            add(held.grip, state.x[k], on_grip, held.rotation.is_some());
+        }
+        for spring in self.springs.iter() {
+            if let Some(grip) = spring.grip {
+                let k = state.base(spring.rod) + spring.node;
+                let (force, moment) = (spring.force(state.x[k]), spring.moment(state.q[k]));
+                let on_grip = Wrench {
+                    force: -force,
+                    moment: -moment,
+                };
+                add(grip, state.x[k], on_grip, spring.turn_stiffness > 0.0);
             }
         }
         reactions
@@ -173,7 +222,7 @@ impl DiscreteLeaf {
             Wrench {
                 force: own.force + tissue.force,
                 moment: match self.leaf.hinged() {
-                    true => -self.base_spring_load(state, j).moment,
+                    true => -self.spring_load(state, j, 0).moment,
                     false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
                 },
             }
@@ -217,26 +266,17 @@ impl DiscreteLeaf {
     }
 }
 
-/// Components of a node's increment (rotation, displacement) that are zero for a node in the
-/// mirror plane: rotations about x and z, the displacement along y.
-const MIRROR_CONSTRAINED_COMPONENTS: [usize; 3] = [0, 2, 4];
-
-/// All components; displacements are the last three.
-const ALL_COMPONENTS: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
-
 /// The entry on the diagonal of held components: with the masses of nodes within a vein it is a
 /// frequency above all others.
 const HELD_DIAGONAL_ENTRY: f64 = 1e9;
 
 impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` of rod `j`.
-    fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
+    fn held_components(&self, j: usize, i: usize) -> ComponentSet {
         if i == 0 || !self.grips.is_empty() {
-            let freedom = self.freedom_without_tip_support(j, i);
-            match (freedom.rotation, freedom.displacement) {
-                (false, _) => return &ALL_COMPONENTS,
-                (true, false) => return &ALL_COMPONENTS[3..],
-                (true, true) => {}
+            let held = self.freedom_without_tip_support(j, i).held_components();
+            if held != ComponentSet::NONE {
+                return held;
             }
         }
         if let Some(held) = self
@@ -246,15 +286,15 @@ impl DiscreteLeaf {
             .filter(|_| i == self.segments())
         {
             match held.clamps {
-                Some(_) => &ALL_COMPONENTS,
-                None => &ALL_COMPONENTS[3..],
+                Some(_) => ComponentSet::ROTATION | ComponentSet::DISPLACEMENT,
+                None => ComponentSet::DISPLACEMENT,
             }
         } else if self.leaf.is_halved_midrib(j) {
-            &MIRROR_CONSTRAINED_COMPONENTS
+            ComponentSet::ACROSS_MIRROR
         } else if self.leaf.mirrored && self.leaf.joined() && i == self.segments() {
-            &MIRROR_CONSTRAINED_COMPONENTS[2..]
+            ComponentSet::ACROSS_MIRROR & ComponentSet::DISPLACEMENT
         } else {
-            &[]
+            ComponentSet::NONE
         }
     }
 
@@ -273,7 +313,7 @@ impl DiscreteLeaf {
     pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [GroupIncrements]) {
         for i in self.first_held()..self.segments() + 1 {
             let rhs = &mut rhs[i - self.first_node()];
-            for &c in self.held_components(j, i) {
+            for c in self.held_components(j, i).iter() {
                 rhs[c].0[rod_lane(j).lane] = 0.0;
             }
         }
@@ -282,7 +322,7 @@ impl DiscreteLeaf {
     /// Sets the held components of forces on the nodes to zero.
     pub(super) fn clear_held_forces(&self, forces: &mut NodalField) {
         for (j, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
-            for &c in self.held_components(j, i) {
+            for c in self.held_components(j, i).iter() {
                 forces[j][i - self.first_node()][c] = 0.0;
             }
         }
@@ -294,7 +334,7 @@ impl DiscreteLeaf {
         let set = |four: &mut NumberGroup, value: f64| four.0[rod_lane(j).lane] = value;
         for i in self.first_held()..self.segments() + 1 {
             let at = i - self.first_node();
-            for &c in self.held_components(j, i) {
+            for c in self.held_components(j, i).iter() {
                 for k in 0..UNKNOWNS {
                     set(chain.diagonal_entry_mut(at, c.min(k), c.max(k)), 0.0);
                     set(chain.off_diagonal_entry_mut(at, c, k), 0.0);
@@ -302,7 +342,7 @@ impl DiscreteLeaf {
                         set(chain.off_diagonal_entry_mut(at - 1, k, c), 0.0);
                     }
                 }
-                let gripped = !self.freedom_without_tip_support(j, i).displacement;
+                let gripped = self.freedom_without_tip_support(j, i) != NodeFreedom::FREE;
                 set(
                     chain.diagonal_entry_mut(at, c, c),
                     if gripped { HELD_DIAGONAL_ENTRY } else { 1.0 },
@@ -316,10 +356,10 @@ impl DiscreteLeaf {
         for (g, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             if g + 1 < self.rods() {
                 let across = system.gap_block_mut(g, i - self.first_node());
-                for &c in self.held_components(g, i) {
+                for c in self.held_components(g, i).iter() {
                     across[c] = [0.0; UNKNOWNS];
                 }
-                for &c in self.held_components(g + 1, i) {
+                for c in self.held_components(g + 1, i).iter() {
                     across.iter_mut().for_each(|row| row[c] = 0.0);
                 }
                 self.clear_held_cell_blocks(system, g, i);
@@ -333,15 +373,15 @@ impl DiscreteLeaf {
         let at = i - self.first_node();
         let [own, other] = [g, g + 1].map(|rod| self.held_components(rod, i));
         if let Some([ahead, crossing]) = system.cell_blocks_mut(g, at) {
-            own.iter().for_each(|&c| ahead[c] = [0.0; UNKNOWNS]);
-            for &c in other {
+            own.iter().for_each(|c| ahead[c] = [0.0; UNKNOWNS]);
+            for c in other.iter() {
                 crossing.iter_mut().for_each(|row| row[c] = 0.0);
             }
         }
         let before = at.checked_sub(1);
         if let Some([ahead, crossing]) = before.and_then(|at| system.cell_blocks_mut(g, at)) {
-            own.iter().for_each(|&c| crossing[c] = [0.0; UNKNOWNS]);
-            for &c in other {
+            own.iter().for_each(|c| crossing[c] = [0.0; UNKNOWNS]);
+            for c in other.iter() {
                 ahead.iter_mut().for_each(|row| row[c] = 0.0);
             }
         }
@@ -515,7 +555,7 @@ impl DiscreteLeaf {
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
                     let freedom = self.node_freedom(j, node);
-                    if freedom.displacement || node < n {
+                    if freedom.displacement.any() || node < n {
                         state.x[k] = point + turn * (state.x[k] - point);
                     }
                     if freedom.rotation || node < n {

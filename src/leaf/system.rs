@@ -24,7 +24,7 @@ use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
-use std::ops::Range;
+use std::ops::{BitAnd, BitOr, Range};
 use std::sync::{Arc, OnceLock};
 
 /// Number of nodes from which on groups of rods are distributed over threads. Measured: with fewer
@@ -73,12 +73,51 @@ pub struct DiagonalBlocks {
     pub translational: f64,
 }
 
+/// A set of the components of a node's increment: rotations, then displacements, along the lab axes. Bit `c`
+/// stands for component `c`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ComponentSet(u8);
+
+impl ComponentSet {
+    pub const NONE: ComponentSet = ComponentSet(0);
+    pub const ROTATION: ComponentSet = ComponentSet(0b000111);
+    pub const DISPLACEMENT: ComponentSet = ComponentSet(0b111000);
+    /// Zero for a node in the mirror plane: rotations about x and z, the displacement along y.
+    pub const ACROSS_MIRROR: ComponentSet = ComponentSet(0b010101);
+
+    /// The displacement along a lab axis.
+    pub fn displacement_along(axis: usize) -> Self {
+        ComponentSet(1 << (3 + axis))
+    }
+
+    /// The components of the set.
+    pub fn iter(self) -> impl Iterator<Item = usize> {
+        (0..6).filter(move |c| self.0 >> c & 1 == 1)
+    }
+}
+
+impl BitOr for ComponentSet {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        ComponentSet(self.0 | other.0)
+    }
+}
+
+impl BitAnd for ComponentSet {
+    type Output = Self;
+
+    fn bitand(self, other: Self) -> Self {
+        ComponentSet(self.0 & other.0)
+    }
+}
+
 /// Components of the increment of a node that a hinge or grip holds.
 #[derive(Clone, Debug)]
 pub(super) struct HeldComponents {
     pub rod: usize,
     pub node: usize,
-    pub components: Range<usize>,
+    pub components: ComponentSet,
 }
 
 /// E of the rods of a group: their coupling per weight with the rods before and after them.
@@ -451,7 +490,9 @@ impl System {
             .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
             .collect();
         for held in &self.held_components {
-            momentum[held.rod][held.node][held.components.clone()].fill(0.0);
+            for c in held.components.iter() {
+                momentum[held.rod][held.node][c] = 0.0;
+            }
         }
         momentum
     }

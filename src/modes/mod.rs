@@ -18,12 +18,12 @@
 mod lanczos;
 
 use crate::leaf::{
-    DiagonalBlocks, DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State,
-    System, displacement_part, hessian_at_constant_force, rotation_part,
+    DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,
+    displacement_part, hessian_at_constant_force, rotation_part,
 };
 use crate::modes::lanczos::{Lanczos, NormalizedEigenvector, RitzBound};
 use crate::motion::Physics;
-use crate::rod::{Section, Segment, Wrench};
+use crate::rod::{Section, Segment};
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
 
@@ -492,7 +492,8 @@ struct NodeMassBlock {
     node: usize,
     unknowns: [usize; 6],
     tensor: DMat3,
-    mass: f64,
+    /// Along the lab axes.
+    mass: DVec3,
 }
 
 /// The mass matrix of a leaf, its unknowns numbered as in the pattern of its
@@ -519,7 +520,7 @@ impl MassMatrix {
                 node: i,
                 unknowns: pattern.unknowns(j, i),
                 tensor: if free.rotation { tensor } else { DMat3::ZERO },
-                mass: if free.displacement { inertia.mass } else { 0.0 },
+                mass: free.of_displacement(DVec3::splat(inertia.mass)),
             }
         };
         let nodes = leaf
@@ -538,8 +539,8 @@ impl MassMatrix {
             for (at, turned) in [a, b, c].into_iter().zip(turned.to_array()) {
                 product[at] += turned;
             }
-            for at in shifts {
-                product[at] += node.mass * v[at];
+            for (at, mass) in shifts.into_iter().zip(node.mass.to_array()) {
+                product[at] += mass * v[at];
             }
         }
         product
@@ -548,11 +549,9 @@ impl MassMatrix {
     /// Adds `factor` M to the matrix of a system.
     pub fn add_to_system(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let stiffness = DiagonalBlocks {
-                rotary: node.tensor * factor,
-                translational: node.mass * factor,
-            };
-            system.add_to_node(node.rod, node.node, stiffness, Wrench::default());
+            let against_displacement = DMat3::from_diagonal(node.mass * factor);
+            system.add_rotation_spring(node.rod, node.node, node.tensor * factor);
+            system.add_displacement_spring(node.rod, node.node, against_displacement);
         }
     }
 }
@@ -621,7 +620,7 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         let [a, b] = [j, j + 1].map(|rod| displacement_part(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.node_coupling(j, i) * (b - a));
     }
-    sum + leaf.tissue_curvature(state, shape) + leaf.base_spring_curvature(state, shape)
+    sum + leaf.tissue_curvature(state, shape) + leaf.spring_curvature(state, shape)
 }
 
 /// The contribution of second derivatives with respect to rotations, at constant force.

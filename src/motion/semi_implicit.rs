@@ -409,11 +409,7 @@ impl SemiImplicit {
         let shift = || self.trial.x[k] - self.state.x[k];
         [
             if free.rotation { turn() } else { DVec3::ZERO },
-            if free.displacement {
-                shift()
-            } else {
-                DVec3::ZERO
-            },
+            free.of_displacement(shift()),
         ]
     }
 
@@ -553,16 +549,14 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.rod_index_pairs(1..=n) {
             let k = self.state.base(j) + i;
-            let moves = self.leaf.node_freedom(j, i).displacement;
+            let free = self.leaf.node_freedom(j, i);
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,
                 true => (force(j, i) + loads.tip_force) / mass,
                 false => force(j, i) / mass,
             };
-            if moves {
-                self.node_motions[k].a[1] += linear;
-            }
+            self.node_motions[k].a[1] += free.of_displacement(linear);
         }
         for NodalMoment { node, moment } in self.leaf.dead_moments_under(loads) {
             if self.leaf.node_freedom(0, node).rotation {
@@ -764,20 +758,23 @@ impl SemiImplicit {
     fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
-        let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
+        let free_axes = |j: usize, i: usize| {
+            let ones = leaf.node_freedom(j, i).of_displacement(DVec3::ONE);
+            DMat3::from_diagonal(ones)
+        };
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
-            let half = Wrench::from_force(0.5 * drag.force());
+            let half = 0.5 * drag.force();
             let stiffness = 0.25 * rate * drag.velocity_derivative();
-            let free = [moves(j, i), moves(j, i + 1)];
+            let free = [free_axes(j, i), free_axes(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {
-                if free {
-                    system.add_load(j, node, half);
-                    system.add_displacement_spring(j, node, stiffness);
+                if free != DMat3::ZERO {
+                    system.add_load(j, node, Wrench::from_force(free * half));
+                    system.add_displacement_spring(j, node, free * stiffness * free);
                 }
             }
-            if free == [true; 2] {
-                system.add_adjacent_node_spring(j, i, stiffness);
+            if !free.contains(&DMat3::ZERO) {
+                system.add_adjacent_node_spring(j, i, free[0] * stiffness * free[1]);
             }
         }
     }

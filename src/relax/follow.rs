@@ -542,7 +542,8 @@ impl EquilibriumTracker {
             && own.points.len() == other.points.len()
             && own.grips.len() == other.grips.len()
             && { points }.all(|(a, b)| (a.vein, a.at) == (b.vein, b.at))
-            && { grips }.all(|(a, b)| (a.vein, a.at, a.held) == (b.vein, b.at, b.held))
+            && own.foundation.is_some() == other.foundation.is_some()
+            && { grips }.all(|(a, b)| a.holds_same_components(b))
             && self.at.levels[0].leaf.leaf.kinks() == leaf.kinks()
     }
 

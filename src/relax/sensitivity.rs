@@ -311,8 +311,8 @@ impl SensitivityGrid<'_> {
         rate: &LeafParameterDerivative,
         response: &LinearResponse,
     ) -> Vec<DVec3> {
-        let leaf = &self.level.leaf;
-        let mut all = vec![leaf.reaction_rate(rate, response)];
+        let GridLevel { leaf, state } = self.level;
+        let mut all = vec![leaf.reaction_rate(state, rate, response)];
         if has_clamped_tip(&leaf.leaf) {
             all.extend(
                 near.iter()

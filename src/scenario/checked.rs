@@ -51,6 +51,9 @@ pub struct Scenario {
     pub g: [f64; 3],
     /// Dead force per unit reference length along each vein, by components; `None` if there is none.
     pub distributed: Option<Vec<[Profile; 3]>>,
+    /// Stiffness, per unit reference length, of springs along each vein that hold it in its natural place,
+    /// by lab axes; `None` if there is none.
+    pub foundation: Option<Vec<[Profile; 3]>>,
     /// Dead loads on points.
     pub points: Vec<PointLoad>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
@@ -118,6 +121,7 @@ impl Scenario {
             .chain(masses.map(|(_, mass)| mass))
             .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
             .chain(self.distributed.iter().flatten().flatten())
+            .chain(self.foundation.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
@@ -141,15 +145,16 @@ impl Scenario {
     pub fn holds_all_tips(&self) -> bool {
         let gripped = |vein: usize| {
             let mut grips = self.grips.iter().filter(|grip| grip.vein == vein);
-            grips.any(|grip| 1.0 - grip.at[1] < TIP_GRIP_TOLERANCE)
+            grips
+                .any(|grip| 1.0 - grip.at[1] < TIP_GRIP_TOLERANCE && grip.rigid_axes() == [true; 3])
         };
         self.held_tip.is_some() || (0..self.rods.len()).all(gripped)
     }
 
-    /// Whether tissue, which has no force in the natural leaf, or grips, which hold veins where they
-    /// are in it, make a leaf depend on shapes at rest in another way than by their strains.
+    /// Whether tissue, which has no force in the natural leaf, or grips and a foundation, which hold veins
+    /// where they are in it, make a leaf depend on shapes at rest in another way than by their strains.
     pub fn needs_stress_free_leaf(&self) -> bool {
-        self.tissue.is_some() || !self.grips.is_empty()
+        self.tissue.is_some() || !self.grips.is_empty() || self.foundation.is_some()
     }
 
     /// The weight of a vein per reference length.
@@ -195,6 +200,7 @@ impl Scenario {
         let blade_mass = self.blade.as_ref().is_some_and(|blade| blade.has_mass());
         let keys = [
             (!self.grips.is_empty(), "grip"),
+            (self.foundation.is_some(), Key::FoundationStiffness.path()),
             (!self.points.is_empty(), "load.point"),
             (
                 acts(&self.gravity) || !self.own_gravity.is_empty(),

@@ -88,6 +88,8 @@ impl Scenario {
             json!({
                 "vein": grip.vein + 1, "held": grip.held, "move": list_value(grip.displacement),
                 "at": if from == to { json!(from) } else { list_value(grip.at) },
+                "stiffness": list_value(grip.stiffness),
+                "turn_stiffness": number_value(grip.turn_stiffness),
             })
         };
         let rows: Vec<Value> = match first {
@@ -157,6 +159,7 @@ impl Scenario {
             }
             Key::G => list_value(self.g),
             Key::Distributed => vector_quantity(self.distributed.as_deref()?),
+            Key::FoundationStiffness => vector_quantity(self.foundation.as_deref()?),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),

@@ -66,6 +66,10 @@ struct LeafLimits {
     drag: DimensionlessLimit,
     wind_velocity: DimensionlessLimit,
     wind_width: DimensionlessLimit,
+    /// Springs along veins: as for the coupling.
+    foundation: DimensionlessLimit,
+    grip_stiffness: DimensionlessLimit,
+    turn_stiffness: DimensionlessLimit,
 }
 
 // Values in natural units that differ by twelve orders of magnitude hardly affect each other in double
@@ -171,7 +175,13 @@ const LIMITS: LeafLimits = LeafLimits {
         1e6,
         "L is the longest rod: choose one closer to the width of a rod",
     ),
+    foundation: upper_limit("k L^4/A", 1e12, SPRING_REASON),
+    grip_stiffness: upper_limit("k L^3/A", 1e12, SPRING_REASON),
+    turn_stiffness: upper_limit("c L/A", 1e12, SPRING_REASON),
 };
+
+const SPRING_REASON: &str = "A is the smallest bending stiffness of a rod and L its length; beyond the limit a spring \
+     is rigid for all that double precision resolves: lower it, or hold the rod rigidly";
 
 const REST_ANGLE_REASON: &str =
     "an angle in radians: the rod at rest would be wound up more than 150 times";
@@ -489,6 +499,7 @@ fn check_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     check_tissue(entries, scenario)?;
     check_weights(entries, scenario)?;
     check_distributed_loads(entries, scenario)?;
+    check_springs(entries, scenario)?;
     check_point_loads(entries, scenario)?;
     check_wind(entries, scenario)
 }
@@ -603,6 +614,41 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
         LIMITS
             .point_weight
             .check(weighed, vector_norm(scenario.g) / force * point.mass)?;
+    }
+    Ok(())
+}
+
+fn check_springs(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let unit = |key| smallest_unit(key, &scenario.rods);
+    if let Some(item) = entries.given_value(Key::FoundationStiffness) {
+        let unit = unit(Key::FoundationStiffness);
+        for stiffness in scenario.foundation.iter().flatten().flatten() {
+            LIMITS.foundation.check(item, stiffness.max_abs() / unit)?;
+        }
+    }
+    if let Some(item) = entries.given_value(Key::BaseTurnStiffness) {
+        let unit = unit(Key::BaseTurnStiffness);
+        for (rod, stiffness) in scenario.base_turn_stiffness.iter().enumerate() {
+            LIMITS
+                .turn_stiffness
+                .check(item.entry(rod), stiffness / unit)?;
+        }
+    }
+    for row in 0..entries.table_count("grip").unwrap_or(0) {
+        let item = entries.value_in_row(Key::GripStiffness, row)?;
+        let unit_of_grips = unit(Key::GripStiffness);
+        for (axis, stiffness) in item.vector()?.into_iter().enumerate() {
+            if stiffness.is_finite() {
+                let limit = &LIMITS.grip_stiffness;
+                limit.check(item.entry(axis), stiffness / unit_of_grips)?;
+            }
+        }
+        let item = entries.value_in_row(Key::GripTurnStiffness, row)?;
+        let stiffness = item.number()?;
+        if stiffness.is_finite() {
+            let unit = unit(Key::GripTurnStiffness);
+            LIMITS.turn_stiffness.check(item, stiffness / unit)?;
+        }
     }
     Ok(())
 }

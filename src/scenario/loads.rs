@@ -94,12 +94,21 @@ pub(super) fn read_distributed_loads(
     entries: &Entries,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
-    let Some(item) = entries.given_value(Key::Distributed) else {
+    read_vectors_along_rods(entries, Key::Distributed, rods)
+}
+
+/// Reads a key with vectors along rods; `None` if the entry is left out or zero.
+pub(super) fn read_vectors_along_rods(
+    entries: &Entries,
+    key: Key,
+    rods: usize,
+) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
+    let Some(item) = entries.given_value(key) else {
         return Ok(None);
     };
-    let loads = item.vector_profile_per_rod(rods)?;
-    let some = loads.iter().flatten().any(|load| load.max_abs() > 0.0);
-    Ok(some.then_some(loads))
+    let vectors = item.vector_profile_per_rod(rods)?;
+    let some = vectors.iter().flatten().any(|of| of.max_abs() > 0.0);
+    Ok(some.then_some(vectors))
 }
 
 /// Reads `[[load.point]]`.

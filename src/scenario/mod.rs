@@ -33,7 +33,6 @@ crate::renamed! {
 pub use crate::scenario::blade::Blade;
 pub use crate::scenario::checked::Scenario;
 pub use crate::scenario::format::Key;
-pub(crate) use crate::scenario::format::ValueSchema;
 pub use crate::scenario::format::entries::Entries;
 pub use crate::scenario::format::error::{ScenarioError, SourceLocation, printable};
 pub use crate::scenario::format::path::EntryPath;

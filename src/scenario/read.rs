@@ -195,6 +195,8 @@ impl Entries {
         let weights = loads::read_weights(self, rods.len())?;
         let g = loads::read_gravity_acceleration(self)?;
         let distributed = loads::read_distributed_loads(self, rods.len())?;
+        let foundation =
+            loads::read_vectors_along_rods(self, Key::FoundationStiffness, rods.len())?;
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
@@ -224,6 +226,7 @@ impl Entries {
             own_gravity: weights.own,
             g,
             distributed,
+            foundation,
             points,
             tip_force,
             tip_moment,
@@ -398,7 +401,9 @@ impl Entries {
             ValueSchema::Whole if key == Key::Rods => {
                 Key::all().any(|key| self.is_list_of_rods(key))
             }
-            ValueSchema::Text | ValueSchema::Whole => key.table() != "units",
+            ValueSchema::Text | ValueSchema::Whole | ValueSchema::WholeOrList => {
+                key.table() != "units"
+            }
             _ => false,
         }
     }
@@ -410,7 +415,7 @@ impl Entries {
             | ValueSchema::Quantity(_)
             | ValueSchema::PerGap(_)
             | ValueSchema::Fan => 0,
-            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity => 1,
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity(_) => 1,
             _ => return false,
         };
         self.given_value(key)

@@ -170,7 +170,8 @@ fn check_reach(at: &EntryValue, [x, y, z]: [f64; 3], rods: &[Rod]) -> ScenarioRe
 }
 
 /// A holder somewhere along a vein. It holds a stretch, or a point, where that is in the natural
-/// leaf (every vein in its rest shape from its base), moved by a given displacement.
+/// leaf (every vein in its rest shape from its base), moved by a given displacement: rigidly, by a
+/// spring, or so that it slides, along each lab axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// The vein, counted from 0.
@@ -182,6 +183,49 @@ pub struct Grip {
     pub held: SupportKind,
     /// By how much the grip has moved from its place in the natural leaf.
     pub displacement: [f64; 3],
+    /// The force per displacement along each lab axis: infinite where the grip is rigid, zero where it
+    /// slides. A spring of a stretch is spread evenly over it.
+    pub stiffness: [f64; 3],
+    /// The moment per radian of a clamped grip: infinite where it is rigid.
+    pub turn_stiffness: f64,
+}
+
+impl Grip {
+    /// A rigid grip of a vein, counted from 0, that has not moved.
+    pub fn rigid(vein: usize, at: [f64; 2], held: SupportKind) -> Self {
+        Grip {
+            vein,
+            at,
+            held,
+            displacement: [0.0; 3],
+            stiffness: [f64::INFINITY; 3],
+            turn_stiffness: f64::INFINITY,
+        }
+    }
+
+    /// Whether the grip holds the position rigidly, along each lab axis.
+    pub fn rigid_axes(&self) -> [bool; 3] {
+        self.stiffness.map(f64::is_infinite)
+    }
+
+    /// Whether the grip holds the directions rigidly.
+    pub fn holds_directions(&self) -> bool {
+        self.held == SupportKind::Clamped && self.turn_stiffness.is_infinite()
+    }
+
+    /// Whether the grip holds the position along some axis, or the directions, by a spring.
+    pub fn has_springs(&self) -> bool {
+        let gives = |stiffness: f64| stiffness.is_finite() && stiffness > 0.0;
+        self.stiffness.into_iter().any(gives)
+            || self.held == SupportKind::Clamped && gives(self.turn_stiffness)
+    }
+
+    /// Whether this grip and another hold the same, with springs of any stiffness.
+    pub(crate) fn holds_same_components(&self, other: &Grip) -> bool {
+        (self.vein, self.at, self.held) == (other.vein, other.at, other.held)
+            && self.rigid_axes() == other.rigid_axes()
+            && self.holds_directions() == other.holds_directions()
+    }
 }
 
 impl EntryValue<'_> {
@@ -238,14 +282,32 @@ pub(super) fn read_grips(
     shared: bool,
 ) -> ScenarioResult<Vec<Grip>> {
     let count = entries.table_count("grip").unwrap_or(0);
-    let grips: Vec<Grip> = (0..count)
-        .map(|row| read_grip(entries, row, rods, shared))
-        .collect::<ScenarioResult<_>>()?;
-    refuse_overlaps(entries, &grips)?;
-    Ok(grips)
+    let mut rows = Vec::new();
+    for row in 0..count {
+        let veins = entries.value_in_row(Key::GripVein, row)?;
+        for vein in veins.whole_numbers(rods.len())? {
+            let grip = read_grip(entries, row, vein - 1, rods, shared)?;
+            rows.push(GripInRow { row, grip });
+        }
+    }
+    refuse_overlaps(entries, &rows)?;
+    Ok(rows.into_iter().map(|it| it.grip).collect())
 }
 
-fn read_grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> ScenarioResult<Grip> {
+/// A grip, and the table that it is from: one with a list of veins is that of several.
+struct GripInRow {
+    row: usize,
+    grip: Grip,
+}
+
+/// Reads the grip on a vein, counted from 0, from its table.
+fn read_grip(
+    entries: &Entries,
+    row: usize,
+    vein: usize,
+    rods: &[Rod],
+    shared: bool,
+) -> ScenarioResult<Grip> {
     let item = |key| entries.value_in_row(key, row);
     let place = item(Key::GripAt)?;
     let at = place.fraction_interval()?;
@@ -260,29 +322,44 @@ fn read_grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> Scena
         x.hypot(y).hypot(z) <= farthest * longest(rods),
         format_args!("must be at most {farthest} times the longest rod"),
     )?;
+    let held = item(Key::GripHeld)?.support_kind()?;
+    let springs = item(Key::GripStiffness)?;
+    let stiffness = springs.vector()?;
+    springs.refuse_unless(
+        held == SupportKind::Clamped || stiffness != [0.0; 3],
+        "holds nothing: give an axis a stiffness, or inf where the grip is rigid",
+    )?;
+    let turned = item(Key::GripTurnStiffness)?;
+    let turn_stiffness = turned.number()?;
+    turned.refuse_unless(
+        held == SupportKind::Clamped || turn_stiffness.is_infinite(),
+        "belongs to a grip that holds directions: add held = \"clamped\"",
+    )?;
     Ok(Grip {
-        vein: item(Key::GripVein)?.whole_number(rods.len())? - 1,
+        vein,
         at,
-        held: item(Key::GripHeld)?.support_kind()?,
+        held,
         displacement: [x, y, z],
+        stiffness,
+        turn_stiffness,
     })
 }
 
 /// Refuses grips that hold the same point.
-fn refuse_overlaps(entries: &Entries, grips: &[Grip]) -> ScenarioResult<()> {
-    let mut order: Vec<usize> = (0..grips.len()).collect();
-    let begin = |grip: &Grip| (grip.vein, grip.at[0]);
-    order.sort_by(|&a, &b| {
-        let ((vein, from), (other, begins)) = (begin(&grips[a]), begin(&grips[b]));
-        vein.cmp(&other).then(from.total_cmp(&begins))
+fn refuse_overlaps(entries: &Entries, grips: &[GripInRow]) -> ScenarioResult<()> {
+    let mut order: Vec<&GripInRow> = grips.iter().collect();
+    order.sort_by(|a, b| {
+        let by_vein = a.grip.vein.cmp(&b.grip.vein);
+        by_vein.then(a.grip.at[0].total_cmp(&b.grip.at[0]))
     });
     for pair in order.windows(2) {
-        let [one, other] = [&grips[pair[0]], &grips[pair[1]]];
-        entries.value_in_row(Key::GripAt, pair[1])?.refuse_unless(
+        let [one, other] = [pair[0].grip, pair[1].grip];
+        let item = entries.value_in_row(Key::GripAt, pair[1].row)?;
+        item.refuse_unless(
             one.vein != other.vein || other.at[0] > one.at[1],
             format_args!(
                 "is held by grip[{}], too: let the stretches of a vein lie apart",
-                pair[0]
+                pair[0].row
             ),
         )?;
     }

@@ -9,7 +9,8 @@
 //! On hinges a vein that is straight or round spins: every section turns about its own tangent,
 //! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
 //! turns as a rigid body about the line through all points where it is held, if it is loaded along
-//! this line, whatever its sections.
+//! this line, whatever its sections. Rollers and foundations that hold along one axis alone let veins turn
+//! about this axis.
 
 #[cfg(test)]
 mod tests;
@@ -19,7 +20,7 @@ use crate::scenario::checked::Scenario;
 use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::supports::{BaseSupport, Grip, SupportKind};
 use crate::scenario::veins::{Rod, Tissue, longest};
-use glam::{DQuat, DVec3};
+use glam::{BVec3, DQuat, DVec3};
 use std::ops::Range;
 
 /// What counts as the same, or as straight, where veins turn.
@@ -236,7 +237,9 @@ impl Scenario {
         };
         let loads = self.group_loads(group);
         let axis = self.support_line(group, apart)?;
+        let rollers = self.roller_axis(group).ok()?;
         let turns = on_line(axis)
+            && rollers.is_none_or(|roller| is_along(roller, axis))
             && loads.iter().all(|load| is_along(*load, axis))
             && self.coupling_is_isotropic(group, axis);
         turns.then_some(axis)
@@ -272,11 +275,56 @@ impl Scenario {
         })
     }
 
+    /// The lab axes along which springs of the foundation hold a group of veins.
+    fn foundation_axes(&self, group: &Range<usize>) -> BVec3 {
+        let mut axes = BVec3::FALSE;
+        for stiffness in self.foundation.iter().flat_map(|all| &all[group.clone()]) {
+            axes |= BVec3::from_array(stiffness.each_ref().map(|of| of.max_abs() > 0.0));
+        }
+        axes
+    }
+
+    /// The only axis along which supports that hold neither directions nor the other axes hold a group of
+    /// veins, grips on rollers and a foundation: nothing but turns about that axis is free of their
+    /// forces. `None` without such supports; an error if there are others.
+    fn roller_axis(&self, group: &Range<usize>) -> Result<Option<DVec3>, OtherSupports> {
+        let mut axes = self.foundation_axes(group);
+        for grip in self.grips.iter().filter(|grip| group.contains(&grip.vein)) {
+            if grip.held == SupportKind::Clamped {
+                return Err(OtherSupports);
+            }
+            axes |= BVec3::from_array(grip.stiffness.map(|stiffness| stiffness > 0.0));
+        }
+        match [0, 1, 2].map(|axis| axes.test(axis)) {
+            [false, false, false] => Ok(None),
+            [true, false, false] => Ok(Some(DVec3::X)),
+            [false, true, false] => Ok(Some(DVec3::Y)),
+            [false, false, true] => Ok(Some(DVec3::Z)),
+            _ => Err(OtherSupports),
+        }
+    }
+
+    /// Whether the springs of a foundation, and grips in their stiffness, are the same in all directions
+    /// across an axis.
+    fn supports_are_isotropic(&self, group: &Range<usize>, axis: DVec3) -> bool {
+        let grips = self.grips.iter().filter(|grip| group.contains(&grip.vein));
+        let foundation = self.foundation.iter().flat_map(|all| &all[group.clone()]);
+        let even = |[x, y, z]: &[Profile; 3]| {
+            let alike = |a: &Profile, b: &Profile| a == b;
+            is_isotropic([alike(y, z), alike(z, x), alike(x, y)], axis)
+        };
+        { grips }.all(|grip| {
+            let [x, y, z] = grip.stiffness;
+            let equal = [[y, z], [z, x], [x, y]].map(|[a, b]| are_nearly_equal(a, b));
+            is_isotropic(equal, axis)
+        }) && { foundation }.all(even)
+    }
+
     /// The places where a group of veins is held, from that of its first hinge; `None` if clamps hold
-    /// it, or grips, whose places depend on the shapes at rest.
+    /// it, or grips, whose places depend on the shapes at rest, unless these hold along one axis only.
     fn support_offsets(&self, group: &Range<usize>) -> Option<Vec<DVec3>> {
         let tip = self.held_tip.as_ref();
-        let gripped = self.grips.iter().any(|grip| group.contains(&grip.vein));
+        let gripped = self.roller_axis(group).is_err();
         let clamped = tip.is_some_and(|held| held.clamps.is_some());
         if gripped || clamped {
             return None;
@@ -292,7 +340,10 @@ impl Scenario {
         let near = TOLERANCES.equality * longest(&self.rods);
         let line = apart.iter().find(|apart| apart.length() > near).copied();
         let load = |load: &DVec3| *load != DVec3::ZERO;
-        let axis = line.or_else(|| self.group_loads(group).into_iter().find(load));
+        let rollers = || self.roller_axis(group).ok().flatten();
+        let axis = line
+            .or_else(|| self.group_loads(group).into_iter().find(load))
+            .or_else(rollers);
         axis.map(DVec3::normalize)
     }
 
@@ -310,14 +361,12 @@ impl Scenario {
     /// Whether every coupling within a group has one stiffness in all directions across an axis: no
     /// turn about the axis changes its energy.
     fn coupling_is_isotropic(&self, group: &Range<usize>, axis: DVec3) -> bool {
-        self.coupling[group.start..group.end - 1].iter().all(|k| {
-            (0..3).any(|own| {
-                let [one, other] = [k[(own + 1) % 3], k[(own + 2) % 3]];
-                let on_axis =
-                    axis.reject_from_normalized(DVec3::AXES[own]).length() <= TOLERANCES.equality;
-                are_nearly_equal(one, other) && (are_nearly_equal(one, k[own]) || on_axis)
+        self.coupling[group.start..group.end - 1]
+            .iter()
+            .all(|&[x, y, z]| {
+                let equal = [[y, z], [z, x], [x, y]].map(|[a, b]| are_nearly_equal(a, b));
+                is_isotropic(equal, axis)
             })
-        })
     }
 
     /// Whether dead moments, which have no potential, act on a group of veins.
@@ -393,6 +442,7 @@ impl Scenario {
             && !tissue
             && self.group_loads(&group).iter().all(|load| is_along(*load, axis))
             && grips.all(|grip| along(grip.displacement))
+            && self.supports_are_isotropic(&group, axis)
             && !self.has_moments_on(&group)
             && held
             && self.coupling_is_isotropic(&group, axis)
@@ -427,6 +477,18 @@ impl Scenario {
             .filter(|it| moves(it))
             .count()
     }
+}
+
+/// Supports that hold a group of veins otherwise than along one axis.
+struct OtherSupports;
+
+/// Whether a diagonal tensor, of whose entries for y and z, z and x, x and y it is known whether they are
+/// equal, is the same in all directions across an axis.
+fn is_isotropic(equal: [bool; 3], axis: DVec3) -> bool {
+    (0..3).any(|own| {
+        let off_axis = axis.reject_from_normalized(DVec3::AXES[own]).length();
+        equal[own] && (equal[(own + 2) % 3] || off_axis <= TOLERANCES.equality)
+    })
 }
 
 fn is_along(vector: DVec3, axis: DVec3) -> bool {

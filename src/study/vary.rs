@@ -31,9 +31,7 @@ use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
 use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
-use crate::scenario::{
-    Entries, EntryPath, Key, Scenario, ScenarioError, ValueSchema, intended_number,
-};
+use crate::scenario::{Entries, EntryPath, Key, Scenario, ScenarioError, intended_number};
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -143,7 +141,7 @@ impl VariableTarget {
 
     fn is_whole_number(self) -> bool {
         match self {
-            VariableTarget::Entry(part) => part.key.form() == ValueSchema::Whole,
+            VariableTarget::Entry(part) => part.key.is_whole_number(),
             VariableTarget::Knob(knob) => knob == SolverSetting::Segments,
         }
     }
@@ -566,7 +564,7 @@ impl BaseScenario {
             let VariableTarget::Entry(part) = target else {
                 return refuse("is a setting of a method, not a number of the leaf");
             };
-            if part.key.form() == ValueSchema::Whole {
+            if part.key.is_whole_number() {
                 return refuse("is a whole number, and cannot change by a little");
             }
             if part.is_node_position() {

@@ -8,11 +8,12 @@ use leafdyn::study::{BaseScenario, ParameterKeys, relax_with_sensitivities};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
 
-/// Leaves to be tried, from the second number on with grips, from the third on with hinges;
-/// `LEAFDYN_LEAVES` in the environment asks for more.
-const LEAVES: usize = 38;
+/// Leaves to be tried, from the second number on with grips, from the third on with hinges, from the fourth on
+/// with grips that slide and give, or on a foundation; `LEAFDYN_LEAVES` in the environment asks for more.
+const LEAVES: usize = 48;
 const GRIPPED: usize = 24;
 const HINGED: usize = 32;
+const SLIDING: usize = 38;
 
 /// A part of a scenario, and the keys that it has, between blanks.
 type Part = (String, &'static str);
@@ -144,6 +145,47 @@ fn grips(draw: &mut Draw, number: usize, rods: usize) -> Part {
     (text, "grip[0].move[1] grip[1].move[2]")
 }
 
+/// Grips that slide and give, and on every second leaf a foundation.
+fn sliding(draw: &mut Draw, number: usize, rods: usize) -> Part {
+    // Between two holders of a nearly rigid rod the force is that of rounding.
+    let held = match number % 5 {
+        4 => "3.0",
+        _ => "inf",
+    };
+    let way = draw.list(6, -0.05, 0.05);
+    let springs = draw.list(4, 0.3, 5.0);
+    let [a, b, c, d] = springs[..] else {
+        unreachable!("four of them");
+    };
+    let foundation = match number.is_multiple_of(2) {
+        true => {
+            "foundation = { stiffness = { at = [0.0, 0.4, 1.0], value = [[1.0, 0.0, 2.0], [0.5, 3.0, 1.0], [2.0, 1.0, 1.0]] } }"
+        }
+        false => "",
+    };
+    let text = format!(
+        r#"
+        {foundation}
+        grip = [
+            {{ vein = 1, at = [0.25, 0.5], stiffness = [{a:?}, 0.0, {held}], move = {:?} }},
+            {{ vein = {rods}, at = 0.75, held = "clamped", stiffness = [{held}, {b:?}, {c:?}], turn_stiffness = {d:?}, move = {:?} }},
+        ]
+        "#,
+        &way[..3],
+        &way[3..],
+    );
+    let keys = match foundation.is_empty() {
+        true => {
+            "grip[0].stiffness[0] grip[1].stiffness[2] grip[1].turn_stiffness grip[0].move[2] grip[1].move[1]"
+        }
+        false => {
+            "grip[0].stiffness[0] grip[1].turn_stiffness grip[1].move[0] foundation.stiffness.value[1][1] \
+             foundation.stiffness.value[2][0]"
+        }
+    };
+    (text, keys)
+}
+
 /// A random leaf, and keys of all kinds of it.
 fn random(number: usize) -> (String, Vec<&'static str>) {
     let mut draw = Draw(number as u64);
@@ -160,7 +202,10 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         false => (String::new(), ""),
     };
     let (apart, apart_keys) = apart(&mut draw, number, rods);
-    let (grips, grip_keys) = grips(&mut draw, number, rods);
+    let (grips, grip_keys) = match number < SLIDING {
+        true => grips(&mut draw, number, rods),
+        false => sliding(&mut draw, number, rods),
+    };
     let all = "rest.twist[0] rest.bend_2[0] rest.bend_3[0] rest.stretch load.gravity[0] \
                load.gravity[2] load.tip_force[1] leaf.length[0] leaf.fan[0] dynamics.density";
     let keys = [

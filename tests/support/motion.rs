@@ -81,10 +81,8 @@ pub fn gripped_veins() -> Scenario {
         2
     ]);
     let grip = |vein: usize, at: [f64; 2], held: SupportKind, displacement: [f64; 3]| Grip {
-        vein,
-        at,
-        held,
         displacement,
+        ..Grip::rigid(vein, at, held)
     };
     leaf.grips = vec![
         grip(0, [0.25, 0.5], SupportKind::Pinned, [0.02, -0.03, 0.04]),

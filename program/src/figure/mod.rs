@@ -189,20 +189,14 @@ mod tests {
             sample::sample_record(5, 8),
         );
         let mut held = scenario();
-        let grip = |vein: usize, at: [f64; 2], held: SupportKind| Grip {
-            vein,
-            at,
-            held,
-            displacement: [0.0; 3],
-        };
         let drawn = |scenario: &Scenario| {
             [leaf(&fan, scenario), filmstrip(&record, scenario)]
                 .map(|it| formats::checked_svg_text(&it))
         };
         let free = drawn(&held);
         held.grips = vec![
-            grip(0, [0.25, 0.5], SupportKind::Clamped),
-            grip(3, [0.6; 2], SupportKind::Pinned),
+            Grip::rigid(0, [0.25, 0.5], SupportKind::Clamped),
+            Grip::rigid(3, [0.6; 2], SupportKind::Pinned),
         ];
         for (svg, free) in drawn(&held).iter().zip(&free) {
             assert!(svg.contains(">pinned<") && !free.contains(">pinned<"));

@@ -14,11 +14,11 @@ use crate::figure::drawing::{
     Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
     curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::scenario::FigureSetting;
+use crate::figure::scenario::{FigureSetting, SupportForm};
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Scenario, SupportKind};
+use leafdyn::scenario::Scenario;
 
 /// Sizes of the view of a rod.
 struct RodLayout {
@@ -260,7 +260,7 @@ impl<'a> DrawnRod<'a> {
         for (how, name) in SUPPORT_NAMES {
             let (ends, gripped) = (veins.has_held_ends(how), veins.has_grips(how));
             match how {
-                SupportKind::Clamped if ends => key.add_entry(page, name, |page, cell| {
+                SupportForm::Clamped if ends => key.add_entry(page, name, |page, cell| {
                     let [left, right] = cell.midline();
                     draw_wall(page, left.lerp(right, 0.6), DVec2::X, 0.6);
                 }),
@@ -319,9 +319,9 @@ impl<'a> DrawnRod<'a> {
 }
 
 /// Draws what holds an end of a rod that goes on into this direction on the page.
-fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: SupportKind) {
+fn draw_support(page: &mut Drawing, at: DVec2, inward: DVec2, held: SupportForm) {
     match (held, inward.try_normalize()) {
-        (SupportKind::Clamped, Some(inward)) => draw_wall(page, at, inward, 1.0),
+        (SupportForm::Clamped, Some(inward)) => draw_wall(page, at, inward, 1.0),
         _ => draw_support_marker(page, at, held),
     }
 }

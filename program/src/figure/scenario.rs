@@ -7,7 +7,7 @@
 use crate::report::numbers::format_four_digits;
 use ListEntryOwner::*;
 use glam::DVec3;
-use leafdyn::scenario::{BaseSupport, Key, Scenario, Schedule, SupportKind, Units};
+use leafdyn::scenario::{BaseSupport, Grip, Key, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
 
 /// Arrows of loads.
@@ -64,7 +64,35 @@ pub enum ParsedKey {
     Base,
     Tip,
     Grip,
+    Foundation,
 }
+
+/// How something is held, as it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SupportForm {
+    Clamped,
+    Pinned,
+    /// Along some axes only.
+    Sliding,
+    /// By springs.
+    Elastic,
+}
+
+impl SupportForm {
+    /// How a grip holds.
+    fn from_grip(grip: &Grip) -> Self {
+        match grip.held {
+            _ if grip.stiffness.contains(&0.0) => SupportForm::Sliding,
+            _ if grip.has_springs() => SupportForm::Elastic,
+            SupportKind::Clamped => SupportForm::Clamped,
+            SupportKind::Pinned => SupportForm::Pinned,
+        }
+    }
+}
+
+/// Marks of a foundation along each vein.
+const FOUNDATION_MARKS: usize = 8;
 
 /// A point or a stretch of a vein that is held.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -74,15 +102,7 @@ pub struct SupportMark {
     pub vein: usize,
     /// Fractions of the length of the vein, from and to.
     pub at: [f64; 2],
-    #[serde(serialize_with = "serialize_support")]
-    pub held: SupportKind,
-}
-
-fn serialize_support<S: serde::Serializer>(held: &SupportKind, to: S) -> Result<S::Ok, S::Error> {
-    to.serialize_str(match held {
-        SupportKind::Clamped => "clamped",
-        SupportKind::Pinned => "pinned",
-    })
+    pub held: SupportForm,
 }
 
 /// The dead loads on a leaf at rest, or on one in motion at this time. Gravity and wind, which act on
@@ -150,7 +170,7 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     marks.collect()
 }
 
-/// What holds a leaf: bases, of which those at one place are one, a tip, and grips.
+/// What holds a leaf: bases, of which those at one place are one, a tip, grips, and a foundation.
 pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
     let mut bases: Vec<[f64; 3]> = Vec::new();
     let mut marks = Vec::new();
@@ -161,10 +181,10 @@ pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
                 part: ParsedKey::Base,
                 vein,
                 at: [0.0; 2],
-                // An elastic base is drawn as the hinge that it would be without its spring.
                 held: match scenario.base_held {
-                    BaseSupport::Clamped => SupportKind::Clamped,
-                    BaseSupport::Pinned | BaseSupport::Elastic => SupportKind::Pinned,
+                    BaseSupport::Clamped => SupportForm::Clamped,
+                    BaseSupport::Pinned => SupportForm::Pinned,
+                    BaseSupport::Elastic => SupportForm::Elastic,
                 },
             });
         }
@@ -174,16 +194,26 @@ pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
         vein: 1,
         at: [1.0; 2],
         held: match tip.clamps {
-            Some(_) => SupportKind::Clamped,
-            None => SupportKind::Pinned,
+            Some(_) => SupportForm::Clamped,
+            None => SupportForm::Pinned,
         },
     }));
     marks.extend(scenario.grips.iter().map(|grip| SupportMark {
         part: ParsedKey::Grip,
         vein: grip.vein + 1,
         at: grip.at,
-        held: grip.held,
+        held: SupportForm::from_grip(grip),
     }));
+    for (stiffness, vein) in scenario.foundation.iter().flatten().zip(1..) {
+        let places = (1..=FOUNDATION_MARKS).map(|k| k as f64 / FOUNDATION_MARKS as f64);
+        let held = |at: &f64| stiffness.iter().any(|along| along.at(*at) > 0.0);
+        marks.extend(places.filter(held).map(|at| SupportMark {
+            part: ParsedKey::Foundation,
+            vein,
+            at: [at; 2],
+            held: SupportForm::Elastic,
+        }));
+    }
     marks
 }
 
@@ -381,6 +411,9 @@ const KEY_WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("tip.twist", "twist at the tip", Veins),
     ("grip.at", "place of grip", Plain),
     ("grip.move", "displacement of grip", Along),
+    ("grip.stiffness", "spring of grip", Along),
+    ("grip.turn_stiffness", "turning stiffness of grip", Plain),
+    ("foundation.stiffness", "stiffness of foundation", Along),
     ("dynamics.density", "mass per length", Veins),
     ("dynamics.rotary_inertia", "rotary inertia", Veins),
     ("dynamics.section_radius", "radius of the section", Veins),

@@ -204,7 +204,7 @@ class LeafMesh {
 const placeOf = (vein, at, { stations }, mesh) => 3 * (view.drawn.indexOf(vein) * mesh.fine + mesh.fineAt(stations, at));
 
 /// Marks on what is held, at its ends and at the nodes between: blocks where veins are clamped, and cones that point at them
-/// where they are pinned.
+/// where they are pinned, wheels where they slide, and posts where springs hold them.
 function holdMarks(leaf, mesh) {
   const cone = new THREE.CylinderGeometry(1.9 * radius, 0, 3.2 * radius, 12);
   cone.rotateX(Math.PI / 2);
@@ -213,7 +213,10 @@ function holdMarks(leaf, mesh) {
     const size = part === "grip" ? [2 * radius, 2 * radius, 2.8 * radius, 4] : [3 * radius, 3 * radius, 3 * radius, 24];
     return new THREE.CylinderGeometry(...size).rotateX(Math.PI / 2);
   };
-  const shapes = { pinned: () => plain(cone), clamped: (part) => plain(block(part)) };
+  // Wheels, across what slides, and posts.
+  const wheel = new THREE.CylinderGeometry(1.9 * radius, 1.9 * radius, 1.2 * radius, 24);
+  const post = new THREE.CylinderGeometry(1.1 * radius, 1.1 * radius, 3.6 * radius, 6);
+  const shapes = { pinned: () => plain(cone), clamped: (part) => plain(block(part)), sliding: () => plain(wheel), elastic: () => plain(post) };
   const drawn = view.holds.filter(({ vein }) => view.drawn.includes(vein));
   return drawn.flatMap(({ part, vein, at, held }) => {
     const inside = leaf.stations.filter((sigma) => sigma > at[0] && sigma < at[1]);

@@ -68,13 +68,21 @@ class DynamicsTable(TypedDict, total=False):
     tip_moment: Profile
 
 
+class FoundationTable(TypedDict, total=False):
+    """``[foundation]``"""
+
+    stiffness: Numbers | Vectors | Profile
+
+
 class GripTable(TypedDict, total=False):
     """``[[grip]]``"""
 
     at: float | Numbers
     held: str
     move: Numbers
-    vein: SupportsIndex
+    stiffness: Numbers | Sequence[float | str]
+    turn_stiffness: float | str
+    vein: SupportsIndex | Sequence[SupportsIndex]
 
 
 class LeafTable(TypedDict, total=False):
@@ -222,6 +230,7 @@ class ScenarioDict(TypedDict, total=False):
     blade: BladeTable
     coupling: CouplingTable
     dynamics: DynamicsTable
+    foundation: FoundationTable
     grip: Sequence[GripTable]
     leaf: LeafTable
     load: LoadTable

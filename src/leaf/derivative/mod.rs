@@ -385,7 +385,7 @@ impl DiscreteLeaf {
             return;
         }
         self.add_own_load_changes(state, each, forces);
-        self.add_base_spring_changes(state, each, forces);
+        self.add_spring_changes(state, each, forces);
         let terms: Vec<_> = each.iter().map(|it| (it.weight, &it.term)).collect();
         forces.energy += self.for_each_tissue_change(state, &terms, |j, i, load| {
             if nodes.contains(&i) {
@@ -395,20 +395,55 @@ impl DiscreteLeaf {
         });
     }
 
-    /// Adds the changes of the springs at the bases, in their stiffness and their natural direction.
-    fn add_base_spring_changes(
+    /// Adds the changes of the springs of supports, in their stiffness and in where they have no force.
+    fn add_spring_changes(
         &self,
         state: &State,
         each: &[Weighted<DiscreteLeaf>],
         forces: &mut ParameterForces,
     ) {
-        let count = self.moving_nodes().len();
-        for j in (0..self.rods()).filter(|_| self.has_base_springs()) {
-            for Weighted { weight, term } in each {
-                let load = term.base_spring_load(state, j);
-                forces.energy += *weight * load.energy;
-                let base = &mut forces.rod_forces_mut(j, count)[0];
-                add_to_increment(base, *weight * load.moment, DVec3::ZERO);
+        let nodes = self.moving_nodes();
+        for Weighted { weight, term } in each {
+            for spring in term.springs.iter() {
+                let k = state.base(spring.rod) + spring.node;
+                let [moment, force] = [spring.moment(state.q[k]), spring.force(state.x[k])];
+                forces.energy += *weight * spring.energy(state.x[k], state.q[k]);
+                if nodes.contains(&spring.node) {
+                    let on_rod = forces.rod_forces_mut(spring.rod, nodes.len());
+                    let on = &mut on_rod[spring.node - nodes.start];
+                    add_to_increment(on, *weight * moment, *weight * force);
+                }
+            }
+        }
+    }
+
+    /// The change of the forces of the springs on node `i` of rod `j` by its displacement.
+    pub(super) fn spring_response(&self, j: usize, i: usize, response: &LinearResponse) -> DVec3 {
+        let springs = self.springs.on_node(j * (self.segments() + 1) + i);
+        let stiffness: DVec3 = springs.iter().map(|spring| spring.stiffness).sum();
+        -stiffness * displacement_part(&response.nodes[j][i - self.first_node()])
+    }
+
+    /// Adds the changes of the forces of springs on their grips.
+    fn add_spring_force_rates(
+        &self,
+        state: &State,
+        each: &[Weighted<DiscreteLeaf>],
+        response: &LinearResponse,
+        rates: &mut [DVec3],
+    ) {
+        for Weighted { weight, term } in each {
+            for spring in term.springs.iter() {
+                if let Some(grip) = spring.grip {
+                    let x = state.x[state.base(spring.rod) + spring.node];
+                    rates[grip] -= *weight * spring.force(x);
+                }
+            }
+        }
+        for spring in self.springs.iter() {
+            if let Some(grip) = spring.grip {
+                let increment = &response.nodes[spring.rod][spring.node - self.first_node()];
+                rates[grip] += spring.stiffness * displacement_part(increment);
             }
         }
     }

@@ -138,7 +138,7 @@ impl<'s> LeafParameterDerivative<'s> {
                 || leaf.has_base_springs()
                 || terms
                     .iter()
-                    .any(|it| it.term.has_own_loads() || !it.term.grips.is_empty())
+                    .any(|it| it.term.has_own_loads() || it.term.needs_stress_free_leaf())
             {
                 true => weighted_leaves(leaf, terms),
                 false => Vec::new(),

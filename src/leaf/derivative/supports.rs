@@ -45,7 +45,8 @@ impl DiscreteLeaf {
             let mut by = NodeIncrement::default();
             for Weighted { weight, term } in each {
                 let [first, other] = [&each[0].term, term].map(|leaf| leaf.grips[k]);
-                by.displacement += *weight * (other.position - first.position);
+                let moved = *weight * (other.position - first.position);
+                by.displacement += DVec3::select(own.held_axes, moved, DVec3::ZERO);
                 if let (Some(from), Some(to)) = (first.rotation, other.rotation) {
                     by.rotation += *weight * rotation::log(to * from.conjugate());
                 }
@@ -94,19 +95,20 @@ impl DiscreteLeaf {
     ) {
         let n = self.segments();
         let (turned, moved) = (rotation_part(by), displacement_part(by));
+        let free = self.node_freedom(j, i);
         let (first, count) = (self.first_node(), self.moving_nodes().len());
         if i > 0 {
             let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
             let k = hessian_at_constant_force(segment, section);
             let nodes = forces.rod_forces_mut(j, count);
+            let force = k.xx * moved + k.xb * turned;
             if i > first {
                 let moment = k.ab * turned + k.xa.transpose() * moved;
-                let force = k.xx * moved + k.xb * turned;
                 add_to_increment(&mut nodes[i - 1 - first], -moment, force);
             }
-            // A node that is only pinned rotates freely.
+            // A node that is only pinned rotates freely, and one that slides is displaced.
             let moment = k.bb * turned + k.xb.transpose() * moved;
-            add_to_increment(&mut nodes[i - first], -moment, DVec3::ZERO);
+            add_to_increment(&mut nodes[i - first], -moment, free.of_displacement(-force));
             let gap = segment.gap_increment(section, moved, DVec3::ZERO, turned);
             forces.gap_effects_mut(j, n)[i - 1] += gap;
         }
@@ -115,11 +117,12 @@ impl DiscreteLeaf {
             let k = hessian_at_constant_force(segment, section);
             let nodes = forces.rod_forces_mut(j, count);
             let moment = k.aa * turned - k.xa.transpose() * moved;
-            add_to_increment(&mut nodes[i - first], -moment, DVec3::ZERO);
+            let force = k.xx * moved - k.xa * turned;
+            add_to_increment(&mut nodes[i - first], -moment, free.of_displacement(-force));
             add_to_increment(
                 &mut nodes[i + 1 - first],
                 k.xb.transpose() * moved - k.ab.transpose() * turned,
-                k.xx * moved - k.xa * turned,
+                force,
             );
             forces.gap_effects_mut(j, n)[i] +=
                 segment.gap_increment(section, -moved, turned, DVec3::ZERO);
@@ -202,11 +205,8 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.add_load_changes(state, j, rate, &mut loads);
         }
-        self.add_tissue_and_own_load_changes(
-            state,
-            &self.weighted_leaves_on_grid(rate),
-            &mut loads,
-        );
+        let each = self.weighted_leaves_on_grid(rate);
+        self.add_tissue_and_own_load_changes(state, &each, &mut loads);
         self.add_coupling_response(state, &response.nodes, &mut loads);
         let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
         for held in &self.grips {
@@ -217,8 +217,11 @@ impl DiscreteLeaf {
             if i < n {
                 force += carried(i);
             }
-            rates[held.grip] += force;
+            force += self.spring_response(j, i, response);
+            let free = self.freedom_without_tip_support(j, i);
+            rates[held.grip] += force - free.of_displacement(force);
         }
+        self.add_spring_force_rates(state, &each, response, &mut rates);
         rates
     }
 
@@ -226,16 +229,29 @@ impl DiscreteLeaf {
     /// the loads on the tip, and of the forces in the last segments.
     pub fn reaction_rate(
         &self,
+        state: &State,
         rate: &LeafParameterDerivative,
         response: &LinearResponse,
     ) -> DVec3 {
         let n = self.segments();
+        let founded = rate
+            .weighted_leaves
+            .iter()
+            .any(|it| it.term.has_foundation());
+        let each = match founded {
+            true => self.weighted_leaves_on_grid(rate),
+            false => Vec::new(),
+        };
         let weight = self.load_factor * self.grid.node_weight(n);
         let mut force = self.load_factor * rate.tip_force;
         for (j, rod) in rate.rods.iter().enumerate() {
             let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
             force += weight * gravity - response.force_changes[j * n + n - 1];
             force += self.load_factor * self.own_load_rate(rate, j, n);
+            let springs =
+                |it: &Weighted<DiscreteLeaf>| it.weight * it.term.spring_load(state, j, n).force;
+            force += each.iter().map(springs).sum::<DVec3>();
+            force += self.spring_response(j, n, response);
         }
         force
     }

@@ -170,10 +170,7 @@ impl DiscreteLeaf {
     /// Whether supports determine both nodes of a strip: their places and rotations, or a common place.
     fn is_strip_given(&self, g: usize, i: usize) -> bool {
         let tip = i == self.segments();
-        let held = |rod: usize| {
-            let free = self.freedom_without_tip_support(rod, i);
-            !free.displacement && !free.rotation
-        };
+        let held = |rod: usize| self.freedom_without_tip_support(rod, i).is_fixed();
         let at_base = i < self.first_node();
         let in_common = tip && (self.leaf.joined() || self.leaf.tip_support.is_some());
         at_base || in_common || held(g) && held(g + 1)

@@ -18,7 +18,8 @@
 //! which the motion returns. The path does not depend on the times asked for.
 //!
 //! Besides segments, coupling and dead loads, the tissue between neighboring rods, loads of single
-//! rods and wind act on the nodes. Drag depends on the velocities at the time of the positions. Known are
+//! rods, springs of supports and wind act on the nodes. A node that a grip holds along some axes only is
+//! returned to its place along these after each drift, without velocity there. Drag depends on the velocities at the time of the positions. Known are
 //! those half a step before, and half a step before the last step: drag takes their linear
 //! extrapolation, so that the method stays of second order.
 //!
@@ -36,7 +37,7 @@ mod tests;
 use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
 use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
-use crate::motion::explicit::packs::{NodeMomentum, Pack};
+use crate::motion::explicit::packs::{NodeMomentum, Pack, SlidingNode};
 pub use crate::motion::explicit::stable_step::StableStep;
 use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
@@ -97,6 +98,8 @@ pub struct Explicit {
     applied: Option<AppliedLoads>,
     /// The dead moments of a step.
     moments: StepDeadMoments,
+    /// Nodes that grips hold along some axes and let slide along the others.
+    sliding: Vec<SlidingNode>,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
@@ -172,6 +175,7 @@ impl Explicit {
             applied: AppliedLoads::new(&leaf, &physics, state, layout),
             moments: StepDeadMoments::default(),
             block: BlockForces::new(),
+            sliding: packs::sliding_nodes(&leaf, state, layout),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_load_length: (0..count).map(tip_weight).sum(),
             step: 0.0,
@@ -357,6 +361,7 @@ impl Explicit {
                 }
             }
         }
+        energy -= self.return_sliding_nodes();
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity);
@@ -374,6 +379,24 @@ impl Explicit {
             },
             twice_kinetic: energy,
         }
+    }
+
+    /// Puts nodes that slide back to where they are held along the other axes, without velocity there;
+    /// returns twice the kinetic energy that those components had in the middle of the kick, at half of
+    /// their velocity.
+    fn return_sliding_nodes(&mut self) -> f64 {
+        let mut energy = 0.0;
+        for sliding in &self.sliding {
+            let PackPosition { pack, entry } = sliding.place;
+            let mass = self.packs[pack].mass(entry);
+            for axis in (0..3).filter(|axis| sliding.held_axes.test(*axis)) {
+                let velocity = &mut self.packs[pack].motion.v[axis][entry];
+                energy += mass * (0.5 * *velocity).powi(2);
+                *velocity = 0.0;
+                self.positions[axis][sliding.node] = sliding.position[axis];
+            }
+        }
+        energy
     }
 
     fn law(&self, rest: f64, remember: bool) -> StepLaw {
@@ -613,7 +636,7 @@ impl AppliedLoads {
     ) -> Option<Self> {
         let wind = WindDrag::new(leaf, physics);
         let dead = leaf.loads.rod_load_factor != 0.0;
-        if !leaf.has_tissue() && !dead && !leaf.has_base_springs() && wind.is_none() {
+        if !leaf.has_tissue() && !dead && !leaf.has_springs() && wind.is_none() {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -668,7 +691,7 @@ impl AppliedLoads {
         self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
-        leaf.add_base_spring_moments(&self.state, &mut self.nodes);
+        leaf.add_spring_loads(&self.state, &mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
             let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);
             let velocity = |k: usize| now[k] + air.extrapolation * (now[k] - earlier[k]);

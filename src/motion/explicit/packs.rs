@@ -4,10 +4,11 @@ use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
 use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory};
 use crate::motion::explicit::layout::{
-    AlignedArray, BlockMaterial, NodeData, PackLayout, material_blocks, vector_at,
+    AlignedArray, BlockMaterial, NODES_PER_BLOCK, NodeData, PackLayout, PackPosition,
+    material_blocks, vector_at,
 };
 use crate::motion::physics::Physics;
-use glam::{DQuat, DVec3};
+use glam::{BVec3, DQuat, DVec3};
 use std::sync::Arc;
 
 /// The arrays of a pack of rods, except its positions, which its neighbors read.
@@ -18,6 +19,40 @@ pub struct Pack {
     pub past: StrainHistory,
     /// Sums of the last step.
     pub totals: StepTotals,
+}
+
+impl Pack {
+    /// The mass of a node.
+    pub fn mass(&self, entry: usize) -> f64 {
+        self.material[entry / NODES_PER_BLOCK].mass[entry % NODES_PER_BLOCK]
+    }
+}
+
+/// A node that a grip holds along some lab axes and lets slide along the others.
+#[derive(Clone, Copy, Debug)]
+pub struct SlidingNode {
+    pub place: PackPosition,
+    /// Its number among the positions.
+    pub node: usize,
+    pub held_axes: BVec3,
+    /// Where it is held.
+    pub position: DVec3,
+}
+
+/// The nodes of a leaf that slide.
+pub fn sliding_nodes(leaf: &DiscreteLeaf, state: &State, layout: PackLayout) -> Vec<SlidingNode> {
+    let node = |(j, i): (usize, usize)| {
+        let held_axes = !leaf.node_freedom(j, i).displacement;
+        (held_axes.any() && !held_axes.all()).then(|| SlidingNode {
+            place: layout.pack_position(j, i),
+            node: layout.node_index(j, i),
+            held_axes,
+            position: state.x[state.base(j) + i],
+        })
+    };
+    leaf.rod_index_pairs(1..=leaf.segments())
+        .filter_map(node)
+        .collect()
 }
 
 fn arrays<const K: usize>(length: usize) -> [AlignedArray; K] {
@@ -124,7 +159,7 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
             node.inverse_inertia = 1.0 / inertia.transverse;
             node.inverse_spin_excess = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
         }
-        if free.displacement && (i < n || !joined) {
+        if free.displacement.any() && (i < n || !joined) {
             node.mass = inertia.mass;
             node.inverse_mass = 1.0 / inertia.mass;
             let neighbours = [j > 0, j + 1 < leaf.rods()];

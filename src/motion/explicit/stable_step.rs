@@ -64,12 +64,12 @@ impl StableStep {
                 "coupling"
             };
         }
-        let springs = leaf.base_spring_frequency_bound(|j| {
-            let inertia = physics.inertia(leaf, j, 0);
-            inertia.transverse.min(inertia.polar())
+        let springs = leaf.spring_frequency_bound(|j, i| {
+            let inertia = physics.inertia(leaf, j, i);
+            [inertia.transverse.min(inertia.polar()), inertia.mass]
         });
         if springs > strains.max(coupling).max(tissue) {
-            limit = "the springs at the bases";
+            limit = "the springs of supports";
         }
         let coupling = coupling + tissue + springs;
         let all = strains + coupling;
@@ -155,12 +155,14 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Fas
             let (j1, j2) = (inertia.polar(), inertia.transverse);
             let turning = DVec3::new(j1, j2, j2) * turn / held[node].rotation;
             let frame = DMat3::from_quat(state.q[node]);
-            [(moving, free.displacement), (turning, free.rotation)].map(|(mass, free)| match free {
-                true => {
-                    let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
-                    frame * root * frame.transpose()
+            [(moving, free.displacement.any()), (turning, free.rotation)].map(|(mass, free)| {
+                match free {
+                    true => {
+                        let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
+                        frame * root * frame.transpose()
+                    }
+                    false => DMat3::ZERO,
                 }
-                false => DMat3::ZERO,
             })
         };
         let (left, right) = (root(0), root(1));
@@ -282,7 +284,7 @@ fn tissue_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics, state: &State)
         let turning = inertia.polar().min(inertia.transverse);
         [
             part(free.rotation) / turning,
-            part(free.displacement) / inertia.mass,
+            part(free.displacement.any()) / inertia.mass,
         ]
         .map(f64::sqrt)
     };

@@ -152,7 +152,7 @@ pub struct CorrectionGoal {
 /// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
 /// segments of the one before, with `columns` extrapolations. If the error is more than that of the
 /// `goal` the leaf is corrected, provided that this reduces it below.
-/// `None` where grips hold veins, whose forces jump there, where the linear equations cannot be
+/// `None` where grips hold veins, whose forces jump there, where a foundation does, where the linear equations cannot be
 /// solved, where tissue is so stiff that integration along the veins is unstable, or where the
 /// segments of a single level are not pairs of equal ones. The equations are factorized, in the
 /// memory of the `workspace`, unless `linear` has them already.
@@ -177,7 +177,7 @@ pub fn estimate(
     let widths = (0..parts.segments()).map(|i| parts.segment_width(i));
     let unstable =
         first.tissue_growth_exponent(0.5 * widths.fold(0.0, larger)) > CORRECTION.largest_growth;
-    if unstable || first.has_grips() {
+    if unstable || first.has_grips() || first.leaf.has_foundation() {
         return None;
     }
     if linear

@@ -3,11 +3,11 @@
 //! A leaf with a held tip may have many equilibria, and the one it reaches depends on the
 //! loading path. The path here is that of a testing machine: the leaf is gripped where a free
 //! start has its tips, and the grips move and rotate uniformly to their final positions, with
-//! the leaf at rest at every step. A step after which it is not near is shortened: where the
+//! the leaf at rest at every step. Where a grip is a spring, its other end moves. A step after which it is not near is shortened: where the
 //! shortest does not help, the leaf has lost its stability.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{DiscreteLeaf, GrippedNode, State, System};
+use crate::leaf::{DiscreteLeaf, GrippedNode, SpringEnd, State, System};
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
@@ -86,7 +86,10 @@ pub fn move_grips(
             })
             .collect(),
     };
-    let longest = 1.0 / holders.steps();
+    let spring_starts = leaf.grip_spring_ends(&state);
+    let [way, turn] = leaf.grip_spring_way(&spring_starts);
+    let spring_steps = (way / LIMITS.displacement).max(turn / LIMITS.rotation);
+    let longest = 1.0 / holders.steps().max(spring_steps.ceil());
     let steps = StepSizes {
         first: longest,
         shortest: STEPS.shortest * longest,
@@ -96,7 +99,9 @@ pub fn move_grips(
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
     let mut continuation = SupportContinuation {
+        on_path: leaf.clone(),
         leaf,
+        spring_starts,
         system: System::new(leaf),
         held: GridRelaxation::new(state, ACCURACY, &mut effort.work, ignored, limit),
         keeps_unstable: problem.keeps_unstable(),
@@ -130,7 +135,12 @@ pub fn move_grips(
 
 /// A leaf at rest while its holders are moved.
 struct SupportContinuation<'a> {
+    /// The leaf with its holders in their places.
     leaf: &'a DiscreteLeaf,
+    /// The leaf with the springs of its grips where they are on the path.
+    on_path: DiscreteLeaf,
+    /// Where the springs of grips begin on the path.
+    spring_starts: Vec<SpringEnd>,
     system: System,
     held: GridRelaxation<'a>,
     keeps_unstable: bool,
@@ -140,7 +150,7 @@ struct SupportContinuation<'a> {
 impl SupportContinuation<'_> {
     /// Brings the leaf to rest where its holders take it.
     fn relax_held_leaf(&mut self, holders: &SupportPaths) {
-        holders.carry_to_lambda(self.leaf, 0.0, &mut self.held.state);
+        self.carry_to_lambda(holders, 0.0);
         let rest = self.relax_roughly();
         self.held.near_rest = match rest {
             Err(EquilibriumFailure::Saddle) if !self.keeps_unstable => {
@@ -148,6 +158,12 @@ impl SupportContinuation<'_> {
             }
             _ => rest.is_ok(),
         };
+    }
+
+    /// Carries what is held, and the springs of grips, to a part of their paths.
+    fn carry_to_lambda(&mut self, holders: &SupportPaths, part: f64) {
+        (self.on_path).place_grip_springs(self.leaf, &self.spring_starts, part);
+        holders.carry_to_lambda(self.leaf, part, &mut self.held.state);
     }
 
     /// Makes a step to a part of the path. False, with the leaf as it was, if it should be shorter, as
@@ -158,7 +174,7 @@ impl SupportContinuation<'_> {
             self.held.left_convex_valley,
             self.held.near_rest,
         );
-        holders.carry_to_lambda(self.leaf, part, &mut self.held.state);
+        self.carry_to_lambda(holders, part);
         let carried = self.held.state.clone();
         self.held.left_convex_valley = false;
         let rest = match shortest || !near_rest {
@@ -188,7 +204,7 @@ impl SupportContinuation<'_> {
 
     /// From the saddle to which the leaf came it turns to one of its sides.
     fn branch_aside(&mut self, part: f64) -> Result<(), EquilibriumFailure> {
-        let (leaf, saddle) = (self.leaf, self.held.state.clone());
+        let (leaf, saddle) = (&self.on_path, self.held.state.clone());
         let system = &mut self.system;
         if !saddle::find_unstable_mode(leaf, &saddle, system, DVec3::ZERO, self.held.work) {
             return Err(EquilibriumFailure::Saddle);
@@ -197,9 +213,12 @@ impl SupportContinuation<'_> {
         let sides = [1.0, -1.0].map(|sign| {
             self.held.state.clone_from(&saddle);
             self.system.set_solution(&mode);
-            saddle::displace(leaf, &mut self.held.state, &self.system, sign);
+            saddle::displace(&self.on_path, &mut self.held.state, &self.system, sign);
             self.leave_saddles().ok()?;
-            Some(saddle::SideOfSaddle::new(leaf, self.held.state.clone()))
+            Some(saddle::SideOfSaddle::new(
+                &self.on_path,
+                self.held.state.clone(),
+            ))
         });
         let side = saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
         self.held.state = side.state;
@@ -218,7 +237,7 @@ impl SupportContinuation<'_> {
                 return rest;
             }
             let (system, state) = (&mut self.system, &mut self.held.state);
-            saddle::escape_saddle(self.leaf, state, system, DVec3::ZERO, self.held.work);
+            saddle::escape_saddle(&self.on_path, state, system, DVec3::ZERO, self.held.work);
         }
         Err(EquilibriumFailure::Saddle)
     }
@@ -239,7 +258,7 @@ impl SupportContinuation<'_> {
             shifted: false,
             cg_tolerance: FAR_FROM_REST,
         };
-        let (leaf, state, system) = (self.leaf, &mut self.held.state, &mut self.system);
+        let (leaf, state, system) = (&self.on_path, &mut self.held.state, &mut self.system);
         let rest = newton.solve(leaf, state, system, equations)?;
         // The last matrix was that of the state before.
         let shift = leaf.neutral_shift();
@@ -252,7 +271,8 @@ impl SupportContinuation<'_> {
     /// Brings the leaf roughly to rest with its holders fixed.
     fn relax_roughly(&mut self) -> Result<f64, EquilibriumFailure> {
         self.held.solver = DefiniteSolver::default();
-        self.held.relax_semi_implicitly(self.leaf, &mut self.system)
+        self.held
+            .relax_semi_implicitly(&self.on_path, &mut self.system)
     }
 
     fn record_event(&mut self, part: f64, happening: StabilityLoss) {
@@ -395,7 +415,8 @@ impl GripPath {
 
     /// The number of steps along the path.
     fn steps(&self) -> f64 {
-        let distance = self.from.distance(self.held.position);
+        let way = self.held.position - self.from;
+        let distance = DVec3::select(self.held.held_axes, way, DVec3::ZERO).length();
         (distance / LIMITS.displacement)
             .max(self.turn.length() / LIMITS.rotation)
             .ceil()
@@ -417,6 +438,7 @@ fn carry_gripped_nodes(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state
         for path in &of_rod {
             let node = path.held.node;
             let shift = path.from.lerp(path.held.position, part) - state.x[base + node];
+            let shift = DVec3::select(path.held.held_axes, shift, DVec3::ZERO);
             let here = NodeDisplacement { node, shift };
             interpolate_displacements(sigma, [before, here], |i, shift| state.x[base + i] += shift);
             state.x[base + node] += shift;

@@ -14,7 +14,8 @@
 
 use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{
-    DiscreteLeaf, Grid, Leaf, Loads, NodalField, State, System, add_to_increment, displacement_part,
+    DiscreteLeaf, Grid, Leaf, Loads, NodalField, NodeFreedom, State, System, add_to_increment,
+    displacement_part,
 };
 use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegrator, WindDrag};
 use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
@@ -453,8 +454,8 @@ fn balance_wind_forces(
 struct SteadyWind {
     wind: WindDrag,
     velocity: DVec3,
-    /// Whether each node may be displaced, rod after rod.
-    free: Vec<bool>,
+    /// What supports allow to each node, rod after rod.
+    free: Vec<NodeFreedom>,
     segments: usize,
     /// The first node of a rod with equations.
     first: usize,
@@ -463,7 +464,7 @@ struct SteadyWind {
 impl SteadyWind {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| leaf.node_freedom(j, i).displacement;
+        let free = |(j, i)| leaf.node_freedom(j, i);
         Some(SteadyWind {
             wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
@@ -481,18 +482,24 @@ impl SteadyWind {
         self.wind.drags(state, self.velocity, |_| DVec3::ZERO)
     }
 
-    /// The free ones among the ends of a segment.
-    fn free_segment_ends(&self, j: usize, i: usize) -> impl Iterator<Item = usize> + '_ {
+    /// The ends of a segment that supports let move, and what they allow.
+    fn free_segment_ends(
+        &self,
+        j: usize,
+        i: usize,
+    ) -> impl Iterator<Item = (usize, NodeFreedom)> + '_ {
         let base = j * (self.segments + 1);
-        [i, i + 1].into_iter().filter(move |i| self.free[base + i])
+        let ends = [i, i + 1].map(|i| (i, self.free[base + i]));
+        ends.into_iter().filter(|(_, free)| free.displacement.any())
     }
 }
 
 impl FollowerForces for SteadyWind {
     fn add_forces(&self, state: &State, system: &mut System) {
         for ((j, i), drag) in self.drags(state) {
-            for node in self.free_segment_ends(j, i) {
-                system.add_load(j, node, Wrench::from_force(0.5 * drag.force()));
+            for (node, free) in self.free_segment_ends(j, i) {
+                let half = free.of_displacement(0.5 * drag.force());
+                system.add_load(j, node, Wrench::from_force(half));
             }
         }
     }
@@ -504,7 +511,8 @@ impl FollowerForces for SteadyWind {
                 None => DVec3::ZERO,
             };
             let half = 0.5 * (drag.chord_derivative() * (moved(i + 1) - moved(i)));
-            for node in self.free_segment_ends(j, i) {
+            for (node, free) in self.free_segment_ends(j, i) {
+                let half = free.of_displacement(half);
                 add_to_increment(&mut forces[j][node - self.first], DVec3::ZERO, half);
             }
         }

@@ -290,7 +290,9 @@ impl Entries {
                 ValueSchema::Quantity(_) => {
                     value.is_array() || value.get("value").is_some_and(is_list_of_lists)
                 }
-                ValueSchema::VectorPerRod | ValueSchema::VectorQuantity => is_list_of_lists(value),
+                ValueSchema::VectorPerRod | ValueSchema::VectorQuantity(_) => {
+                    is_list_of_lists(value)
+                }
                 _ => false,
             }
         })

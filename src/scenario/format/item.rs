@@ -211,7 +211,7 @@ impl<'e> EntryValue<'e> {
             ValueSchema::VectorInTime
                 | ValueSchema::VectorOrInTime
                 | ValueSchema::VectorPerRod
-                | ValueSchema::VectorQuantity
+                | ValueSchema::VectorQuantity(_)
         );
         let entry = match self.part.indices.map(|index| index.map(|index| index + 1)) {
             [Some(i), Some(j), Some(k)] => format!(", list {i}, entry {j}, component {k}"),
@@ -510,13 +510,28 @@ impl<'e> EntryValue<'e> {
         Ok(list)
     }
 
-    /// A vector x, y, z.
+    /// Different whole numbers from 1 to `most`: one, or a list of them.
+    pub fn whole_numbers(&self, most: usize) -> ScenarioResult<Vec<usize>> {
+        if !self.value.is_array() {
+            return Ok(vec![self.whole_number(most)?]);
+        }
+        let mut numbers = Vec::new();
+        for item in self.list_entries(LIST_OF_NUMBERS)? {
+            let number = item.whole_number(most)?;
+            item.refuse_unless(!numbers.contains(&number), "stands in the list twice")?;
+            numbers.push(number);
+        }
+        self.refuse_unless(!numbers.is_empty(), "has no entries")?;
+        Ok(numbers)
+    }
+
+    /// A vector x, y, z, with components in the range of its key.
     pub fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
         let mut vector = [0.0; 3];
         let components = self.list_of_length(3, "one per axis x, y, z", needed)?;
         for (component, item) in vector.iter_mut().zip(components) {
-            *component = item.number_in(NumberRange::Finite)?;
+            *component = item.number()?;
         }
         Ok(vector)
     }

@@ -155,7 +155,7 @@ keys! {
     /// acceleration of gravity, which pulls the mass of the rods and of points.
     G "load.g": Vector, [1, 0, -2], Default("[0.0, 0.0, 0.0]");
     /// dead force per length of rod, which may vary along it.
-    Distributed "load.distributed": VectorQuantity, [-1, 1, 0], Derived;
+    Distributed "load.distributed": VectorQuantity(Finite), [-1, 1, 0], Derived;
     /// dead force on the joint tip, or on every tip.
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
@@ -178,14 +178,23 @@ keys! {
     TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
     TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Default("0.0");
-    /// the rod that is gripped, counted from 1.
-    GripVein "grip.vein": Whole, [0, 0, 0], Required("1");
+    /// of springs along the veins, force per length of rod and displacement from the natural place, by
+    /// lab axis; it may vary along a rod.
+    FoundationStiffness "foundation.stiffness": VectorQuantity(NotNegative), [-2, 1, 0], Required("[0.0, 0.0, 2.0]");
+    /// the rod that is gripped, counted from 1, or a list of them: a grip on each.
+    GripVein "grip.vein": WholeOrList, [0, 0, 0], Required("1");
     /// where, a fraction of the length, or the two ends of a stretch.
     GripAt "grip.at": Stretch, [0, 0, 0], Required("[0.3, 0.7]");
     /// whether the directions are held, too.
     GripHeld "grip.held": Text, [0, 0, 0], Default("\"pinned\"");
     /// by how much the grip has moved from its place in the natural leaf.
     GripMove "grip.move": Vector, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
+    /// by lab axis, how the grip holds the position: rigidly (`inf`), not at all (0), or by a spring of
+    /// this force per displacement.
+    GripStiffness "grip.stiffness": AxisStiffness, [-1, 1, 0], Default("[inf, inf, inf]");
+    /// of a clamped grip, how it holds the directions: rigidly (`inf`), or by a spring of this moment per
+    /// radian.
+    GripTurnStiffness "grip.turn_stiffness": Number(PositiveOrInfinite), [1, 1, 0], Default("inf");
     /// wanted accuracy, relative to the longest rod.
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
     /// rho, mass per length of rod.
@@ -294,6 +303,11 @@ impl Key {
     /// Whether the numbers of the key are positive, or not negative.
     pub(crate) fn is_positive(self) -> bool {
         self.form().range() != Finite
+    }
+
+    /// Whether the key takes whole numbers.
+    pub(crate) fn is_whole_number(self) -> bool {
+        matches!(self.form(), ValueSchema::Whole | ValueSchema::WholeOrList)
     }
 
     /// Whether the quantities of the leaf are proportional to the numbers of the key.
@@ -408,6 +422,8 @@ pub(crate) enum ValueSchema {
     Switch,
     /// A whole number from 1.
     Whole,
+    /// A whole number from 1, or a list of them.
+    WholeOrList,
     Number(NumberRange),
     /// A number for all rods, or a list with one for each.
     PerRod(NumberRange),
@@ -422,7 +438,9 @@ pub(crate) enum ValueSchema {
     /// x, y, z for all rods, or a list with one such vector for each.
     VectorPerRod,
     /// x, y, z for all rods, a list with one such vector for each, or a profile of vectors along them.
-    VectorQuantity,
+    VectorQuantity(NumberRange),
+    /// A stiffness, not negative or infinite, along each of x, y, z.
+    AxisStiffness,
     /// A place along a rod, or the two ends of a stretch: fractions of the length.
     Stretch,
     /// A pixel of a photograph, to the right and down.
@@ -466,7 +484,9 @@ impl ValueSchema {
             | ValueSchema::PerRod(range)
             | ValueSchema::Quantity(range)
             | ValueSchema::Outline(range)
+            | ValueSchema::VectorQuantity(range)
             | ValueSchema::PerGap(range) => range,
+            ValueSchema::AxisStiffness => NumberRange::NotNegativeOrInfinite,
             _ => NumberRange::Finite,
         }
     }
@@ -485,7 +505,7 @@ mod tests {
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 16);
+        assert_eq!(Key::tables().len(), 17);
         assert_eq!(Key::allowed_in("load")[..2], ["gravity", "g"]);
         assert!(Key::allowed_in("load").contains(&"point"));
         assert!(!Key::allowed_in("").contains(&"load.point"));

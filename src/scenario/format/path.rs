@@ -74,7 +74,7 @@ impl EntryPath {
             let index = index.trim().strip_prefix('[').ok_or_else(invalid_index)?;
             *indices.get_mut(place).ok_or_else(invalid_index)? = Some(parse_index(index)?);
         }
-        if indices[2].is_some() && key.form() != ValueSchema::VectorQuantity {
+        if indices[2].is_some() && !matches!(key.form(), ValueSchema::VectorQuantity(_)) {
             return Err(invalid_index());
         }
         if !brackets.is_empty() && !brackets.ends_with(']') {
@@ -100,7 +100,7 @@ impl EntryPath {
         let (form, path, index) = (self.key.form(), self.key.path(), self.indices[0]);
         let single = matches!(
             form,
-            ValueSchema::Text | ValueSchema::Switch | ValueSchema::Whole
+            ValueSchema::Text | ValueSchema::Switch | ValueSchema::Whole | ValueSchema::WholeOrList
         );
         match form {
             _ if single && self.scale => Err("has no numbers that could be scaled".into()),
@@ -110,11 +110,13 @@ impl EntryPath {
             ValueSchema::Text | ValueSchema::Switch if index.is_some() => {
                 Err("has no entries".into())
             }
-            ValueSchema::Vector if index > Some(2) => Err(COMPONENT_INDICES_HINT.into()),
+            ValueSchema::Vector | ValueSchema::AxisStiffness if index > Some(2) => {
+                Err(COMPONENT_INDICES_HINT.into())
+            }
             ValueSchema::VectorPerRod if self.indices[1] > Some(2) => {
                 Err(COMPONENT_INDICES_HINT.into())
             }
-            ValueSchema::Quantity(_) | ValueSchema::Outline(_) | ValueSchema::VectorQuantity => {
+            ValueSchema::Quantity(_) | ValueSchema::Outline(_) | ValueSchema::VectorQuantity(_) => {
                 Ok(())
             }
             ValueSchema::VectorInTime | ValueSchema::VectorOrInTime | ValueSchema::FactorInTime => {
@@ -141,6 +143,7 @@ impl EntryPath {
                 format!("takes no number that could vary; its entries do: {path}.at[0]"),
             ),
             ValueSchema::Vector
+            | ValueSchema::AxisStiffness
             | ValueSchema::VectorOrInTime
             | ValueSchema::Fan
             | ValueSchema::Pixel
@@ -148,13 +151,13 @@ impl EntryPath {
             {
                 list()
             }
-            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity(_)
                 if self.indices[0].is_none() =>
             {
                 list()
             }
             // One index is that of a component, two are those of a rod and a component.
-            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity(_)
                 if self.list.is_none() && self.indices[1].or(self.indices[0]) > Some(2) =>
             {
                 Err(COMPONENT_INDICES_HINT.into())
@@ -180,7 +183,7 @@ impl EntryPath {
     pub(super) fn shared_indices(&self, value: &Value) -> usize {
         let is_vector = matches!(
             self.key.form(),
-            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity
+            ValueSchema::VectorPerRod | ValueSchema::VectorQuantity(_)
         );
         if !is_vector || value.is_table() || self.list == Some("at") {
             return 0;

@@ -56,6 +56,10 @@ fn entry_schema(key: Key) -> Value {
         ValueSchema::Text => json!({ "type": "string" }),
         ValueSchema::Switch => json!({ "type": "boolean" }),
         ValueSchema::Whole => json!({ "type": "integer", "minimum": 1 }),
+        ValueSchema::WholeOrList => {
+            let whole = json!({ "type": "integer", "minimum": 1 });
+            json!({ "anyOf": [whole, list_schema(whole.clone())] })
+        }
         ValueSchema::Number(range) => number_schema(range),
         ValueSchema::PerRod(range) | ValueSchema::PerGap(range) => {
             json!({ "anyOf": [number_schema(range), list_schema(number_schema(range))] })
@@ -71,17 +75,20 @@ fn entry_schema(key: Key) -> Value {
         ValueSchema::Outline(range) => {
             json!({ "anyOf": [number_schema(range), profile_schema("value", list_schema(number_schema(range)))] })
         }
-        ValueSchema::Vector => vector_schema(),
+        ValueSchema::Vector => vector_schema(NumberRange::Finite),
+        ValueSchema::AxisStiffness => vector_schema(key.form().range()),
         ValueSchema::VectorPerRod => {
-            json!({ "anyOf": [vector_schema(), list_schema(vector_schema())] })
+            let vector = vector_schema(NumberRange::Finite);
+            json!({ "anyOf": [vector, list_schema(vector.clone())] })
         }
-        ValueSchema::VectorQuantity => {
-            let vectors = list_schema(vector_schema());
+        ValueSchema::VectorQuantity(range) => {
+            let vector = vector_schema(range);
+            let vectors = list_schema(vector.clone());
             let profile = profile_schema(
                 "value",
-                json!({ "anyOf": [vectors, list_schema(list_schema(vector_schema()))] }),
+                json!({ "anyOf": [vectors, list_schema(vectors.clone())] }),
             );
-            json!({ "anyOf": [vector_schema(), list_schema(vector_schema()), profile] })
+            json!({ "anyOf": [vector, vectors, profile] })
         }
         ValueSchema::Stretch => {
             let ends = json!({ "type": "array", "items": fraction_schema(), "minItems": 2, "maxItems": 2 });
@@ -93,9 +100,12 @@ fn entry_schema(key: Key) -> Value {
         ValueSchema::Fan => json!({ "anyOf": [
             { "enum": ["paper", "symmetric"] }, list_schema(number_schema(NumberRange::Finite)),
         ] }),
-        ValueSchema::VectorInTime => schedule_schema(&["value"], vector_schema()),
+        ValueSchema::VectorInTime => {
+            schedule_schema(&["value"], vector_schema(NumberRange::Finite))
+        }
         ValueSchema::VectorOrInTime => {
-            json!({ "anyOf": [vector_schema(), schedule_schema(&["value"], vector_schema())] })
+            let vector = vector_schema(NumberRange::Finite);
+            json!({ "anyOf": [vector, schedule_schema(&["value"], vector.clone())] })
         }
         ValueSchema::FactorInTime => {
             schedule_schema(&["factor", "value"], number_schema(NumberRange::Finite))
@@ -132,8 +142,8 @@ fn list_schema(of: Value) -> Value {
     json!({ "type": "array", "items": of })
 }
 
-fn vector_schema() -> Value {
-    json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
+fn vector_schema(range: NumberRange) -> Value {
+    json!({ "type": "array", "items": number_schema(range), "minItems": 3, "maxItems": 3 })
 }
 
 /// A quantity in time: times and the values there, under one of these names, or a sine.

@@ -271,8 +271,9 @@ impl CaseSolution {
                 self.equilibrium.extrapolated_value(tip)[axis] * self.leaf_length()
             }
             MeasuredQuantity::Reaction(axis) => {
-                let force =
-                    |k: usize, level: &GridLevel| level.leaf.reaction_rate(rate, &responses[k]);
+                let force = |k: usize, level: &GridLevel| {
+                    level.leaf.reaction_rate(&level.state, rate, &responses[k])
+                };
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Grip(grip, axis) => {

@@ -9,8 +9,8 @@ use crate::figure::drawing::{
     CURVE_COLORS, Color, Drawing, FONT_SIZE, NOTE_COLOR, PAGE, PageRectangle, Stroke, TEXT_COLOR,
     TextAnchor, rectangle_path, vein_color,
 };
+use crate::figure::scenario::SupportForm;
 use glam::DVec2;
-use leafdyn::scenario::SupportKind;
 
 /// Where labels are tried around a point, in pixels.
 struct LabelRules {
@@ -218,9 +218,11 @@ pub fn draw_header(
 }
 
 /// What keys call supports.
-pub const SUPPORT_NAMES: [(SupportKind, &str); 2] = [
-    (SupportKind::Clamped, "clamp"),
-    (SupportKind::Pinned, "pinned"),
+pub const SUPPORT_NAMES: [(SupportForm, &str); 4] = [
+    (SupportForm::Clamped, "clamp"),
+    (SupportForm::Pinned, "pinned"),
+    (SupportForm::Sliding, "slides"),
+    (SupportForm::Elastic, "spring"),
 ];
 
 /// Draws the key at the right end of the header; returns where it starts.

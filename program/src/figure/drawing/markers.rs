@@ -7,10 +7,10 @@ use crate::figure::drawing::{
     Color, Drawing, FONT_SIZE, NOTE_COLOR, PageRectangle, SECOND_SOLUTION_COLOR, Stroke,
     TEXT_COLOR, TextAnchor, WHITE, circle_path, polygon_path, polyline_path, rectangle_path,
 };
-use crate::figure::scenario::{LoadKind, LoadMark, load_marks};
+use crate::figure::scenario::{LoadKind, LoadMark, SupportForm, load_marks};
 use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
-use leafdyn::scenario::{Scenario, SupportKind};
+use leafdyn::scenario::Scenario;
 use std::f64::consts::PI;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,10 +67,12 @@ pub fn draw_tip_marker(page: &mut Drawing, at: DVec2) {
 }
 
 /// Marks what is held of a vein's end.
-pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportKind) {
+pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportForm) {
     match held {
-        SupportKind::Clamped => draw_clamp_marker(page, at),
-        SupportKind::Pinned => Marker::Triangle.draw(page, at, TEXT_COLOR),
+        SupportForm::Clamped => draw_clamp_marker(page, at),
+        SupportForm::Pinned => Marker::Triangle.draw(page, at, TEXT_COLOR),
+        SupportForm::Sliding => Marker::Ring.draw(page, at, TEXT_COLOR),
+        SupportForm::Elastic => Marker::Diamond.draw(page, at, TEXT_COLOR),
     }
 }
 

@@ -9,10 +9,12 @@ use crate::figure::drawing::{
     Color, Drawing, DrawingPath, PathStep, Stroke, TEXT_COLOR, WHITE, circle_path, color_of_vein,
     curve_between_fractions, is_drawable, polyline_path,
 };
-use crate::figure::scenario::{FigureSetting, LoadMark, ParsedKey, load_marks, support_marks};
+use crate::figure::scenario::{
+    FigureSetting, LoadMark, ParsedKey, SupportForm, load_marks, support_marks,
+};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, RodShape};
-use leafdyn::scenario::{Scenario, SupportKind};
+use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Record, ShapeSnapshot};
 
 /// Of a leaf of more veins only some are drawn: more could not be distinguished.
@@ -65,7 +67,7 @@ impl DrawnVein {
 /// A stretch of a vein, or a point, that a grip holds.
 pub struct GrippedStretch {
     pub points: Vec<DVec3>,
-    pub support: SupportKind,
+    pub support: SupportForm,
 }
 
 /// The tip of a vein, or of all where they are joined.
@@ -80,8 +82,8 @@ pub struct DrawnVeins {
     pub dots: Vec<DVec3>,
     pub tips: Vec<DrawnTip>,
     /// How the bases are held, and the tips if they are.
-    pub base_support: SupportKind,
-    pub tip_support: Option<SupportKind>,
+    pub base_support: SupportForm,
+    pub tip_support: Option<SupportForm>,
     pub grips: Vec<GrippedStretch>,
     pub moments: Vec<MomentArrow>,
     /// Corners of the bounding box.
@@ -105,12 +107,12 @@ impl DrawnVeins {
     }
 
     /// Whether bases or tips are held like this.
-    pub fn has_held_ends(&self, how: SupportKind) -> bool {
+    pub fn has_held_ends(&self, how: SupportForm) -> bool {
         self.base_support == how || self.tip_support == Some(how)
     }
 
     /// Whether a grip holds like this.
-    pub fn has_grips(&self, how: SupportKind) -> bool {
+    pub fn has_grips(&self, how: SupportForm) -> bool {
         self.grips.iter().any(|grip| grip.support == how)
     }
 
@@ -146,7 +148,9 @@ impl DrawnVeins {
             is_drawable(point).then_some(point)
         });
         let grips = support_marks(scenario).into_iter();
-        for grip in grips.filter(|mark| mark.part == ParsedKey::Grip) {
+        for grip in
+            grips.filter(|mark| [ParsedKey::Grip, ParsedKey::Foundation].contains(&mark.part))
+        {
             let curve = curves.get(grip.vein - 1).map_or(&[][..], Vec::as_slice);
             let points = curve_between_fractions(stations, curve, grip.at).into_iter();
             let points = points.map(|point| point / self.unit);
@@ -205,7 +209,7 @@ impl DrawnVeins {
             count,
             dots: Vec::new(),
             tips,
-            base_support: SupportKind::Clamped,
+            base_support: SupportForm::Clamped,
             tip_support: None,
             grips: Vec::new(),
             moments: Vec::new(),
@@ -358,7 +362,7 @@ pub fn draw_vein_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(
     }
 }
 
-/// Marks where a grip holds a vein: a stretch with both of its ends, or a point; pinned or clamped.
+/// Marks where a grip holds a vein: a stretch with both of its ends, or a point.
 fn draw_grip_markers(
     page: &mut Drawing,
     grip: &GrippedStretch,
@@ -367,8 +371,10 @@ fn draw_grip_markers(
 ) {
     let points: Vec<DVec2> = grip.points.iter().map(|&point| place(point)).collect();
     let marker = match grip.support {
-        SupportKind::Clamped => Marker::Square,
-        SupportKind::Pinned => Marker::Triangle,
+        SupportForm::Clamped => Marker::Square,
+        SupportForm::Pinned => Marker::Triangle,
+        SupportForm::Sliding => Marker::Ring,
+        SupportForm::Elastic => Marker::Diamond,
     };
     if let [first, .., last] = points.as_slice() {
         page.draw_stroke(

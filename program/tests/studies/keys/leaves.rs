@@ -124,6 +124,38 @@ move = [0.0, 0.03, 0.05]
         boundary: None,
     },
     TestLeaf {
+        name: "rollers",
+        text: "
+leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }
+load = { tip_force = [0.1, 0.2, -0.3], gravity = [0.0, 0.3, -0.6] }
+[[grip]]
+vein = [1, 2]
+at = 0.4
+stiffness = [0.0, inf, 4.0]
+move = [0.0, 0.03, 0.05]
+[[grip]]
+vein = 1
+at = [0.7, 0.8]
+held = \"clamped\"
+stiffness = [0.0, 3.0, 0.0]
+turn_stiffness = 2.0
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
+        name: "founded",
+        text: "
+leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }
+load = { tip_force = [0.1, 0.2, -0.3], gravity = [0.0, 0.3, -0.6] }
+foundation = { stiffness = [0.0, 1.0, 2.0] }
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "oval",
         text: "
 leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }

@@ -121,6 +121,17 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::GripVein => always("gripped", "grip[0].vein=2"),
         Key::GripAt => always("gripped", "grip[0].at=[0.3,0.5]"),
         Key::GripHeld => always("gripped", "grip[0].held=clamped"),
+        Key::GripStiffness => vec![
+            row("rollers", "grip[0].stiffness[2]=4.5", Acts::Always, true),
+            row(
+                "rollers",
+                "grip[0].stiffness=[inf,inf,4.0]",
+                Acts::Always,
+                false,
+            ),
+        ],
+        Key::GripTurnStiffness => smooth("rollers", "grip[1].turn_stiffness=2.5"),
+        Key::FoundationStiffness => smooth("founded", "foundation.stiffness[2]=2.2"),
         Key::GripMove => vec![
             row("gripped", "grip[0].move[2]=0.06", Acts::Always, true),
             row(
