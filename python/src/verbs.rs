@@ -277,9 +277,13 @@ pub fn chart(
     seconds: Option<f64>,
     methods: Option<Vec<String>>,
     leaves: Vec<PyRef<Scenario>>,
+    motion: bool,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Charted> {
-    let mut options = ChartOptions::default();
+    let mut options = ChartOptions {
+        motion,
+        ..ChartOptions::default()
+    };
     options.seconds = seconds.unwrap_or(options.seconds);
     if let Some(words) = methods {
         let wanted: Result<Vec<SolverConfig>, _> = words.iter().map(|word| word.parse()).collect();

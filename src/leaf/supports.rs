@@ -319,11 +319,11 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Sets the held components of forces on the nodes to zero.
-    pub(super) fn clear_held_forces(&self, forces: &mut NodalField) {
+    /// Sets the held components of increments of the nodes, or of forces on them, to zero.
+    pub fn zero_held_components(&self, field: &mut NodalField) {
         for (j, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             for c in self.held_components(j, i).iter() {
-                forces[j][i - self.first_node()][c] = 0.0;
+                field[j][i - self.first_node()][c] = 0.0;
             }
         }
     }

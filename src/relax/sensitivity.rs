@@ -781,6 +781,12 @@ fn response(
         force_changes: vec![DVec3::ZERO; gaps.len()],
     };
     leaf.condense_gaps(carriers, &gaps, &mut rhs);
+    // In the matrix held components have a large stiffness, and a neighbor's coupling moves them a little.
+    let solve = &mut |forces: &NodalField| {
+        let mut nodes = solve(forces)?;
+        leaf.zero_held_components(&mut nodes);
+        Some(nodes)
+    };
     response.nodes = solve(&rhs)?;
     leaf.carried_force_changes(
         carriers,

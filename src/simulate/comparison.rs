@@ -245,7 +245,7 @@ pub(super) fn largest_distance(own: &[DVec3], other: &[DVec3]) -> f64 {
 
 /// The points of a leaf that are compared: the tips, and the middles of all rods, as tips may be
 /// held.
-pub(super) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
+pub(crate) fn compared_points(frame: &Frame, stations: &[f64], joined: bool) -> Vec<DVec3> {
     let InterpolationWeights { first, weights } = interpolation_weights(stations, 0.5, CUBIC_NODES);
     let mut points = frame.tips(joined);
     for rod in 0..frame.rods {

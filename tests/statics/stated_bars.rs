@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use leafdyn::relax::Route;
+use leafdyn::scenario::{Grip, SupportKind};
 use leafdyn_testing::random::{Draw, list};
 use leafdyn_testing::*;
 
@@ -213,6 +214,74 @@ pub fn draw(seed: usize) -> Drawn {
         scenario: parse(&text.replace("SPRING", &format!("{spring:?}"))),
         kinds,
     }
+}
+
+/// A random leaf whose grips slide and give, with one more grip, or on a foundation.
+fn draw_on_springs(seed: usize) -> Drawn {
+    let Drawn {
+        mut scenario,
+        kinds,
+    } = draw(seed);
+    let mut random = Draw(0x5b21_0000 + seed as u64);
+    let (scale, rods) = (scenario.scale(), scenario.rods.len());
+    let per_length = scale.force() / scale.length;
+    let vein = (random.even() * rods as f64) as usize;
+    let held = match random.chance(0.3) {
+        true => SupportKind::Clamped,
+        false => SupportKind::Pinned,
+    };
+    if scenario.grips.iter().all(|grip| grip.vein != vein) {
+        let displacement = [0; 3].map(|_| scale.length * random.uniform(-0.05, 0.05));
+        let place = random.uniform(0.2, 0.9);
+        let at = match random.chance(0.3) {
+            true => [0.7 * place, place],
+            false => [place; 2],
+        };
+        scenario.grips.push(Grip {
+            displacement,
+            ..Grip::rigid(vein, at, held)
+        });
+    }
+    for grip in &mut scenario.grips {
+        grip.stiffness = [0; 3].map(|_| match random.even() {
+            kind if kind < 0.3 => 0.0,
+            kind if kind < 0.5 => f64::INFINITY,
+            _ => per_length * random.log(0.3, 300.0),
+        });
+        let turn = per_length * scale.length.powi(2) * random.log(0.03, 30.0);
+        if grip.held == SupportKind::Clamped && random.chance(0.7) {
+            grip.turn_stiffness = turn;
+        } else if grip.held == SupportKind::Pinned && grip.stiffness == [0.0; 3] {
+            grip.stiffness[2] = per_length;
+        }
+    }
+    if random.chance(0.5) {
+        let unit = per_length / scale.length;
+        let vein = |random: &mut Draw| {
+            [0; 3].map(|_| match random.chance(0.3) {
+                true => Profile::Constant(0.0),
+                false => linear(&[0.0, 1.0], &[0; 2].map(|_| unit * random.log(0.3, 100.0))),
+            })
+        };
+        scenario.foundation = Some((0..rods).map(|_| vein(&mut random)).collect());
+    }
+    Drawn { scenario, kinds }
+}
+
+/// As many leaves as `LEAFDYN_SPRING_BARS` says.
+#[test]
+fn bars_of_random_leaves_on_springs_hold() {
+    let mut table = Table::default();
+    let count = asked("LEAFDYN_SPRING_BARS", 6);
+    let first = asked("LEAFDYN_SPRING_BARS_FROM", 0);
+    for seed in first..first + count {
+        table.judge(seed, draw_on_springs(seed), &[1e-11, 1e-10], &ASKED);
+    }
+    println!("{}", table.rows());
+    println!("{} rest, {} in others", table.resting, table.others);
+    let wrong = table.wrong.join("\n");
+    assert!(wrong.is_empty(), "{wrong}");
+    assert!(2 * table.resting > count && table.others <= table.resting / 5);
 }
 
 /// A random blade in cm and N under its weight: pointed, a fan or a strip, free, gripped at its margins, loaded or in

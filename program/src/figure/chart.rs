@@ -38,14 +38,17 @@ const FEWEST_DECADES: f64 = 1.0;
 pub fn draw_chart(chart: &Chart) -> Drawing {
     let rods = chart.rods;
     let rows = chart.rows.iter().map(|row| RowOfLeaf { rods, row });
-    let mut series = contender_series(&rows.collect::<Vec<_>>(), false);
+    let mut series = contender_series(&rows.collect::<Vec<_>>(), SeriesOf::from_chart(chart));
     series.extend(peer_series(&chart.peers));
     let floor = chart.reference.as_ref().map(|found| found.known_within);
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
     let failed = series.iter().flat_map(|series| &series.failures);
     let seconds = series_points(&series).map(|point| point.0);
     let errors = series_points(&series).map(|point| point.1).chain(floor);
-    let name = "largest true error of positions / L";
+    let name = match chart.motion {
+        true => "largest true error of tips and middles in the motion / L",
+        false => "largest true error of positions / L",
+    };
     let panel = ChartPanel {
         across: time_axis(seconds.chain(failed.filter_map(|failure| failure.x))),
         up: Axis::logarithmic(name, errors, FEWEST_DECADES),
@@ -53,6 +56,7 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
         floor,
     };
     let reference = match &chart.reference {
+        None if chart.motion => "no reference: no method follows the motion".into(),
         None => "no reference: no equilibrium was found".into(),
         Some(found) => {
             let what = match found.confirmed {
@@ -67,7 +71,8 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
         reference,
         "left is faster, down is more accurate".into(),
     ];
-    let title = format!("{}: speed against accuracy", chart.scenario);
+    let what = if chart.motion { ", in motion" } else { "" };
+    let title = format!("{}{what}: speed against accuracy", chart.scenario);
     chart_page(&title, &notes, &panel)
 }
 
@@ -76,7 +81,7 @@ pub fn draw_scaling(scaling: &ScalingStudy) -> Drawing {
         rods: found.rods,
         row: &found.row,
     });
-    let series = contender_series(&rows.collect::<Vec<_>>(), true);
+    let series = contender_series(&rows.collect::<Vec<_>>(), SeriesOf::VEINS);
     let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
     rods.sort_unstable();
     rods.dedup();
@@ -158,12 +163,44 @@ fn contender_style(who: SolverConfig) -> SeriesStyle {
     CONTENDER_STYLES[who.number().unwrap_or(0)]
 }
 
+/// What is charted.
+#[derive(Clone, Copy)]
+struct SeriesOf {
+    /// Seconds over veins, and not errors over seconds.
+    over_veins: bool,
+    /// Motions, and not leaves at rest.
+    motion: bool,
+    /// The contender that is called the default.
+    default: SolverConfig,
+}
+
+impl SeriesOf {
+    const VEINS: SeriesOf = SeriesOf {
+        over_veins: true,
+        motion: false,
+        default: SolverConfig::ALL[0],
+    };
+
+    fn from_chart(chart: &Chart) -> Self {
+        SeriesOf {
+            over_veins: false,
+            motion: chart.motion,
+            default: chart.default,
+        }
+    }
+}
+
 /// A series for each contender with results: seconds over veins, or errors over
 /// seconds.
-fn contender_series(rows: &[RowOfLeaf], over_veins: bool) -> Vec<ChartSeries> {
+fn contender_series(rows: &[RowOfLeaf], charted: SeriesOf) -> Vec<ChartSeries> {
+    let SeriesOf {
+        over_veins,
+        motion,
+        default,
+    } = charted;
     let of = |who: SolverConfig| {
-        let default = if who.is_default() { " (default)" } else { "" };
-        let name = format!("{}{default}", contender_name(who));
+        let default = if who == default { " (default)" } else { "" };
+        let name = format!("{}{default}", contender_name(who, motion));
         let mut series = ChartSeries::new(name, contender_style(who));
         for RowOfLeaf { rods, row } in rows.iter().filter(|it| it.row.contender == who) {
             let rods = *rods as f64;
@@ -520,7 +557,17 @@ mod tests {
             rods: 5,
             row: &chart.rows[0],
         }];
-        let spread = |over_veins| contender_series(&rows, over_veins)[0].points[0].spread;
+        let spread = |over_veins| {
+            contender_series(
+                &rows,
+                SeriesOf {
+                    over_veins,
+                    ..SeriesOf::VEINS
+                },
+            )[0]
+            .points[0]
+                .spread
+        };
         assert_eq!(spread(false), [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
         assert_eq!(spread(true), [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
     }

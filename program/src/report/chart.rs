@@ -5,9 +5,7 @@ use crate::report::document::{ReportedResult, contender_name};
 use crate::report::numbers::{duration_text, format_error_bound, veins_text_for_count};
 use crate::report::table::{LabelledLines, label_first_line, text_cell};
 use leafdyn::scenario::Units;
-use leafdyn::study::{
-    Chart, ChartRow, FastestByAccuracy, PeerProgram, ReferenceSolution, ScalingStudy,
-};
+use leafdyn::study::{Chart, ChartRow, FastestByAccuracy, PeerProgram, ScalingStudy};
 use serde::Serialize;
 use serde_json::Value;
 use std::io;
@@ -20,11 +18,12 @@ const CHART_COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_
 impl ReportedResult for Chart {
     fn heading(&self) -> String {
         let veins = veins_text_for_count(self.rods, self.joined);
-        format!("{}: {veins}, speed against accuracy", self.scenario)
+        let what = if self.motion { ", in motion" } else { "" };
+        format!("{}{what}: {veins}, speed against accuracy", self.scenario)
     }
 
     fn report_lines(&self, _: &Units) -> LabelledLines {
-        let mut lines = label_first_line("errors", reference_lines(self.reference.as_ref()));
+        let mut lines = label_first_line("errors", reference_lines(self));
         lines.push(("measured", measurement_line(self)));
         lines.extend(label_first_line("front", pareto_front_lines(self)));
         lines.extend(label_first_line("fastest", fastest_by_accuracy_lines(self)));
@@ -38,9 +37,13 @@ impl ReportedResult for Chart {
     }
 }
 
-fn reference_lines(reference: Option<&ReferenceSolution>) -> Vec<String> {
-    let Some(found) = reference else {
-        return vec!["not known: no equilibrium was found to measure them against".into()];
+fn reference_lines(chart: &Chart) -> Vec<String> {
+    let Some(found) = &chart.reference else {
+        let what = match chart.motion {
+            true => "no method follows the motion on three grids",
+            false => "no equilibrium was found to measure them against",
+        };
+        return vec![format!("not known: {what}")];
     };
     let within = format_error_bound(found.known_within);
     let accuracy = match found.confirmed {
@@ -78,7 +81,10 @@ fn pareto_front_lines(chart: &Chart) -> Vec<String> {
     let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
         let (time, error) = row.seconds_and_error()?;
-        let (name, knob) = (contender_name(row.contender), row.knob.to_string());
+        let (name, knob) = (
+            contender_name(row.contender, chart.motion),
+            row.knob.to_string(),
+        );
         Some((time, table_line(time, error, name, &knob)))
     });
     let peers = chart.peers.iter().filter(|peer| peer.pareto);
@@ -104,7 +110,10 @@ fn fastest_by_accuracy_lines(chart: &Chart) -> Vec<String> {
             duration_text(decade.seconds?),
             format!("{:e}", decade.error),
         );
-        let (who, knob) = (contender_name(decade.contender?), decade.knob?);
+        let (who, knob) = (
+            contender_name(decade.contender?, chart.motion),
+            decade.knob?,
+        );
         Some(format!(
             "{time:>10}  to {error:<7} {who}, {knob}; {default}"
         ))
@@ -127,7 +136,7 @@ fn failure_lines(chart: &Chart) -> Vec<String> {
         let why = row.remark.as_ref();
         let why = why.map_or(String::new(), |why| format!(": {why}"));
         let (who, knobs, end) = (
-            contender_name(row.contender),
+            contender_name(row.contender, chart.motion),
             settings_text(&knobs),
             row.ending.word(),
         );
@@ -207,7 +216,7 @@ fn scaling_lines(scaling: &ScalingStudy) -> Vec<String> {
         let cell = format!("N = {}: {what}", found.rods);
         match lines.last_mut().filter(|_| last == Some(row.contender)) {
             Some(line) => *line = format!("{line}, {cell}"),
-            None => lines.push(format!("{}, {cell}", contender_name(row.contender))),
+            None => lines.push(format!("{}, {cell}", contender_name(row.contender, false))),
         }
         last = Some(row.contender);
     }

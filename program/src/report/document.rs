@@ -246,8 +246,8 @@ pub fn check_verdict_phrase(verdict: &CheckVerdict) -> &'static str {
     }
 }
 
-/// The name of a contender in a chart.
-pub fn contender_name(contender: SolverConfig) -> &'static str {
+/// The name of a contender in a chart of leaves at rest, or of a `motion`.
+pub fn contender_name(contender: SolverConfig, motion: bool) -> &'static str {
     /// In the order of [`SolverConfig::ALL`].
     const NAMES: [&str; SolverConfig::ALL.len()] = [
         "semi-implicit, extrapolated",
@@ -258,7 +258,11 @@ pub fn contender_name(contender: SolverConfig) -> &'static str {
         "multiple shooting",
         "shooting from the relaxed leaf",
     ];
-    NAMES[contender.number().unwrap_or(0)]
+    match NAMES[contender.number().unwrap_or(0)] {
+        "semi-implicit, extrapolated" if motion => "semi-implicit, refined",
+        "explicit, extrapolated" if motion => "explicit, refined",
+        name => name,
+    }
 }
 
 /// How a branch ended, in a phrase.

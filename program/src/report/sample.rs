@@ -10,7 +10,7 @@ use leafdyn::study::{
     AccuracySetting, BaseScenario, Chart, ChartOutcome, ChartRemark, ChartRow, ChartRowRemark,
     Check, Map, MapMethod, MapOutcome, MapRemark, MapRequest, MapRow, NeutralDirection,
     PeerProgram, ReferenceConfidence, ReferenceSolution, ScalingRow, ScalingStudy, ShootingResult,
-    ShootingSolution, TimingSpread,
+    ShootingSolution, SolverConfig, TimingSpread,
 };
 use leafdyn::{relax, simulate};
 
@@ -235,6 +235,8 @@ pub fn sample_chart() -> Chart {
         ratio: None,
     };
     let chart = Chart {
+        motion: false,
+        default: SolverConfig::ALL[0],
         scenario: "fan".into(),
         rods: 5,
         joined: true,

@@ -37,6 +37,10 @@ pub struct ChartArguments {
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath, help_heading = EXPERT_OPTIONS_HEADING)]
     peers: Vec<PathBuf>,
 
+    /// Chart the motion of `simulate` by both integrators, and not the leaf at rest
+    #[arg(long)]
+    motion: bool,
+
     /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     rods: Vec<usize>,
@@ -68,8 +72,14 @@ impl ChartArguments {
         };
         let leaves: Result<Vec<_>, VaryError> = self.rods.iter().map(leaf).collect();
         let leaves = leaves?;
+        if self.motion && !self.rods.is_empty() {
+            return Err("--rods: is about leaves at rest; leave --motion out"
+                .to_string()
+                .into());
+        }
         let mut options = ChartOptions {
             seconds: self.seconds,
+            motion: self.motion,
             ..ChartOptions::default()
         };
         if !self.methods.is_empty() {
@@ -95,7 +105,7 @@ impl ChartArguments {
                     round,
                     ..
                 } = turn;
-                let who = contender_name(turn.contender);
+                let who = contender_name(turn.contender, self.motion);
                 format!("{rods} veins, {who}, {knob}, round {round} of {rounds}")
             });
         };

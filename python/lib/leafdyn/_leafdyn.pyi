@@ -174,6 +174,7 @@ def chart(
     seconds: float | None,
     methods: Sequence[str] | None,
     leaves: Sequence[Scenario],
+    motion: bool,
     progress: _Heard,
 ) -> tuple[Files, Files | None, bool, list[str]]: ...
 def fit(

@@ -171,6 +171,7 @@ def chart(
     seconds: float | None = None,
     methods: str | Iterable[str] | None = None,
     rods: Iterable[SupportsIndex] = (),
+    motion: bool = False,
     progress: Progress = None,
 ) -> Chart:
     """Measure every method over its own accuracy: time against true error.
@@ -185,6 +186,8 @@ def chart(
         One or more; left out: all.
     rods
         Also measure time against the number of rods, at the tolerance: ``[5, 15, 35]``.
+    motion
+        Chart the motion of `simulate` by both integrators, and not the leaf at rest.
 
     Returns
     -------
@@ -217,8 +220,10 @@ def chart(
     words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
     leaves = [Scenario(leaf, {"leaf.rods": count})._core for count in rods]
+    if motion and leaves:
+        raise ValueError("rods is about leaves at rest: leave motion out")
     with reporter(progress) as heard:
-        found = Chart(*_leafdyn.chart(leaf._core, seconds, words, leaves, heard))
+        found = Chart(*_leafdyn.chart(leaf._core, seconds, words, leaves, motion, heard))
     for remark in found.remarks:
         warn(leaf.name, remark)
     return found

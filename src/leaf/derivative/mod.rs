@@ -207,7 +207,7 @@ impl DiscreteLeaf {
             add_to_increment(&mut nodes[g + 1][i], -change.b, -change.x);
         }
         // Held components have no equations.
-        self.clear_held_forces(nodes);
+        self.zero_held_components(nodes);
     }
 
     /// The changes of the forces of all segments for increments of the nodes and changes of

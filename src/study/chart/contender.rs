@@ -102,18 +102,18 @@ pub(super) const CHARTED_TOLERANCES: [f64; 11] = [
 pub(in crate::study) const CHARTED_SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 
 /// A leaf, a contender and its setting, with the results of its runs so far.
-pub struct RepeatedRuns<'s> {
+pub struct RepeatedRuns<'s, R = MethodSolution, E = RelaxError> {
     pub scenario: &'s Scenario,
     pub contender: SolverConfig,
     pub setting: AccuracySetting,
     /// The result of the first run. `None`: it was not run, since a coarser one of
     /// its contender took too long.
-    pub first_result: Option<Result<MethodSolution, RelaxError>>,
+    pub first_result: Option<Result<R, E>>,
     /// Seconds of each run; ascending once all are made.
     pub seconds: Vec<f64>,
 }
 
-impl<'s> RepeatedRuns<'s> {
+impl<'s, R, E> RepeatedRuns<'s, R, E> {
     pub fn new(scenario: &'s Scenario, contender: SolverConfig, knob: AccuracySetting) -> Self {
         RepeatedRuns {
             scenario,
@@ -123,7 +123,9 @@ impl<'s> RepeatedRuns<'s> {
             seconds: Vec::new(),
         }
     }
+}
 
+impl RepeatedRuns<'_> {
     /// The answer, unless the run was refused or not made.
     pub fn solution(&self) -> Option<&MethodSolution> {
         self.first_result.as_ref()?.as_ref().ok()
@@ -309,16 +311,17 @@ pub fn serialize_spread<S: Serializer>(
     }
 }
 
-/// Runs all settings once, in order, and those that are not slow a few times;
+/// Runs all settings once by `run_once`, in order, and those that are not slow a few times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
 /// the budget (or is slow), those after it are not run. Returns the number of rounds.
-pub fn time_runs(
-    all: &mut [RepeatedRuns],
+pub fn time_runs<'s, R, E>(
+    all: &mut [RepeatedRuns<'s, R, E>],
     budget: f64,
+    run_once: &dyn Fn(&RepeatedRuns<'s, R, E>) -> Result<Timed<R>, E>,
     progress: &mut (dyn FnMut(&ChartProgress) + Send),
 ) -> usize {
-    let mut run = |runs: &RepeatedRuns, round: usize, rounds: usize| {
+    let mut run = |runs: &RepeatedRuns<'s, R, E>, round: usize, rounds: usize| {
         progress(&ChartProgress {
             rods: runs.scenario.rods.len(),
             contender: runs.contender,
@@ -326,7 +329,7 @@ pub fn time_runs(
             round,
             rounds,
         });
-        runs.run_once()
+        run_once(runs)
     };
     let longest = budget.max(TIMING.slow_seconds);
     let mut too_slow = Vec::new();
@@ -342,7 +345,7 @@ pub fn time_runs(
             found.result
         }));
     }
-    let mut run_again = |runs: &mut RepeatedRuns, round: usize, rounds: usize| {
+    let mut run_again = |runs: &mut RepeatedRuns<'s, R, E>, round: usize, rounds: usize| {
         if runs.seconds[0] < TIMING.short_seconds {
             let _ = run(runs, round, rounds);
         }
@@ -351,7 +354,7 @@ pub fn time_runs(
             runs.seconds.push(found.seconds);
         }
     };
-    let is_fast = |runs: &RepeatedRuns| {
+    let is_fast = |runs: &RepeatedRuns<'s, R, E>| {
         runs.seconds
             .first()
             .is_some_and(|&time| time < TIMING.slow_seconds)

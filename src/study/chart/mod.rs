@@ -1,9 +1,10 @@
-//! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
+//! Speed against accuracy: all methods for an equilibrium, or for a motion, over their own accuracy settings,
 //! measured together against one reference; and cost against the number of veins at one accuracy.
 //!
 //! All settings take turns, so that a varying load of the machine affects them equally.
 
 pub(super) mod contender;
+mod motion;
 mod reference;
 mod remark;
 pub(super) mod result;
@@ -12,6 +13,7 @@ use crate::read_and_write;
 use crate::relax::{MAX_NODES, Outcome, RelaxError, check_tolerance, without_wind};
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
+use crate::simulate::SimulationError;
 use crate::study::chart::contender::{
     AccuracySetting, CHARTED_SEGMENTS, ChartProgress, RepeatedRuns, SolverConfig, time_runs,
 };
@@ -35,6 +37,8 @@ pub struct ChartOptions {
     pub contenders: Vec<SolverConfig>,
     /// Measurements of other programs.
     pub peers: Vec<PeerMeasurement>,
+    /// Whether the motion of the leaf is charted, and not the leaf at rest.
+    pub motion: bool,
 }
 
 impl Default for ChartOptions {
@@ -43,6 +47,7 @@ impl Default for ChartOptions {
             seconds: 10.0,
             contenders: SolverConfig::ALL.to_vec(),
             peers: Vec::new(),
+            motion: false,
         }
     }
 }
@@ -56,6 +61,14 @@ pub enum ChartError {
     /// The leaf cannot be relaxed.
     #[error(transparent)]
     Relax(#[from] RelaxError),
+    /// The leaf cannot be moved.
+    #[error(transparent)]
+    Motion(#[from] SimulationError),
+    /// The methods requested do not move leaves.
+    #[error(
+        "none of the methods requested moves a leaf: take explicit or semi-implicit, or leave them out"
+    )]
+    NoMovingMethod,
     /// The time requested is out of range.
     #[error("{0}")]
     Seconds(#[from] RefusedOption),
@@ -70,6 +83,9 @@ pub fn chart(
     options: &ChartOptions,
     progress: &mut (dyn FnMut(&ChartProgress) + Send),
 ) -> Result<Chart, ChartError> {
+    if options.motion {
+        return chart_motion(scenario, options, progress);
+    }
     without_wind(scenario, "a chart")?;
     let each = |&who: &SolverConfig| {
         let knobs = who.charted_settings().into_iter();
@@ -77,21 +93,67 @@ pub fn chart(
     };
     let mut all: Vec<RepeatedRuns> = options.contenders.iter().flat_map(each).collect();
     let (reference, rows, rounds) = run_on_one_thread(options.seconds, || {
-        let rounds = time_runs(&mut all, options.seconds, progress);
+        let rounds = time_runs(&mut all, options.seconds, &RepeatedRuns::run_once, progress);
         let found = reference::find_reference(scenario, result::reference_stations(&all))?;
         let rows = result::chart_rows(&all, found.as_ref().map(|it| &it.solution));
-        Ok((found.map(|it| it.reference), rows, rounds))
+        Ok::<_, RelaxError>((found.map(|it| it.reference), rows, rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);
     let PeerRows {
         peers,
         remarks: others,
-    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest);
+    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest, false);
     let mut remarks = result::chart_remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {
         scenario: scenario.name.clone(),
+        motion: false,
+        default: SolverConfig::ALL[0],
+        rods,
+        joined: scenario.joined,
+        threads: 1,
+        rounds,
+        reference,
+        remarks,
+        rows,
+        peers,
+        decades: Vec::new(),
+        scaling: None,
+    };
+    Ok(chart.with_comparisons())
+}
+
+/// Charts speed against accuracy for the motion of a leaf.
+fn chart_motion(
+    scenario: &Scenario,
+    options: &ChartOptions,
+    progress: &mut (dyn FnMut(&ChartProgress) + Send),
+) -> Result<Chart, ChartError> {
+    let default = motion::default_contender(scenario)?;
+    let mut all = motion::charted_runs(scenario, &options.contenders);
+    if all.is_empty() {
+        return Err(ChartError::NoMovingMethod);
+    }
+    let (found, rows, rounds) = run_on_one_thread(options.seconds, || {
+        let rounds = motion::time_motions(&mut all, options.seconds, progress);
+        let found = motion::find_reference(scenario, options.seconds);
+        let rows = motion::chart_rows(&all, found.as_ref());
+        Ok::<_, SimulationError>((found, rows, rounds))
+    })?;
+    let reference = found.map(|it| it.reference);
+    let rods = scenario.rods.len();
+    let longest = longest(&scenario.rods);
+    let PeerRows {
+        peers,
+        remarks: others,
+    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest, true);
+    let mut remarks = result::motion_remarks(&rows, reference.as_ref());
+    remarks.extend(others);
+    let chart = Chart {
+        scenario: scenario.name.clone(),
+        motion: true,
+        default,
         rods,
         joined: scenario.joined,
         threads: 1,
@@ -107,10 +169,13 @@ pub fn chart(
 }
 
 /// Calls a function on one thread, if it may take so many `seconds`.
-fn run_on_one_thread<R: Send>(
+fn run_on_one_thread<R: Send, E: Send>(
     seconds: f64,
-    work: impl FnOnce() -> Result<R, RelaxError> + Send,
-) -> Result<R, ChartError> {
+    work: impl FnOnce() -> Result<R, E> + Send,
+) -> Result<R, ChartError>
+where
+    ChartError: From<E>,
+{
     if !(seconds > 0.0 && seconds <= LONGEST_MEASUREMENT_SECONDS) {
         let allowed = format!("must be greater than 0 and at most {LONGEST_MEASUREMENT_SECONDS}");
         return Err(RefusedOption::new("seconds", seconds, allowed).into());
@@ -203,7 +268,7 @@ fn measure_scaling(
             of_leaf.push(leaf);
         }
     }
-    time_runs(&mut all, options.seconds, progress);
+    time_runs(&mut all, options.seconds, &RepeatedRuns::run_once, progress);
     for (runs, leaf) in all.into_iter().zip(of_leaf) {
         let rods = leaf.scenario.rods.len();
         let row = result::chart_rows(&[runs], leaf.reference.as_ref());

@@ -1,7 +1,9 @@
 //! What is said of a chart, and of each of its runs.
 
+use crate::motion::Stopped;
 use crate::relax::RelaxError;
 use crate::run::remarks;
+use crate::simulate::SimulationError;
 use crate::study::chart::contender::{AccuracySetting, SolverConfig};
 use crate::study::remark::SolutionRemark;
 
@@ -65,6 +67,12 @@ remarks! {
         /// A leaf or a setting that the method refuses.
         #[error("{0}")]
         Refused(RelaxError) = "refused",
+        /// A motion that the method refuses.
+        #[error("{0}")]
+        MotionRefused(SimulationError) = "refused",
+        /// Why the motion ended early.
+        #[error("{0}")]
+        MotionStopped(Stopped) = "motion-stopped",
         /// What the method says of its answer.
         #[error("{0}")]
         Solution(SolutionRemark) = inner.code(),

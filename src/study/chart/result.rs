@@ -2,6 +2,7 @@
 //!
 //! A run that ended in another equilibrium than the reference is told apart from an inaccurate one.
 
+use crate::motion::Stopped;
 use crate::relax::Outcome;
 use crate::scenario::longest;
 use crate::study::chart::contender::{
@@ -13,7 +14,7 @@ use crate::study::judge::{MethodSolution, common_stations};
 use serde::{Serialize, Serializer};
 
 /// Outcome of a run in a chart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ChartOutcome {
     /// The outcome of the run itself.
     Ended(Outcome),
@@ -21,6 +22,8 @@ pub enum ChartOutcome {
     OtherEquilibrium,
     /// The contender does not support the request.
     Refused,
+    /// The motion was followed to its end, or ended early.
+    Moved(Option<Stopped>),
     /// Not run, since a coarser run of the contender took too long.
     NotRun,
 }
@@ -31,18 +34,23 @@ impl ChartOutcome {
         match self {
             ChartOutcome::Ended(outcome) => outcome.word(),
             ChartOutcome::OtherEquilibrium => "other-equilibrium",
+            ChartOutcome::Moved(None) => COMPLETED_OUTCOME,
+            ChartOutcome::Moved(Some(stopped)) => stopped.word(),
             ChartOutcome::Refused => "refused",
             ChartOutcome::NotRun => "not-run",
         }
     }
 
     /// Whether the leaf is at rest in the reference equilibrium, with the requested accuracy,
-    /// and not known to be unstable.
+    /// and not known to be unstable, or was followed to the end of its motion.
     pub fn is_success(self) -> bool {
-        let ChartOutcome::Ended(outcome) = self else {
-            return false;
-        };
-        matches!(outcome, Outcome::Converged | Outcome::ConvergedAfterSaddle)
+        match self {
+            ChartOutcome::Ended(outcome) => {
+                matches!(outcome, Outcome::Converged | Outcome::ConvergedAfterSaddle)
+            }
+            ChartOutcome::Moved(stopped) => stopped.is_none(),
+            _ => false,
+        }
     }
 }
 
@@ -119,6 +127,11 @@ impl ChartRow {
 pub struct Chart {
     /// Name of the scenario.
     pub scenario: String,
+    /// Whether it is that of a motion.
+    pub motion: bool,
+    /// The contender that a leaf has unless a method is requested.
+    #[serde(skip)]
+    pub default: SolverConfig,
     /// Number of veins.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -186,7 +199,7 @@ impl Chart {
         let ratio = |peer: &PeerProgram| {
             let (seconds, error) = peer.seconds_and_error()?;
             // Errors indistinguishable from zero count as equal.
-            let ours = self.fastest_row(error.max(floor), |row| row.contender.is_default())?;
+            let ours = self.fastest_row(error.max(floor), |row| row.contender == self.default)?;
             Some(seconds / ours.seconds?.median)
         };
         let ratios: Vec<Option<f64>> = self.peers.iter().map(ratio).collect();
@@ -210,7 +223,7 @@ impl Chart {
 
     fn fastest_by_accuracy(&self, error: f64) -> FastestByAccuracy {
         let fastest = self.fastest_row(error, |_| true);
-        let default = self.fastest_row(error, |row| row.contender.is_default());
+        let default = self.fastest_row(error, |row| row.contender == self.default);
         let median = |row: &ChartRow| row.seconds.map(|spread| spread.median);
         let [seconds, default_seconds] = [fastest, default].map(|row| row.and_then(median));
         let both = default_seconds.zip(seconds);
@@ -368,6 +381,19 @@ pub fn chart_remarks(
     remarks
 }
 
+/// Remarks on these rows of motions and their reference.
+pub fn motion_remarks(
+    rows: &[ChartRow],
+    reference: Option<&ReferenceSolution>,
+) -> Vec<ChartRemark> {
+    let floor = reference.map_or(0.0, |found| found.known_within);
+    let each = SolverConfig::ALL.into_iter();
+    let charted = each.filter(|who| rows.iter().any(|row| row.contender == *who));
+    charted
+        .flat_map(|who| contender_remarks(who, rows, floor, false))
+        .collect()
+}
+
 fn contender_remarks(
     contender: SolverConfig,
     rows: &[ChartRow],
@@ -405,7 +431,7 @@ fn contender_remarks(
 /// First words of outcomes that are equilibria.
 const EQUILIBRIUM_OUTCOMES: [&str; 2] = ["converged", "at-rest"];
 
-/// First word of the outcome of a measurement that is not a search for an equilibrium.
+/// First word of the outcome of a motion that was followed to its end.
 const COMPLETED_OUTCOME: &str = "completed";
 
 /// One measurement of another program.
@@ -464,12 +490,13 @@ pub struct PeerRows {
     pub remarks: Vec<ChartRemark>,
 }
 
-/// The rows for a leaf of this name and number of rods.
+/// The rows for a leaf of this name and number of rods, at rest or in `motion`.
 pub fn combine_peer_measurements(
     rows: &[PeerMeasurement],
     scenario: &str,
     rods: usize,
     longest: f64,
+    motion: bool,
 ) -> PeerRows {
     let mut peers: Vec<PeerProgram> = Vec::new();
     let mut times: Vec<Vec<f64>> = Vec::new();
@@ -481,11 +508,20 @@ pub fn combine_peer_measurements(
         }
         let word = row.outcome.split_whitespace().next().unwrap_or_default();
         let at_rest = EQUILIBRIUM_OUTCOMES.contains(&word);
-        if row.error.is_none() && (at_rest || word == COMPLETED_OUTCOME) {
+        let moved = word == COMPLETED_OUTCOME;
+        if row.error.is_none() && (at_rest || moved) {
             silent += 1;
             continue;
         }
-        let true_error = row.error.filter(|_| at_rest).map(|error| error / longest);
+        // A motion is no search for an equilibrium, and the other way round.
+        if at_rest && motion || moved && !motion {
+            other += 1;
+            continue;
+        }
+        let true_error = row
+            .error
+            .filter(|_| at_rest || moved)
+            .map(|error| error / longest);
         let (knob, settings) = row.knob.split_once(' ').unwrap_or((&row.knob, ""));
         let name = format!("{} {settings}", row.program).trim_end().to_string();
         let same = |peer: &PeerProgram| {
@@ -742,7 +778,7 @@ mod peers_tests {
             "a,tree,5,n=20,2,1e-3,converged",
         ]
         .map(row);
-        let PeerRows { peers, remarks } = combine_peer_measurements(&rows, "leaf", 5, 2.0);
+        let PeerRows { peers, remarks } = combine_peer_measurements(&rows, "leaf", 5, 2.0, false);
         let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
         let names: Vec<(&str, &str)> = names.collect();
         assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);
