@@ -79,14 +79,6 @@ pub enum UnmodelledFeature {
         /// The method or the question.
         what: &'static str,
     },
-    /// A foundation.
-    #[error(
-        "[foundation]: {what} does not take springs along veins into account, as relaxation and following do; leave it out"
-    )]
-    Foundation {
-        /// The method or the question.
-        what: &'static str,
-    },
     /// Wind.
     #[error(
         "[wind]: {what} does not take wind into account, as motions do, and the release of a leaf in a steady one; leave it out"

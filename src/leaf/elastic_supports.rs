@@ -94,7 +94,7 @@ impl DiscreteLeaf {
             } else {
                 0.0
             };
-            if grip.rigid_axes() == [true; 3] && (!clamped || grip.holds_directions()) {
+            if grip.is_rigid() {
                 continue;
             }
             let [from, to] = grip.at.map(|at| self.grid.nearest_node(at));

@@ -213,6 +213,12 @@ impl Grip {
         self.held == SupportKind::Clamped && self.turn_stiffness.is_infinite()
     }
 
+    /// Whether the grip holds all that it holds rigidly.
+    pub fn is_rigid(&self) -> bool {
+        let directions = self.held == SupportKind::Pinned || self.holds_directions();
+        self.rigid_axes() == [true; 3] && directions
+    }
+
     /// Whether the grip holds the position along some axis, or the directions, by a spring.
     pub fn has_springs(&self) -> bool {
         let gives = |stiffness: f64| stiffness.is_finite() && stiffness > 0.0;

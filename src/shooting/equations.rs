@@ -20,6 +20,7 @@
 #[cfg(test)]
 mod tests;
 
+use crate::natural::Natural;
 use crate::rod::Wrench;
 use crate::rotation;
 use crate::rotation::Pose;
@@ -46,6 +47,8 @@ pub struct BoundaryValueProblem<'a> {
     pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
     tissue: Option<TissueEnergy<'a>>,
+    /// The natural leaf, in which a foundation has no force; `None` without a foundation.
+    foundation: Option<Natural<'a>>,
     /// Whether veins have loads of their own.
     own_loads: bool,
     gravity: DVec3,
@@ -140,6 +143,11 @@ impl<'a> BoundaryValueProblem<'a> {
                 let twisting = twisting.fold(0.0, f64::max);
                 let fold: f64 = gaps.clone().map(|gap| of_tissue(gap)[1]).sum();
                 let pull: DVec3 = gaps.map(|gap| coupling[gap] + of_tissue(gap)[0]).sum();
+                let ground = scenario.foundation.as_ref().map_or(DVec3::ZERO, |ground| {
+                    let most = ground[j].each_ref().map(Profile::max_abs);
+                    DVec3::from_array(most) * (lengths[j] * length * length / force)
+                });
+                let pull = pull + 0.5 * ground;
                 // Neighbors that move in the opposite direction double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
@@ -162,6 +170,7 @@ impl<'a> BoundaryValueProblem<'a> {
             coupling_growth_rate: coupled_rate,
             coupling,
             tissue,
+            foundation: (scenario.foundation.is_some()).then(|| Natural::new(scenario, true)),
             own_loads: scenario.has_own_loads(),
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
@@ -398,6 +407,12 @@ impl<'a> BoundaryValueProblem<'a> {
                 energy += 0.5 * gap.dot(pull);
                 load += pull;
             }
+            if let Some(natural) = &self.foundation {
+                let stretch = natural.vein_pose(j, place.sigma).position / self.length_unit - rod.r;
+                let held = self.foundation_stiffness(j, place) * stretch;
+                energy += 0.5 * stretch.dot(held);
+                load += held;
+            }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
             RodState {
                 r: tangent,
@@ -438,6 +453,7 @@ impl<'a> BoundaryValueProblem<'a> {
             r_n,
             theta_theta: theta_m * cross_matrix(rod.m),
             theta_m,
+            n_r: self.foundation_stiffness(j, place),
             m_theta: cross_matrix(rod.n) * r_theta,
             m_n: cross_matrix(rod.n) * r_n - tangent,
         }
@@ -587,6 +603,15 @@ impl BoundaryValueProblem<'_> {
 }
 
 impl BoundaryValueProblem<'_> {
+    /// Stiffness of the foundation of rod `j` at a place: force per displacement and unit of sigma.
+    fn foundation_stiffness(&self, j: usize, place: RodPlace) -> DVec3 {
+        let Some(foundation) = &self.scenario.foundation else {
+            return DVec3::ZERO;
+        };
+        let along = DVec3::from_array(foundation[j].each_ref().map(|of| of.at(place)));
+        along * (self.lengths[j] * self.length_unit.powi(2) / self.force_unit)
+    }
+
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is
     /// distributed along it.
     fn own_load(&self, j: usize, place: RodPlace) -> DVec3 {

@@ -68,6 +68,8 @@ pub struct SlopeDerivatives {
     pub theta_theta: DMat3,
     /// Derivative of the rotation rate with respect to m.
     pub theta_m: DMat3,
+    /// Derivative of n' with respect to r, by a foundation, along the lab axes.
+    pub n_r: DVec3,
     /// Derivative of m' with respect to the rotation.
     pub m_theta: DMat3,
     /// Derivative of m' with respect to n.

@@ -176,6 +176,11 @@ fn linearized_slopes<const W: usize>(
                 let next = Some(j + 1).filter(|next| *next < derivatives.len());
                 pull(first + j, next);
             }
+            if d.n_r[k] != 0.0 {
+                for w in 0..W {
+                    force[w] += d.n_r[k] * rows[at + k][w];
+                }
+            }
             out[6 + k] = force;
         }
     }

@@ -77,9 +77,6 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
     if !scenario.grips.is_empty() {
         return Err(UnmodelledFeature::Grips { what: "shooting" });
     }
-    if scenario.foundation.is_some() {
-        return Err(UnmodelledFeature::Foundation { what: "shooting" });
-    }
     if scenario.wind.is_some() {
         return Err(UnmodelledFeature::Wind { what: "shooting" });
     }
@@ -98,6 +95,9 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
         return from_arcs(
             "a joint leaf with rigid tissue (tissue.along, tissue.normal) is led to rest by the relaxation",
         );
+    }
+    if scenario.foundation.is_some() {
+        return from_arcs("a leaf on a foundation is led to rest by the relaxation");
     }
     if scenario.base_held != BaseSupport::Clamped {
         // Without loads the leaf of arcs turns about its hinges.

@@ -1,5 +1,6 @@
 //! Motion in time: orders, energies, momenta, stiff leaves.
 
+mod charts;
 mod damping;
 mod driven;
 mod energy;

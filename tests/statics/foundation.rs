@@ -100,6 +100,34 @@ fn many_grips_are_a_foundation() {
     }
 }
 
+/// Relaxation and shooting are independent of each other: joined and free tips, a foundation that varies along
+/// the veins and jumps.
+#[test]
+fn shooting_finds_the_same() {
+    let ground = "{ at = [0.0, 0.4, 0.4, 1.0], value = [[1.0, 0.0, 9.0], [2.0, 5.0, 3.0], [0.0, 20.0, 8.0], [4.0, 1.0, 8.0]] }";
+    for joined in ["false", "true"] {
+        let text = format!(
+            r#"
+            name = "leaf"
+            leaf = {{ rods = 3, length = [1.0, 0.9, 1.1], fan = [0.3, 0.0, -0.2], joined = {joined} }}
+            stiffness = {{ torsion = 0.8, bending_2 = 1.0, bending_3 = 1.5, axial = 200.0, shear_2 = 100.0, shear_3 = 100.0 }}
+            rest = {{ bend_2 = 0.5, twist = 0.3, bend_3 = -0.4, stretch = 1.05 }}
+            coupling = {{ x = 1.0, y = 2.0, z = 1.5 }}
+            load = {{ gravity = [0.3, 0.8, -2.2], tip_force = [0.1, -0.2, 0.1] }}
+            foundation = {{ stiffness = {ground} }}
+            "#
+        );
+        let scenario = parse(&text);
+        let relaxed = settle(&scenario, 1e-10);
+        let shot = found(&scenario, shoot_near(&scenario, &relaxed));
+        for (a, b) in nodes(&relaxed.shape.rods).zip(nodes(&shot.rods)) {
+            assert!(a.position.distance(b.position) < 2e-9);
+            assert!(a.m.distance(b.m) < 1e-6);
+        }
+        close("energy", relaxed.energy.unwrap(), shot.energy, 1e-8);
+    }
+}
+
 /// Each squared frequency of a straight beam is that without the ground, and k/rho.
 #[test]
 fn ground_raises_squared_frequencies() {

@@ -406,3 +406,31 @@ fn shooting_is_not_right_about_a_leaf_with_grips() {
         assert_eq!(counted["counts"], wanted, "{counted}");
     }
 }
+
+/// Motions have the files of charts, with the settings of both integrators.
+#[test]
+fn motions_are_charted() {
+    let place = Workplace::new();
+    let leaf = "scenarios/motion/swing.toml --set leaf.rods=2 --set dynamics.duration=0.2";
+    let how = "--motion --seconds 0.05 --json --out out";
+    let run = place.run(format!("chart {leaf} {how}"));
+    // On grids as coarse as these the reference may not be confirmed.
+    assert!([Some(0), Some(1)].contains(&run.status), "{}", run.err);
+    let found = run.json();
+    assert_eq!(found["motion"], json!(true));
+    let rows = rows(&place, "out/chart.csv", COLUMNS);
+    assert!(!of(&rows, "explicit-grid").is_empty());
+    assert!(rows.iter().any(|row| row["outcome"] == "completed"));
+    for (more, why) in [
+        ("--rods 3,5", "--rods: is about leaves at rest"),
+        (
+            "--methods shooting",
+            "none of the methods requested moves a leaf",
+        ),
+    ] {
+        let refused = place
+            .run(format!("chart {leaf} --motion {more} --out out2"))
+            .ends(2);
+        contains(&refused.err, &[why]);
+    }
+}

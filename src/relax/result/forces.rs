@@ -42,6 +42,10 @@ const BASE_BAR: BaseBar = BaseBar {
     rounding: 16.0 * f64::EPSILON,
 };
 
+/// Safety factor on the bars of reactions of grips that give, whose forces are those of displacements: of 860 forces and
+/// moments on holders of 117 random leaves on springs the largest error was 2.8 times the bar without it.
+const ELASTIC_GRIP_SAFETY: f64 = 4.0;
+
 /// The reaction at a held tip: what the leaf exerts on its holder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reaction {
@@ -436,16 +440,18 @@ impl NestedEquilibrium {
         let forces = extrapolate_vectors(&self.levels, on(|it| it.force), noise);
         let moments = extrapolate_vectors(&self.levels, on(|it| it.moment), noise);
         let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
+        let gives = scenario.foundation.is_some() || !scenario.grips.iter().all(Grip::is_rigid);
+        let safety = if gives { ELASTIC_GRIP_SAFETY } else { 1.0 };
         let both = forces.value.iter().zip(&moments.value).zip(&scenario.grips);
         let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
             let clamped = grip.held == SupportKind::Clamped;
             GripReaction {
                 force: *force * scale.force(),
-                error: forces.error.map(|error| error * scale.force()),
+                error: forces.error.map(|error| safety * error * scale.force()),
                 moment: clamped.then(|| *moment * scale.moment()),
                 moment_error: (moments.error)
                     .filter(|_| clamped)
-                    .map(|error| error * scale.moment()),
+                    .map(|error| safety * error * scale.moment()),
             }
         };
         both.map(reaction).collect()

@@ -22,7 +22,7 @@ use verbs::{Answer, Verb, ask, largest_difference, tips};
 const REFUSED: &str = "
 single-shooting shooting shooting-from-rest check chart | gripped | does not take grips
 single-shooting shooting shooting-from-rest check chart | rollers | does not take grips
-single-shooting shooting shooting-from-rest check chart | founded | does not take springs along veins
+single-shooting shooting | founded | led to rest by the relaxation
 relax explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit page figures | windy gripped-in-wind | does not take wind
 check single-shooting shooting shooting-from-rest | gripped-in-wind | does not take grips
 single-shooting shooting | jaws pinned | a tip that is held (tip.held)
