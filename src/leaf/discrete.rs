@@ -9,6 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
+use crate::leaf::loads::ScheduledLoads;
 use crate::leaf::state::State;
 use crate::leaf::{GrippedNode, Leaf, Loads};
 use crate::natural::Natural;
@@ -55,6 +56,9 @@ pub struct DiscreteLeaf {
     pub(super) own_loads: Vec<DVec3>,
     /// Dead moments on points of a single rod, whole.
     pub(super) point_moments: Vec<NodalMoment>,
+    /// Loads of single veins that vary in time, if there are any. Their forces and moments are in
+    /// `own_loads` and `point_moments`, which are those at rest until factors are set.
+    pub scheduled_loads: Option<Box<ScheduledLoads>>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
     /// Factor of all loads: one, except during continuation in the loads.
@@ -141,12 +145,14 @@ impl DiscreteLeaf {
             strips: Vec::new(),
             own_loads: Vec::new(),
             point_moments: Vec::new(),
+            scheduled_loads: None,
             grips: Vec::new(),
             load_factor: 1.0,
             loads: leaf.loads,
         };
         discrete.own_loads = discrete.nodal_own_loads(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
+        discrete.scheduled_loads = discrete.find_scheduled_loads();
         let gripped = !leaf.scenario().grips.is_empty();
         if leaf.has_tissue() || gripped {
             let natural = discrete.stress_free_state();

@@ -250,7 +250,7 @@ pub fn measure(
     state: &State,
     velocity: &[Velocity],
 ) -> Energy {
-    leaf.loads = physics.loads(time);
+    physics.apply_loads(leaf, time);
     if physics.rest_curvature_differs() {
         leaf.scale_rest_curvatures(physics.rest_curvature_factor(time));
     }
@@ -290,6 +290,13 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
         if i == n {
             energy += loads.tip_force.length_squared() / inertia.mass;
         }
+    }
+    for it in leaf
+        .scheduled_loads
+        .iter()
+        .flat_map(|it| it.present_forces())
+    {
+        energy += it.force.length_squared() / physics.inertia(leaf, it.rod, it.node).mass;
     }
     for it in leaf.dead_moments_under(loads) {
         energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;

@@ -214,6 +214,9 @@ pub struct SemiImplicit {
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
     corrected_loads: Loads,
+    /// As `corrected_loads`, of the factors of loads of single veins: the corrections, and their present changes.
+    corrected_factors: Vec<f64>,
+    factor_changes: Vec<f64>,
     /// How sections at the tissue's strips are aligned at the start.
     alignments: Vec<bool>,
 }
@@ -250,6 +253,8 @@ impl SemiImplicit {
             factorizations: 0,
             balance: EnergyBalance::default(),
             corrected_loads: Loads::default(),
+            corrected_factors: physics.load_factors(0.0).map(|_| 0.0).collect(),
+            factor_changes: physics.load_factors(0.0).map(|_| 0.0).collect(),
             alignments: leaf.strip_alignments(state),
             leaf,
             physics,
@@ -526,13 +531,60 @@ impl SemiImplicit {
             return;
         }
         let (now, w) = (self.clock.time, self.weights);
-        let [before, now, after] =
-            [now - self.past_step, now, now + h].map(|t| self.physics.loads(t));
+        let times = [now - self.past_step, now, now + h];
+        let [before, now, after] = times.map(|t| self.physics.loads(t));
         let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
         let change = lag - self.corrected_loads;
         self.corrected_loads = lag;
+        let [before, now, after] = times.map(|t| self.physics.load_factors(t));
+        let corrections = self
+            .corrected_factors
+            .iter_mut()
+            .zip(&mut self.factor_changes);
+        for (((before, now), after), (corrected, change)) in
+            before.zip(now).zip(after).zip(corrections)
+        {
+            let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
+            *change = lag - *corrected;
+            *corrected = lag;
+        }
         if change != Loads::default() {
             self.add_load_accelerations(change);
+        }
+        if self.factor_changes.iter().any(|change| *change != 0.0) {
+            self.add_scheduled_accelerations();
+        }
+    }
+
+    /// Adds the accelerations of free nodes under the changes of the loads of single veins that vary.
+    fn add_scheduled_accelerations(&mut self) {
+        let Some(scheduled) = &self.leaf.scheduled_loads else {
+            return;
+        };
+        let (n, rods) = (self.leaf.segments(), self.leaf.rods());
+        let together = self.leaf.tips_move_together();
+        for it in &scheduled.forces {
+            let change = self.factor_changes[it.factor] * it.force;
+            let on_joint_tip = together && it.node == n;
+            let nodes = match on_joint_tip {
+                true => 0..rods,
+                false => it.rod..it.rod + 1,
+            };
+            let mass: f64 = { nodes.clone() }
+                .map(|j| self.inertia[self.state.base(j) + it.node].mass)
+                .sum();
+            for j in nodes {
+                if self.leaf.node_freedom(j, it.node).displacement {
+                    self.node_motions[self.state.base(j) + it.node].a[1] += change / mass;
+                }
+            }
+        }
+        for (number, NodalMoment { node, moment }) in &scheduled.moments {
+            if self.leaf.node_freedom(0, *node).rotation {
+                let tensor = self.inertia[*node].tensor(self.state.q[*node]);
+                let change = self.factor_changes[*number] * *moment;
+                self.node_motions[*node].a[0] += tensor.inverse() * change;
+            }
         }
     }
 
@@ -578,7 +630,7 @@ impl SemiImplicit {
     /// stiffer by 1 + eta c0 and has another rest shape. Inertia enters the matrix as
     /// `per_mass` times the masses.
     fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
-        self.leaf.loads = self.physics.loads(time);
+        self.physics.apply_loads(&mut self.leaf, time);
         let (rest, eta) = (
             self.physics.rest_curvature_factor(time),
             self.physics.retardation,
@@ -656,6 +708,7 @@ impl SemiImplicit {
             self.strain_history[0] = self.strains();
         }
         self.corrected_loads = Loads::default();
+        self.corrected_factors.fill(0.0);
         self.past_step = h;
         self.longest_taken = self.longest_taken.max(h);
         self.clock.time += h;
@@ -682,12 +735,12 @@ impl SemiImplicit {
         let (from, to) = (self.clock.time, self.clock.time + h);
         let mut work = 0.0;
         if self.physics.loads_vary() {
-            let mut potential = |loads: Loads| {
-                self.leaf.loads = loads;
+            let mut potential = |time: f64| {
+                self.physics.apply_loads(&mut self.leaf, time);
                 self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
             };
-            let before = potential(self.physics.loads(from));
-            work += 0.5 * (potential(self.physics.loads(to)) - before);
+            let before = potential(from);
+            work += 0.5 * (potential(to) - before);
         }
         if self.physics.rest_curvature_varies() {
             let bending =
@@ -697,7 +750,8 @@ impl SemiImplicit {
                     - bending(self.physics.rest_curvature_factor(from)));
         }
         for time in [from, to] {
-            let moments = self.leaf.dead_moments_under(self.physics.loads(time));
+            self.physics.apply_loads(&mut self.leaf, time);
+            let moments = self.leaf.dead_moments_under(self.leaf.loads);
             for NodalMoment { node, moment } in moments {
                 let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
                 work += 0.5 * moment.dot(turn);

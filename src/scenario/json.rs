@@ -78,10 +78,17 @@ impl Scenario {
     /// All points that are loaded, or all grips, by the first of their keys.
     fn table_rows(&self, first: Key) -> Option<Value> {
         let point = |point: &PointLoad| {
-            json!({
+            let varying = point.in_time.as_deref();
+            let [force, moment] =
+                varying.map_or([point.force, point.moment], |it| [it.force, it.moment]);
+            let mut row = json!({
                 "vein": point.vein + 1, "at": point.at, "mass": point.mass,
-                "force": list_value(point.force), "moment": list_value(point.moment),
-            })
+                "force": list_value(force), "moment": list_value(moment),
+            });
+            if let Some(varying) = varying {
+                row["factor"] = schedule_value(&varying.factor, "factor", number_value);
+            }
+            row
         };
         let grip = |grip: &Grip| {
             let [from, to] = grip.at;
@@ -151,15 +158,36 @@ impl Scenario {
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
                 number_or_list(self.coupling.iter().map(|gap| gap[axis]))
             }
-            Key::Gravity => {
-                let veins = 0..self.rods.len();
-                vector_or_list(veins.map(|vein| self.weight(vein).even))
+            Key::Gravity | Key::G | Key::Distributed | Key::LoadFactor => {
+                return self.load_value(key);
             }
-            Key::G => list_value(self.g),
-            Key::Distributed => vector_quantity(self.distributed.as_deref()?),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),
+            _ => return None,
+        })
+    }
+
+    /// Loads of veins, at a factor of one, and the factor.
+    fn load_value(&self, key: Key) -> Option<Value> {
+        if let (Some(loads), Key::LoadFactor) = (&self.factored, key) {
+            return Some(schedule_value(&loads.factor, "factor", number_value));
+        }
+        let mut whole = std::borrow::Cow::Borrowed(self);
+        if let Some(loads) = &self.factored {
+            let whole = whole.to_mut();
+            whole.gravity = loads.gravity;
+            whole.own_gravity.clone_from(&loads.own_gravity);
+            whole.g = loads.g;
+            whole.distributed.clone_from(&loads.distributed);
+        }
+        Some(match key {
+            Key::Gravity => {
+                let veins = 0..self.rods.len();
+                vector_or_list(veins.map(|vein| whole.weight(vein).even))
+            }
+            Key::G => list_value(whole.g),
+            Key::Distributed => vector_quantity(whole.distributed.as_deref()?),
             _ => return None,
         })
     }
@@ -254,6 +282,7 @@ impl Scenario {
             Key::OutputInterval => number_value(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
             Key::Start => json!(dynamics.start),
+            Key::GravityInTime if self.factored.is_some() => return None,
             Key::GravityInTime => {
                 schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list_value)?
             }

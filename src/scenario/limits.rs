@@ -43,6 +43,7 @@ struct LeafLimits {
     /// Oscillations in time.
     periods: DimensionlessLimit,
     phase: DimensionlessLimit,
+    load_factor: DimensionlessLimit,
     rest_factor: DimensionlessLimit,
     rest_factor_angle: DimensionlessLimit,
     /// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
@@ -134,6 +135,11 @@ const LIMITS: LeafLimits = LeafLimits {
         "the number of periods, each of which takes at least eight steps: choose a lower frequency or a shorter duration",
     ),
     phase: upper_limit("|phase|", 1e3, "in radians"),
+    load_factor: upper_limit(
+        "|factor|",
+        1e6,
+        "loads are multiplied by it: choose larger ones in [load], and a smaller factor",
+    ),
     rest_factor: upper_limit(
         "|factor|",
         1e6,
@@ -417,6 +423,25 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
             }
         }
     }
+    if let Some(loads) = &scenario.factored {
+        check_load_factor(entries.given_value(Key::LoadFactor), &loads.factor, units)?;
+    }
+    for (row, point) in scenario.points.iter().enumerate() {
+        if let Some(varying) = &point.in_time {
+            let item = entries.value_in_row(Key::PointFactor, row)?;
+            check_load_factor(Some(item), &varying.factor, units)?;
+            let unit = |key| smallest_unit(key, rods);
+            let [force, moment] = [
+                vector_norm(varying.force) / unit(Key::PointForce),
+                vector_norm(varying.moment) / unit(Key::PointMoment),
+            ];
+            for (index, factor) in varying.factor.bounds().into_iter().enumerate() {
+                let entry = entry_of_bound(item, &varying.factor, index);
+                LIMITS.tip_force.check(entry, factor.abs() * force)?;
+                LIMITS.tip_moment.check(entry, factor.abs() * moment)?;
+            }
+        }
+    }
     if let Some(item) = entries.given_value(Key::RestInTime) {
         let angles = (rods.iter())
             .flat_map(|rod| rod.rest_curvature.iter().map(|u| u.max_abs() * rod.length));
@@ -463,6 +488,24 @@ fn check_times<T: InTime>(
             LIMITS.periods.check(entry("frequency"), periods)?;
             LIMITS.phase.check(entry("phase"), sine.phase.abs())?;
         }
+    }
+    Ok(())
+}
+
+/// Refuses times of a factor of loads that no motion can follow, and factors that are too large.
+fn check_load_factor(
+    item: Option<EntryValue>,
+    factor: &Schedule<f64>,
+    units: TimeUnits,
+) -> ScenarioResult<()> {
+    check_times(item, factor, units)?;
+    let Some(item) = item else {
+        return Ok(());
+    };
+    let bounds = factor.bounds().into_iter().enumerate();
+    for (index, value) in bounds {
+        let entry = entry_of_bound(item, factor, index);
+        LIMITS.load_factor.check(entry, value.abs())?;
     }
     Ok(())
 }
@@ -592,12 +635,16 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
     let mass = scenario.unit(Key::PointMass);
     for (row, point) in scenario.points.iter().enumerate() {
         let item = |key| entries.value_in_row(key, row);
+        // At a factor of one, if there is one.
+        let varying = point.in_time.as_deref();
+        let [given, turned] =
+            varying.map_or([point.force, point.moment], |it| [it.force, it.moment]);
         LIMITS
             .tip_force
-            .check(item(Key::PointForce)?, vector_norm(point.force) / force)?;
+            .check(item(Key::PointForce)?, vector_norm(given) / force)?;
         LIMITS
             .tip_moment
-            .check(item(Key::PointMoment)?, vector_norm(point.moment) / moment)?;
+            .check(item(Key::PointMoment)?, vector_norm(turned) / moment)?;
         let weighed = item(Key::PointMass)?;
         LIMITS.point_mass.check(weighed, point.mass / mass)?;
         LIMITS

@@ -41,7 +41,9 @@ pub use crate::scenario::format::schema::schema;
 pub(crate) use crate::scenario::format::source::intended_number;
 pub use crate::scenario::format::units::{self, Units};
 pub(crate) use crate::scenario::loads::CLAMPED_ROD_FREQUENCY;
-pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, PolarInertia, Weight, Wind};
+pub use crate::scenario::loads::{
+    Dynamics, FactoredLoads, MotionStart, PointLoad, PolarInertia, VaryingPointLoad, Weight, Wind,
+};
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{

@@ -13,6 +13,7 @@ use crate::scenario::format::units::Units;
 use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
 use crate::scenario::loads::{check_single_rod_moments, read_dynamics, read_wind};
 use crate::scenario::photo::read_photo;
+use crate::scenario::schedule::Schedule;
 use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
 use crate::scenario::{limits, loads, supports};
 use std::fs::File;
@@ -195,6 +196,7 @@ impl Entries {
         let weights = loads::read_weights(self, rods.len())?;
         let g = loads::read_gravity_acceleration(self)?;
         let distributed = loads::read_distributed_loads(self, rods.len())?;
+        let factored = loads::read_load_factor(self, &weights, g, &distributed)?;
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
@@ -206,9 +208,12 @@ impl Entries {
         let wind = read_wind(self, rods.len())?;
         let photo = read_photo(self)?;
         let tolerance = read_tolerance(self.value_or_default(Key::Tolerance)?)?;
-        let loads = [weights.shared, tip_force, tip_moment];
-        let dynamics = read_dynamics(self, &rods, &source, loads)?;
-        Ok(Scenario {
+        let gravity = match &factored {
+            Some(loads) => loads.factor.times(loads.gravity),
+            None => Schedule::constant(weights.shared),
+        };
+        let dynamics = read_dynamics(self, &rods, &source, gravity, [tip_force, tip_moment])?;
+        let mut scenario = Scenario {
             name,
             units,
             rods,
@@ -224,6 +229,7 @@ impl Entries {
             own_gravity: weights.own,
             g,
             distributed,
+            factored,
             points,
             tip_force,
             tip_moment,
@@ -233,7 +239,9 @@ impl Entries {
             photo,
             tolerance,
             dynamics,
-        })
+        };
+        scenario.apply_load_factor(0.0);
+        Ok(scenario)
     }
 
     /// The name of a leaf that has none: that of its file.

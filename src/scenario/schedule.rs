@@ -182,6 +182,35 @@ impl<T: InTime> Schedule<T> {
     }
 }
 
+impl Schedule<f64> {
+    /// A factor in time, times a value.
+    pub fn times<T: InTime>(&self, value: T) -> Schedule<T> {
+        let all = |factors: &[f64]| factors.iter().map(|&of| scaled(of, value)).collect();
+        let through = |knots: &Knots<f64>| Knots {
+            at: knots.at.clone(),
+            value: all(&knots.value),
+        };
+        match self {
+            Schedule::Linear(knots) => Schedule::Linear(through(knots)),
+            Schedule::Smooth { knots, slopes } => Schedule::Smooth {
+                knots: through(knots),
+                slopes: all(slopes),
+            },
+            Schedule::Sine(sine) => Schedule::Sine(Sine {
+                mean: scaled(sine.mean, value),
+                amplitude: scaled(sine.amplitude, value),
+                frequency: sine.frequency,
+                phase: sine.phase,
+            }),
+        }
+    }
+}
+
+/// A value times a factor.
+pub fn scaled<T: InTime>(factor: f64, value: T) -> T {
+    T::ZERO.plus(factor, value)
+}
+
 impl<T> Sine<T> {
     fn angle(&self, time: f64) -> f64 {
         2.0 * PI * self.frequency * time + self.phase

@@ -293,6 +293,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         own_gravity: Vec::new(),
         g: [0.0; 3],
         distributed: None,
+        factored: None,
         points: Vec::new(),
         tip_force: [0.0; 3],
         tip_moment: [0.0; 3],

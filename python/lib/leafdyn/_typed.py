@@ -94,6 +94,7 @@ class LoadPointTable(TypedDict, total=False):
     """``[load.point]``"""
 
     at: float
+    factor: Profile
     force: Numbers
     mass: float
     moment: Numbers
@@ -104,6 +105,7 @@ class LoadTable(TypedDict, total=False):
     """``[load]``"""
 
     distributed: Numbers | Vectors | Profile
+    factor: Profile
     g: Numbers
     gravity: Numbers | Vectors
     point: Sequence[LoadPointTable]

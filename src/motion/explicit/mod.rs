@@ -187,6 +187,7 @@ impl Explicit {
             leaf,
             physics,
         };
+        explicit.physics.apply_loads(&mut explicit.leaf, 0.0);
         explicit.step =
             step.unwrap_or_else(|| SETTINGS.stable_step_fraction * explicit.stable_step().step);
         let start = explicit.snapshot();
@@ -301,7 +302,8 @@ impl Explicit {
             self.last_step_time - self.velocity_lag(),
             self.last_step_time + ahead,
         ];
-        let loads = self.physics.mean_loads([from, to]);
+        self.physics.apply_mean_loads(&mut self.leaf, [from, to]);
+        let loads = self.leaf.loads;
         let rest = self.physics.mean_rest_curvature_factor([from, to]);
         let before_kick = self.excess_load_power(&loads);
         let mut work = 0.0;
@@ -825,10 +827,11 @@ impl Explicit {
 
     /// Present potential of the excess of loads and rest curvatures over those at time 0: it
     /// is in the energies, but does not come from the motion.
-    fn excess_potential(&self) -> f64 {
+    fn excess_potential(&mut self) -> f64 {
         let mut work = 0.0;
         if self.physics.loads_vary() {
-            let loads = self.physics.loads(self.clock.time);
+            (self.physics).apply_loads(&mut self.leaf, self.clock.time);
+            let loads = self.leaf.loads;
             work -= self.excess_load_sum(&loads, |j, i| {
                 vector_at(&self.positions, self.layout.node_index(j, i))
             });
@@ -864,6 +867,6 @@ impl Explicit {
                 sum += excess.tip_force.dot(vectors(j, self.layout.segments));
             }
         }
-        sum
+        sum + self.physics.scheduled_excess(&self.leaf, vectors)
     }
 }

@@ -160,6 +160,8 @@ keys! {
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
     TipMoment "load.tip_moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// factor in time of gravity, of `load.g` and of distributed loads; at rest that of time 0.
+    LoadFactor "load.factor": FactorInTime, [0, 0, 0], Derived;
     /// the rod that is loaded at a point, counted from 1.
     PointVein "load.point.vein": Whole, [0, 0, 0], Required("1");
     /// where the point is, a fraction of the length.
@@ -170,6 +172,8 @@ keys! {
     PointMoment "load.point.moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// mass of the point, which `load.g` pulls.
     PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
+    /// factor in time of the force and the moment on the point; at rest that of time 0.
+    PointFactor "load.point.factor": FactorInTime, [0, 0, 0], Derived;
     /// how the tips are held.
     TipHeld "tip.held": Text, [0, 0, 0], Default("\"free\"");
     /// where the joint tip, or the only rod's, is held.

@@ -114,6 +114,34 @@ pub fn rows(key: Key) -> Vec<Row> {
             // Without a weight: what is left is its inertia.
             row("moving", "load.point[0].mass=0.4", Acts::Inertia, false),
         ],
+        Key::LoadFactor => vec![
+            row(
+                "veins",
+                "load.factor={at=[0.0],factor=[0.9]}",
+                Acts::Always,
+                false,
+            ),
+            row(
+                "veins",
+                "load.factor={at=[0.0,0.2],factor=[1.0,3.0]}",
+                Acts::Motions,
+                false,
+            ),
+        ],
+        Key::PointFactor => vec![
+            row(
+                "veins",
+                "load.point[0].factor={mean=0.7,amplitude=0.1,frequency=2.0}",
+                Acts::Always,
+                false,
+            ),
+            row(
+                "twisted",
+                "load.point[0].factor={at=[0.0,0.1],factor=[1.0,9.0]}",
+                Acts::Motions,
+                false,
+            ),
+        ],
         Key::TipHeld => always("pinned", "tip.held=clamped"),
         Key::TipPosition => smooth("pinned", "tip.position[0]=0.91"),
         Key::TipAngles => smooth("jaws", "tip.angles=0.25"),
