@@ -32,7 +32,8 @@ pub struct PointForce {
 /// A dead force on a node of a rod, along the lab axes, by a load whose factor varies in time.
 #[derive(Clone, Copy, Debug)]
 pub struct ScheduledForce {
-    /// Number of the factor, as in [`Scenario::load_factors`](crate::scenario::Scenario::load_factors).
+    /// Number of the factor: those of [`Scenario::load_factors`](crate::scenario::Scenario::load_factors), then one
+    /// for each of [`Scenario::landings`](crate::scenario::Scenario::landings).
     pub factor: usize,
     pub rod: usize,
     pub node: usize,
@@ -40,7 +41,8 @@ pub struct ScheduledForce {
     pub force: DVec3,
 }
 
-/// Loads of single veins whose factors vary in time.
+/// Loads of single veins whose factors vary in time: first those with a factor of their own, then the weights of
+/// masses that land.
 #[derive(Clone, Debug, Default)]
 pub struct ScheduledLoads {
     /// The present factors.
@@ -137,7 +139,8 @@ impl DiscreteLeaf {
     /// The loads of single veins whose factors vary in time, if there are any.
     pub(super) fn find_scheduled_loads(&self) -> Option<Box<ScheduledLoads>> {
         let scenario = self.leaf.scenario();
-        let count = scenario.load_factors().count();
+        let factors = scenario.load_factors().count();
+        let count = factors + scenario.landings().count();
         if count == 0 {
             return None;
         }
@@ -202,6 +205,16 @@ impl DiscreteLeaf {
             };
             let moments = self.nodal_moments(std::iter::once(moment));
             scheduled.moments.extend(moments.map(|it| (factor, it)));
+        }
+        let g = scenario.factored.as_ref().map_or(scenario.g, |it| it.g);
+        for (factor, (number, landing)) in (factors..).zip(scenario.landings()) {
+            let point = &scenario.points[number];
+            scheduled.forces.push(ScheduledForce {
+                factor,
+                rod: point.vein,
+                node: self.grid.nearest_node(point.at),
+                force: landing.mass * DVec3::from_array(g) / scale.force(),
+            });
         }
         Some(Box::new(scheduled))
     }

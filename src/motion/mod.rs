@@ -164,6 +164,17 @@ impl Stopped {
     }
 }
 
+/// A mass that has landed. Dimensionless.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Number of the point on which it landed.
+    pub point: usize,
+    /// When it landed.
+    pub time: f64,
+    /// The energy that was lost: of the mass and of the point, with one velocity afterwards.
+    pub lost_energy: f64,
+}
+
 /// Differences of time below this part of a step are rounding.
 const TIME_ROUNDING_FRACTION: f64 = 1e-9;
 
@@ -175,6 +186,8 @@ pub struct MotionClock {
     /// Number of time steps.
     steps: usize,
     limit: Limit,
+    /// The masses that have landed so far.
+    impacts: Vec<Impact>,
 }
 
 impl MotionClock {
@@ -203,6 +216,11 @@ pub trait TimeIntegrator {
     /// Number of time steps.
     fn steps(&self) -> usize {
         self.clock().steps
+    }
+
+    /// The masses that have landed so far.
+    fn impacts(&self) -> &[Impact] {
+        &self.clock().impacts
     }
 
     /// Bounds the steps from now on, of a method whose error determines them: the steps of a
@@ -394,6 +412,47 @@ impl EnergyBalance {
         let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).end_rotation();
         let turns = leaf.rod_index_pairs(0..leaf.segments()).map(turn);
         check_resolution(leaf, time, largest(turns))
+    }
+}
+
+/// A mass that meets a node which is free, or held.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Collision {
+    /// The landing mass and its velocity.
+    pub mass: f64,
+    pub velocity: DVec3,
+    /// The mass and the velocity of the node: of all tips together, if they are one.
+    pub node_mass: f64,
+    pub node_velocity: DVec3,
+    /// Whether the node moves freely.
+    pub is_free: bool,
+}
+
+impl Collision {
+    /// The velocity of both afterwards: their momentum is kept, unless a holder takes it.
+    pub fn common_velocity(&self) -> DVec3 {
+        if !self.is_free {
+            return self.node_velocity;
+        }
+        let momentum = self.node_mass * self.node_velocity + self.mass * self.velocity;
+        momentum / (self.node_mass + self.mass)
+    }
+
+    /// The energy that is put in by the mass and by the impulse of a holder, and that which is lost.
+    pub fn exchange(&self) -> Exchange {
+        let apart = (self.velocity - self.node_velocity).length_squared();
+        let brought = 0.5 * self.mass * self.velocity.length_squared();
+        match self.is_free {
+            true => Exchange {
+                dissipated: 0.5 * self.mass * self.node_mass / (self.mass + self.node_mass) * apart,
+                work: brought,
+            },
+            false => Exchange {
+                dissipated: 0.5 * self.mass * apart,
+                work: brought
+                    + self.mass * (self.node_velocity - self.velocity).dot(self.node_velocity),
+            },
+        }
     }
 }
 

@@ -11,6 +11,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, Scale, State};
 use crate::rotation::outer;
 use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule};
 use glam::{DMat3, DQuat, DVec3};
+use std::cmp::Ordering;
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
 /// masses on points there.
@@ -53,6 +54,29 @@ struct LoadFactor {
     factor: Schedule<f64>,
     /// The factor at time 0.
     first: f64,
+    /// Whether the load is there: not the weight of a mass that has not landed.
+    acts: bool,
+}
+
+impl LoadFactor {
+    fn present_value(&self, value: impl FnOnce(&Schedule<f64>) -> f64) -> f64 {
+        if self.acts { value(&self.factor) } else { 0.0 }
+    }
+}
+
+/// A mass that lands on a point of a vein. Dimensionless.
+#[derive(Clone, Copy, Debug)]
+pub struct LandingMass {
+    /// Number of the point.
+    pub point: usize,
+    /// The vein, and the fraction of its length.
+    pub vein: usize,
+    pub sigma: f64,
+    pub mass: f64,
+    pub velocity: DVec3,
+    pub time: f64,
+    /// Number of the factor of its weight.
+    factor: usize,
 }
 
 /// Duration of a motion and the interval between its outputs.
@@ -83,6 +107,8 @@ pub struct Physics {
     air: Option<Schedule<[f64; 3]>>,
     /// Factors of loads of single veins that vary in time.
     load_factors: Vec<LoadFactor>,
+    /// The masses that have not landed, the next one last.
+    landing_masses: Vec<LandingMass>,
     /// The loads, if they are constant.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
@@ -99,6 +125,7 @@ impl Physics {
         let factors: Vec<_> = scenario.load_factors().cloned().collect();
         let dynamics = scenario.dynamics.clone();
         let mut physics = Physics::from_dynamics(leaf, dynamics, factors);
+        physics.add_landing_masses(leaf);
         let unit = physics.density_unit * physics.scale.length;
         let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
         let masses = points.map(|it| PointMass {
@@ -108,6 +135,60 @@ impl Physics {
         });
         physics.point_masses = masses.collect();
         physics
+    }
+
+    fn add_landing_masses(&mut self, leaf: &Leaf) {
+        let scenario = leaf.scenario();
+        let weight = match &scenario.factored {
+            Some(loads) => loads.factor.clone(),
+            None => Schedule::constant(1.0),
+        };
+        for (point, landing) in scenario.landings() {
+            self.landing_masses.push(LandingMass {
+                point,
+                vein: scenario.points[point].vein,
+                sigma: scenario.points[point].at,
+                mass: landing.mass / (self.density_unit * self.scale.length),
+                velocity: DVec3::from_array(landing.velocity)
+                    * (self.time_unit / self.scale.length),
+                time: landing.from / self.time_unit,
+                factor: self.load_factors.len(),
+            });
+            self.load_factors.push(LoadFactor {
+                factor: weight.clone(),
+                first: 0.0,
+                acts: false,
+            });
+            self.constant_loads = None;
+        }
+        self.landing_masses.sort_by(|a, b| {
+            (b.time, b.point)
+                .partial_cmp(&(a.time, a.point))
+                .unwrap_or(Ordering::Equal)
+        });
+    }
+
+    /// The mass that lands next, if one is left.
+    pub fn next_landing(&self) -> Option<LandingMass> {
+        self.landing_masses.last().copied()
+    }
+
+    /// The time at which a mass lands next; infinite if none is left.
+    pub fn next_landing_time(&self) -> f64 {
+        self.next_landing().map_or(f64::INFINITY, |it| it.time)
+    }
+
+    /// Adds the mass that lands next to the leaf.
+    pub fn land_next_mass(&mut self) {
+        let Some(landing) = self.landing_masses.pop() else {
+            return;
+        };
+        self.load_factors[landing.factor].acts = true;
+        self.point_masses.push(PointMass {
+            vein: landing.vein,
+            sigma: landing.sigma,
+            mass: landing.mass,
+        });
     }
 
     /// The defaults for scenarios without dynamics, under the loads at
@@ -150,8 +231,10 @@ impl Physics {
                 .map(|factor| LoadFactor {
                     first: factor.at(0.0),
                     factor,
+                    acts: true,
                 })
                 .collect(),
+            landing_masses: Vec::new(),
             air,
             constant_rest_factor: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
@@ -232,14 +315,15 @@ impl Physics {
 
     fn apply_load_factors(&self, leaf: &mut DiscreteLeaf, value: impl Fn(&Schedule<f64>) -> f64) {
         if !self.load_factors.is_empty() {
-            leaf.set_scheduled_factors(|number| value(&self.load_factors[number].factor));
+            leaf.set_scheduled_factors(|number| self.load_factors[number].present_value(&value));
         }
     }
 
     /// The factors at a time of the loads of single veins that vary.
     pub fn load_factors(&self, time: f64) -> impl Iterator<Item = f64> {
         let at = time * self.time_unit;
-        self.load_factors.iter().map(move |it| it.factor.at(at))
+        let factors = self.load_factors.iter();
+        factors.map(move |it| it.present_value(|factor| factor.at(at)))
     }
 
     /// The sum of the present forces of loads of single veins that vary, less those at time 0, times vectors of

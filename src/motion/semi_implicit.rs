@@ -23,14 +23,14 @@ use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, Syste
 use crate::motion::constraint_projection::project_constraints;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
-    TimeIntegrator, Velocity, measure, rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
+    TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, measure, rate_weights,
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
 use crate::rod::{Section, Wrench};
 use crate::rotation;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// Settings of the semi-implicit method.
 struct SemiImplicitSettings {
@@ -106,6 +106,9 @@ const FIRST_STEP: FirstStepSettings = FirstStepSettings {
     strain_rounding: 1e-12,
     inconsistent_strain: 1e-8,
 };
+
+/// A time so short that loads change no velocity in it: an impulse in rigid segments acts in it.
+const IMPULSE_TIME: f64 = 1e-6;
 
 /// Advice if energy grows, besides a shorter step.
 const ENERGY_GROWTH_ADVICE: &str = "dynamics.start = \"at-rest\"";
@@ -266,6 +269,21 @@ impl SemiImplicit {
         motion
     }
 
+    /// Lets a mass land if it is time, or else attempts a step that goes neither beyond `until` nor
+    /// beyond a knot, as within a step loads are linear in time: no pulse is stepped over.
+    ///
+    /// # Errors
+    /// As of [`SemiImplicit::step_towards`].
+    pub fn proceed_towards(&mut self, until: f64) -> Result<(), Stopped> {
+        let (now, landing) = (self.clock.time, self.physics.next_landing_time());
+        if landing <= now {
+            self.land_next_mass();
+            return Ok(());
+        }
+        let knot = self.physics.next_knot(now);
+        self.step_towards(until.min(knot).min(landing))
+    }
+
     /// Attempts a step that does not go beyond `until`.
     ///
     /// # Errors
@@ -346,11 +364,9 @@ impl TimeIntegrator for SemiImplicit {
     }
 
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
-        while self.clock.time < until {
+        while self.clock.time < until || self.physics.next_landing_time() <= self.clock.time {
             self.clock.check_limit()?;
-            // Within a step loads are linear in time: no pulse is stepped over.
-            let knot = self.physics.next_knot(self.clock.time);
-            self.step_towards(until.min(knot))?;
+            self.proceed_towards(until)?;
         }
         let now = self.snapshot();
         (self.balance).check_reliability(
@@ -898,12 +914,22 @@ impl SemiImplicit {
 
     /// A first step, into the trial; false if it failed.
     fn first_step(&mut self) -> bool {
+        self.short_step(FIRST_STEP.inverse_square, 0.0)
+    }
+
+    /// A step into the trial in which inertia, `per_mass` times the masses, resists increments that differ from those
+    /// of the present velocities in the time `h`; false if it failed.
+    fn short_step(&mut self, per_mass: f64, h: f64) -> bool {
         self.trial.clone_from(&self.state);
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(0.0, 0.0);
-            let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
-            let (inertia, per_mass) = (&self.inertia, FIRST_STEP.inverse_square);
+            self.add_drag(self.clock.time, 0.0);
+            let excess = |k: usize| {
+                let ([turn, shift], v) = (self.increment(k), self.node_motions[k].v);
+                [turn - h * v[0], shift - h * v[1]]
+            };
+            let increments: Vec<_> = (0..self.state.x.len()).map(excess).collect();
+            let inertia = &self.inertia;
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
@@ -925,7 +951,9 @@ impl SemiImplicit {
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         self.trial.clone_from(&self.state);
-        self.add_drag(0.0, 0.0);
+        self.next_node_motions.clone_from(&self.node_motions);
+        self.add_drag(self.clock.time, 0.0);
+        let damping = self.physics.damping;
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
@@ -938,14 +966,138 @@ impl SemiImplicit {
                 tip_force += force;
                 tip_mass += mass;
             }
-            self.node_motions[k] = NodeMotion::at_rest([tensor.inverse() * moment, force / mass]);
+            let v = self.node_motions[k].v;
+            let momentum = tensor * v[0];
+            let moment = moment - v[0].cross(momentum) - damping * momentum;
+            let w = [tensor.inverse() * moment, force / mass - damping * v[1]];
+            self.node_motions[k] = NodeMotion { v, a: w, w };
         }
         if joined {
             for j in 0..self.leaf.rods() {
-                let k = self.state.base(j) + n;
-                self.node_motions[k].w[1] = tip_force / tip_mass;
-                self.node_motions[k].a[1] = tip_force / tip_mass;
+                let motion = &mut self.node_motions[self.state.base(j) + n];
+                motion.w[1] = tip_force / tip_mass - damping * motion.v[1];
+                motion.a[1] = motion.w[1];
             }
+        }
+    }
+}
+
+impl SemiImplicit {
+    /// Lets the next mass land on its node: the velocities jump, and the accelerations with them.
+    fn land_next_mass(&mut self) {
+        let Some(landing) = self.physics.next_landing() else {
+            return;
+        };
+        let (j, i) = (landing.vein, self.leaf.grid.nearest_node(landing.sigma));
+        let together = self.leaf.tips_move_together() && i == self.leaf.segments();
+        let rods = if together {
+            0..self.leaf.rods()
+        } else {
+            j..j + 1
+        };
+        let nodes: Vec<usize> = rods.map(|j| self.state.base(j) + i).collect();
+        let (own, time) = (self.state.base(j) + i, self.clock.time);
+        let collision = Collision {
+            mass: landing.mass,
+            velocity: landing.velocity,
+            node_mass: nodes.iter().map(|&k| self.inertia[k].mass).sum(),
+            node_velocity: self.node_motions[own].v[1],
+            is_free: self.leaf.node_freedom(j, i).displacement,
+        };
+        self.physics.apply_loads(&mut self.leaf, time);
+        let potential = self.leaf.potential(&self.state);
+        self.physics.land_next_mass();
+        self.inertia[own] = self.physics.inertia(&self.leaf, j, i);
+        for &k in &nodes {
+            self.node_motions[k].v[1] = collision.common_velocity();
+        }
+        let mut exchange = collision.exchange();
+        if self.leaf.least_compliance() == 0.0 || self.leaf.has_rigid_tissue() {
+            let before = self.kinetic_energy();
+            self.project_velocities();
+            exchange.dissipated += before - self.kinetic_energy();
+        }
+        self.restart();
+        self.physics.apply_loads(&mut self.leaf, time);
+        let weighed = self.leaf.potential(&self.state) - potential;
+        self.clock.impacts.push(Impact {
+            point: landing.point,
+            time,
+            lost_energy: exchange.dissipated,
+        });
+        exchange.work += weighed;
+        self.balance.add(exchange);
+    }
+
+    fn kinetic_energy(&self) -> f64 {
+        let nodes = self
+            .inertia
+            .iter()
+            .zip(&self.node_motions)
+            .zip(&self.state.q);
+        let energy = |((inertia, motion), q): ((&Inertia, &NodeMotion), &DQuat)| {
+            let [angular, linear] = motion.v;
+            let turning = angular.dot(inertia.tensor(*q) * angular);
+            0.5 * (inertia.mass * linear.length_squared() + turning)
+        };
+        nodes.map(energy).sum()
+    }
+
+    /// Replaces the velocities by the nearest ones, by their kinetic energy, with which rigid segments and tissue are
+    /// not strained: those to which impulses in them lead.
+    fn project_velocities(&mut self) {
+        let h = IMPULSE_TIME;
+        let per_mass = (h * h).recip();
+        self.apply_loads_and_damping(self.clock.time, 0.0, per_mass);
+        let carried = self.state.clone();
+        if self.short_step(per_mass, h) {
+            for k in 0..self.state.x.len() {
+                let moved = self.increment(k).map(|d| d / h);
+                self.node_motions[k].v = moved;
+            }
+        }
+        self.state = carried;
+    }
+
+    /// Starts anew from the present positions and velocities, after these have jumped.
+    fn restart(&mut self) {
+        self.past_step = 0.0;
+        let retarded = self.physics.retardation > 0.0;
+        if retarded {
+            // The strains before, had the leaf always moved as it does now.
+            let before = self.step.min(self.step_bound);
+            let mut shifted = self.state.clone();
+            for (k, motion) in self.node_motions.iter().enumerate() {
+                let [turn, shift] = motion.v.map(|v| -before * v);
+                shifted.q[k] = (rotation::exp(turn) * shifted.q[k]).normalize();
+                shifted.x[k] += shift;
+            }
+            std::mem::swap(&mut self.state, &mut shifted);
+            let strains = self.strains();
+            std::mem::swap(&mut self.state, &mut shifted);
+            self.strain_history = [strains.clone(), strains];
+            self.apply_loads_and_damping(self.clock.time, before, FIRST_STEP.inverse_square);
+            self.past_step = before;
+        } else {
+            self.apply_loads_and_damping(self.clock.time, 0.0, FIRST_STEP.inverse_square);
+        }
+        if self.leaf.least_compliance() > 0.0 {
+            self.leaf.strain_forces(&mut self.state);
+            self.set_accelerations();
+        } else {
+            let h = (2.0 / FIRST_STEP.inverse_square).sqrt();
+            if self.short_step(FIRST_STEP.inverse_square, h) {
+                std::mem::swap(&mut self.state.n, &mut self.trial.n);
+                for k in 0..self.state.x.len() {
+                    let (d, v) = (self.increment(k), self.node_motions[k].v);
+                    let w = [0, 1].map(|c| FIRST_STEP.inverse_square * (d[c] - h * v[c]));
+                    self.node_motions[k] = NodeMotion { v, a: w, w };
+                }
+            }
+        }
+        if retarded {
+            self.strain_history[0] = self.strains();
+            self.friction_power = self.power_of_friction(self.past_step);
         }
     }
 }

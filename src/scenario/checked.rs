@@ -4,7 +4,9 @@ use crate::numbers::sorted_distinct;
 use crate::scenario::blade::Blade;
 use crate::scenario::format::Key;
 use crate::scenario::format::units::Units;
-use crate::scenario::loads::{Dynamics, FactoredLoads, PointLoad, Weight, Wind, natural_time_unit};
+use crate::scenario::loads::{
+    Dynamics, FactoredLoads, Landing, PointLoad, Weight, Wind, natural_time_unit,
+};
 use crate::scenario::photo::Photo;
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::Schedule;
@@ -198,6 +200,12 @@ impl Scenario {
         let of_all = self.factored.iter().map(|loads| &loads.factor);
         let points = self.points.iter().filter_map(|it| it.in_time.as_ref());
         of_all.chain(points.map(|varying| &varying.factor))
+    }
+
+    /// The masses that land on points, in the order of the points, each with its number.
+    pub fn landings(&self) -> impl Iterator<Item = (usize, Landing)> {
+        let points = self.points.iter().enumerate();
+        points.filter_map(|(number, point)| Some((number, point.landing?)))
     }
 
     /// The scenario whose loads at rest are those of this one at a time.

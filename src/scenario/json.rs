@@ -82,9 +82,14 @@ impl Scenario {
             let [force, moment] =
                 varying.map_or([point.force, point.moment], |it| [it.force, it.moment]);
             let mut row = json!({
-                "vein": point.vein + 1, "at": point.at, "mass": point.mass,
+                "vein": point.vein + 1, "at": point.at,
+                "mass": point.landing.map_or(point.mass, |landing| landing.mass),
                 "force": list_value(force), "moment": list_value(moment),
             });
+            if let Some(landing) = point.landing {
+                row["from"] = number_value(landing.from);
+                row["velocity"] = list_value(landing.velocity);
+            }
             if let Some(varying) = varying {
                 row["factor"] = schedule_value(&varying.factor, "factor", number_value);
             }

@@ -7,7 +7,7 @@ use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::{EntryValue, MAGNITUDES};
 use crate::scenario::format::{Key, ValueSchema};
-use crate::scenario::loads::Dynamics;
+use crate::scenario::loads::{Dynamics, Landing};
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::{InTime, Schedule};
 use crate::scenario::section;
@@ -66,6 +66,7 @@ struct LeafLimits {
     /// Drag on a rod normal to the wind: as for gravity.
     drag: DimensionlessLimit,
     wind_velocity: DimensionlessLimit,
+    landing_velocity: DimensionlessLimit,
     wind_width: DimensionlessLimit,
 }
 
@@ -172,6 +173,7 @@ const LIMITS: LeafLimits = LeafLimits {
          beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity",
     ),
     wind_velocity: upper_limit("|U| T/L", 1e12, NATURAL_UNITS_REASON),
+    landing_velocity: upper_limit("|v| T/L", 1e12, NATURAL_UNITS_REASON),
     wind_width: ratio_limit(
         "w/L",
         1e6,
@@ -646,10 +648,21 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
             .tip_moment
             .check(item(Key::PointMoment)?, vector_norm(turned) / moment)?;
         let weighed = item(Key::PointMass)?;
-        LIMITS.point_mass.check(weighed, point.mass / mass)?;
+        let whole = point.landing.map_or(point.mass, |landing| landing.mass);
+        LIMITS.point_mass.check(weighed, whole / mass)?;
         LIMITS
             .point_weight
-            .check(weighed, vector_norm(scenario.g) / force * point.mass)?;
+            .check(weighed, vector_norm(scenario.g) / force * whole)?;
+        if let Some(Landing { from, velocity, .. }) = point.landing {
+            let unit = |key| scenario.unit(key);
+            LIMITS
+                .times
+                .check(item(Key::PointFrom)?, from / unit(Key::PointFrom))?;
+            let speed = vector_norm(velocity) / unit(Key::PointVelocity);
+            LIMITS
+                .landing_velocity
+                .check(item(Key::PointVelocity)?, speed)?;
+        }
     }
     Ok(())
 }

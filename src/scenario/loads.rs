@@ -26,6 +26,20 @@ pub struct PointLoad {
     pub mass: f64,
     /// The force and the moment in time, if they vary; those at rest are those of time 0.
     pub in_time: Option<Box<VaryingPointLoad>>,
+    /// The mass that lands on the point, if one does; [`PointLoad::mass`] is zero then.
+    pub landing: Option<Landing>,
+}
+
+/// A mass that lands on a point of a leaf in motion and stays there. The momentum of the point and of the mass is
+/// kept, and energy is lost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landing {
+    /// The mass; positive.
+    pub mass: f64,
+    /// The time at which it lands; positive.
+    pub from: f64,
+    /// The velocity with which it lands.
+    pub velocity: [f64; 3],
 }
 
 /// A dead load on a point whose force and moment vary in time.
@@ -43,6 +57,13 @@ impl PointLoad {
     /// The load at rest that is this one at a time.
     pub fn at_time(&self, time: f64) -> PointLoad {
         let mut at = self.clone();
+        if let Some(landing) = self.landing {
+            at.mass = if landing.from <= time {
+                landing.mass
+            } else {
+                0.0
+            };
+        }
         if let Some(varying) = &self.in_time {
             let factor = varying.factor.at(time);
             [at.force, at.moment] =
@@ -217,8 +238,30 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
         moment,
         mass: item(Key::PointMass)?.number()?,
         in_time: varying,
+        landing: read_landing(entries, row)?,
     };
     Ok(given.at_time(0.0))
+}
+
+/// Reads when the mass of a point lands, unless it is there from the start.
+fn read_landing(entries: &Entries, row: usize) -> ScenarioResult<Option<Landing>> {
+    let item = |key| entries.value_in_row(key, row);
+    let (begins, moves) = (item(Key::PointFrom)?, item(Key::PointVelocity)?);
+    let (from, velocity) = (begins.number()?, moves.vector()?);
+    moves.refuse_unless(
+        from > 0.0 || velocity == [0.0; 3],
+        "belongs to a mass that lands: add from, the time at which it does, greater than 0",
+    )?;
+    let mass = item(Key::PointMass)?.number()?;
+    begins.refuse_unless(
+        from == 0.0 || mass > 0.0,
+        "is the time at which a mass lands: add mass, greater than 0",
+    )?;
+    Ok((from > 0.0).then_some(Landing {
+        mass,
+        from,
+        velocity,
+    }))
 }
 
 /// Refuses moments on more than one rod.

@@ -42,7 +42,8 @@ pub(crate) use crate::scenario::format::source::intended_number;
 pub use crate::scenario::format::units::{self, Units};
 pub(crate) use crate::scenario::loads::CLAMPED_ROD_FREQUENCY;
 pub use crate::scenario::loads::{
-    Dynamics, FactoredLoads, MotionStart, PointLoad, PolarInertia, VaryingPointLoad, Weight, Wind,
+    Dynamics, FactoredLoads, Landing, MotionStart, PointLoad, PolarInertia, VaryingPointLoad,
+    Weight, Wind,
 };
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;

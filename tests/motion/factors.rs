@@ -42,6 +42,7 @@ fn loaded(
             force,
             moment,
         })),
+        landing: None,
     };
     scenario.points.push(load.at_time(0.0));
 }

@@ -8,6 +8,7 @@ mod factors;
 mod grips;
 mod half_turn;
 mod hinges;
+mod landing;
 mod moments;
 mod momentum;
 mod order;

@@ -111,6 +111,7 @@ impl Pull {
             moment: [0.0; 3],
             mass: 0.0,
             in_time: None,
+            landing: None,
         });
         scenario
     }

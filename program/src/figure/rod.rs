@@ -383,6 +383,7 @@ mod tests {
                 moment: [0.0; 3],
                 mass: 0.0,
                 in_time: None,
+                landing: None,
             }];
         });
         assert!(loaded.contains(">force 2<") && loaded.contains(">force 0.5<"));

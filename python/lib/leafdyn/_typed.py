@@ -90,15 +90,21 @@ class LeafTable(TypedDict, total=False):
     rods: SupportsIndex
 
 
-class LoadPointTable(TypedDict, total=False):
-    """``[load.point]``"""
-
-    at: float
-    factor: Profile
-    force: Numbers
-    mass: float
-    moment: Numbers
-    vein: SupportsIndex
+LoadPointTable = TypedDict(
+    "LoadPointTable",
+    {
+        "at": float,
+        "factor": Profile,
+        "force": Numbers,
+        "from": float,
+        "mass": float,
+        "moment": Numbers,
+        "vein": SupportsIndex,
+        "velocity": Numbers,
+    },
+    total=False,
+)
+"""``[load.point]``"""
 
 
 class LoadTable(TypedDict, total=False):

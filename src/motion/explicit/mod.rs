@@ -40,8 +40,8 @@ use crate::motion::explicit::packs::{NodeMomentum, Pack};
 pub use crate::motion::explicit::stable_step::StableStep;
 use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
-    TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
+    TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
 };
 use crate::numbers::largest;
 use crate::rod::{RESOLVED_TURN, Wrench};
@@ -106,11 +106,29 @@ pub struct Explicit {
     last_step_time: f64,
     clock: MotionClock,
     equal_steps: EqualSteps,
-    /// Widths of the last step and of the one before; zero if there was none.
-    widths: [f64; 2],
+    past: PastSteps,
     balance: EnergyBalance,
     work: VaryingWork,
     parallel: bool,
+}
+
+/// Steps before the present time.
+#[derive(Clone, Copy, Debug, Default)]
+struct PastSteps {
+    /// Widths of the last step and of the one before; zero if there was none since the start, or since
+    /// velocities jumped.
+    widths: [f64; 2],
+    /// Times between the present strains and those stored last, and between these and the ones before.
+    strain_widths: [f64; 2],
+    /// Whether velocities jumped at the present time.
+    jumped: bool,
+}
+
+impl PastSteps {
+    /// Time by which velocities lag behind positions: half a step, but zero at the start.
+    fn velocity_lag(&self) -> f64 {
+        0.5 * self.widths[0]
+    }
 }
 
 /// Where steps of the present length began.
@@ -178,7 +196,7 @@ impl Explicit {
             last_step_time: 0.0,
             clock: MotionClock::default(),
             equal_steps: EqualSteps::default(),
-            widths: [0.0; 2],
+            past: PastSteps::default(),
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
             parallel: layout.packs() > 1
@@ -230,7 +248,7 @@ impl Explicit {
                 array.fill(0.0);
             }
         }
-        self.widths = [0.0; 2];
+        self.past = PastSteps::default();
     }
 
     /// Sets the decay rate of all velocities from now on.
@@ -283,23 +301,22 @@ impl Explicit {
 
     fn kick_and_drift(&mut self, h: f64) -> KickEnergy {
         let energy = self.kick(0.5 * h, h, true);
-        self.widths = [h, self.widths[0]];
+        self.past = PastSteps {
+            widths: [h, self.past.widths[0]],
+            strain_widths: [h, self.past.strain_widths[0]],
+            jumped: false,
+        };
         self.last_step_time += h;
         energy
-    }
-
-    /// Time by which velocities lag behind positions: half a step, but zero at the start.
-    fn velocity_lag(&self) -> f64 {
-        0.5 * self.widths[0]
     }
 
     /// Advances velocities, by the forces at the present positions, to the time
     /// `ahead` of these, and positions by the time `drift`.
     /// Strains are stored as those of the last step if `remember`.
     fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> KickEnergy {
-        let length = self.velocity_lag() + ahead;
+        let length = self.past.velocity_lag() + ahead;
         let [from, to] = [
-            self.last_step_time - self.velocity_lag(),
+            self.last_step_time - self.past.velocity_lag(),
             self.last_step_time + ahead,
         ];
         self.physics.apply_mean_loads(&mut self.leaf, [from, to]);
@@ -315,7 +332,7 @@ impl Explicit {
             &self.packs,
         );
         if let Some(applied) = &mut self.applied {
-            let [last, before] = self.widths;
+            let [last, before] = self.past.widths;
             let air = KickAir {
                 velocity: self.physics.mean_air([from, to]),
                 extrapolation: if last > 0.0 {
@@ -365,9 +382,7 @@ impl Explicit {
         }
         work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_curvature_varies() {
-            work += self
-                .work
-                .rest_curvature_work(rest, bent, length, self.widths[0]);
+            work += self.work.rest_curvature_work(rest, bent, length, self.past);
         }
         KickEnergy {
             exchange: Exchange {
@@ -385,7 +400,10 @@ impl Explicit {
             rest_varies: changes,
             rest_curvature_factor: if changes { rest } else { 1.0 },
             retardation: self.physics.retardation,
-            strain_rate_weights: rate_weights(self.widths[0], self.widths[1]),
+            strain_rate_weights: {
+                let [last, before] = self.past.strain_widths;
+                rate_weights(last, before)
+            },
             stores_strains: remember,
         }
     }
@@ -517,6 +535,11 @@ impl TimeIntegrator for Explicit {
             // Times are multiples of the step, so that rounding does not accumulate.
             let EqualSteps { time, steps } = self.equal_steps;
             let next = time + h * (self.clock.steps + 1 - steps) as f64;
+            let landing = self.physics.next_landing_time();
+            if landing <= until && next > landing + TIME_ROUNDING_FRACTION * h {
+                self.land_next_mass();
+                continue;
+            }
             if next > until + TIME_ROUNDING_FRACTION * h {
                 break;
             }
@@ -546,7 +569,7 @@ impl TimeIntegrator for Explicit {
         let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
         let past = self.applied.as_ref().map(AppliedLoads::past_velocities);
         let path = (self.positions.clone(), moving);
-        let (time, widths, work) = (self.last_step_time, self.widths, self.work);
+        let (time, steps, work) = (self.last_step_time, self.past, self.work);
         let mut exchange = Exchange::default();
         let left = self.clock.time - self.last_step_time;
         if left > TIME_ROUNDING_FRACTION * self.step {
@@ -568,7 +591,7 @@ impl TimeIntegrator for Explicit {
         if let (Some(applied), Some(past)) = (&mut self.applied, past) {
             applied.set_past_velocities(past);
         }
-        (self.last_step_time, self.widths, self.work) = (time, widths, work);
+        (self.last_step_time, self.past, self.work) = (time, steps, work);
         let energy = measure(
             &mut self.leaf,
             &self.physics,
@@ -582,6 +605,81 @@ impl TimeIntegrator for Explicit {
             state,
             velocity,
         }
+    }
+}
+
+impl Explicit {
+    /// Goes to the time at which the next mass lands, by a step of its own, and lets it land on its node: the
+    /// velocities jump, and steps begin anew.
+    fn land_next_mass(&mut self) {
+        let Some(landing) = self.physics.next_landing() else {
+            return;
+        };
+        let (h, left) = (self.step, landing.time - self.last_step_time);
+        if left > TIME_ROUNDING_FRACTION * h {
+            let energy = self.kick_and_drift(left);
+            self.balance.add(energy.exchange);
+            self.clock.steps += 1;
+        }
+        self.last_step_time = landing.time;
+        let mut exchange = self.kick(0.0, 0.0, false).exchange;
+        if self.physics.rest_curvature_varies() {
+            exchange.work += std::mem::take(&mut self.work.half_impulse) * self.work.rate;
+        }
+        let (j, i) = (landing.vein, self.leaf.grid.nearest_node(landing.sigma));
+        let joint = self.tip_mass.filter(|_| i == self.layout.segments);
+        let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+        let collision = Collision {
+            mass: landing.mass,
+            velocity: landing.velocity,
+            node_mass: joint.unwrap_or_else(|| self.physics.inertia(&self.leaf, j, i).mass),
+            node_velocity: self.momentum(j, i).velocity,
+            is_free: joint.is_some() || self.packs[pack].moves_freely(entry),
+        };
+        self.physics.land_next_mass();
+        match joint {
+            Some(mass) => self.tip_mass = Some(mass + landing.mass),
+            None => self.packs[pack].add_mass(entry, landing.mass),
+        }
+        let velocity = collision.common_velocity();
+        let rods = if joint.is_some() {
+            0..self.layout.rods
+        } else {
+            j..j + 1
+        };
+        for j in rods {
+            let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+            for c in 0..3 {
+                self.packs[pack].motion.v[c][entry] = velocity[c];
+            }
+        }
+        let lost = collision.exchange();
+        exchange += lost;
+        self.balance.add(exchange);
+        self.clock.impacts.push(Impact {
+            point: landing.point,
+            time: landing.time,
+            lost_energy: lost.dissipated,
+        });
+        self.past = PastSteps {
+            jumped: true,
+            ..PastSteps::default()
+        };
+        if self.physics.retardation > 0.0 {
+            // Stores the strains before, had the leaf always moved as it does now.
+            let rest = self.physics.rest_curvature_factor(landing.time);
+            let loads = self.leaf.loads;
+            self.move_packs(&loads, self.law(rest, false), 1.0, 0.0, -h);
+            self.move_packs(&loads, self.law(rest, true), 1.0, 0.0, h);
+            self.past.strain_widths = [h, 0.0];
+        }
+        (self.clock.time, self.equal_steps) = (
+            landing.time,
+            EqualSteps {
+                time: landing.time,
+                steps: self.clock.steps,
+            },
+        );
     }
 }
 
@@ -803,9 +901,14 @@ impl VaryingWork {
     /// Work since the last kick, `width` ago, by the mean factors of the rest curvatures in that
     /// kick and, over `length`, in this one; `bent` is the sum of the rest curvatures
     /// times the present moments.
-    fn rest_curvature_work(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
-        let turned = bent + mean * self.twice_straightening_energy;
-        let half_impulse = 0.5 * length * (mean - self.rest_curvature_factor);
+    fn rest_curvature_work(&mut self, mean: f64, bent: f64, length: f64, past: PastSteps) -> f64 {
+        let (turned, width) = (
+            bent + mean * self.twice_straightening_energy,
+            past.widths[0],
+        );
+        // After a jump of the velocities only the rate after it counts.
+        let part = if past.jumped { 1.0 } else { 0.5 };
+        let half_impulse = part * length * (mean - self.rest_curvature_factor);
         self.rate = match width > 0.0 {
             true => (turned - self.rest_moment_sum) / width,
             false => 0.0,

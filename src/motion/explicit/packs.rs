@@ -172,6 +172,22 @@ impl Pack {
         }
     }
 
+    /// Whether a node moves by the forces on it alone: it is not held, and is no shared tip.
+    pub fn moves_freely(&self, at: usize) -> bool {
+        let NodeMaterial { block, node } = self.node_material(at);
+        block.inverse_mass[node] > 0.0
+    }
+
+    /// Adds a mass to a node, unless it is held.
+    pub fn add_mass(&mut self, at: usize, mass: f64) {
+        if self.moves_freely(at) {
+            let length = self.material[0].mass.len();
+            let block = Arc::make_mut(&mut self.material[at / length]);
+            block.mass[at % length] += mass;
+            block.inverse_mass[at % length] = block.mass[at % length].recip();
+        }
+    }
+
     /// Length of rod whose loads act on a node.
     pub fn load_length(&self, at: usize) -> f64 {
         let NodeMaterial { block, node } = self.node_material(at);

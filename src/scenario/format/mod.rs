@@ -172,6 +172,10 @@ keys! {
     PointMoment "load.point.moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// mass of the point, which `load.g` pulls.
     PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
+    /// time at which the mass lands on the leaf; before that it is absent.
+    PointFrom "load.point.from": Number(NotNegative), [0, 0, 1], Default("0.0");
+    /// velocity with which it lands.
+    PointVelocity "load.point.velocity": Vector, [1, 0, -1], Default("[0.0, 0.0, 0.0]");
     /// factor in time of the force and the moment on the point; at rest that of time 0.
     PointFactor "load.point.factor": FactorInTime, [0, 0, 0], Derived;
     /// how the tips are held.

@@ -142,6 +142,8 @@ pub fn rows(key: Key) -> Vec<Row> {
                 false,
             ),
         ],
+        Key::PointFrom => motions("struck", "load.point[0].from=0.1"),
+        Key::PointVelocity => motions("struck", "load.point[0].velocity=[0.0,2.0,-5.0]"),
         Key::TipHeld => always("pinned", "tip.held=clamped"),
         Key::TipPosition => smooth("pinned", "tip.position[0]=0.91"),
         Key::TipAngles => smooth("jaws", "tip.angles=0.25"),
