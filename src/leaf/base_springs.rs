@@ -12,7 +12,9 @@ use glam::{DMat3, DQuat, DVec3};
 impl Leaf {
     /// The rotation vector, along the lab axes, from the natural direction of the base of rod `j` to `q`.
     fn base_turn(&self, j: usize, q: DQuat) -> DVec3 {
-        rotation::log(q * self.base_pose(j).rotation.conjugate())
+        let natural = self.base_pose(j).rotation;
+        let natural = self.base_rotation.map_or(natural, |turn| turn * natural);
+        rotation::log(q * natural.conjugate())
     }
 
     /// The moment of rod `j` at a base with the rotation `q`: that of its spring, or none.

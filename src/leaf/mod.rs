@@ -95,6 +95,8 @@ pub struct Leaf {
     hinged: bool,
     /// Moment per radian of the springs at the bases; empty without any.
     base_turn_stiffness: Vec<f64>,
+    /// By how much the natural directions of elastic bases have turned, if they have.
+    pub base_rotation: Option<DQuat>,
     /// Turns of veins without resistance.
     zero_energy_rotations: Vec<ZeroEnergyRotation>,
     /// Fractions of the length where some profile has a kink, ascending.
@@ -274,6 +276,7 @@ impl Leaf {
             }),
             hinged: scenario.base_held != BaseSupport::Clamped,
             base_turn_stiffness: scenario.base_turn_stiffness.clone(),
+            base_rotation: None,
             zero_energy_rotations: scenario.zero_energy_rotations(),
             kinks,
             softest_couple_stiffness: softest / scale.stiffness,

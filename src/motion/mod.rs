@@ -4,6 +4,7 @@
 
 mod constraint_projection;
 mod explicit;
+mod moving_supports;
 mod physics;
 mod semi_implicit;
 
@@ -26,6 +27,15 @@ pub struct Velocity {
     pub linear: DVec3,
 }
 
+/// The displacement and the rotation vector of a node in a step, along the lab axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodeMotionComponents {
+    /// The rotation vector.
+    pub rotation: DVec3,
+    /// The displacement.
+    pub displacement: DVec3,
+}
+
 /// The energies of a moving leaf. Dimensionless: in A/L.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Energy {
@@ -39,8 +49,8 @@ pub struct Energy {
     pub potential: f64,
     /// Energy dissipated by damping since the start.
     pub dissipated: f64,
-    /// Work done since the start by varying loads and rest shapes, and by what has no potential:
-    /// the moment on a tip, and wind.
+    /// Work done since the start by varying loads and rest shapes, by what has no potential, the moment on a
+    /// tip and wind, by supports that move, and by masses that land.
     pub work: f64,
 }
 

@@ -226,7 +226,7 @@ impl Physics {
             },
             constant_loads: None,
             point_masses: Vec::new(),
-            knots: schedule_knots(&dynamics, air.as_ref(), &factors, time),
+            knots: schedule_knots(&dynamics, air.as_ref(), leaf, &factors, time),
             load_factors: (factors.into_iter())
                 .map(|factor| LoadFactor {
                     first: factor.at(0.0),
@@ -471,11 +471,15 @@ fn load_schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
 fn schedule_knots(
     dynamics: &Dynamics,
     air: Option<&Schedule<[f64; 3]>>,
+    leaf: &Leaf,
     factors: &[Schedule<f64>],
     unit: f64,
 ) -> Vec<f64> {
+    let supports = leaf.scenario().support_motion.iter();
+    let supports = supports.flat_map(|it| it.schedules());
     let (end, loads) = (dynamics.duration, load_schedules(dynamics).into_iter());
-    let knots = loads.chain(air).flat_map(|load| load.knot_times(end));
+    let vectors = loads.chain(air).chain(supports);
+    let knots = vectors.flat_map(|vector| vector.knot_times(end));
     let factors = factors.iter().chain([&dynamics.rest]);
     let knots = knots.chain(factors.flat_map(|factor| factor.knot_times(end)));
     let mut knots: Vec<f64> = knots.map(|time| time / unit).collect();

@@ -21,6 +21,7 @@
 
 use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
 use crate::motion::constraint_projection::project_constraints;
+use crate::motion::moving_supports::MovingSupports;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
     Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
@@ -190,6 +191,7 @@ pub struct SemiImplicit {
     physics: Physics,
     inertia: Vec<Inertia>,
     wind: Option<WindDrag>,
+    supports: Option<MovingSupports>,
     /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
     /// Strains (v, u) of all segments at the last step and the one before.
@@ -231,6 +233,7 @@ impl SemiImplicit {
         let mut motion = SemiImplicit {
             inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
             wind: WindDrag::new(&leaf, &physics),
+            supports: MovingSupports::new(&leaf, &physics),
             sections: leaf.sections.clone(),
             strain_history: [Vec::new(), Vec::new()],
             past_step: 0.0,
@@ -263,6 +266,7 @@ impl SemiImplicit {
             physics,
         };
         motion.initialize();
+        motion.start_supports();
         motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
@@ -276,6 +280,9 @@ impl SemiImplicit {
     /// As of [`SemiImplicit::step_towards`].
     pub fn proceed_towards(&mut self, until: f64) -> Result<(), Stopped> {
         let (now, landing) = (self.clock.time, self.physics.next_landing_time());
+        if self.jump_with_supports() {
+            return Ok(());
+        }
         if landing <= now {
             self.land_next_mass();
             return Ok(());
@@ -456,6 +463,7 @@ impl SemiImplicit {
                 next.w[c] = of_mean * (mean - w.alpha_f * m.w[c]);
             }
         }
+        set_support_motions(&self.supports, &mut self.next_node_motions);
     }
 
     /// Attempts a step of h; returns its local error, or `None` if it was too long.
@@ -467,6 +475,7 @@ impl SemiImplicit {
         self.apply_loads_and_damping(self.clock.time + h, h, per_mass);
         self.correct_load_lag(h);
         self.predict(h);
+        self.move_supports(self.clock.time + h);
         let last = match self.control {
             StepControl::Fixed(_) => SETTINGS.fixed_step_iteration_error,
             StepControl::CountOnly(error) => SETTINGS.count_only_iteration_error * error,
@@ -480,14 +489,19 @@ impl SemiImplicit {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
+            let supports = &self.supports;
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
-                Wrench {
-                    moment: -moment,
-                    force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
-                }
+                free_wrench(
+                    supports,
+                    k,
+                    Wrench {
+                        moment: -moment,
+                        force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
+                    },
+                )
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
@@ -676,6 +690,30 @@ impl SemiImplicit {
     }
 }
 
+/// Sets the motions of nodes to those of the supports that move them.
+fn set_support_motions(supports: &Option<MovingSupports>, motions: &mut [NodeMotion]) {
+    for it in supports.iter().flat_map(|supports| &supports.nodes) {
+        let motion = &mut motions[it.index];
+        let velocities = [it.velocity.angular, it.velocity.linear];
+        for c in usize::from(!it.holds_rotation)..2 {
+            motion.v[c] = velocities[c];
+            (motion.a[c], motion.w[c]) = (DVec3::ZERO, DVec3::ZERO);
+        }
+    }
+}
+
+/// The moment and the force on node `k` without those that a support that moves takes.
+fn free_wrench(supports: &Option<MovingSupports>, k: usize, on_node: Wrench) -> Wrench {
+    let free = |component: usize, of: DVec3| match MovingSupports::holds(supports, k, component) {
+        true => DVec3::ZERO,
+        false => of,
+    };
+    Wrench {
+        moment: free(0, on_node.moment),
+        force: free(1, on_node.force),
+    }
+}
+
 /// Adds mass times `per_mass` to the matrix, and a moment and a force to the
 /// right-hand side, at all nodes with equations.
 fn add_inertia(
@@ -719,6 +757,9 @@ impl SemiImplicit {
             let exchange = self.step_energy_exchange(h);
             self.balance.add(exchange);
         }
+        if let Some(supports) = &mut self.supports {
+            supports.accept();
+        }
         if self.physics.retardation > 0.0 {
             self.strain_history.swap(0, 1);
             self.strain_history[0] = self.strains();
@@ -737,6 +778,7 @@ impl SemiImplicit {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
             work: self.varying_load_work(h) + self.work_of_wind(h),
         };
+        exchange.work += self.work_of_supports();
         if self.physics.retardation > 0.0 {
             let power = self.power_of_friction(h);
             exchange.dissipated += 0.5 * h * (self.friction_power + power);
@@ -819,8 +861,12 @@ impl SemiImplicit {
             let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
-            sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
-            sum += inertia.mass * shift.dot(mean(1));
+            if !MovingSupports::holds(&self.supports, k, 0) {
+                sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
+            }
+            if !MovingSupports::holds(&self.supports, k, 1) {
+                sum += inertia.mass * shift.dot(mean(1));
+            }
         }
         sum
     }
@@ -861,7 +907,11 @@ impl SemiImplicit {
         let after = wind.drags(&self.state, to, |k| self.node_motions[k].v[1]);
         let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
             let node = self.state.base(j) + i;
-            let moved = |k: usize| self.state.x[k] - self.trial.x[k];
+            // What presses on a support that moves does no work on the leaf.
+            let moved = |k: usize| match MovingSupports::holds(&self.supports, k, 1) {
+                true => DVec3::ZERO,
+                false => self.state.x[k] - self.trial.x[k],
+            };
             let force = 0.5 * (before.force() + after.force());
             force.dot(0.5 * (moved(node) + moved(node + 1)))
         });
@@ -921,6 +971,9 @@ impl SemiImplicit {
     /// of the present velocities in the time `h`; false if it failed.
     fn short_step(&mut self, per_mass: f64, h: f64) -> bool {
         self.trial.clone_from(&self.state);
+        if h > 0.0 {
+            self.move_supports(self.clock.time + h);
+        }
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(self.clock.time, 0.0);
@@ -929,12 +982,12 @@ impl SemiImplicit {
                 [turn - h * v[0], shift - h * v[1]]
             };
             let increments: Vec<_> = (0..self.state.x.len()).map(excess).collect();
-            let inertia = &self.inertia;
+            let (inertia, supports) = (&self.inertia, &self.supports);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
                 let force = -per_mass * inertia[k].mass * shift;
-                Wrench { moment, force }
+                free_wrench(supports, k, Wrench { moment, force })
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
@@ -979,6 +1032,7 @@ impl SemiImplicit {
                 motion.a[1] = motion.w[1];
             }
         }
+        set_support_motions(&self.supports, &mut self.node_motions);
     }
 }
 
@@ -1012,6 +1066,9 @@ impl SemiImplicit {
             self.node_motions[k].v[1] = collision.common_velocity();
         }
         let mut exchange = collision.exchange();
+        if let Some(supports) = &mut self.supports {
+            supports.add_mass(own, landing.mass);
+        }
         if self.leaf.least_compliance() == 0.0 || self.leaf.has_rigid_tissue() {
             let before = self.kinetic_energy();
             self.project_velocities();
@@ -1057,6 +1114,8 @@ impl SemiImplicit {
             }
         }
         self.state = carried;
+        self.move_supports(self.clock.time);
+        set_support_motions(&self.supports, &mut self.node_motions);
     }
 
     /// Starts anew from the present positions and velocities, after these have jumped.
@@ -1094,10 +1153,88 @@ impl SemiImplicit {
                     self.node_motions[k] = NodeMotion { v, a: w, w };
                 }
             }
+            self.move_supports(self.clock.time);
+            set_support_motions(&self.supports, &mut self.node_motions);
         }
         if retarded {
             self.strain_history[0] = self.strains();
             self.friction_power = self.power_of_friction(self.past_step);
         }
+    }
+}
+
+impl SemiImplicit {
+    /// Moves the supports of the trial to where they are at a time.
+    fn move_supports(&mut self, time: f64) {
+        if let Some(supports) = &mut self.supports {
+            supports.move_to(time, &mut self.leaf);
+            supports.place(&mut self.trial);
+        }
+    }
+
+    /// Sets the velocities and the loads of supports that move at the start.
+    fn start_supports(&mut self) {
+        if self.supports.is_none() {
+            return;
+        }
+        self.move_supports(0.0);
+        set_support_motions(&self.supports, &mut self.node_motions);
+        self.jump_with_supports();
+        if let Some(supports) = &mut self.supports {
+            let inertia = &self.inertia;
+            supports.kinetic_energy = supports.kinetic_energy(|it| inertia[it.index]);
+            for it in &mut supports.nodes {
+                it.load = self.leaf.support_load(&self.state, it.rod, it.node);
+            }
+        }
+    }
+
+    /// Lets the velocities of rigid rods jump if it is time, as those of their supports do; returns whether they did.
+    fn jump_with_supports(&mut self) -> bool {
+        let now = self.clock.time;
+        let rigid = self.leaf.least_compliance() == 0.0 || self.leaf.has_rigid_tissue();
+        let Some(supports) = &mut self.supports else {
+            return false;
+        };
+        let mut jumps = false;
+        while supports.jumps.pop_if(|time| *time <= now).is_some() {
+            jumps = true;
+        }
+        if !jumps || !rigid {
+            return false;
+        }
+        let before = self.kinetic_energy();
+        self.move_supports(now);
+        set_support_motions(&self.supports, &mut self.node_motions);
+        self.project_velocities();
+        self.restart();
+        let work = self.kinetic_energy() - before;
+        if let Some(supports) = &mut self.supports {
+            let inertia = &self.inertia;
+            supports.kinetic_energy = supports.kinetic_energy(|it| inertia[it.index]);
+        }
+        self.balance.add(Exchange {
+            dissipated: 0.0,
+            work,
+        });
+        true
+    }
+
+    /// Work of the supports that move in the accepted step.
+    fn work_of_supports(&mut self) -> f64 {
+        let Some(supports) = &mut self.supports else {
+            return 0.0;
+        };
+        let inertia = &self.inertia;
+        let kinetic = supports.kinetic_energy(|it| inertia[it.index]);
+        let mut work = kinetic - std::mem::replace(&mut supports.kinetic_energy, kinetic);
+        for it in &mut supports.nodes {
+            let load = self.leaf.support_load(&self.state, it.rod, it.node);
+            let step = it.step();
+            work -= 0.5 * (load.force + it.load.force).dot(step.displacement);
+            work -= 0.5 * (load.moment + it.load.moment).dot(step.rotation);
+            it.load = load;
+        }
+        work
     }
 }

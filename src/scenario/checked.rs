@@ -11,6 +11,7 @@ use crate::scenario::photo::Photo;
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::Schedule;
 use crate::scenario::section::{Moduli, Radii};
+use crate::scenario::support_motion::SupportMotion;
 use crate::scenario::supports::{BaseSupport, Grip, HeldTip};
 use crate::scenario::veins::{Rod, Scale, Tissue};
 use glam::{DQuat, DVec3};
@@ -67,6 +68,8 @@ pub struct Scenario {
     pub held_tip: Option<HeldTip>,
     /// Holders along the veins; no point has two.
     pub grips: Vec<Grip>,
+    /// The supports that move in time, if any do; at rest they are where they are at time 0.
+    pub support_motion: Option<Box<SupportMotion>>,
     /// Wind.
     pub wind: Option<Wind>,
     /// How a photograph shows the leaf, if points in a photograph are data of a fit; equilibria do not

@@ -95,16 +95,21 @@ impl Scenario {
             }
             row
         };
-        let grip = |grip: &Grip| {
+        let moves = self.support_motion.as_ref().map_or(&[][..], |it| &it.grips);
+        let grip = |(number, grip): (usize, &Grip)| {
             let [from, to] = grip.at;
+            let moved = match moves.get(number) {
+                Some(moves) => vectors_value(moves),
+                None => list_value(grip.displacement),
+            };
             json!({
-                "vein": grip.vein + 1, "held": grip.held, "move": list_value(grip.displacement),
+                "vein": grip.vein + 1, "held": grip.held, "move": moved,
                 "at": if from == to { json!(from) } else { list_value(grip.at) },
             })
         };
         let rows: Vec<Value> = match first {
             Key::PointVein => self.points.iter().map(point).collect(),
-            _ => self.grips.iter().map(grip).collect(),
+            _ => self.grips.iter().enumerate().map(grip).collect(),
         };
         (!rows.is_empty()).then(|| rows.into())
     }
@@ -235,8 +240,7 @@ impl Scenario {
     fn wind_value(&self, key: Key) -> Option<Value> {
         let wind = self.wind.as_ref()?;
         Some(match key {
-            Key::WindVelocity if wind.velocity.is_constant() => list_value(wind.velocity.at(0.0)),
-            Key::WindVelocity => schedule_value(&wind.velocity, "value", list_value),
+            Key::WindVelocity => vectors_value(&wind.velocity),
             Key::WindDensity => number_value(wind.density),
             Key::WindDrag => number_value(wind.drag),
             _ => quantity_value(wind.width.iter()),
@@ -263,7 +267,10 @@ impl Scenario {
         Some(match key {
             Key::TipHeld if clamps.is_some() => json!("clamped"),
             Key::TipHeld => json!("pinned"),
-            Key::TipPosition => list_value(held.position),
+            Key::TipPosition => match self.support_motion.as_ref().and_then(|it| it.tip.as_ref()) {
+                Some(position) => vectors_value(position),
+                None => list_value(held.position),
+            },
             Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
             _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
         })
@@ -300,6 +307,19 @@ impl Scenario {
                 "value",
                 list_value,
             )?,
+            Key::BaseInTime => {
+                let base = self.support_motion.as_ref()?.base.as_ref()?;
+                let mut value = json!({});
+                for (name, motion) in [("move", &base.displacement), ("turn", &base.turn)] {
+                    if *motion != Schedule::constant([0.0; 3]) {
+                        value[name] = schedule_value(motion, "value", list_value);
+                    }
+                }
+                if value == json!({}) {
+                    value["move"] = schedule_value(&base.displacement, "value", list_value);
+                }
+                value
+            }
             Key::RestInTime => {
                 schedule_unless_constant(&dynamics.rest, 1.0, "factor", number_value)?
             }
@@ -463,6 +483,14 @@ fn schedule_unless_constant<T: InTime>(
 ) -> Option<Value> {
     let constant = *schedule == Schedule::constant(at_rest);
     (!constant).then(|| schedule_value(schedule, name, written))
+}
+
+/// Vectors in time, or the one that is the same at all times.
+fn vectors_value(of: &Schedule<[f64; 3]>) -> Value {
+    match of.is_constant() {
+        true => list_value(of.at(0.0)),
+        false => schedule_value(of, "value", list_value),
+    }
 }
 
 fn schedule_value<T: InTime>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {

@@ -59,6 +59,7 @@ struct LeafLimits {
     point_mass: DimensionlessLimit,
     /// At the limit a thousandth of the digits of positions is lost.
     base_distance: DimensionlessLimit,
+    base_turn: DimensionlessLimit,
     /// Wider for tissue than for couplings, as blades need: a strip of width h, thickness t and length L
     /// gives k L^4/A = 12 L^4/(h^2 t^2) and c L^2/A = L^2/h^2.
     tissue: DimensionlessLimit,
@@ -164,6 +165,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "L is the longest rod; \
          beyond the limit positions lose digits: choose an origin closer to the leaf",
     ),
+    base_turn: upper_limit("|turn|", 1e3, REST_ANGLE_REASON),
     tissue: upper_limit("k L^4/A", 1e16, TISSUE_STIFFNESS_REASON),
     fold: upper_limit("c L^2/A", 1e12, TISSUE_STIFFNESS_REASON),
     drag: upper_limit(
@@ -423,6 +425,31 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
             for (index, value) in load.bounds().into_iter().enumerate() {
                 limit.check(entry_of_bound(item, load, index), vector_norm(value) / unit)?;
             }
+        }
+    }
+    if let Some(motion) = &scenario.support_motion {
+        let item = entries.given_value(Key::BaseInTime);
+        if let (Some(base), Some(item)) = (&motion.base, item) {
+            let part = |name| item.list(name).unwrap_or(item);
+            check_times(Some(part("move")), &base.displacement, units)?;
+            check_times(Some(part("turn")), &base.turn, units)?;
+            for way in base.displacement.bounds() {
+                let way = vector_norm(way) / longest(rods);
+                LIMITS.base_distance.check(part("move"), way)?;
+            }
+            for turn in base.turn.bounds() {
+                LIMITS.base_turn.check(part("turn"), vector_norm(turn))?;
+            }
+        }
+        if let Some(tip) = &motion.tip {
+            check_times(entries.given_value(Key::TipPosition), tip, units)?;
+        }
+        for (row, moves) in motion.grips.iter().enumerate() {
+            check_times(
+                Some(entries.value_in_row(Key::GripMove, row)?),
+                moves,
+                units,
+            )?;
         }
     }
     if let Some(loads) = &scenario.factored {

@@ -15,6 +15,7 @@ mod profile;
 mod read;
 mod schedule;
 mod section;
+mod support_motion;
 mod supports;
 #[cfg(test)]
 mod tests;
@@ -55,6 +56,7 @@ pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 pub use crate::scenario::section::{Moduli, Radii, Stress};
+pub use crate::scenario::support_motion::{BaseMotion, SupportMotion};
 pub use crate::scenario::supports::{BaseSupport, Clamp, Grip, HeldTip, SupportKind};
 pub use crate::scenario::veins::{Rod, Scale, Tissue, longest};
 pub use crate::scenario::zero_energy::{BaseRotations, UnbalancedMoment, ZeroEnergyRotation};

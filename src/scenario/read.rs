@@ -14,6 +14,7 @@ use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
 use crate::scenario::loads::{check_single_rod_moments, read_dynamics, read_wind};
 use crate::scenario::photo::read_photo;
 use crate::scenario::schedule::Schedule;
+use crate::scenario::support_motion::read_support_motion;
 use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
 use crate::scenario::{limits, loads, supports};
 use std::fs::File;
@@ -205,6 +206,7 @@ impl Entries {
         let held_tip = supports::read_held_tip(self, &rods, joined)?;
         let shared = held_tip.is_some() || joined && rods.len() > 1;
         let grips = supports::read_grips(self, &rods, shared)?;
+        let support_motion = read_support_motion(self)?;
         let wind = read_wind(self, rods.len())?;
         let photo = read_photo(self)?;
         let tolerance = read_tolerance(self.value_or_default(Key::Tolerance)?)?;
@@ -235,6 +237,7 @@ impl Entries {
             tip_moment,
             held_tip,
             grips,
+            support_motion,
             wind,
             photo,
             tolerance,

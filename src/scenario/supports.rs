@@ -106,8 +106,11 @@ pub(super) fn read_held_tip(
         joined || rods.len() == 1,
         "needs leaf.joined = true: one point is held, which all tips share",
     )?;
-    let position = at.vector()?;
-    check_reach(&at, position, rods)?;
+    let position = at.vectors_in_time()?;
+    for position in position.bounds() {
+        check_reach(&at, position, rods)?;
+    }
+    let position = position.at(0.0);
     if let Some(moment) = entries.given_value(Key::TipMoment) {
         moment.refuse_unless(
             moment.vector()? == [0.0; 3],
@@ -255,16 +258,16 @@ fn read_grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> Scena
     )?;
     let farthest = SUPPORT_LIMITS.grip_move;
     let way = item(Key::GripMove)?;
-    let [x, y, z] = way.vector()?;
+    let moves = way.vectors_in_time()?;
     way.refuse_unless(
-        x.hypot(y).hypot(z) <= farthest * longest(rods),
+        (moves.bounds().iter()).all(|[x, y, z]| x.hypot(*y).hypot(*z) <= farthest * longest(rods)),
         format_args!("must be at most {farthest} times the longest rod"),
     )?;
     Ok(Grip {
         vein: item(Key::GripVein)?.whole_number(rods.len())? - 1,
         at,
         held: item(Key::GripHeld)?.support_kind()?,
-        displacement: [x, y, z],
+        displacement: moves.at(0.0),
     })
 }
 

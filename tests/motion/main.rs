@@ -17,4 +17,5 @@ mod released_rigid;
 mod released_stiff;
 mod stability;
 mod stiff;
+mod supports;
 mod wind;

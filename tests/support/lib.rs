@@ -299,6 +299,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         tip_moment: [0.0; 3],
         held_tip: None,
         grips: Vec::new(),
+        support_motion: None,
         wind: None,
         photo: None,
         tolerance: 1e-6,

@@ -50,9 +50,19 @@ class CouplingTable(TypedDict, total=False):
     z: float | Numbers
 
 
+class BaseMotion(TypedDict, total=False):
+    """``dynamics.base``"""
+
+    at: Numbers
+    move: Sequence[Numbers] | Profile
+    smooth: bool
+    turn: Sequence[Numbers] | Profile
+
+
 class DynamicsTable(TypedDict, total=False):
     """``[dynamics]``"""
 
+    base: BaseMotion
     clamped: bool
     density: float | Numbers | Profile
     duration: float
@@ -73,7 +83,7 @@ class GripTable(TypedDict, total=False):
 
     at: float | Numbers
     held: str
-    move: Numbers
+    move: Numbers | Profile
     vein: SupportsIndex
 
 
@@ -179,7 +189,7 @@ class TipTable(TypedDict, total=False):
 
     angles: float | Numbers
     held: str
-    position: Numbers
+    position: Numbers | Profile
     twist: float | Numbers
 
 

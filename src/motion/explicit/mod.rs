@@ -34,14 +34,16 @@ mod stable_step;
 mod tests;
 
 use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
-use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
+use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw, WatchedNode};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
 use crate::motion::explicit::packs::{NodeMomentum, Pack};
 pub use crate::motion::explicit::stable_step::StableStep;
+use crate::motion::moving_supports::{MovingNode, MovingSupports};
 use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
-    Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
-    TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, NodeMotionComponents, Snapshot,
+    Stopped, TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure,
+    rate_weights,
 };
 use crate::numbers::largest;
 use crate::rod::{RESOLVED_TURN, Wrench};
@@ -95,6 +97,7 @@ pub struct Explicit {
     block: BlockForces,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
     applied: Option<AppliedLoads>,
+    supports: Option<MovingSupports>,
     /// The dead moments of a step.
     moments: StepDeadMoments,
     /// Mass of the shared tip, if there is one.
@@ -188,6 +191,7 @@ impl Explicit {
             positions,
             layout,
             applied: AppliedLoads::new(&leaf, &physics, state, layout),
+            supports: MovingSupports::new(&leaf, &physics),
             moments: StepDeadMoments::default(),
             block: BlockForces::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
@@ -206,6 +210,7 @@ impl Explicit {
             physics,
         };
         explicit.physics.apply_loads(&mut explicit.leaf, 0.0);
+        explicit.start_supports();
         explicit.step =
             step.unwrap_or_else(|| SETTINGS.stable_step_fraction * explicit.stable_step().step);
         let start = explicit.snapshot();
@@ -342,10 +347,14 @@ impl Explicit {
                 },
             };
             applied.update(&self.leaf, self.layout, &self.positions, &self.packs, air);
+            for it in self.supports.iter_mut().flat_map(|it| &mut it.nodes) {
+                it.load = support_load(&self.leaf, &applied.state, it);
+            }
         }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
         self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
+        work += self.drive_supports(drift);
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
@@ -378,7 +387,8 @@ impl Explicit {
         }
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
-            work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity);
+            let free = |k: usize| !MovingSupports::holds(&self.supports, k, 1);
+            work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity, free);
         }
         work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_curvature_varies() {
@@ -442,6 +452,7 @@ impl Explicit {
                 law,
                 loads,
                 moments,
+                watched: &mut pack.watched,
                 velocity_factor: keep,
                 kick,
                 drift,
@@ -570,6 +581,7 @@ impl TimeIntegrator for Explicit {
         let past = self.applied.as_ref().map(AppliedLoads::past_velocities);
         let path = (self.positions.clone(), moving);
         let (time, steps, work) = (self.last_step_time, self.past, self.work);
+        let supports = self.supports.clone();
         let mut exchange = Exchange::default();
         let left = self.clock.time - self.last_step_time;
         if left > TIME_ROUNDING_FRACTION * self.step {
@@ -581,9 +593,19 @@ impl TimeIntegrator for Explicit {
         let state = self.present_state();
         let nodes = self.leaf.rod_index_pairs(0..=self.leaf.segments());
         let places = nodes.map(|(j, i)| self.layout.pack_position(j, i));
-        let velocity: Vec<Velocity> = places
+        let mut velocity: Vec<Velocity> = places
             .map(|place| self.packs[place.pack].velocity(place.entry))
             .collect();
+        if let Some(supports) = &self.supports {
+            for it in &supports.nodes {
+                velocity[it.index].linear = it.velocity.linear;
+                if it.holds_rotation {
+                    velocity[it.index].angular = it.velocity.angular;
+                }
+            }
+            let inertia = |it: &MovingNode| self.physics.inertia(&self.leaf, it.rod, it.node);
+            exchange.work += supports.kinetic_energy(inertia) - supports.kinetic_energy;
+        }
         self.positions = path.0;
         for (pack, moving) in self.packs.iter_mut().zip(path.1) {
             (pack.motion, pack.past) = moving;
@@ -599,6 +621,10 @@ impl TimeIntegrator for Explicit {
             &state,
             &velocity,
         );
+        self.supports = supports;
+        if let Some(supports) = &mut self.supports {
+            supports.move_to(self.last_step_time, &mut self.leaf);
+        }
         Snapshot {
             time: self.clock.time,
             energy: self.balance.present_energy(energy, exchange),
@@ -608,7 +634,88 @@ impl TimeIntegrator for Explicit {
     }
 }
 
+/// The moment and the force on a node whose support moves, besides those of its segments.
+fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
+    let load = leaf.load(state, it.rod, it.node);
+    let moment = match (it.holds_rotation, it.node) {
+        (true, _) => load.moment,
+        (false, 0) => -leaf.base_spring_load(state, it.rod).moment,
+        (false, _) => DVec3::ZERO,
+    };
+    Wrench {
+        moment,
+        force: load.force,
+    }
+}
+
 impl Explicit {
+    /// Watches the nodes whose supports move, and sets their velocities at the start.
+    fn start_supports(&mut self) {
+        let Some(supports) = &mut self.supports else {
+            return;
+        };
+        for it in &mut supports.nodes {
+            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
+            it.watched = self.packs[pack].watched.len();
+            self.packs[pack].watched.push(WatchedNode {
+                entry,
+                force: [0.0; 3],
+                moment: [0.0; 3],
+            });
+        }
+        supports.move_to(0.0, &mut self.leaf);
+        let inertia = |it: &MovingNode| self.physics.inertia(&self.leaf, it.rod, it.node);
+        supports.kinetic_energy = supports.kinetic_energy(inertia);
+    }
+
+    /// Moves supports on by the time `drift`, and returns the work that they did: half of it in the step before,
+    /// half in this one.
+    fn drive_supports(&mut self, drift: f64) -> f64 {
+        let Some(supports) = &mut self.supports else {
+            return 0.0;
+        };
+        supports.move_to(self.last_step_time + drift, &mut self.leaf);
+        let mut work = 0.0;
+        for it in &mut supports.nodes {
+            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
+            let pack = &mut self.packs[pack];
+            let own = pack.watched[it.watched];
+            let step = it.step();
+            let last = match self.past.velocity_lag() > 0.0 {
+                true => it.last_step,
+                false => NodeMotionComponents::default(),
+            };
+            let force = it.load.force + DVec3::from(own.force);
+            let mut moment = it.load.moment;
+            if it.holds_rotation {
+                moment += DVec3::from(own.moment);
+            }
+            work -= 0.5 * force.dot(last.displacement + step.displacement);
+            work -= 0.5 * moment.dot(last.rotation + step.rotation);
+            let velocity = match drift > 0.0 {
+                true => step.displacement / drift,
+                false => it.velocity.linear,
+            };
+            let at = self.layout.node_index(it.rod, it.node);
+            for c in 0..3 {
+                self.positions[c][at] = it.now.position[c];
+                pack.motion.v[c][entry] = velocity[c];
+            }
+            if it.holds_rotation {
+                let before = pack.quaternion(entry);
+                let q = it.now.rotation;
+                let aligned = if before.dot(q) < 0.0 { -q } else { q };
+                for (array, value) in pack.motion.q.iter_mut().zip(aligned.to_array()) {
+                    array[entry] = value;
+                }
+            }
+        }
+        if drift > 0.0 {
+            supports.accept();
+        }
+        work
+    }
+
     /// Goes to the time at which the next mass lands, by a step of its own, and lets it land on its node: the
     /// velocities jump, and steps begin anew.
     fn land_next_mass(&mut self) {
@@ -652,6 +759,9 @@ impl Explicit {
             for c in 0..3 {
                 self.packs[pack].motion.v[c][entry] = velocity[c];
             }
+        }
+        if let Some(supports) = &mut self.supports {
+            supports.add_mass(j * (self.layout.segments + 1) + i, landing.mass);
         }
         let lost = collision.exchange();
         exchange += lost;
@@ -713,7 +823,8 @@ impl AppliedLoads {
     ) -> Option<Self> {
         let wind = WindDrag::new(leaf, physics);
         let dead = leaf.loads.rod_load_factor != 0.0;
-        if !leaf.has_tissue() && !dead && !leaf.has_base_springs() && wind.is_none() {
+        let moved = leaf.leaf.scenario().support_motion.is_some();
+        if !leaf.has_tissue() && !dead && !leaf.has_base_springs() && wind.is_none() && !moved {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -792,13 +903,18 @@ impl AppliedLoads {
         leaf.half_turn_since(&self.alignments, &self.state)
     }
 
-    /// Power of the wind at the mean of the velocities before the last kick and of these.
-    fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
+    /// Power of the wind, on the nodes that count, at the mean of the velocities before the last kick and of these.
+    fn power_of_wind(
+        &self,
+        velocity: impl Fn(usize, usize) -> DVec3,
+        counts: impl Fn(usize) -> bool,
+    ) -> f64 {
         let Some(blown) = &self.nodes_in_wind else {
             return 0.0;
         };
         let nodes = self.state.segments() + 1;
         let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
+        let forces = forces.filter(|(k, _)| counts(*k));
         let power = forces.map(|(k, (force, before))| {
             force.dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
         });

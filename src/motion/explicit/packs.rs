@@ -2,7 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
-use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory};
+use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory, WatchedNode};
 use crate::motion::explicit::layout::{
     AlignedArray, BlockMaterial, NodeData, PackLayout, material_blocks, vector_at,
 };
@@ -18,6 +18,8 @@ pub struct Pack {
     pub past: StrainHistory,
     /// Sums of the last step.
     pub totals: StepTotals,
+    /// Nodes whose supports move.
+    pub watched: Vec<WatchedNode>,
 }
 
 fn arrays<const K: usize>(length: usize) -> [AlignedArray; K] {
@@ -82,6 +84,7 @@ pub fn packs_at_rest(
                 earlier: past(),
             },
             totals: StepTotals::default(),
+            watched: Vec::new(),
         }
     });
     packs.collect()

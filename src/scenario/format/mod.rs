@@ -181,7 +181,7 @@ keys! {
     /// how the tips are held.
     TipHeld "tip.held": Text, [0, 0, 0], Default("\"free\"");
     /// where the joint tip, or the only rod's, is held.
-    TipPosition "tip.position": Vector, [1, 0, 0], Derived;
+    TipPosition "tip.position": VectorOrInTime, [1, 0, 0], Derived;
     /// of a clamped tip, the angles of the rods there, in radians.
     TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
@@ -193,7 +193,7 @@ keys! {
     /// whether the directions are held, too.
     GripHeld "grip.held": Text, [0, 0, 0], Default("\"pinned\"");
     /// by how much the grip has moved from its place in the natural leaf.
-    GripMove "grip.move": Vector, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
+    GripMove "grip.move": VectorOrInTime, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// wanted accuracy, relative to the longest rod.
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
     /// rho, mass per length of rod.
@@ -222,6 +222,8 @@ keys! {
     TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Derived;
     /// factor of the rest curvatures in time.
     RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Derived;
+    /// how all bases move in time: displacements, and rotation vectors about their mean.
+    BaseInTime "dynamics.base": BaseMotion, [1, 0, 0], Derived;
     /// velocity of the air, steady or in time.
     WindVelocity "wind.velocity": VectorOrInTime, [1, 0, -1], Required("[2.0, 0.0, 0.0]");
     /// mass per volume of the air.
@@ -443,6 +445,8 @@ pub(crate) enum ValueSchema {
     VectorOrInTime,
     /// Factors at given times.
     FactorInTime,
+    /// Displacements and rotation vectors at given times.
+    BaseMotion,
 }
 
 /// Which numbers a key allows; never NaN.
