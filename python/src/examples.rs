@@ -50,7 +50,7 @@ pub fn examples() -> Texts {
             "princeton" "rollup" "twisted_strip"),
         &texts!("scenarios/measured":
             "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "pull"),
-        &texts!("scenarios/motion": "curl" "gust" "strike" "swing"),
+        &texts!("scenarios/motion": "curl" "drop" "gust" "strike" "swing"),
         &texts!("scenarios/study": "plate" "saddle" "undulation"),
     ]
     .concat()

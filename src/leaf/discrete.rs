@@ -9,6 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
+use crate::leaf::loads::ScheduledLoads;
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
 use crate::leaf::{GrippedNode, Leaf, Loads};
@@ -56,6 +57,9 @@ pub struct DiscreteLeaf {
     pub(super) own_loads: Vec<DVec3>,
     /// Dead moments on points of a single rod, whole.
     pub(super) point_moments: Vec<NodalMoment>,
+    /// Loads of single veins that vary in time, if there are any. Their forces and moments are in
+    /// `own_loads` and `point_moments`, which are those at rest until factors are set.
+    pub scheduled_loads: Option<Box<ScheduledLoads>>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
     /// Springs of supports that give.
@@ -144,6 +148,7 @@ impl DiscreteLeaf {
             strips: Vec::new(),
             own_loads: Vec::new(),
             point_moments: Vec::new(),
+            scheduled_loads: None,
             grips: Vec::new(),
             springs: NodeSprings::default(),
             load_factor: 1.0,
@@ -151,6 +156,7 @@ impl DiscreteLeaf {
         };
         discrete.own_loads = discrete.nodal_own_loads(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
+        discrete.scheduled_loads = discrete.find_scheduled_loads();
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
             discrete.grips = discrete.find_gripped_nodes(&natural);

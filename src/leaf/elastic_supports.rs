@@ -118,6 +118,16 @@ impl DiscreteLeaf {
         }
     }
 
+    /// Turns the springs of elastic bases by `turn` from where they are in the stress-free leaf.
+    pub fn turn_base_springs(&mut self, turn: DQuat) {
+        let leaf = &self.leaf;
+        let of_bases = |spring: &&mut NodeSpring| spring.node == 0 && spring.turn_stiffness > 0.0;
+        for spring in self.springs.iter_mut().filter(of_bases) {
+            let natural = leaf.base_pose(spring.rod).rotation;
+            spring.rotation = (turn * natural).normalize();
+        }
+    }
+
     /// The ends of the springs of grips that would have no force in a state.
     pub fn grip_spring_ends(&self, state: &State) -> Vec<SpringEnd> {
         let of_grips = self.springs.iter().filter(|spring| spring.grip.is_some());
@@ -174,7 +184,7 @@ impl DiscreteLeaf {
     }
 
     /// The forces, moments and energies of the springs on node `i` of rod `j` together.
-    pub(super) fn spring_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
+    pub fn spring_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
         let k = state.base(j) + i;
         let mut sum = NodeLoad::default();
         for spring in self.springs.on_node(k) {

@@ -10,8 +10,9 @@ use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
-use crate::scenario::RodPlace;
+use crate::scenario::{RodPlace, Scenario};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A dead moment on the point at the fraction `sigma` of a single rod, along the lab axes.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +27,43 @@ pub struct PointForce {
     pub rod: usize,
     pub sigma: f64,
     pub force: DVec3,
+}
+
+/// A dead force on a node of a rod, along the lab axes, by a load whose factor varies in time.
+#[derive(Clone, Copy, Debug)]
+pub struct ScheduledForce {
+    /// Number of the factor: those of [`Scenario::load_factors`](crate::scenario::Scenario::load_factors), then one
+    /// for each of [`Scenario::landings`](crate::scenario::Scenario::landings).
+    pub factor: usize,
+    pub rod: usize,
+    pub node: usize,
+    /// The force at a factor of one.
+    pub force: DVec3,
+}
+
+/// Loads of single veins whose factors vary in time: first those with a factor of their own, then the weights of
+/// masses that land.
+#[derive(Clone, Debug, Default)]
+pub struct ScheduledLoads {
+    /// The present factors.
+    pub factors: Vec<f64>,
+    /// The forces, at factors of one.
+    pub forces: Vec<ScheduledForce>,
+    /// Dead moments on points, at factors of one, each with the number of its factor.
+    pub moments: Vec<(usize, NodalMoment)>,
+    /// Forces on all nodes, and dead moments on points, whose factors do not vary.
+    constant_forces: Vec<DVec3>,
+    constant_moments: Vec<NodalMoment>,
+}
+
+impl ScheduledLoads {
+    /// The forces with their present factors.
+    pub fn present_forces(&self) -> impl Iterator<Item = ScheduledForce> {
+        self.forces.iter().map(|it| ScheduledForce {
+            force: self.factors[it.factor] * it.force,
+            ..*it
+        })
+    }
 }
 
 impl Loads {
@@ -82,14 +120,125 @@ impl DiscreteLeaf {
     /// The dead moments on points at their nodes. A moment within rounding of a clamped base is left
     /// to its clamp.
     pub(super) fn nodal_point_moments(&self) -> Vec<NodalMoment> {
-        let points = self.leaf.point_dead_moments();
+        self.nodal_moments(self.leaf.point_dead_moments()).collect()
+    }
+
+    /// Dead moments on points at their nodes, as in [`DiscreteLeaf::nodal_point_moments`].
+    fn nodal_moments(
+        &self,
+        points: impl Iterator<Item = PointMoment>,
+    ) -> impl Iterator<Item = NodalMoment> {
         let some = points.filter(|it| it.moment != DVec3::ZERO);
         some.map(|it| NodalMoment {
             node: self.grid.nearest_node(it.sigma),
             moment: it.moment,
         })
         .filter(|it| it.node >= self.first_node())
-        .collect()
+    }
+
+    /// The loads of single veins whose factors vary in time, if there are any.
+    pub(super) fn find_scheduled_loads(&self) -> Option<Box<ScheduledLoads>> {
+        let scenario = self.leaf.scenario();
+        let factors = scenario.load_factors().count();
+        let count = factors + scenario.landings().count();
+        if count == 0 {
+            return None;
+        }
+        let (n, scale) = (self.segments(), self.leaf.scale);
+        let of = |change: &dyn Fn(&mut Scenario)| {
+            let mut own = scenario.clone();
+            change(&mut own);
+            Leaf {
+                scenario: Arc::new(own),
+                ..self.leaf.clone()
+            }
+        };
+        let is_factored = scenario.factored.is_some();
+        let constant = of(&|own: &mut Scenario| {
+            if is_factored {
+                let none = own.unloaded();
+                own.own_gravity = none.own_gravity;
+                (own.gravity, own.g, own.distributed) = (none.gravity, none.g, none.distributed);
+            }
+            let varying = own.points.iter_mut().filter(|it| it.in_time.is_some());
+            varying.for_each(|it| (it.force, it.moment) = ([0.0; 3], [0.0; 3]));
+        });
+        let constant_points = constant.point_dead_moments();
+        let mut scheduled = ScheduledLoads {
+            factors: vec![0.0; count],
+            constant_forces: self.nodal_own_loads(&constant),
+            constant_moments: self.nodal_moments(constant_points).collect(),
+            ..ScheduledLoads::default()
+        };
+        if let Some(loads) = &scenario.factored {
+            let whole = of(&|own: &mut Scenario| {
+                own.gravity = loads.gravity;
+                own.own_gravity.clone_from(&loads.own_gravity);
+                own.g = loads.g;
+                own.distributed.clone_from(&loads.distributed);
+                own.points.iter_mut().for_each(|it| it.force = [0.0; 3]);
+            });
+            let forces = self.nodal_own_loads(&whole).into_iter();
+            let nodes = self.rod_index_pairs(0..n + 1).zip(forces);
+            let forces = nodes.filter(|(_, force)| *force != DVec3::ZERO);
+            scheduled.forces = forces
+                .map(|((rod, node), force)| ScheduledForce {
+                    factor: 0,
+                    rod,
+                    node,
+                    force,
+                })
+                .collect();
+        }
+        let points = scenario.points.iter();
+        let varying = points.filter_map(|it| Some((it, it.in_time.as_ref()?)));
+        for (factor, (point, load)) in (usize::from(is_factored)..).zip(varying) {
+            scheduled.forces.push(ScheduledForce {
+                factor,
+                rod: point.vein,
+                node: self.grid.nearest_node(point.at),
+                force: DVec3::from_array(load.force) / scale.force(),
+            });
+            let moment = PointMoment {
+                sigma: point.at,
+                moment: DVec3::from_array(load.moment) / scale.moment(),
+            };
+            let moments = self.nodal_moments(std::iter::once(moment));
+            scheduled.moments.extend(moments.map(|it| (factor, it)));
+        }
+        let g = scenario.factored.as_ref().map_or(scenario.g, |it| it.g);
+        for (factor, (number, landing)) in (factors..).zip(scenario.landings()) {
+            let point = &scenario.points[number];
+            scheduled.forces.push(ScheduledForce {
+                factor,
+                rod: point.vein,
+                node: self.grid.nearest_node(point.at),
+                force: landing.mass * DVec3::from_array(g) / scale.force(),
+            });
+        }
+        Some(Box::new(scheduled))
+    }
+
+    /// Sets the factors of the loads that vary in time, and with them the loads of single veins.
+    pub fn set_scheduled_factors(&mut self, factor: impl Fn(usize) -> f64) {
+        let Some(scheduled) = &mut self.scheduled_loads else {
+            return;
+        };
+        let count = self.grid.segments() + 1;
+        for (number, own) in scheduled.factors.iter_mut().enumerate() {
+            *own = factor(number);
+        }
+        self.own_loads.clone_from(&scheduled.constant_forces);
+        for it in &scheduled.forces {
+            self.own_loads[it.rod * count + it.node] += scheduled.factors[it.factor] * it.force;
+        }
+        self.point_moments.clone_from(&scheduled.constant_moments);
+        let moments = scheduled.moments.iter();
+        self.point_moments
+            .extend(moments.map(|(number, it)| NodalMoment {
+                moment: scheduled.factors[*number] * it.moment,
+                ..*it
+            }));
     }
 
     /// The sum of the dead moments on points that are left to the clamp of the base.

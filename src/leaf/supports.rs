@@ -216,18 +216,25 @@ impl DiscreteLeaf {
     /// What every rod exerts on the support of its base: the force, and the moment about the base, which
     /// of a hinge is zero, or that of its spring.
     pub fn base_reactions(&self, state: &State) -> Vec<Wrench> {
-        let on_base = |j: usize| {
-            let own = self.unbalanced_node_load(state, j, 0);
-            let tissue = self.rigid_end_load(state, j, 0);
-            Wrench {
-                force: own.force + tissue.force,
-                moment: match self.leaf.hinged() {
-                    true => -self.spring_load(state, j, 0).moment,
-                    false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
-                },
-            }
-        };
-        (0..self.rods()).map(on_base).collect()
+        (0..self.rods())
+            .map(|j| self.support_load(state, j, 0))
+            .collect()
+    }
+
+    /// What rod `j` exerts on the support of its node `i`, as of [`DiscreteLeaf::base_reactions`].
+    pub fn support_load(&self, state: &State, j: usize, i: usize) -> Wrench {
+        let own = self.unbalanced_node_load(state, j, i);
+        if i > 0 {
+            return own;
+        }
+        let tissue = self.rigid_end_load(state, j, 0);
+        Wrench {
+            force: own.force + tissue.force,
+            moment: match self.leaf.hinged() {
+                true => -self.spring_load(state, j, 0).moment,
+                false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
+            },
+        }
     }
 
     /// The forces on all supports that are placed: on the holder of the tips, if any, and on every grip.

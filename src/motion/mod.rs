@@ -4,6 +4,7 @@
 
 mod constraint_projection;
 mod explicit;
+mod moving_supports;
 mod physics;
 mod semi_implicit;
 
@@ -15,7 +16,7 @@ pub use crate::motion::semi_implicit::{SemiImplicit, StepControl};
 use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;
 use crate::run::Limit;
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 /// Angular and linear velocity of a node, along the lab axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,6 +25,15 @@ pub struct Velocity {
     pub angular: DVec3,
     /// Velocity.
     pub linear: DVec3,
+}
+
+/// The displacement and the rotation vector of a node in a step, along the lab axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodeMotionComponents {
+    /// The rotation vector.
+    pub rotation: DVec3,
+    /// The displacement.
+    pub displacement: DVec3,
 }
 
 /// The energies of a moving leaf. Dimensionless: in A/L.
@@ -39,8 +49,8 @@ pub struct Energy {
     pub potential: f64,
     /// Energy dissipated by damping since the start.
     pub dissipated: f64,
-    /// Work done since the start by varying loads and rest shapes, and by what has no potential:
-    /// the moment on a tip, and wind.
+    /// Work done since the start by varying loads and rest shapes, by what has no potential, the moment on a
+    /// tip and wind, by supports that move, and by masses that land.
     pub work: f64,
 }
 
@@ -164,6 +174,17 @@ impl Stopped {
     }
 }
 
+/// A mass that has landed. Dimensionless.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Number of the point on which it landed.
+    pub point: usize,
+    /// When it landed.
+    pub time: f64,
+    /// The energy that was lost: of the mass and of the point, with one velocity afterwards.
+    pub lost_energy: f64,
+}
+
 /// Differences of time below this part of a step are rounding.
 const TIME_ROUNDING_FRACTION: f64 = 1e-9;
 
@@ -175,6 +196,8 @@ pub struct MotionClock {
     /// Number of time steps.
     steps: usize,
     limit: Limit,
+    /// The masses that have landed so far.
+    impacts: Vec<Impact>,
 }
 
 impl MotionClock {
@@ -203,6 +226,11 @@ pub trait TimeIntegrator {
     /// Number of time steps.
     fn steps(&self) -> usize {
         self.clock().steps
+    }
+
+    /// The masses that have landed so far.
+    fn impacts(&self) -> &[Impact] {
+        &self.clock().impacts
     }
 
     /// Bounds the steps from now on, of a method whose error determines them: the steps of a
@@ -250,7 +278,7 @@ pub fn measure(
     state: &State,
     velocity: &[Velocity],
 ) -> Energy {
-    leaf.loads = physics.loads(time);
+    physics.apply_loads(leaf, time);
     if physics.rest_curvature_differs() {
         leaf.scale_rest_curvatures(physics.rest_curvature_factor(time));
     }
@@ -290,6 +318,13 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
         if i == n {
             energy += loads.tip_force.length_squared() / inertia.mass;
         }
+    }
+    for it in leaf
+        .scheduled_loads
+        .iter()
+        .flat_map(|it| it.present_forces())
+    {
+        energy += it.force.length_squared() / physics.inertia(leaf, it.rod, it.node).mass;
     }
     for it in leaf.dead_moments_under(loads) {
         energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;
@@ -387,6 +422,45 @@ impl EnergyBalance {
         let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).end_rotation();
         let turns = leaf.rod_index_pairs(0..leaf.segments()).map(turn);
         check_resolution(leaf, time, largest(turns))
+    }
+}
+
+/// A mass that meets a node which is free, or held.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Collision {
+    /// The landing mass and its velocity.
+    pub mass: f64,
+    pub velocity: DVec3,
+    /// The mass and the velocity of the node: of all tips together, if they are one.
+    pub node_mass: f64,
+    pub node_velocity: DVec3,
+    /// The lab axes along which the node moves freely.
+    pub free: BVec3,
+}
+
+impl Collision {
+    /// The velocity of both afterwards: their momentum is kept, unless a holder takes it.
+    pub fn common_velocity(&self) -> DVec3 {
+        let momentum = self.node_mass * self.node_velocity + self.mass * self.velocity;
+        let common = momentum / (self.node_mass + self.mass);
+        DVec3::select(self.free, common, self.node_velocity)
+    }
+
+    /// The energy that is put in by the mass and by the impulse of a holder, and that which is lost.
+    pub fn exchange(&self) -> Exchange {
+        let apart = self.velocity - self.node_velocity;
+        let joined_mass = self.mass * self.node_mass / (self.mass + self.node_mass);
+        let lost = DVec3::select(
+            self.free,
+            DVec3::splat(joined_mass),
+            DVec3::splat(self.mass),
+        );
+        let held = DVec3::select(self.free, DVec3::ZERO, DVec3::splat(self.mass));
+        Exchange {
+            dissipated: 0.5 * (lost * apart).dot(apart),
+            work: 0.5 * self.mass * self.velocity.length_squared()
+                - (held * apart).dot(self.node_velocity),
+        }
     }
 }
 

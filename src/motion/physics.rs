@@ -11,6 +11,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, Scale, State};
 use crate::rotation::outer;
 use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule};
 use glam::{DMat3, DQuat, DVec3};
+use std::cmp::Ordering;
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
 /// masses on points there.
@@ -47,6 +48,37 @@ struct PointMass {
     mass: f64,
 }
 
+/// A factor of loads in time.
+#[derive(Clone, Debug)]
+struct LoadFactor {
+    factor: Schedule<f64>,
+    /// The factor at time 0.
+    first: f64,
+    /// Whether the load is there: not the weight of a mass that has not landed.
+    acts: bool,
+}
+
+impl LoadFactor {
+    fn present_value(&self, value: impl FnOnce(&Schedule<f64>) -> f64) -> f64 {
+        if self.acts { value(&self.factor) } else { 0.0 }
+    }
+}
+
+/// A mass that lands on a point of a vein. Dimensionless.
+#[derive(Clone, Copy, Debug)]
+pub struct LandingMass {
+    /// Number of the point.
+    pub point: usize,
+    /// The vein, and the fraction of its length.
+    pub vein: usize,
+    pub sigma: f64,
+    pub mass: f64,
+    pub velocity: DVec3,
+    pub time: f64,
+    /// Number of the factor of its weight.
+    factor: usize,
+}
+
 /// Duration of a motion and the interval between its outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionTimes {
@@ -73,6 +105,10 @@ pub struct Physics {
     point_masses: Vec<PointMass>,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
+    /// Factors of loads of single veins that vary in time.
+    load_factors: Vec<LoadFactor>,
+    /// The masses that have not landed, the next one last.
+    landing_masses: Vec<LandingMass>,
     /// The loads, if they are constant.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
@@ -85,7 +121,11 @@ pub struct Physics {
 impl Physics {
     /// Inertia, damping and loads of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
-        let mut physics = Physics::from_dynamics(leaf, leaf.scenario().dynamics.clone());
+        let scenario = leaf.scenario();
+        let factors: Vec<_> = scenario.load_factors().cloned().collect();
+        let dynamics = scenario.dynamics.clone();
+        let mut physics = Physics::from_dynamics(leaf, dynamics, factors);
+        physics.add_landing_masses(leaf);
         let unit = physics.density_unit * physics.scale.length;
         let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
         let masses = points.map(|it| PointMass {
@@ -97,16 +137,70 @@ impl Physics {
         physics
     }
 
+    fn add_landing_masses(&mut self, leaf: &Leaf) {
+        let scenario = leaf.scenario();
+        let weight = match &scenario.factored {
+            Some(loads) => loads.factor.clone(),
+            None => Schedule::constant(1.0),
+        };
+        for (point, landing) in scenario.landings() {
+            self.landing_masses.push(LandingMass {
+                point,
+                vein: scenario.points[point].vein,
+                sigma: scenario.points[point].at,
+                mass: landing.mass / (self.density_unit * self.scale.length),
+                velocity: DVec3::from_array(landing.velocity)
+                    * (self.time_unit / self.scale.length),
+                time: landing.from / self.time_unit,
+                factor: self.load_factors.len(),
+            });
+            self.load_factors.push(LoadFactor {
+                factor: weight.clone(),
+                first: 0.0,
+                acts: false,
+            });
+            self.constant_loads = None;
+        }
+        self.landing_masses.sort_by(|a, b| {
+            (b.time, b.point)
+                .partial_cmp(&(a.time, a.point))
+                .unwrap_or(Ordering::Equal)
+        });
+    }
+
+    /// The mass that lands next, if one is left.
+    pub fn next_landing(&self) -> Option<LandingMass> {
+        self.landing_masses.last().copied()
+    }
+
+    /// The time at which a mass lands next; infinite if none is left.
+    pub fn next_landing_time(&self) -> f64 {
+        self.next_landing().map_or(f64::INFINITY, |it| it.time)
+    }
+
+    /// Adds the mass that lands next to the leaf.
+    pub fn land_next_mass(&mut self) {
+        let Some(landing) = self.landing_masses.pop() else {
+            return;
+        };
+        self.load_factors[landing.factor].acts = true;
+        self.point_masses.push(PointMass {
+            vein: landing.vein,
+            sigma: landing.sigma,
+            mass: landing.mass,
+        });
+    }
+
     /// The defaults for scenarios without dynamics, under the loads at
     /// rest: the damped motion of a relaxation, in which masses on points are weights alone.
     pub fn for_relaxation(leaf: &Leaf) -> Self {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
         let loaded = dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment);
-        Physics::from_dynamics(leaf, loaded)
+        Physics::from_dynamics(leaf, loaded, Vec::new())
     }
 
-    fn from_dynamics(leaf: &Leaf, dynamics: Dynamics) -> Self {
+    fn from_dynamics(leaf: &Leaf, dynamics: Dynamics, factors: Vec<Schedule<f64>>) -> Self {
         let scale = leaf.scale;
         let densities = dynamics.density.iter().map(|density| density.at(0.5));
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
@@ -114,6 +208,10 @@ impl Physics {
         let still = load_schedules(&dynamics)
             .iter()
             .all(|load| load.is_constant());
+        let still = still && factors.is_empty();
+        let points = leaf.scenario().points.iter();
+        let mut turned = points.filter_map(|it| it.in_time.as_ref());
+        let turned = !factors.is_empty() && turned.any(|it| it.moment != [0.0; 3]);
         let air = leaf
             .scenario()
             .wind
@@ -121,10 +219,22 @@ impl Physics {
             .map(|wind| wind.velocity.clone());
         let mut physics = Physics {
             rod_load_factor: leaf.loads.rod_load_factor,
-            dead_moment_factor: leaf.loads.dead_moment_factor,
+            dead_moment_factor: if turned {
+                1.0
+            } else {
+                leaf.loads.dead_moment_factor
+            },
             constant_loads: None,
             point_masses: Vec::new(),
-            knots: schedule_knots(&dynamics, air.as_ref(), time),
+            knots: schedule_knots(&dynamics, air.as_ref(), leaf, &factors, time),
+            load_factors: (factors.into_iter())
+                .map(|factor| LoadFactor {
+                    first: factor.at(0.0),
+                    factor,
+                    acts: true,
+                })
+                .collect(),
+            landing_masses: Vec::new(),
             air,
             constant_rest_factor: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
@@ -188,6 +298,49 @@ impl Physics {
     pub fn mean_loads(&self, interval: [f64; 2]) -> Loads {
         let [from, to] = interval.map(|time| time * self.time_unit);
         self.evaluate_loads(|load| load.mean(from, to))
+    }
+
+    /// Sets the loads of a leaf to those of a time.
+    pub fn apply_loads(&self, leaf: &mut DiscreteLeaf, time: f64) {
+        leaf.loads = self.loads(time);
+        self.apply_load_factors(leaf, |factor| factor.at(time * self.time_unit));
+    }
+
+    /// Sets the loads of a leaf to their means over an interval.
+    pub fn apply_mean_loads(&self, leaf: &mut DiscreteLeaf, interval: [f64; 2]) {
+        leaf.loads = self.mean_loads(interval);
+        let [from, to] = interval.map(|time| time * self.time_unit);
+        self.apply_load_factors(leaf, |factor| factor.mean(from, to));
+    }
+
+    fn apply_load_factors(&self, leaf: &mut DiscreteLeaf, value: impl Fn(&Schedule<f64>) -> f64) {
+        if !self.load_factors.is_empty() {
+            leaf.set_scheduled_factors(|number| self.load_factors[number].present_value(&value));
+        }
+    }
+
+    /// The factors at a time of the loads of single veins that vary.
+    pub fn load_factors(&self, time: f64) -> impl Iterator<Item = f64> {
+        let at = time * self.time_unit;
+        let factors = self.load_factors.iter();
+        factors.map(move |it| it.present_value(|factor| factor.at(at)))
+    }
+
+    /// The sum of the present forces of loads of single veins that vary, less those at time 0, times vectors of
+    /// the nodes.
+    pub fn scheduled_excess(
+        &self,
+        leaf: &DiscreteLeaf,
+        vectors: impl Fn(usize, usize) -> DVec3,
+    ) -> f64 {
+        let Some(scheduled) = &leaf.scheduled_loads else {
+            return 0.0;
+        };
+        let excess = |number: usize| scheduled.factors[number] - self.load_factors[number].first;
+        let forces = scheduled.forces.iter();
+        forces
+            .map(|it| excess(it.factor) * it.force.dot(vectors(it.rod, it.node)))
+            .sum()
     }
 
     /// The loads with these values, without dimensions.
@@ -260,7 +413,12 @@ impl Physics {
         let (d, shortest) = (&self.dynamics, MIN_KNOT_STEP * self.time_unit);
         let mut loads = load_schedules(d).into_iter().chain(&self.air);
         let of_loads = loads.find_map(|load| load.pulse_within(shortest));
-        of_loads.or_else(|| d.rest.pulse_within(shortest))
+        let mut factors = self
+            .load_factors
+            .iter()
+            .map(|it| &it.factor)
+            .chain([&d.rest]);
+        of_loads.or_else(|| factors.find_map(|factor| factor.pulse_within(shortest)))
     }
 
     /// The factor of all rest curvatures at a time.
@@ -310,10 +468,20 @@ fn load_schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
 }
 
 /// The knots of everything that varies in time, over the unit of time.
-fn schedule_knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Vec<f64> {
+fn schedule_knots(
+    dynamics: &Dynamics,
+    air: Option<&Schedule<[f64; 3]>>,
+    leaf: &Leaf,
+    factors: &[Schedule<f64>],
+    unit: f64,
+) -> Vec<f64> {
+    let supports = leaf.scenario().support_motion.iter();
+    let supports = supports.flat_map(|it| it.schedules());
     let (end, loads) = (dynamics.duration, load_schedules(dynamics).into_iter());
-    let knots = loads.chain(air).flat_map(|load| load.knot_times(end));
-    let knots = knots.chain(dynamics.rest.knot_times(end));
+    let vectors = loads.chain(air).chain(supports);
+    let knots = vectors.flat_map(|vector| vector.knot_times(end));
+    let factors = factors.iter().chain([&dynamics.rest]);
+    let knots = knots.chain(factors.flat_map(|factor| factor.knot_times(end)));
     let mut knots: Vec<f64> = knots.map(|time| time / unit).collect();
     knots.sort_by(f64::total_cmp);
     knots

@@ -21,16 +21,17 @@
 
 use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
 use crate::motion::constraint_projection::project_constraints;
+use crate::motion::moving_supports::MovingSupports;
 use crate::motion::physics::{Inertia, Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
-    TimeIntegrator, Velocity, measure, rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
+    TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, measure, rate_weights,
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
 use crate::rod::{Section, Wrench};
 use crate::rotation;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// Settings of the semi-implicit method.
 struct SemiImplicitSettings {
@@ -106,6 +107,9 @@ const FIRST_STEP: FirstStepSettings = FirstStepSettings {
     strain_rounding: 1e-12,
     inconsistent_strain: 1e-8,
 };
+
+/// A time so short that loads change no velocity in it: an impulse in rigid segments acts in it.
+const IMPULSE_TIME: f64 = 1e-6;
 
 /// Advice if energy grows, besides a shorter step.
 const ENERGY_GROWTH_ADVICE: &str = "dynamics.start = \"at-rest\"";
@@ -187,6 +191,7 @@ pub struct SemiImplicit {
     physics: Physics,
     inertia: Vec<Inertia>,
     wind: Option<WindDrag>,
+    supports: Option<MovingSupports>,
     /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
     /// Strains (v, u) of all segments at the last step and the one before.
@@ -214,6 +219,9 @@ pub struct SemiImplicit {
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
     corrected_loads: Loads,
+    /// As `corrected_loads`, of the factors of loads of single veins: the corrections, and their present changes.
+    corrected_factors: Vec<f64>,
+    factor_changes: Vec<f64>,
     /// How sections at the tissue's strips are aligned at the start.
     alignments: Vec<bool>,
 }
@@ -225,6 +233,7 @@ impl SemiImplicit {
         let mut motion = SemiImplicit {
             inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
             wind: WindDrag::new(&leaf, &physics),
+            supports: MovingSupports::new(&leaf, &physics),
             sections: leaf.sections.clone(),
             strain_history: [Vec::new(), Vec::new()],
             past_step: 0.0,
@@ -250,15 +259,36 @@ impl SemiImplicit {
             factorizations: 0,
             balance: EnergyBalance::default(),
             corrected_loads: Loads::default(),
+            corrected_factors: physics.load_factors(0.0).map(|_| 0.0).collect(),
+            factor_changes: physics.load_factors(0.0).map(|_| 0.0).collect(),
             alignments: leaf.strip_alignments(state),
             leaf,
             physics,
         };
         motion.initialize();
+        motion.start_supports();
         motion.strain_history = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
         motion.balance.begin(&start);
         motion
+    }
+
+    /// Lets a mass land if it is time, or else attempts a step that goes neither beyond `until` nor
+    /// beyond a knot, as within a step loads are linear in time: no pulse is stepped over.
+    ///
+    /// # Errors
+    /// As of [`SemiImplicit::step_towards`].
+    pub fn proceed_towards(&mut self, until: f64) -> Result<(), Stopped> {
+        let (now, landing) = (self.clock.time, self.physics.next_landing_time());
+        if self.jump_with_supports() {
+            return Ok(());
+        }
+        if landing <= now {
+            self.land_next_mass();
+            return Ok(());
+        }
+        let knot = self.physics.next_knot(now);
+        self.step_towards(until.min(knot).min(landing))
     }
 
     /// Attempts a step that does not go beyond `until`.
@@ -341,11 +371,9 @@ impl TimeIntegrator for SemiImplicit {
     }
 
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
-        while self.clock.time < until {
+        while self.clock.time < until || self.physics.next_landing_time() <= self.clock.time {
             self.clock.check_limit()?;
-            // Within a step loads are linear in time: no pulse is stepped over.
-            let knot = self.physics.next_knot(self.clock.time);
-            self.step_towards(until.min(knot))?;
+            self.proceed_towards(until)?;
         }
         let now = self.snapshot();
         (self.balance).check_reliability(
@@ -431,6 +459,7 @@ impl SemiImplicit {
                 next.w[c] = of_mean * (mean - w.alpha_f * m.w[c]);
             }
         }
+        set_support_motions(&self.supports, &mut self.next_node_motions);
     }
 
     /// Attempts a step of h; returns its local error, or `None` if it was too long.
@@ -442,6 +471,7 @@ impl SemiImplicit {
         self.apply_loads_and_damping(self.clock.time + h, h, per_mass);
         self.correct_load_lag(h);
         self.predict(h);
+        self.move_supports(self.clock.time + h);
         let last = match self.control {
             StepControl::Fixed(_) => SETTINGS.fixed_step_iteration_error,
             StepControl::CountOnly(error) => SETTINGS.count_only_iteration_error * error,
@@ -455,14 +485,19 @@ impl SemiImplicit {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
+            let supports = &self.supports;
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
-                Wrench {
-                    moment: -moment,
-                    force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
-                }
+                free_wrench(
+                    supports,
+                    k,
+                    Wrench {
+                        moment: -moment,
+                        force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
+                    },
+                )
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
@@ -522,13 +557,60 @@ impl SemiImplicit {
             return;
         }
         let (now, w) = (self.clock.time, self.weights);
-        let [before, now, after] =
-            [now - self.past_step, now, now + h].map(|t| self.physics.loads(t));
+        let times = [now - self.past_step, now, now + h];
+        let [before, now, after] = times.map(|t| self.physics.loads(t));
         let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
         let change = lag - self.corrected_loads;
         self.corrected_loads = lag;
+        let [before, now, after] = times.map(|t| self.physics.load_factors(t));
+        let corrections = self
+            .corrected_factors
+            .iter_mut()
+            .zip(&mut self.factor_changes);
+        for (((before, now), after), (corrected, change)) in
+            before.zip(now).zip(after).zip(corrections)
+        {
+            let lag = ((after - now) - (now - before)) * (w.alpha_m - w.alpha_f);
+            *change = lag - *corrected;
+            *corrected = lag;
+        }
         if change != Loads::default() {
             self.add_load_accelerations(change);
+        }
+        if self.factor_changes.iter().any(|change| *change != 0.0) {
+            self.add_scheduled_accelerations();
+        }
+    }
+
+    /// Adds the accelerations of free nodes under the changes of the loads of single veins that vary.
+    fn add_scheduled_accelerations(&mut self) {
+        let Some(scheduled) = &self.leaf.scheduled_loads else {
+            return;
+        };
+        let (n, rods) = (self.leaf.segments(), self.leaf.rods());
+        let together = self.leaf.tips_move_together();
+        for it in &scheduled.forces {
+            let change = self.factor_changes[it.factor] * it.force;
+            let on_joint_tip = together && it.node == n;
+            let nodes = match on_joint_tip {
+                true => 0..rods,
+                false => it.rod..it.rod + 1,
+            };
+            let mass: f64 = { nodes.clone() }
+                .map(|j| self.inertia[self.state.base(j) + it.node].mass)
+                .sum();
+            for j in nodes {
+                let free = self.leaf.node_freedom(j, it.node);
+                let linear = free.of_displacement(change / mass);
+                self.node_motions[self.state.base(j) + it.node].a[1] += linear;
+            }
+        }
+        for (number, NodalMoment { node, moment }) in &scheduled.moments {
+            if self.leaf.node_freedom(0, *node).rotation {
+                let tensor = self.inertia[*node].tensor(self.state.q[*node]);
+                let change = self.factor_changes[*number] * *moment;
+                self.node_motions[*node].a[0] += tensor.inverse() * change;
+            }
         }
     }
 
@@ -572,7 +654,7 @@ impl SemiImplicit {
     /// stiffer by 1 + eta c0 and has another rest shape. Inertia enters the matrix as
     /// `per_mass` times the masses.
     fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
-        self.leaf.loads = self.physics.loads(time);
+        self.physics.apply_loads(&mut self.leaf, time);
         let (rest, eta) = (
             self.physics.rest_curvature_factor(time),
             self.physics.retardation,
@@ -599,6 +681,30 @@ impl SemiImplicit {
             let condensing = (stiffer * own.condensing).max(inertial);
             section.condensing = condensing.min(section.compliance.recip());
         }
+    }
+}
+
+/// Sets the motions of nodes to those of the supports that move them.
+fn set_support_motions(supports: &Option<MovingSupports>, motions: &mut [NodeMotion]) {
+    for it in supports.iter().flat_map(|supports| &supports.nodes) {
+        let motion = &mut motions[it.index];
+        let velocities = [it.velocity.angular, it.velocity.linear];
+        for c in usize::from(!it.holds_rotation)..2 {
+            motion.v[c] = velocities[c];
+            (motion.a[c], motion.w[c]) = (DVec3::ZERO, DVec3::ZERO);
+        }
+    }
+}
+
+/// The moment and the force on node `k` without those that a support that moves takes.
+fn free_wrench(supports: &Option<MovingSupports>, k: usize, on_node: Wrench) -> Wrench {
+    let free = |component: usize, of: DVec3| match MovingSupports::holds(supports, k, component) {
+        true => DVec3::ZERO,
+        false => of,
+    };
+    Wrench {
+        moment: free(0, on_node.moment),
+        force: free(1, on_node.force),
     }
 }
 
@@ -645,11 +751,15 @@ impl SemiImplicit {
             let exchange = self.step_energy_exchange(h);
             self.balance.add(exchange);
         }
+        if let Some(supports) = &mut self.supports {
+            supports.accept();
+        }
         if self.physics.retardation > 0.0 {
             self.strain_history.swap(0, 1);
             self.strain_history[0] = self.strains();
         }
         self.corrected_loads = Loads::default();
+        self.corrected_factors.fill(0.0);
         self.past_step = h;
         self.longest_taken = self.longest_taken.max(h);
         self.clock.time += h;
@@ -662,6 +772,7 @@ impl SemiImplicit {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
             work: self.varying_load_work(h) + self.work_of_wind(h),
         };
+        exchange.work += self.work_of_supports();
         if self.physics.retardation > 0.0 {
             let power = self.power_of_friction(h);
             exchange.dissipated += 0.5 * h * (self.friction_power + power);
@@ -676,12 +787,12 @@ impl SemiImplicit {
         let (from, to) = (self.clock.time, self.clock.time + h);
         let mut work = 0.0;
         if self.physics.loads_vary() {
-            let mut potential = |loads: Loads| {
-                self.leaf.loads = loads;
+            let mut potential = |time: f64| {
+                self.physics.apply_loads(&mut self.leaf, time);
                 self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
             };
-            let before = potential(self.physics.loads(from));
-            work += 0.5 * (potential(self.physics.loads(to)) - before);
+            let before = potential(from);
+            work += 0.5 * (potential(to) - before);
         }
         if self.physics.rest_curvature_varies() {
             let bending =
@@ -691,7 +802,8 @@ impl SemiImplicit {
                     - bending(self.physics.rest_curvature_factor(from)));
         }
         for time in [from, to] {
-            let moments = self.leaf.dead_moments_under(self.physics.loads(time));
+            self.physics.apply_loads(&mut self.leaf, time);
+            let moments = self.leaf.dead_moments_under(self.leaf.loads);
             for NodalMoment { node, moment } in moments {
                 let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
                 work += 0.5 * moment.dot(turn);
@@ -743,8 +855,12 @@ impl SemiImplicit {
             let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
-            sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
-            sum += inertia.mass * shift.dot(mean(1));
+            if !MovingSupports::holds(&self.supports, k, 0) {
+                sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
+            }
+            if !MovingSupports::holds(&self.supports, k, 1) {
+                sum += inertia.mass * shift.dot(mean(1));
+            }
         }
         sum
     }
@@ -788,7 +904,11 @@ impl SemiImplicit {
         let after = wind.drags(&self.state, to, |k| self.node_motions[k].v[1]);
         let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
             let node = self.state.base(j) + i;
-            let moved = |k: usize| self.state.x[k] - self.trial.x[k];
+            // What presses on a support that moves does no work on the leaf.
+            let moved = |k: usize| match MovingSupports::holds(&self.supports, k, 1) {
+                true => DVec3::ZERO,
+                false => self.state.x[k] - self.trial.x[k],
+            };
             let force = 0.5 * (before.force() + after.force());
             force.dot(0.5 * (moved(node) + moved(node + 1)))
         });
@@ -841,17 +961,30 @@ impl SemiImplicit {
 
     /// A first step, into the trial; false if it failed.
     fn first_step(&mut self) -> bool {
+        self.short_step(FIRST_STEP.inverse_square, 0.0)
+    }
+
+    /// A step into the trial in which inertia, `per_mass` times the masses, resists increments that differ from those
+    /// of the present velocities in the time `h`; false if it failed.
+    fn short_step(&mut self, per_mass: f64, h: f64) -> bool {
         self.trial.clone_from(&self.state);
+        if h > 0.0 {
+            self.move_supports(self.clock.time + h);
+        }
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(0.0, 0.0);
-            let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
-            let (inertia, per_mass) = (&self.inertia, FIRST_STEP.inverse_square);
+            self.add_drag(self.clock.time, 0.0);
+            let excess = |k: usize| {
+                let ([turn, shift], v) = (self.increment(k), self.node_motions[k].v);
+                [turn - h * v[0], shift - h * v[1]]
+            };
+            let increments: Vec<_> = (0..self.state.x.len()).map(excess).collect();
+            let (inertia, supports) = (&self.inertia, &self.supports);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
                 let force = -per_mass * inertia[k].mass * shift;
-                Wrench { moment, force }
+                free_wrench(supports, k, Wrench { moment, force })
             };
             add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
@@ -868,7 +1001,9 @@ impl SemiImplicit {
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         self.trial.clone_from(&self.state);
-        self.add_drag(0.0, 0.0);
+        self.next_node_motions.clone_from(&self.node_motions);
+        self.add_drag(self.clock.time, 0.0);
+        let damping = self.physics.damping;
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
@@ -881,14 +1016,222 @@ impl SemiImplicit {
                 tip_force += force;
                 tip_mass += mass;
             }
-            self.node_motions[k] = NodeMotion::at_rest([tensor.inverse() * moment, force / mass]);
+            let v = self.node_motions[k].v;
+            let momentum = tensor * v[0];
+            let moment = moment - v[0].cross(momentum) - damping * momentum;
+            let w = [tensor.inverse() * moment, force / mass - damping * v[1]];
+            self.node_motions[k] = NodeMotion { v, a: w, w };
         }
         if joined {
             for j in 0..self.leaf.rods() {
-                let k = self.state.base(j) + n;
-                self.node_motions[k].w[1] = tip_force / tip_mass;
-                self.node_motions[k].a[1] = tip_force / tip_mass;
+                let motion = &mut self.node_motions[self.state.base(j) + n];
+                motion.w[1] = tip_force / tip_mass - damping * motion.v[1];
+                motion.a[1] = motion.w[1];
             }
         }
+        set_support_motions(&self.supports, &mut self.node_motions);
+    }
+}
+
+impl SemiImplicit {
+    /// Lets the next mass land on its node: the velocities jump, and the accelerations with them.
+    fn land_next_mass(&mut self) {
+        let Some(landing) = self.physics.next_landing() else {
+            return;
+        };
+        let (j, i) = (landing.vein, self.leaf.grid.nearest_node(landing.sigma));
+        let together = self.leaf.tips_move_together() && i == self.leaf.segments();
+        let rods = if together {
+            0..self.leaf.rods()
+        } else {
+            j..j + 1
+        };
+        let nodes: Vec<usize> = rods.map(|j| self.state.base(j) + i).collect();
+        let (own, time) = (self.state.base(j) + i, self.clock.time);
+        let collision = Collision {
+            mass: landing.mass,
+            velocity: landing.velocity,
+            node_mass: nodes.iter().map(|&k| self.inertia[k].mass).sum(),
+            node_velocity: self.node_motions[own].v[1],
+            free: self.leaf.node_freedom(j, i).displacement,
+        };
+        self.physics.apply_loads(&mut self.leaf, time);
+        let potential = self.leaf.potential(&self.state);
+        self.physics.land_next_mass();
+        self.inertia[own] = self.physics.inertia(&self.leaf, j, i);
+        for &k in &nodes {
+            self.node_motions[k].v[1] = collision.common_velocity();
+        }
+        let mut exchange = collision.exchange();
+        if let Some(supports) = &mut self.supports {
+            supports.add_mass(own, landing.mass);
+        }
+        if self.leaf.least_compliance() == 0.0 || self.leaf.has_rigid_tissue() {
+            let before = self.kinetic_energy();
+            self.project_velocities();
+            exchange.dissipated += before - self.kinetic_energy();
+        }
+        self.restart();
+        self.physics.apply_loads(&mut self.leaf, time);
+        let weighed = self.leaf.potential(&self.state) - potential;
+        self.clock.impacts.push(Impact {
+            point: landing.point,
+            time,
+            lost_energy: exchange.dissipated,
+        });
+        exchange.work += weighed;
+        self.balance.add(exchange);
+    }
+
+    fn kinetic_energy(&self) -> f64 {
+        let nodes = self
+            .inertia
+            .iter()
+            .zip(&self.node_motions)
+            .zip(&self.state.q);
+        let energy = |((inertia, motion), q): ((&Inertia, &NodeMotion), &DQuat)| {
+            let [angular, linear] = motion.v;
+            let turning = angular.dot(inertia.tensor(*q) * angular);
+            0.5 * (inertia.mass * linear.length_squared() + turning)
+        };
+        nodes.map(energy).sum()
+    }
+
+    /// Replaces the velocities by the nearest ones, by their kinetic energy, with which rigid segments and tissue are
+    /// not strained: those to which impulses in them lead.
+    fn project_velocities(&mut self) {
+        let h = IMPULSE_TIME;
+        let per_mass = (h * h).recip();
+        self.apply_loads_and_damping(self.clock.time, 0.0, per_mass);
+        let carried = self.state.clone();
+        if self.short_step(per_mass, h) {
+            for k in 0..self.state.x.len() {
+                let moved = self.increment(k).map(|d| d / h);
+                self.node_motions[k].v = moved;
+            }
+        }
+        self.state = carried;
+        self.move_supports(self.clock.time);
+        set_support_motions(&self.supports, &mut self.node_motions);
+    }
+
+    /// Starts anew from the present positions and velocities, after these have jumped.
+    fn restart(&mut self) {
+        self.past_step = 0.0;
+        let retarded = self.physics.retardation > 0.0;
+        if retarded {
+            // The strains before, had the leaf always moved as it does now.
+            let before = self.step.min(self.step_bound);
+            let mut shifted = self.state.clone();
+            for (k, motion) in self.node_motions.iter().enumerate() {
+                let [turn, shift] = motion.v.map(|v| -before * v);
+                shifted.q[k] = (rotation::exp(turn) * shifted.q[k]).normalize();
+                shifted.x[k] += shift;
+            }
+            std::mem::swap(&mut self.state, &mut shifted);
+            let strains = self.strains();
+            std::mem::swap(&mut self.state, &mut shifted);
+            self.strain_history = [strains.clone(), strains];
+            self.apply_loads_and_damping(self.clock.time, before, FIRST_STEP.inverse_square);
+            self.past_step = before;
+        } else {
+            self.apply_loads_and_damping(self.clock.time, 0.0, FIRST_STEP.inverse_square);
+        }
+        if self.leaf.least_compliance() > 0.0 {
+            self.leaf.strain_forces(&mut self.state);
+            self.set_accelerations();
+        } else {
+            let h = (2.0 / FIRST_STEP.inverse_square).sqrt();
+            if self.short_step(FIRST_STEP.inverse_square, h) {
+                std::mem::swap(&mut self.state.n, &mut self.trial.n);
+                for k in 0..self.state.x.len() {
+                    let (d, v) = (self.increment(k), self.node_motions[k].v);
+                    let w = [0, 1].map(|c| FIRST_STEP.inverse_square * (d[c] - h * v[c]));
+                    self.node_motions[k] = NodeMotion { v, a: w, w };
+                }
+            }
+            self.move_supports(self.clock.time);
+            set_support_motions(&self.supports, &mut self.node_motions);
+        }
+        if retarded {
+            self.strain_history[0] = self.strains();
+            self.friction_power = self.power_of_friction(self.past_step);
+        }
+    }
+}
+
+impl SemiImplicit {
+    /// Moves the supports of the trial to where they are at a time.
+    fn move_supports(&mut self, time: f64) {
+        if let Some(supports) = &mut self.supports {
+            supports.move_to(time, &mut self.leaf);
+            supports.place(&mut self.trial);
+        }
+    }
+
+    /// Sets the velocities and the loads of supports that move at the start.
+    fn start_supports(&mut self) {
+        if self.supports.is_none() {
+            return;
+        }
+        self.move_supports(0.0);
+        set_support_motions(&self.supports, &mut self.node_motions);
+        self.jump_with_supports();
+        if let Some(supports) = &mut self.supports {
+            let inertia = &self.inertia;
+            supports.kinetic_energy = supports.kinetic_energy(|it| inertia[it.index]);
+            for it in &mut supports.nodes {
+                it.load = self.leaf.support_load(&self.state, it.rod, it.node);
+            }
+        }
+    }
+
+    /// Lets the velocities of rigid rods jump if it is time, as those of their supports do; returns whether they did.
+    fn jump_with_supports(&mut self) -> bool {
+        let now = self.clock.time;
+        let rigid = self.leaf.least_compliance() == 0.0 || self.leaf.has_rigid_tissue();
+        let Some(supports) = &mut self.supports else {
+            return false;
+        };
+        let mut jumps = false;
+        while supports.jumps.pop_if(|time| *time <= now).is_some() {
+            jumps = true;
+        }
+        if !jumps || !rigid {
+            return false;
+        }
+        let before = self.kinetic_energy();
+        self.move_supports(now);
+        set_support_motions(&self.supports, &mut self.node_motions);
+        self.project_velocities();
+        self.restart();
+        let work = self.kinetic_energy() - before;
+        if let Some(supports) = &mut self.supports {
+            let inertia = &self.inertia;
+            supports.kinetic_energy = supports.kinetic_energy(|it| inertia[it.index]);
+        }
+        self.balance.add(Exchange {
+            dissipated: 0.0,
+            work,
+        });
+        true
+    }
+
+    /// Work of the supports that move in the accepted step.
+    fn work_of_supports(&mut self) -> f64 {
+        let Some(supports) = &mut self.supports else {
+            return 0.0;
+        };
+        let inertia = &self.inertia;
+        let kinetic = supports.kinetic_energy(|it| inertia[it.index]);
+        let mut work = kinetic - std::mem::replace(&mut supports.kinetic_energy, kinetic);
+        for it in &mut supports.nodes {
+            let load = self.leaf.support_load(&self.state, it.rod, it.node);
+            let step = it.step();
+            work -= 0.5 * (load.force + it.load.force).dot(step.displacement);
+            work -= 0.5 * (load.moment + it.load.moment).dot(step.rotation);
+            it.load = load;
+        }
+        work
     }
 }

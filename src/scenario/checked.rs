@@ -4,10 +4,14 @@ use crate::numbers::sorted_distinct;
 use crate::scenario::blade::Blade;
 use crate::scenario::format::Key;
 use crate::scenario::format::units::Units;
-use crate::scenario::loads::{Dynamics, PointLoad, Weight, Wind, natural_time_unit};
+use crate::scenario::loads::{
+    Dynamics, FactoredLoads, Landing, PointLoad, Weight, Wind, natural_time_unit,
+};
 use crate::scenario::photo::Photo;
 use crate::scenario::profile::Profile;
+use crate::scenario::schedule::Schedule;
 use crate::scenario::section::{Moduli, Radii};
+use crate::scenario::support_motion::SupportMotion;
 use crate::scenario::supports::{BaseSupport, Grip, HeldTip};
 use crate::scenario::veins::{Rod, Scale, Tissue};
 use glam::{DQuat, DVec3};
@@ -54,6 +58,9 @@ pub struct Scenario {
     /// Stiffness, per unit reference length, of springs along each vein that hold it in its natural place,
     /// by lab axes; `None` if there is none.
     pub foundation: Option<Vec<[Profile; 3]>>,
+    /// Gravity, [`Scenario::g`] and the distributed loads in time, if a factor multiplies them; those at rest are
+    /// those of time 0.
+    pub factored: Option<Box<FactoredLoads>>,
     /// Dead loads on points.
     pub points: Vec<PointLoad>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
@@ -64,6 +71,8 @@ pub struct Scenario {
     pub held_tip: Option<HeldTip>,
     /// Holders along the veins; no point has two.
     pub grips: Vec<Grip>,
+    /// The supports that move in time, if any do; at rest they are where they are at time 0.
+    pub support_motion: Option<Box<SupportMotion>>,
     /// Wind.
     pub wind: Option<Wind>,
     /// How a photograph shows the leaf, if points in a photograph are data of a fit; equilibria do not
@@ -175,6 +184,7 @@ impl Scenario {
             own_gravity: Vec::new(),
             g: none,
             distributed: None,
+            factored: None,
             points: Vec::new(),
             tip_force: none,
             tip_moment: none,
@@ -188,7 +198,44 @@ impl Scenario {
     /// Whether veins have loads of their own besides the gravity that all share.
     pub fn has_own_loads(&self) -> bool {
         let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];
-        weights || self.distributed.is_some() || !self.points.is_empty()
+        let some = weights || self.distributed.is_some() || !self.points.is_empty();
+        some || self.factored.is_some()
+    }
+
+    /// The factors in time of loads of single veins: that of all their weights and distributed loads, if there is
+    /// one, and those of points.
+    pub fn load_factors(&self) -> impl Iterator<Item = &Schedule<f64>> {
+        let of_all = self.factored.iter().map(|loads| &loads.factor);
+        let points = self.points.iter().filter_map(|it| it.in_time.as_ref());
+        of_all.chain(points.map(|varying| &varying.factor))
+    }
+
+    /// The masses that land on points, in the order of the points, each with its number.
+    pub fn landings(&self) -> impl Iterator<Item = (usize, Landing)> {
+        let points = self.points.iter().enumerate();
+        points.filter_map(|(number, point)| Some((number, point.landing?)))
+    }
+
+    /// The scenario whose loads at rest are those of this one at a time.
+    pub fn at_time(&self, time: f64) -> Scenario {
+        let mut at = self.clone();
+        at.apply_load_factor(time);
+        at.points = self.points.iter().map(|it| it.at_time(time)).collect();
+        at.gravity = self.dynamics.gravity.at(time);
+        at.tip_force = self.dynamics.tip_force.at(time);
+        at.tip_moment = self.dynamics.tip_moment.at(time);
+        at
+    }
+
+    /// Sets the loads that `load.factor` multiplies to those of a time.
+    pub(super) fn apply_load_factor(&mut self, time: f64) {
+        let Some(loads) = self.factored.as_ref().map(|loads| loads.at_time(time)) else {
+            return;
+        };
+        self.gravity = loads.gravity;
+        self.own_gravity = loads.own_gravity;
+        self.g = loads.g;
+        self.distributed = loads.distributed;
     }
 
     /// The key, or the table, of something that acts on single veins or on each of them, so that the

@@ -78,15 +78,32 @@ impl Scenario {
     /// All points that are loaded, or all grips, by the first of their keys.
     fn table_rows(&self, first: Key) -> Option<Value> {
         let point = |point: &PointLoad| {
-            json!({
-                "vein": point.vein + 1, "at": point.at, "mass": point.mass,
-                "force": list_value(point.force), "moment": list_value(point.moment),
-            })
+            let varying = point.in_time.as_deref();
+            let [force, moment] =
+                varying.map_or([point.force, point.moment], |it| [it.force, it.moment]);
+            let mut row = json!({
+                "vein": point.vein + 1, "at": point.at,
+                "mass": point.landing.map_or(point.mass, |landing| landing.mass),
+                "force": list_value(force), "moment": list_value(moment),
+            });
+            if let Some(landing) = point.landing {
+                row["from"] = number_value(landing.from);
+                row["velocity"] = list_value(landing.velocity);
+            }
+            if let Some(varying) = varying {
+                row["factor"] = schedule_value(&varying.factor, "factor", number_value);
+            }
+            row
         };
-        let grip = |grip: &Grip| {
+        let moves = self.support_motion.as_ref().map_or(&[][..], |it| &it.grips);
+        let grip = |(number, grip): (usize, &Grip)| {
             let [from, to] = grip.at;
+            let moved = match moves.get(number) {
+                Some(moves) => vectors_value(moves),
+                None => list_value(grip.displacement),
+            };
             json!({
-                "vein": grip.vein + 1, "held": grip.held, "move": list_value(grip.displacement),
+                "vein": grip.vein + 1, "held": grip.held, "move": moved,
                 "at": if from == to { json!(from) } else { list_value(grip.at) },
                 "stiffness": list_value(grip.stiffness),
                 "turn_stiffness": number_value(grip.turn_stiffness),
@@ -94,7 +111,7 @@ impl Scenario {
         };
         let rows: Vec<Value> = match first {
             Key::PointVein => self.points.iter().map(point).collect(),
-            _ => self.grips.iter().map(grip).collect(),
+            _ => self.grips.iter().enumerate().map(grip).collect(),
         };
         (!rows.is_empty()).then(|| rows.into())
     }
@@ -153,16 +170,37 @@ impl Scenario {
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
                 number_or_list(self.coupling.iter().map(|gap| gap[axis]))
             }
-            Key::Gravity => {
-                let veins = 0..self.rods.len();
-                vector_or_list(veins.map(|vein| self.weight(vein).even))
+            Key::Gravity | Key::G | Key::Distributed | Key::LoadFactor => {
+                return self.load_value(key);
             }
-            Key::G => list_value(self.g),
-            Key::Distributed => vector_quantity(self.distributed.as_deref()?),
             Key::FoundationStiffness => vector_quantity(self.foundation.as_deref()?),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),
+            _ => return None,
+        })
+    }
+
+    /// Loads of veins, at a factor of one, and the factor.
+    fn load_value(&self, key: Key) -> Option<Value> {
+        if let (Some(loads), Key::LoadFactor) = (&self.factored, key) {
+            return Some(schedule_value(&loads.factor, "factor", number_value));
+        }
+        let mut whole = std::borrow::Cow::Borrowed(self);
+        if let Some(loads) = &self.factored {
+            let whole = whole.to_mut();
+            whole.gravity = loads.gravity;
+            whole.own_gravity.clone_from(&loads.own_gravity);
+            whole.g = loads.g;
+            whole.distributed.clone_from(&loads.distributed);
+        }
+        Some(match key {
+            Key::Gravity => {
+                let veins = 0..self.rods.len();
+                vector_or_list(veins.map(|vein| whole.weight(vein).even))
+            }
+            Key::G => list_value(whole.g),
+            Key::Distributed => vector_quantity(whole.distributed.as_deref()?),
             _ => return None,
         })
     }
@@ -205,8 +243,7 @@ impl Scenario {
     fn wind_value(&self, key: Key) -> Option<Value> {
         let wind = self.wind.as_ref()?;
         Some(match key {
-            Key::WindVelocity if wind.velocity.is_constant() => list_value(wind.velocity.at(0.0)),
-            Key::WindVelocity => schedule_value(&wind.velocity, "value", list_value),
+            Key::WindVelocity => vectors_value(&wind.velocity),
             Key::WindDensity => number_value(wind.density),
             Key::WindDrag => number_value(wind.drag),
             _ => quantity_value(wind.width.iter()),
@@ -233,7 +270,10 @@ impl Scenario {
         Some(match key {
             Key::TipHeld if clamps.is_some() => json!("clamped"),
             Key::TipHeld => json!("pinned"),
-            Key::TipPosition => list_value(held.position),
+            Key::TipPosition => match self.support_motion.as_ref().and_then(|it| it.tip.as_ref()) {
+                Some(position) => vectors_value(position),
+                None => list_value(held.position),
+            },
             Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
             _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
         })
@@ -257,6 +297,7 @@ impl Scenario {
             Key::OutputInterval => number_value(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
             Key::Start => json!(dynamics.start),
+            Key::GravityInTime if self.factored.is_some() => return None,
             Key::GravityInTime => {
                 schedule_unless_constant(&dynamics.gravity, self.gravity, "value", list_value)?
             }
@@ -269,6 +310,19 @@ impl Scenario {
                 "value",
                 list_value,
             )?,
+            Key::BaseInTime => {
+                let base = self.support_motion.as_ref()?.base.as_ref()?;
+                let mut value = json!({});
+                for (name, motion) in [("move", &base.displacement), ("turn", &base.turn)] {
+                    if *motion != Schedule::constant([0.0; 3]) {
+                        value[name] = schedule_value(motion, "value", list_value);
+                    }
+                }
+                if value == json!({}) {
+                    value["move"] = schedule_value(&base.displacement, "value", list_value);
+                }
+                value
+            }
             Key::RestInTime => {
                 schedule_unless_constant(&dynamics.rest, 1.0, "factor", number_value)?
             }
@@ -432,6 +486,14 @@ fn schedule_unless_constant<T: InTime>(
 ) -> Option<Value> {
     let constant = *schedule == Schedule::constant(at_rest);
     (!constant).then(|| schedule_value(schedule, name, written))
+}
+
+/// Vectors in time, or the one that is the same at all times.
+fn vectors_value(of: &Schedule<[f64; 3]>) -> Value {
+    match of.is_constant() {
+        true => list_value(of.at(0.0)),
+        false => schedule_value(of, "value", list_value),
+    }
 }
 
 fn schedule_value<T: InTime>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {

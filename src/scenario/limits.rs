@@ -7,7 +7,7 @@ use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::{EntryValue, MAGNITUDES};
 use crate::scenario::format::{Key, ValueSchema};
-use crate::scenario::loads::Dynamics;
+use crate::scenario::loads::{Dynamics, Landing};
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::{InTime, Schedule};
 use crate::scenario::section;
@@ -43,6 +43,7 @@ struct LeafLimits {
     /// Oscillations in time.
     periods: DimensionlessLimit,
     phase: DimensionlessLimit,
+    load_factor: DimensionlessLimit,
     rest_factor: DimensionlessLimit,
     rest_factor_angle: DimensionlessLimit,
     /// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
@@ -58,6 +59,7 @@ struct LeafLimits {
     point_mass: DimensionlessLimit,
     /// At the limit a thousandth of the digits of positions is lost.
     base_distance: DimensionlessLimit,
+    base_turn: DimensionlessLimit,
     /// Wider for tissue than for couplings, as blades need: a strip of width h, thickness t and length L
     /// gives k L^4/A = 12 L^4/(h^2 t^2) and c L^2/A = L^2/h^2.
     tissue: DimensionlessLimit,
@@ -65,6 +67,7 @@ struct LeafLimits {
     /// Drag on a rod normal to the wind: as for gravity.
     drag: DimensionlessLimit,
     wind_velocity: DimensionlessLimit,
+    landing_velocity: DimensionlessLimit,
     wind_width: DimensionlessLimit,
     /// Springs along veins: as for the coupling.
     foundation: DimensionlessLimit,
@@ -138,6 +141,11 @@ const LIMITS: LeafLimits = LeafLimits {
         "the number of periods, each of which takes at least eight steps: choose a lower frequency or a shorter duration",
     ),
     phase: upper_limit("|phase|", 1e3, "in radians"),
+    load_factor: upper_limit(
+        "|factor|",
+        1e6,
+        "loads are multiplied by it: choose larger ones in [load], and a smaller factor",
+    ),
     rest_factor: upper_limit(
         "|factor|",
         1e6,
@@ -161,6 +169,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "L is the longest rod; \
          beyond the limit positions lose digits: choose an origin closer to the leaf",
     ),
+    base_turn: upper_limit("|turn|", 1e3, REST_ANGLE_REASON),
     tissue: upper_limit("k L^4/A", 1e16, TISSUE_STIFFNESS_REASON),
     fold: upper_limit("c L^2/A", 1e12, TISSUE_STIFFNESS_REASON),
     drag: upper_limit(
@@ -170,6 +179,7 @@ const LIMITS: LeafLimits = LeafLimits {
          beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity",
     ),
     wind_velocity: upper_limit("|U| T/L", 1e12, NATURAL_UNITS_REASON),
+    landing_velocity: upper_limit("|v| T/L", 1e12, NATURAL_UNITS_REASON),
     wind_width: ratio_limit(
         "w/L",
         1e6,
@@ -427,6 +437,47 @@ fn check_loads_in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult
             }
         }
     }
+    if let Some(motion) = &scenario.support_motion {
+        let item = entries.given_value(Key::BaseInTime);
+        if let (Some(base), Some(item)) = (&motion.base, item) {
+            let part = |name| item.list(name).unwrap_or(item);
+            check_times(Some(part("move")), &base.displacement, units)?;
+            check_times(Some(part("turn")), &base.turn, units)?;
+            for way in base.displacement.bounds() {
+                let way = vector_norm(way) / longest(rods);
+                LIMITS.base_distance.check(part("move"), way)?;
+            }
+            for turn in base.turn.bounds() {
+                LIMITS.base_turn.check(part("turn"), vector_norm(turn))?;
+            }
+        }
+        if let Some(tip) = &motion.tip {
+            check_times(entries.given_value(Key::TipPosition), tip, units)?;
+        }
+        for row in 0..entries.table_count("grip").unwrap_or(0) {
+            let item = entries.value_in_row(Key::GripMove, row)?;
+            check_times(Some(item), &item.vectors_in_time()?, units)?;
+        }
+    }
+    if let Some(loads) = &scenario.factored {
+        check_load_factor(entries.given_value(Key::LoadFactor), &loads.factor, units)?;
+    }
+    for (row, point) in scenario.points.iter().enumerate() {
+        if let Some(varying) = &point.in_time {
+            let item = entries.value_in_row(Key::PointFactor, row)?;
+            check_load_factor(Some(item), &varying.factor, units)?;
+            let unit = |key| smallest_unit(key, rods);
+            let [force, moment] = [
+                vector_norm(varying.force) / unit(Key::PointForce),
+                vector_norm(varying.moment) / unit(Key::PointMoment),
+            ];
+            for (index, factor) in varying.factor.bounds().into_iter().enumerate() {
+                let entry = entry_of_bound(item, &varying.factor, index);
+                LIMITS.tip_force.check(entry, factor.abs() * force)?;
+                LIMITS.tip_moment.check(entry, factor.abs() * moment)?;
+            }
+        }
+    }
     if let Some(item) = entries.given_value(Key::RestInTime) {
         let angles = (rods.iter())
             .flat_map(|rod| rod.rest_curvature.iter().map(|u| u.max_abs() * rod.length));
@@ -473,6 +524,24 @@ fn check_times<T: InTime>(
             LIMITS.periods.check(entry("frequency"), periods)?;
             LIMITS.phase.check(entry("phase"), sine.phase.abs())?;
         }
+    }
+    Ok(())
+}
+
+/// Refuses times of a factor of loads that no motion can follow, and factors that are too large.
+fn check_load_factor(
+    item: Option<EntryValue>,
+    factor: &Schedule<f64>,
+    units: TimeUnits,
+) -> ScenarioResult<()> {
+    check_times(item, factor, units)?;
+    let Some(item) = item else {
+        return Ok(());
+    };
+    let bounds = factor.bounds().into_iter().enumerate();
+    for (index, value) in bounds {
+        let entry = entry_of_bound(item, factor, index);
+        LIMITS.load_factor.check(entry, value.abs())?;
     }
     Ok(())
 }
@@ -603,17 +672,32 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
     let mass = scenario.unit(Key::PointMass);
     for (row, point) in scenario.points.iter().enumerate() {
         let item = |key| entries.value_in_row(key, row);
+        // At a factor of one, if there is one.
+        let varying = point.in_time.as_deref();
+        let [given, turned] =
+            varying.map_or([point.force, point.moment], |it| [it.force, it.moment]);
         LIMITS
             .tip_force
-            .check(item(Key::PointForce)?, vector_norm(point.force) / force)?;
+            .check(item(Key::PointForce)?, vector_norm(given) / force)?;
         LIMITS
             .tip_moment
-            .check(item(Key::PointMoment)?, vector_norm(point.moment) / moment)?;
+            .check(item(Key::PointMoment)?, vector_norm(turned) / moment)?;
         let weighed = item(Key::PointMass)?;
-        LIMITS.point_mass.check(weighed, point.mass / mass)?;
+        let whole = point.landing.map_or(point.mass, |landing| landing.mass);
+        LIMITS.point_mass.check(weighed, whole / mass)?;
         LIMITS
             .point_weight
-            .check(weighed, vector_norm(scenario.g) / force * point.mass)?;
+            .check(weighed, vector_norm(scenario.g) / force * whole)?;
+        if let Some(Landing { from, velocity, .. }) = point.landing {
+            let unit = |key| scenario.unit(key);
+            LIMITS
+                .times
+                .check(item(Key::PointFrom)?, from / unit(Key::PointFrom))?;
+            let speed = vector_norm(velocity) / unit(Key::PointVelocity);
+            LIMITS
+                .landing_velocity
+                .check(item(Key::PointVelocity)?, speed)?;
+        }
     }
     Ok(())
 }

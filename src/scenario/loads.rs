@@ -6,13 +6,13 @@ use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::format::item::EntryValue;
 use crate::scenario::profile::{Profile, RodPlace, knot_places};
-use crate::scenario::schedule::Schedule;
+use crate::scenario::schedule::{Schedule, scaled};
 use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
 
-/// A dead load on a point of a vein.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A dead load on a point of a vein, at rest.
+#[derive(Clone, Debug, PartialEq)]
 pub struct PointLoad {
     /// The vein, counted from 0.
     pub vein: usize,
@@ -24,6 +24,113 @@ pub struct PointLoad {
     pub moment: [f64; 3],
     /// The mass, which [`Scenario::g`](crate::scenario::Scenario::g) pulls; not negative.
     pub mass: f64,
+    /// The force and the moment in time, if they vary; those at rest are those of time 0.
+    pub in_time: Option<Box<VaryingPointLoad>>,
+    /// The mass that lands on the point, if one does; [`PointLoad::mass`] is zero then.
+    pub landing: Option<Landing>,
+}
+
+/// A mass that lands on a point of a leaf in motion and stays there. The momentum of the point and of the mass is
+/// kept, and energy is lost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landing {
+    /// The mass; positive.
+    pub mass: f64,
+    /// The time at which it lands; positive.
+    pub from: f64,
+    /// The velocity with which it lands.
+    pub velocity: [f64; 3],
+}
+
+/// A dead load on a point whose force and moment vary in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VaryingPointLoad {
+    /// The factor of both.
+    pub factor: Schedule<f64>,
+    /// The force at a factor of one.
+    pub force: [f64; 3],
+    /// The moment at a factor of one.
+    pub moment: [f64; 3],
+}
+
+impl PointLoad {
+    /// The load at rest that is this one at a time.
+    pub fn at_time(&self, time: f64) -> PointLoad {
+        let mut at = self.clone();
+        if let Some(landing) = self.landing {
+            at.mass = if landing.from <= time {
+                landing.mass
+            } else {
+                0.0
+            };
+        }
+        if let Some(varying) = &self.in_time {
+            let factor = varying.factor.at(time);
+            [at.force, at.moment] =
+                [varying.force, varying.moment].map(|load| scaled(factor, load));
+        }
+        at
+    }
+}
+
+/// The loads that a factor in time multiplies (`load.factor`), at a factor of one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FactoredLoads {
+    /// The factor.
+    pub factor: Schedule<f64>,
+    /// As [`Scenario::gravity`](crate::scenario::Scenario::gravity).
+    pub gravity: [f64; 3],
+    /// As [`Scenario::own_gravity`](crate::scenario::Scenario::own_gravity).
+    pub own_gravity: Vec<[f64; 3]>,
+    /// As [`Scenario::g`](crate::scenario::Scenario::g).
+    pub g: [f64; 3],
+    /// As [`Scenario::distributed`](crate::scenario::Scenario::distributed).
+    pub distributed: Option<Vec<[Profile; 3]>>,
+}
+
+impl FactoredLoads {
+    /// These loads times a factor.
+    fn times(&self, factor: f64) -> FactoredLoads {
+        let along = |load: &[Profile; 3]| load.each_ref().map(|of| of.scaled(factor));
+        let distributed = self.distributed.as_ref().filter(|_| factor != 0.0);
+        FactoredLoads {
+            factor: self.factor.clone(),
+            gravity: scaled(factor, self.gravity),
+            own_gravity: (self.own_gravity.iter())
+                .map(|own| scaled(factor, *own))
+                .collect(),
+            g: scaled(factor, self.g),
+            distributed: distributed.map(|all| all.iter().map(along).collect()),
+        }
+    }
+
+    /// The loads at a time.
+    pub fn at_time(&self, time: f64) -> FactoredLoads {
+        self.times(self.factor.at(time))
+    }
+}
+
+/// Reads `load.factor`, if it is given, of loads as they are read.
+pub(super) fn read_load_factor(
+    entries: &Entries,
+    weights: &RodWeights,
+    g: [f64; 3],
+    distributed: &Option<Vec<[Profile; 3]>>,
+) -> ScenarioResult<Option<Box<FactoredLoads>>> {
+    let Some(item) = entries.given_value(Key::LoadFactor) else {
+        return Ok(None);
+    };
+    item.refuse_unless(
+        !entries.is_given(Key::GravityInTime),
+        "dynamics.gravity is gravity in time, too: leave one of them out",
+    )?;
+    Ok(Some(Box::new(FactoredLoads {
+        factor: item.factors_in_time()?,
+        gravity: weights.shared,
+        own_gravity: weights.own.clone(),
+        g,
+        distributed: distributed.clone(),
+    })))
 }
 
 /// The weight of a vein per reference length.
@@ -124,13 +231,46 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
     check_single_rod_moments(turned, rods, &[moment])?;
-    Ok(PointLoad {
+    let force = item(Key::PointForce)?.vector()?;
+    let varying = match entries.is_given_in_row(Key::PointFactor, row) {
+        true => Some(Box::new(VaryingPointLoad {
+            factor: item(Key::PointFactor)?.factors_in_time()?,
+            force,
+            moment,
+        })),
+        false => None,
+    };
+    let given = PointLoad {
         vein: item(Key::PointVein)?.whole_number(rods)? - 1,
         at: item(Key::PointAt)?.fraction()?,
-        force: item(Key::PointForce)?.vector()?,
+        force,
         moment,
         mass: item(Key::PointMass)?.number()?,
-    })
+        in_time: varying,
+        landing: read_landing(entries, row)?,
+    };
+    Ok(given.at_time(0.0))
+}
+
+/// Reads when the mass of a point lands, unless it is there from the start.
+fn read_landing(entries: &Entries, row: usize) -> ScenarioResult<Option<Landing>> {
+    let item = |key| entries.value_in_row(key, row);
+    let (begins, moves) = (item(Key::PointFrom)?, item(Key::PointVelocity)?);
+    let (from, velocity) = (begins.number()?, moves.vector()?);
+    moves.refuse_unless(
+        from > 0.0 || velocity == [0.0; 3],
+        "belongs to a mass that lands: add from, the time at which it does, greater than 0",
+    )?;
+    let mass = item(Key::PointMass)?.number()?;
+    begins.refuse_unless(
+        from == 0.0 || mass > 0.0,
+        "is the time at which a mass lands: add mass, greater than 0",
+    )?;
+    Ok((from > 0.0).then_some(Landing {
+        mass,
+        from,
+        velocity,
+    }))
 }
 
 /// Refuses moments on more than one rod.
@@ -378,14 +518,14 @@ fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     }
 }
 
-/// Reads `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
+/// Reads `[dynamics]`, for rods under this gravity in time, a tip force and a tip moment.
 pub(super) fn read_dynamics(
     entries: &Entries,
     rods: &[Rod],
     source: &StiffnessSource,
-    loads: [[f64; 3]; 3],
+    gravity: Schedule<[f64; 3]>,
+    [tip_force, tip_moment]: [[f64; 3]; 2],
 ) -> ScenarioResult<Dynamics> {
-    let [gravity, tip_force, tip_moment] = loads;
     let mass = [Key::MassDensity, Key::BladeMassDensity];
     let mass = mass.into_iter().find(|key| entries.is_given(*key));
     let of_mass = |property| mass.and_then(|_| source.property_profiles(property));
@@ -404,7 +544,7 @@ pub(super) fn read_dynamics(
         Some(density) => Dynamics::with_density(rods, density),
         None => Dynamics::default_for(rods),
     }
-    .with_loads(gravity, tip_force, tip_moment);
+    .with_loads([0.0; 3], tip_force, tip_moment);
     let number = |key, default| {
         entries
             .given_value(key)
@@ -433,7 +573,7 @@ pub(super) fn read_dynamics(
     };
     let clamped = read_clamped(entries.value_or_default(Key::Clamped)?, rods.len())?;
     let start = read_start(entries.value_or_default(Key::Start)?, clamped)?;
-    let gravity = load(Key::GravityInTime, preset.gravity)?;
+    let gravity = load(Key::GravityInTime, gravity)?;
     let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
     let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
     if let Some(item) = entries.given_value(Key::TipMomentInTime) {

@@ -15,6 +15,7 @@ mod profile;
 mod read;
 mod schedule;
 mod section;
+mod support_motion;
 mod supports;
 #[cfg(test)]
 mod tests;
@@ -40,7 +41,10 @@ pub use crate::scenario::format::schema::schema;
 pub(crate) use crate::scenario::format::source::intended_number;
 pub use crate::scenario::format::units::{self, Units};
 pub(crate) use crate::scenario::loads::CLAMPED_ROD_FREQUENCY;
-pub use crate::scenario::loads::{Dynamics, MotionStart, PointLoad, PolarInertia, Weight, Wind};
+pub use crate::scenario::loads::{
+    Dynamics, FactoredLoads, Landing, MotionStart, PointLoad, PolarInertia, VaryingPointLoad,
+    Weight, Wind,
+};
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{
@@ -51,6 +55,7 @@ pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 pub use crate::scenario::section::{Moduli, Radii, Stress};
+pub use crate::scenario::support_motion::{BaseMotion, SupportMotion};
 pub use crate::scenario::supports::{BaseSupport, Clamp, Grip, HeldTip, SupportKind};
 pub use crate::scenario::veins::{Rod, Scale, Tissue, longest};
 pub use crate::scenario::zero_energy::{BaseRotations, UnbalancedMoment, ZeroEnergyRotation};

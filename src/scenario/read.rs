@@ -13,6 +13,8 @@ use crate::scenario::format::units::Units;
 use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
 use crate::scenario::loads::{check_single_rod_moments, read_dynamics, read_wind};
 use crate::scenario::photo::read_photo;
+use crate::scenario::schedule::Schedule;
+use crate::scenario::support_motion::read_support_motion;
 use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
 use crate::scenario::{limits, loads, supports};
 use std::fs::File;
@@ -197,6 +199,7 @@ impl Entries {
         let distributed = loads::read_distributed_loads(self, rods.len())?;
         let foundation =
             loads::read_vectors_along_rods(self, Key::FoundationStiffness, rods.len())?;
+        let factored = loads::read_load_factor(self, &weights, g, &distributed)?;
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
@@ -205,12 +208,16 @@ impl Entries {
         let held_tip = supports::read_held_tip(self, &rods, joined)?;
         let shared = held_tip.is_some() || joined && rods.len() > 1;
         let grips = supports::read_grips(self, &rods, shared)?;
+        let support_motion = read_support_motion(self)?;
         let wind = read_wind(self, rods.len())?;
         let photo = read_photo(self)?;
         let tolerance = read_tolerance(self.value_or_default(Key::Tolerance)?)?;
-        let loads = [weights.shared, tip_force, tip_moment];
-        let dynamics = read_dynamics(self, &rods, &source, loads)?;
-        Ok(Scenario {
+        let gravity = match &factored {
+            Some(loads) => loads.factor.times(loads.gravity),
+            None => Schedule::constant(weights.shared),
+        };
+        let dynamics = read_dynamics(self, &rods, &source, gravity, [tip_force, tip_moment])?;
+        let mut scenario = Scenario {
             name,
             units,
             rods,
@@ -227,16 +234,20 @@ impl Entries {
             g,
             distributed,
             foundation,
+            factored,
             points,
             tip_force,
             tip_moment,
             held_tip,
             grips,
+            support_motion,
             wind,
             photo,
             tolerance,
             dynamics,
-        })
+        };
+        scenario.apply_load_factor(0.0);
+        Ok(scenario)
     }
 
     /// The name of a leaf that has none: that of its file.

@@ -1,5 +1,7 @@
 //! Quantities in time: through given values at given times, in straight lines or smoothly, or as a sine.
 
+use crate::rotation;
+use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
 
 /// What may change in time: numbers and vectors.
@@ -106,12 +108,35 @@ impl<T: InTime> Schedule<T> {
         }
     }
 
+    /// Whether its rate may jump.
+    pub fn has_kinks(&self) -> bool {
+        matches!(self, Schedule::Linear(_)) && !self.is_constant()
+    }
+
     /// The value at `time`.
     pub fn at(&self, time: f64) -> T {
         match self {
             Schedule::Linear(knots) => knots.linear_at(time),
             Schedule::Smooth { knots, slopes } => knots.smooth_at(slopes, time),
             Schedule::Sine(sine) => sine.mean.plus(sine.angle(time).sin(), sine.amplitude),
+        }
+    }
+
+    /// The rate of change at `time`, at a kink that after it.
+    pub fn rate(&self, time: f64) -> T {
+        match self {
+            Schedule::Linear(knots) => {
+                let Bracket {
+                    from, to, after, ..
+                } = knots.bracket(time);
+                let width = after.map_or(1.0, |after| knots.at[after] - knots.at[after - 1]);
+                T::ZERO.plus(1.0 / width, to.plus(-1.0, from))
+            }
+            Schedule::Smooth { knots, slopes } => knots.smooth_rate(slopes, time),
+            Schedule::Sine(sine) => {
+                let rate = 2.0 * PI * sine.frequency * sine.angle(time).cos();
+                T::ZERO.plus(rate, sine.amplitude)
+            }
         }
     }
 
@@ -180,6 +205,95 @@ impl<T: InTime> Schedule<T> {
                 .to_vec(),
         }
     }
+}
+
+impl Schedule<f64> {
+    /// A factor in time, times a value.
+    pub fn times<T: InTime>(&self, value: T) -> Schedule<T> {
+        let all = |factors: &[f64]| factors.iter().map(|&of| scaled(of, value)).collect();
+        let through = |knots: &Knots<f64>| Knots {
+            at: knots.at.clone(),
+            value: all(&knots.value),
+        };
+        match self {
+            Schedule::Linear(knots) => Schedule::Linear(through(knots)),
+            Schedule::Smooth { knots, slopes } => Schedule::Smooth {
+                knots: through(knots),
+                slopes: all(slopes),
+            },
+            Schedule::Sine(sine) => Schedule::Sine(Sine {
+                mean: scaled(sine.mean, value),
+                amplitude: scaled(sine.amplitude, value),
+                frequency: sine.frequency,
+                phase: sine.phase,
+            }),
+        }
+    }
+}
+
+/// Rotations in time: vectors are rotation vectors.
+impl Schedule<[f64; 3]> {
+    /// Rotations through these rotation vectors: in straight lines, the shortest rotation at a constant rate from each
+    /// to the next; smoothly or as a sine, those of the rotation vectors between.
+    pub fn of_rotations(self) -> Self {
+        let Schedule::Smooth { knots, .. } = self else {
+            return self;
+        };
+        // The vector of each rotation that is nearest to that before it.
+        let mut before = DVec3::ZERO;
+        let nearest = |value: [f64; 3]| {
+            let vector = DVec3::from_array(value);
+            let axis = vector.try_normalize().or(before.try_normalize());
+            let turns = axis.map_or(0.0, |axis| {
+                ((before - vector).dot(axis) / (2.0 * PI)).round()
+            });
+            before = vector + 2.0 * PI * turns * axis.unwrap_or(DVec3::ZERO);
+            before.to_array()
+        };
+        let values = knots.value.into_iter().map(nearest).collect();
+        Schedule::smooth(knots.at, values)
+    }
+
+    /// The rotation at a time.
+    pub fn rotation(&self, time: f64) -> DQuat {
+        match self {
+            Schedule::Linear(knots) => {
+                let Bracket {
+                    from, to, fraction, ..
+                } = knots.bracket(time);
+                let [from, to] = [from, to].map(|it| rotation::exp(DVec3::from_array(it)));
+                rotation::exp(fraction * rotation::log(to * from.conjugate())) * from
+            }
+            _ => rotation::exp(DVec3::from_array(self.at(time))),
+        }
+    }
+
+    /// The angular velocity at a time, along the lab axes.
+    pub fn angular_velocity(&self, time: f64) -> DVec3 {
+        if let Schedule::Linear(knots) = self {
+            let Bracket {
+                from, to, after, ..
+            } = knots.bracket(time);
+            let width = after.map_or(1.0, |after| knots.at[after] - knots.at[after - 1]);
+            let [from, to] = [from, to].map(|it| rotation::exp(DVec3::from_array(it)));
+            return rotation::log(to * from.conjugate()) / width;
+        }
+        let [theta, rate] = [self.at(time), self.rate(time)].map(DVec3::from_array);
+        let (angle, axis) = (theta.length(), theta.normalize_or_zero());
+        if axis == DVec3::ZERO {
+            return rate;
+        }
+        // omega = sin(t)/t r + (1 - sin(t)/t) a a.r + (1 - cos(t))/t a x r
+        let sinc = angle.sin() / angle;
+        sinc * rate
+            + (1.0 - sinc) * axis.dot(rate) * axis
+            + (1.0 - angle.cos()) / angle * axis.cross(rate)
+    }
+}
+
+/// A value times a factor.
+pub fn scaled<T: InTime>(factor: f64, value: T) -> T {
+    T::ZERO.plus(factor, value)
 }
 
 impl<T> Sine<T> {
@@ -262,6 +376,23 @@ impl<T: InTime> Knots<T> {
         from.plus(t * t * (3.0 - 2.0 * t), to.plus(-1.0, from))
             .plus(width * t * (1.0 - t) * (1.0 - t), slopes[after - 1])
             .plus(-width * t * t * (1.0 - t), slopes[after])
+    }
+
+    fn smooth_rate(&self, slopes: &[T], time: f64) -> T {
+        let Bracket {
+            from,
+            to,
+            fraction: t,
+            after,
+        } = self.bracket(time);
+        let Some(after) = after else {
+            return T::ZERO;
+        };
+        let width = self.at[after] - self.at[after - 1];
+        T::ZERO
+            .plus(6.0 * t * (1.0 - t) / width, to.plus(-1.0, from))
+            .plus((1.0 - t) * (1.0 - 3.0 * t), slopes[after - 1])
+            .plus(-t * (2.0 - 3.0 * t), slopes[after])
     }
 
     /// The slopes of the cubic spline through the values that begins and ends level: those for which its
@@ -386,6 +517,60 @@ mod tests {
                 let sum: f64 = (0..count).map(|k| course.at(at(k))).sum();
                 let found = course.mean(from, to);
                 assert!((found - sum / f64::from(count)).abs() < 1e-7, "{found}");
+            }
+        }
+    }
+
+    /// Rates are those of values nearby.
+    #[test]
+    fn rates_are_differences() {
+        let sine = Schedule::Sine(Sine {
+            mean: 0.5,
+            amplitude: 2.0,
+            frequency: 0.7,
+            phase: 0.3,
+        });
+        let linear = schedule(&[0.0, 1.0, 1.5], &[1.0, 4.0, 0.1]);
+        for course in [smooth(), sine, linear] {
+            for time in [-0.3, 0.2, 0.9, 1.2, 3.1, 5.0] {
+                let h = 1e-5;
+                let rate = (course.at(time + h) - course.at(time - h)) / (2.0 * h);
+                assert!((course.rate(time) - rate).abs() < 1e-8, "{time}: {rate}");
+            }
+        }
+    }
+
+    /// Rotations go through those given, by the shortest way, and angular velocities are theirs.
+    #[test]
+    fn rotations_take_the_shortest_way() {
+        let at = vec![0.0, 0.5, 1.0, 2.0];
+        let value = vec![[0.0; 3], [0.0, 0.0, 3.0], [0.0, 0.1, -3.0], [1.0, 0.5, 0.2]];
+        let sine = Schedule::Sine(Sine {
+            mean: [0.1, 0.0, 0.0],
+            amplitude: [1.0, 2.0, -0.5],
+            frequency: 0.7,
+            phase: 0.3,
+        });
+        for turn in [
+            Schedule::linear(at.clone(), value.clone()).of_rotations(),
+            Schedule::smooth(at.clone(), value.clone()).of_rotations(),
+            sine,
+        ] {
+            if let Some(knots) = turn.knots() {
+                for (time, value) in knots.at.iter().zip(&value) {
+                    let exact = rotation::exp(DVec3::from_array(*value));
+                    assert!(turn.rotation(*time).dot(exact).abs() > 1.0 - 1e-12);
+                }
+                // From 3 to 2 pi - 3 is not the way back through 0.
+                let middle = turn.rotation(0.75) * DVec3::X;
+                assert!(middle.x < -0.9, "{middle}");
+            }
+            for time in [0.2, 0.7, 1.3] {
+                let h = 1e-5;
+                let turned = turn.rotation(time + h) * turn.rotation(time - h).conjugate();
+                let rate = rotation::log(turned) / (2.0 * h);
+                let found = turn.angular_velocity(time);
+                assert!(found.distance(rate) < 1e-7, "{time}: {found} {rate}");
             }
         }
     }

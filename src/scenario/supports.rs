@@ -106,8 +106,11 @@ pub(super) fn read_held_tip(
         joined || rods.len() == 1,
         "needs leaf.joined = true: one point is held, which all tips share",
     )?;
-    let position = at.vector()?;
-    check_reach(&at, position, rods)?;
+    let position = at.vectors_in_time()?;
+    for position in position.bounds() {
+        check_reach(&at, position, rods)?;
+    }
+    let position = position.at(0.0);
     if let Some(moment) = entries.given_value(Key::TipMoment) {
         moment.refuse_unless(
             moment.vector()? == [0.0; 3],
@@ -323,9 +326,9 @@ fn read_grip(
     )?;
     let farthest = SUPPORT_LIMITS.grip_move;
     let way = item(Key::GripMove)?;
-    let [x, y, z] = way.vector()?;
+    let moves = way.vectors_in_time()?;
     way.refuse_unless(
-        x.hypot(y).hypot(z) <= farthest * longest(rods),
+        (moves.bounds().iter()).all(|[x, y, z]| x.hypot(*y).hypot(*z) <= farthest * longest(rods)),
         format_args!("must be at most {farthest} times the longest rod"),
     )?;
     let held = item(Key::GripHeld)?.support_kind()?;
@@ -341,14 +344,19 @@ fn read_grip(
         held == SupportKind::Clamped || turn_stiffness.is_infinite(),
         "belongs to a grip that holds directions: add held = \"clamped\"",
     )?;
-    Ok(Grip {
+    let grip = Grip {
         vein,
         at,
         held,
-        displacement: [x, y, z],
+        displacement: moves.at(0.0),
         stiffness,
         turn_stiffness,
-    })
+    };
+    way.refuse_unless(
+        moves.is_constant() || grip.is_rigid(),
+        "changes in time, as rigid grips alone do: leave out its stiffness and turn_stiffness, or give one vector",
+    )?;
+    Ok(grip)
 }
 
 /// Refuses grips that hold the same point.

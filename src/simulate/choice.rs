@@ -256,8 +256,7 @@ pub(super) fn semi_implicit_cost(
     let mut marks = [(0.0, 0.0); 2];
     while pilot.time() < duration && steps <= most && attempts < longest && !failed {
         let before = pilot.time();
-        let knot = physics.next_knot(before);
-        failed = pilot.step_towards(duration.min(knot)).is_err();
+        failed = pilot.proceed_towards(duration).is_err();
         steps += match pilot.time() - before {
             h if h > 0.0 => of_step.max(h / interval),
             _ => 0.0,

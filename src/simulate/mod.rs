@@ -32,8 +32,8 @@ pub use crate::leaf::HalfTurn;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 pub use crate::motion::{Energy, Stopped};
 use crate::motion::{
-    Explicit, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep, StepControl,
-    TimeIntegrator,
+    Explicit, Impact, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep,
+    StepControl, TimeIntegrator,
 };
 use crate::relax;
 use crate::relax::{Equilibrium, EquilibriumTracker, RelaxError, StateOnGrid};
@@ -43,7 +43,7 @@ pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub(crate) use crate::simulate::comparison::compared_points;
 pub use crate::simulate::comparison::{Frame, OutputSample, ShapeSnapshot};
 use crate::simulate::comparison::{MotionComparison, Trajectory};
-pub use crate::simulate::record::{Record, film_indices, snapshot_indices};
+pub use crate::simulate::record::{LandingRecord, Record, film_indices, snapshot_indices};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
 pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
 pub(crate) use crate::simulate::request::DEFAULT_MOTION_SEGMENTS;
@@ -380,6 +380,19 @@ impl Simulation {
     /// Number of frames of the whole motion, and of those so far, both without the first.
     pub fn frames(&self) -> (usize, usize) {
         (self.outputs, self.made)
+    }
+
+    /// The masses that have landed so far.
+    pub fn landings(&self) -> Vec<LandingRecord> {
+        let scenario = self.leaf.scenario();
+        let record = |impact: &Impact| LandingRecord {
+            point: impact.point + 1,
+            vein: scenario.points[impact.point].vein + 1,
+            at: scenario.points[impact.point].at,
+            time: impact.time * self.physics.time_unit,
+            lost_energy: impact.lost_energy * self.leaf.scale.moment(),
+        };
+        self.method.impacts().iter().map(record).collect()
     }
 
     /// The time now, in the scenario's unit.

@@ -65,6 +65,9 @@ pub struct Record {
     pub stable_step: Option<StableStep>,
     /// Number of time steps.
     pub steps: usize,
+    /// The masses that have landed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub landings: Vec<LandingRecord>,
     /// All outputs; the first at time 0.
     #[serde(flatten, serialize_with = "serialize_moments")]
     pub moments: Vec<OutputSample>,
@@ -82,6 +85,22 @@ pub struct Record {
     pub film: Vec<ShapeSnapshot>,
     /// Wall-clock time of the motion alone.
     pub wall_seconds: f64,
+}
+
+/// A mass that has landed on a point, in the units of the scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LandingRecord {
+    /// The point, from 1.
+    pub point: usize,
+    /// The vein, from 1.
+    pub vein: usize,
+    /// The fraction of its length.
+    pub at: f64,
+    /// When the mass landed.
+    pub time: f64,
+    /// The energy that was lost, which is part of the dissipated energy: that of the mass and the node on which it
+    /// landed less that of both with one velocity. It vanishes with the length of the segments.
+    pub lost_energy: f64,
 }
 
 impl Record {
@@ -119,6 +138,7 @@ impl Record {
             time_step: simulation.longest_step(),
             stable_step: simulation.stable_step(),
             steps: simulation.steps(),
+            landings: simulation.landings(),
             moments,
             tips: match scenario.joined {
                 true => tips.take(1).collect(),

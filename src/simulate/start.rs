@@ -82,12 +82,8 @@ pub(super) fn state_at_rest(
 
 /// The scenario with the loads, the wind and the rest shape at time 0.
 pub(super) fn scenario_at_start(scenario: &Scenario) -> Scenario {
-    let mut scenario = scenario.clone();
-    let dynamics = &scenario.dynamics;
-    scenario.gravity = dynamics.gravity.at(0.0);
-    scenario.tip_force = dynamics.tip_force.at(0.0);
-    scenario.tip_moment = dynamics.tip_moment.at(0.0);
-    let factor = dynamics.rest.at(0.0);
+    let mut scenario = scenario.at_time(0.0);
+    let factor = scenario.dynamics.rest.at(0.0);
     let air = scenario.wind.as_ref().map(|wind| wind.velocity.at(0.0));
     match (&mut scenario.wind, air) {
         (Some(wind), Some(air)) if air != [0.0; 3] => wind.velocity = Schedule::constant(air),
@@ -125,7 +121,7 @@ pub(crate) fn unstable_start_doubt(
     start: &State,
 ) -> Option<MotionDoubt> {
     let mut leaf = leaf.clone();
-    leaf.loads = physics.loads(0.0);
+    physics.apply_loads(&mut leaf, 0.0);
     if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
         // Its rest is no minimum of an energy, or it has none.
         return None;

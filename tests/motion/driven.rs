@@ -11,7 +11,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A complex number.
 #[derive(Clone, Copy, Debug)]
-struct Complex(f64, f64);
+pub struct Complex(pub f64, pub f64);
 
 impl Add for Complex {
     type Output = Complex;
@@ -59,13 +59,13 @@ impl Div for Complex {
 }
 
 impl Complex {
-    fn sqrt(self) -> Complex {
+    pub fn sqrt(self) -> Complex {
         let size = self.0.hypot(self.1).sqrt();
         let half = 0.5 * self.1.atan2(self.0);
         Complex(size * half.cos(), size * half.sin())
     }
 
-    fn exp(self) -> Complex {
+    pub fn exp(self) -> Complex {
         let size = self.0.exp();
         Complex(size * self.1.cos(), size * self.1.sin())
     }

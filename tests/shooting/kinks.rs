@@ -269,6 +269,8 @@ fn stations_a_rounding_error_from_a_point_that_is_loaded() {
             force: [0.2, 0.3, 1.0],
             moment: [0.4, -0.5, 0.6],
             mass: 0.0,
+            in_time: None,
+            landing: None,
         }];
         let (relaxed, _) = all_agree("point", &rod);
         for station in [at.next_down(), at, at.next_up()] {

@@ -82,7 +82,7 @@ fn masses_on_one_point_add_up() {
     two.points[0].mass = 0.4;
     let other = leafdyn::scenario::PointLoad {
         mass: 0.3,
-        ..two.points[0]
+        ..two.points[0].clone()
     };
     two.points.push(other);
     let (found, bar) = lowest(&two);

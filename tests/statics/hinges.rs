@@ -35,6 +35,8 @@ fn moment_at(at: f64, entries: &str) -> Scenario {
         force: [0.0; 3],
         moment: [0.3, 0.8, -0.4],
         mass: 0.0,
+        in_time: None,
+        landing: None,
     });
     scenario
 }

@@ -45,6 +45,8 @@ pub fn moments_on_points() -> Scenario {
         force: [0.0; 3],
         moment,
         mass: 0.0,
+        in_time: None,
+        landing: None,
     };
     rod.points = vec![
         point(0.5, [0.8, -0.6, 0.9]),

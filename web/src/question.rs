@@ -110,6 +110,8 @@ impl Pull {
             force,
             moment: [0.0; 3],
             mass: 0.0,
+            in_time: None,
+            landing: None,
         });
         scenario
     }

@@ -227,6 +227,8 @@ mod tests {
             force: [0.0; 3],
             moment: [0.3, 0.2, 0.1],
             mass: 0.0,
+            in_time: None,
+            landing: None,
         }];
         let pictures = record.stills.len();
         // An arc and its head in every panel, and one view at rest.

@@ -382,6 +382,8 @@ mod tests {
                 force: [0.0, 0.0, 0.5],
                 moment: [0.0; 3],
                 mass: 0.0,
+                in_time: None,
+                landing: None,
             }];
         });
         assert!(loaded.contains(">force 2<") && loaded.contains(">force 0.5<"));

@@ -9,6 +9,7 @@ use ListEntryOwner::*;
 use glam::DVec3;
 use leafdyn::scenario::{BaseSupport, Grip, Key, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Arrows of loads.
 struct LoadArrows {
@@ -108,12 +109,11 @@ pub struct SupportMark {
 /// The dead loads on a leaf at rest, or on one in motion at this time. Gravity and wind, which act on
 /// all veins alike, are directions of the whole figure.
 pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
-    let motion = &scenario.dynamics;
-    let [tip_force, tip_moment] = match time {
-        Some(time) => [motion.tip_force.at(time), motion.tip_moment.at(time)],
-        None => [scenario.tip_force, scenario.tip_moment],
-    }
-    .map(DVec3::from_array);
+    let scenario = &match time {
+        Some(time) => Cow::Owned(scenario.at_time(time)),
+        None => Cow::Borrowed(scenario),
+    };
+    let [tip_force, tip_moment] = [scenario.tip_force, scenario.tip_moment].map(DVec3::from_array);
     let veins = scenario.rods.len();
     let g = DVec3::from_array(scenario.g);
     let points = scenario.points.iter();

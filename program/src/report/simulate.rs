@@ -9,7 +9,7 @@ use crate::report::table::{LabelledLines, label_first_line};
 use leafdyn::numbers::{larger, largest};
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, LENGTH, TIME};
-use leafdyn::simulate::{Record, SchemeReason};
+use leafdyn::simulate::{LandingRecord, Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
 const ENERGY_ROUNDING: f64 = 1e-13;
@@ -33,6 +33,11 @@ impl ReportedResult for Record {
             lines.push(("choice", self.choice.to_string()));
         }
         lines.extend(energy_lines(self, units));
+        let landings = self
+            .landings
+            .iter()
+            .map(|landing| landing_line(landing, units));
+        lines.extend(label_first_line("landing", landings));
         if let [tip] = self.tips.as_slice() {
             let decimals = (POSITION_DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
             let tip = format_position(tip.to_array(), decimals as usize);
@@ -105,6 +110,16 @@ fn energy_lines(record: &Record, units: &Units) -> LabelledLines {
     let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
     let parts = number_in_unit(parts.join(", "), units, ENERGY);
     vec![("energy", parts), ("balance", balance)]
+}
+
+/// When a mass landed, and what energy was lost.
+fn landing_line(landing: &LandingRecord, units: &Units) -> String {
+    let time = number_in_unit(format_five_digits(landing.time), units, TIME);
+    let lost = number_in_unit(format_five_digits(landing.lost_energy), units, ENERGY);
+    let LandingRecord { vein, at, .. } = landing;
+    format!(
+        "a mass on vein {vein} at {at:.3}, at t = {time}: energy {lost} lost, which finer grids lower"
+    )
 }
 
 /// The bar on the tips, and where it ends.

@@ -50,9 +50,19 @@ class CouplingTable(TypedDict, total=False):
     z: float | Numbers
 
 
+class BaseMotion(TypedDict, total=False):
+    """``dynamics.base``"""
+
+    at: Numbers
+    move: Sequence[Numbers] | Profile
+    smooth: bool
+    turn: Sequence[Numbers] | Profile
+
+
 class DynamicsTable(TypedDict, total=False):
     """``[dynamics]``"""
 
+    base: BaseMotion
     clamped: bool
     density: float | Numbers | Profile
     duration: float
@@ -79,7 +89,7 @@ class GripTable(TypedDict, total=False):
 
     at: float | Numbers
     held: str
-    move: Numbers
+    move: Numbers | Profile
     stiffness: Numbers | Sequence[float | str]
     turn_stiffness: float | str
     vein: SupportsIndex | Sequence[SupportsIndex]
@@ -98,20 +108,28 @@ class LeafTable(TypedDict, total=False):
     rods: SupportsIndex
 
 
-class LoadPointTable(TypedDict, total=False):
-    """``[load.point]``"""
-
-    at: float
-    force: Numbers
-    mass: float
-    moment: Numbers
-    vein: SupportsIndex
+LoadPointTable = TypedDict(
+    "LoadPointTable",
+    {
+        "at": float,
+        "factor": Profile,
+        "force": Numbers,
+        "from": float,
+        "mass": float,
+        "moment": Numbers,
+        "vein": SupportsIndex,
+        "velocity": Numbers,
+    },
+    total=False,
+)
+"""``[load.point]``"""
 
 
 class LoadTable(TypedDict, total=False):
     """``[load]``"""
 
     distributed: Numbers | Vectors | Profile
+    factor: Profile
     g: Numbers
     gravity: Numbers | Vectors
     point: Sequence[LoadPointTable]
@@ -179,7 +197,7 @@ class TipTable(TypedDict, total=False):
 
     angles: float | Numbers
     held: str
-    position: Numbers
+    position: Numbers | Profile
     twist: float | Numbers
 
 

@@ -114,6 +114,16 @@ impl BlockForces {
     }
 }
 
+/// A node at which the forces of segments are wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct WatchedNode {
+    /// Index in the arrays of the pack.
+    pub entry: usize,
+    /// Force and moment of its segments before the step.
+    pub force: [f64; 3],
+    pub moment: [f64; 3],
+}
+
 /// A time step of a pack: a kick by all forces, of length `kick`, velocities
 /// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
 pub struct PackStep<'a> {
@@ -139,6 +149,8 @@ pub struct PackStep<'a> {
     pub loads: Loads,
     /// Dead moments on a single rod.
     pub moments: &'a [NodalMoment],
+    /// Nodes at which the forces of segments are wanted.
+    pub watched: &'a mut [WatchedNode],
     pub velocity_factor: f64,
     pub kick: f64,
     pub drift: f64,
@@ -191,6 +203,15 @@ impl pulp::WithSimd for PackStep<'_> {
             };
             let (past, block) = (&mut *self.past, &mut *self.block);
             forces(simd, nodes, past, block, &mut sums);
+            for it in self.watched.iter_mut() {
+                let node = it.entry.wrapping_sub(start);
+                if node < count {
+                    let at = MAX_LANES + node;
+                    it.force = [0, 1, 2].map(|c| block.n[c][at] - block.n[c][at - 1]);
+                    it.moment =
+                        [0, 1, 2].map(|c| 0.5 * (block.left[c][at] + block.right[c][at - 1]));
+                }
+            }
             for rod in 0..rods.len() {
                 // No segment follows the last node.
                 let tip = (rod * layout.stride + layout.segments).wrapping_sub(start);

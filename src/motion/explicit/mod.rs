@@ -35,19 +35,21 @@ mod stable_step;
 mod tests;
 
 use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
-use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
+use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw, WatchedNode};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
 use crate::motion::explicit::packs::{NodeMomentum, Pack, SlidingNode};
 pub use crate::motion::explicit::stable_step::StableStep;
+use crate::motion::moving_supports::{MovingNode, MovingSupports};
 use crate::motion::physics::{Physics, WindDrag};
 use crate::motion::{
-    EnergyBalance, Exchange, MotionClock, Snapshot, Stopped, TIME_ROUNDING_FRACTION,
-    TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, NodeMotionComponents, Snapshot,
+    Stopped, TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure,
+    rate_weights,
 };
 use crate::numbers::largest;
 use crate::rod::{RESOLVED_TURN, Wrench};
 use crate::simd::widest_arch;
-use glam::{DQuat, DVec3};
+use glam::{BVec3, DQuat, DVec3};
 use pulp::Arch;
 use rayon::prelude::*;
 
@@ -96,6 +98,7 @@ pub struct Explicit {
     block: BlockForces,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
     applied: Option<AppliedLoads>,
+    supports: Option<MovingSupports>,
     /// The dead moments of a step.
     moments: StepDeadMoments,
     /// Nodes that grips hold along some axes and let slide along the others.
@@ -109,11 +112,29 @@ pub struct Explicit {
     last_step_time: f64,
     clock: MotionClock,
     equal_steps: EqualSteps,
-    /// Widths of the last step and of the one before; zero if there was none.
-    widths: [f64; 2],
+    past: PastSteps,
     balance: EnergyBalance,
     work: VaryingWork,
     parallel: bool,
+}
+
+/// Steps before the present time.
+#[derive(Clone, Copy, Debug, Default)]
+struct PastSteps {
+    /// Widths of the last step and of the one before; zero if there was none since the start, or since
+    /// velocities jumped.
+    widths: [f64; 2],
+    /// Times between the present strains and those stored last, and between these and the ones before.
+    strain_widths: [f64; 2],
+    /// Whether velocities jumped at the present time.
+    jumped: bool,
+}
+
+impl PastSteps {
+    /// Time by which velocities lag behind positions: half a step, but zero at the start.
+    fn velocity_lag(&self) -> f64 {
+        0.5 * self.widths[0]
+    }
 }
 
 /// Where steps of the present length began.
@@ -173,6 +194,7 @@ impl Explicit {
             positions,
             layout,
             applied: AppliedLoads::new(&leaf, &physics, state, layout),
+            supports: MovingSupports::new(&leaf, &physics),
             moments: StepDeadMoments::default(),
             block: BlockForces::new(),
             sliding: packs::sliding_nodes(&leaf, state, layout),
@@ -182,7 +204,7 @@ impl Explicit {
             last_step_time: 0.0,
             clock: MotionClock::default(),
             equal_steps: EqualSteps::default(),
-            widths: [0.0; 2],
+            past: PastSteps::default(),
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
             parallel: layout.packs() > 1
@@ -191,6 +213,8 @@ impl Explicit {
             leaf,
             physics,
         };
+        explicit.physics.apply_loads(&mut explicit.leaf, 0.0);
+        explicit.start_supports();
         explicit.step =
             step.unwrap_or_else(|| SETTINGS.stable_step_fraction * explicit.stable_step().step);
         let start = explicit.snapshot();
@@ -233,7 +257,7 @@ impl Explicit {
                 array.fill(0.0);
             }
         }
-        self.widths = [0.0; 2];
+        self.past = PastSteps::default();
     }
 
     /// Sets the decay rate of all velocities from now on.
@@ -286,26 +310,26 @@ impl Explicit {
 
     fn kick_and_drift(&mut self, h: f64) -> KickEnergy {
         let energy = self.kick(0.5 * h, h, true);
-        self.widths = [h, self.widths[0]];
+        self.past = PastSteps {
+            widths: [h, self.past.widths[0]],
+            strain_widths: [h, self.past.strain_widths[0]],
+            jumped: false,
+        };
         self.last_step_time += h;
         energy
-    }
-
-    /// Time by which velocities lag behind positions: half a step, but zero at the start.
-    fn velocity_lag(&self) -> f64 {
-        0.5 * self.widths[0]
     }
 
     /// Advances velocities, by the forces at the present positions, to the time
     /// `ahead` of these, and positions by the time `drift`.
     /// Strains are stored as those of the last step if `remember`.
     fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> KickEnergy {
-        let length = self.velocity_lag() + ahead;
+        let length = self.past.velocity_lag() + ahead;
         let [from, to] = [
-            self.last_step_time - self.velocity_lag(),
+            self.last_step_time - self.past.velocity_lag(),
             self.last_step_time + ahead,
         ];
-        let loads = self.physics.mean_loads([from, to]);
+        self.physics.apply_mean_loads(&mut self.leaf, [from, to]);
+        let loads = self.leaf.loads;
         let rest = self.physics.mean_rest_curvature_factor([from, to]);
         let before_kick = self.excess_load_power(&loads);
         let mut work = 0.0;
@@ -317,7 +341,7 @@ impl Explicit {
             &self.packs,
         );
         if let Some(applied) = &mut self.applied {
-            let [last, before] = self.widths;
+            let [last, before] = self.past.widths;
             let air = KickAir {
                 velocity: self.physics.mean_air([from, to]),
                 extrapolation: if last > 0.0 {
@@ -327,10 +351,14 @@ impl Explicit {
                 },
             };
             applied.update(&self.leaf, self.layout, &self.positions, &self.packs, air);
+            for it in self.supports.iter_mut().flat_map(|it| &mut it.nodes) {
+                it.load = support_load(&self.leaf, &applied.state, it);
+            }
         }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
         self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
+        work += self.drive_supports(drift);
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
@@ -364,13 +392,12 @@ impl Explicit {
         energy -= self.return_sliding_nodes();
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
-            work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity);
+            let free = |k: usize| !MovingSupports::holds(&self.supports, k, 1);
+            work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity, free);
         }
         work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_curvature_varies() {
-            work += self
-                .work
-                .rest_curvature_work(rest, bent, length, self.widths[0]);
+            work += self.work.rest_curvature_work(rest, bent, length, self.past);
         }
         KickEnergy {
             exchange: Exchange {
@@ -406,7 +433,10 @@ impl Explicit {
             rest_varies: changes,
             rest_curvature_factor: if changes { rest } else { 1.0 },
             retardation: self.physics.retardation,
-            strain_rate_weights: rate_weights(self.widths[0], self.widths[1]),
+            strain_rate_weights: {
+                let [last, before] = self.past.strain_widths;
+                rate_weights(last, before)
+            },
             stores_strains: remember,
         }
     }
@@ -445,6 +475,7 @@ impl Explicit {
                 law,
                 loads,
                 moments,
+                watched: &mut pack.watched,
                 velocity_factor: keep,
                 kick,
                 drift,
@@ -538,6 +569,11 @@ impl TimeIntegrator for Explicit {
             // Times are multiples of the step, so that rounding does not accumulate.
             let EqualSteps { time, steps } = self.equal_steps;
             let next = time + h * (self.clock.steps + 1 - steps) as f64;
+            let landing = self.physics.next_landing_time();
+            if landing <= until && next > landing + TIME_ROUNDING_FRACTION * h {
+                self.land_next_mass();
+                continue;
+            }
             if next > until + TIME_ROUNDING_FRACTION * h {
                 break;
             }
@@ -567,7 +603,8 @@ impl TimeIntegrator for Explicit {
         let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
         let past = self.applied.as_ref().map(AppliedLoads::past_velocities);
         let path = (self.positions.clone(), moving);
-        let (time, widths, work) = (self.last_step_time, self.widths, self.work);
+        let (time, steps, work) = (self.last_step_time, self.past, self.work);
+        let supports = self.supports.clone();
         let mut exchange = Exchange::default();
         let left = self.clock.time - self.last_step_time;
         if left > TIME_ROUNDING_FRACTION * self.step {
@@ -579,9 +616,19 @@ impl TimeIntegrator for Explicit {
         let state = self.present_state();
         let nodes = self.leaf.rod_index_pairs(0..=self.leaf.segments());
         let places = nodes.map(|(j, i)| self.layout.pack_position(j, i));
-        let velocity: Vec<Velocity> = places
+        let mut velocity: Vec<Velocity> = places
             .map(|place| self.packs[place.pack].velocity(place.entry))
             .collect();
+        if let Some(supports) = &self.supports {
+            for it in &supports.nodes {
+                velocity[it.index].linear = it.velocity.linear;
+                if it.holds_rotation {
+                    velocity[it.index].angular = it.velocity.angular;
+                }
+            }
+            let inertia = |it: &MovingNode| self.physics.inertia(&self.leaf, it.rod, it.node);
+            exchange.work += supports.kinetic_energy(inertia) - supports.kinetic_energy;
+        }
         self.positions = path.0;
         for (pack, moving) in self.packs.iter_mut().zip(path.1) {
             (pack.motion, pack.past) = moving;
@@ -589,7 +636,7 @@ impl TimeIntegrator for Explicit {
         if let (Some(applied), Some(past)) = (&mut self.applied, past) {
             applied.set_past_velocities(past);
         }
-        (self.last_step_time, self.widths, self.work) = (time, widths, work);
+        (self.last_step_time, self.past, self.work) = (time, steps, work);
         let energy = measure(
             &mut self.leaf,
             &self.physics,
@@ -597,12 +644,181 @@ impl TimeIntegrator for Explicit {
             &state,
             &velocity,
         );
+        self.supports = supports;
+        if let Some(supports) = &mut self.supports {
+            supports.move_to(self.last_step_time, &mut self.leaf);
+        }
         Snapshot {
             time: self.clock.time,
             energy: self.balance.present_energy(energy, exchange),
             state,
             velocity,
         }
+    }
+}
+
+/// The moment and the force on a node whose support moves, besides those of its segments.
+fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
+    let load = leaf.load(state, it.rod, it.node);
+    let moment = match (it.holds_rotation, it.node) {
+        (true, _) => load.moment,
+        (false, 0) => -leaf.spring_load(state, it.rod, 0).moment,
+        (false, _) => DVec3::ZERO,
+    };
+    Wrench {
+        moment,
+        force: load.force,
+    }
+}
+
+impl Explicit {
+    /// Watches the nodes whose supports move, and sets their velocities at the start.
+    fn start_supports(&mut self) {
+        let Some(supports) = &mut self.supports else {
+            return;
+        };
+        for it in &mut supports.nodes {
+            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
+            it.watched = self.packs[pack].watched.len();
+            self.packs[pack].watched.push(WatchedNode {
+                entry,
+                force: [0.0; 3],
+                moment: [0.0; 3],
+            });
+        }
+        supports.move_to(0.0, &mut self.leaf);
+        let inertia = |it: &MovingNode| self.physics.inertia(&self.leaf, it.rod, it.node);
+        supports.kinetic_energy = supports.kinetic_energy(inertia);
+    }
+
+    /// Moves supports on by the time `drift`, and returns the work that they did: half of it in the step before,
+    /// half in this one.
+    fn drive_supports(&mut self, drift: f64) -> f64 {
+        let Some(supports) = &mut self.supports else {
+            return 0.0;
+        };
+        supports.move_to(self.last_step_time + drift, &mut self.leaf);
+        let mut work = 0.0;
+        for it in &mut supports.nodes {
+            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
+            let pack = &mut self.packs[pack];
+            let own = pack.watched[it.watched];
+            let step = it.step();
+            let last = match self.past.velocity_lag() > 0.0 {
+                true => it.last_step,
+                false => NodeMotionComponents::default(),
+            };
+            let force = it.load.force + DVec3::from(own.force);
+            let mut moment = it.load.moment;
+            if it.holds_rotation {
+                moment += DVec3::from(own.moment);
+            }
+            work -= 0.5 * force.dot(last.displacement + step.displacement);
+            work -= 0.5 * moment.dot(last.rotation + step.rotation);
+            let velocity = match drift > 0.0 {
+                true => step.displacement / drift,
+                false => it.velocity.linear,
+            };
+            let at = self.layout.node_index(it.rod, it.node);
+            for c in 0..3 {
+                self.positions[c][at] = it.now.position[c];
+                pack.motion.v[c][entry] = velocity[c];
+            }
+            if it.holds_rotation {
+                let before = pack.quaternion(entry);
+                let q = it.now.rotation;
+                let aligned = if before.dot(q) < 0.0 { -q } else { q };
+                for (array, value) in pack.motion.q.iter_mut().zip(aligned.to_array()) {
+                    array[entry] = value;
+                }
+            }
+        }
+        if drift > 0.0 {
+            supports.accept();
+        }
+        work
+    }
+
+    /// Goes to the time at which the next mass lands, by a step of its own, and lets it land on its node: the
+    /// velocities jump, and steps begin anew.
+    fn land_next_mass(&mut self) {
+        let Some(landing) = self.physics.next_landing() else {
+            return;
+        };
+        let (h, left) = (self.step, landing.time - self.last_step_time);
+        if left > TIME_ROUNDING_FRACTION * h {
+            let energy = self.kick_and_drift(left);
+            self.balance.add(energy.exchange);
+            self.clock.steps += 1;
+        }
+        self.last_step_time = landing.time;
+        let mut exchange = self.kick(0.0, 0.0, false).exchange;
+        if self.physics.rest_curvature_varies() {
+            exchange.work += std::mem::take(&mut self.work.half_impulse) * self.work.rate;
+        }
+        let (j, i) = (landing.vein, self.leaf.grid.nearest_node(landing.sigma));
+        let joint = self.tip_mass.filter(|_| i == self.layout.segments);
+        let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+        let collision = Collision {
+            mass: landing.mass,
+            velocity: landing.velocity,
+            node_mass: joint.unwrap_or_else(|| self.physics.inertia(&self.leaf, j, i).mass),
+            node_velocity: self.momentum(j, i).velocity,
+            free: match joint {
+                Some(_) => BVec3::TRUE,
+                None if self.packs[pack].moves_freely(entry) => {
+                    self.leaf.node_freedom(j, i).displacement
+                }
+                None => BVec3::FALSE,
+            },
+        };
+        self.physics.land_next_mass();
+        match joint {
+            Some(mass) => self.tip_mass = Some(mass + landing.mass),
+            None => self.packs[pack].add_mass(entry, landing.mass),
+        }
+        let velocity = collision.common_velocity();
+        let rods = if joint.is_some() {
+            0..self.layout.rods
+        } else {
+            j..j + 1
+        };
+        for j in rods {
+            let PackPosition { pack, entry } = self.layout.pack_position(j, i);
+            for c in 0..3 {
+                self.packs[pack].motion.v[c][entry] = velocity[c];
+            }
+        }
+        if let Some(supports) = &mut self.supports {
+            supports.add_mass(j * (self.layout.segments + 1) + i, landing.mass);
+        }
+        let lost = collision.exchange();
+        exchange += lost;
+        self.balance.add(exchange);
+        self.clock.impacts.push(Impact {
+            point: landing.point,
+            time: landing.time,
+            lost_energy: lost.dissipated,
+        });
+        self.past = PastSteps {
+            jumped: true,
+            ..PastSteps::default()
+        };
+        if self.physics.retardation > 0.0 {
+            // Stores the strains before, had the leaf always moved as it does now.
+            let rest = self.physics.rest_curvature_factor(landing.time);
+            let loads = self.leaf.loads;
+            self.move_packs(&loads, self.law(rest, false), 1.0, 0.0, -h);
+            self.move_packs(&loads, self.law(rest, true), 1.0, 0.0, h);
+            self.past.strain_widths = [h, 0.0];
+        }
+        (self.clock.time, self.equal_steps) = (
+            landing.time,
+            EqualSteps {
+                time: landing.time,
+                steps: self.clock.steps,
+            },
+        );
     }
 }
 
@@ -636,7 +852,8 @@ impl AppliedLoads {
     ) -> Option<Self> {
         let wind = WindDrag::new(leaf, physics);
         let dead = leaf.loads.rod_load_factor != 0.0;
-        if !leaf.has_tissue() && !dead && !leaf.has_springs() && wind.is_none() {
+        let moved = leaf.leaf.scenario().support_motion.is_some();
+        if !leaf.has_tissue() && !dead && !leaf.has_springs() && wind.is_none() && !moved {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -715,13 +932,18 @@ impl AppliedLoads {
         leaf.half_turn_since(&self.alignments, &self.state)
     }
 
-    /// Power of the wind at the mean of the velocities before the last kick and of these.
-    fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
+    /// Power of the wind, on the nodes that count, at the mean of the velocities before the last kick and of these.
+    fn power_of_wind(
+        &self,
+        velocity: impl Fn(usize, usize) -> DVec3,
+        counts: impl Fn(usize) -> bool,
+    ) -> f64 {
         let Some(blown) = &self.nodes_in_wind else {
             return 0.0;
         };
         let nodes = self.state.segments() + 1;
         let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
+        let forces = forces.filter(|(k, _)| counts(*k));
         let power = forces.map(|(k, (force, before))| {
             force.dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
         });
@@ -824,9 +1046,14 @@ impl VaryingWork {
     /// Work since the last kick, `width` ago, by the mean factors of the rest curvatures in that
     /// kick and, over `length`, in this one; `bent` is the sum of the rest curvatures
     /// times the present moments.
-    fn rest_curvature_work(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
-        let turned = bent + mean * self.twice_straightening_energy;
-        let half_impulse = 0.5 * length * (mean - self.rest_curvature_factor);
+    fn rest_curvature_work(&mut self, mean: f64, bent: f64, length: f64, past: PastSteps) -> f64 {
+        let (turned, width) = (
+            bent + mean * self.twice_straightening_energy,
+            past.widths[0],
+        );
+        // After a jump of the velocities only the rate after it counts.
+        let part = if past.jumped { 1.0 } else { 0.5 };
+        let half_impulse = part * length * (mean - self.rest_curvature_factor);
         self.rate = match width > 0.0 {
             true => (turned - self.rest_moment_sum) / width,
             false => 0.0,
@@ -848,10 +1075,11 @@ impl Explicit {
 
     /// Present potential of the excess of loads and rest curvatures over those at time 0: it
     /// is in the energies, but does not come from the motion.
-    fn excess_potential(&self) -> f64 {
+    fn excess_potential(&mut self) -> f64 {
         let mut work = 0.0;
         if self.physics.loads_vary() {
-            let loads = self.physics.loads(self.clock.time);
+            (self.physics).apply_loads(&mut self.leaf, self.clock.time);
+            let loads = self.leaf.loads;
             work -= self.excess_load_sum(&loads, |j, i| {
                 vector_at(&self.positions, self.layout.node_index(j, i))
             });
@@ -887,6 +1115,6 @@ impl Explicit {
                 sum += excess.tip_force.dot(vectors(j, self.layout.segments));
             }
         }
-        sum
+        sum + self.physics.scheduled_excess(&self.leaf, vectors)
     }
 }

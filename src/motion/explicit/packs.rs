@@ -2,7 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
-use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory};
+use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory, WatchedNode};
 use crate::motion::explicit::layout::{
     AlignedArray, BlockMaterial, NODES_PER_BLOCK, NodeData, PackLayout, PackPosition,
     material_blocks, vector_at,
@@ -19,6 +19,8 @@ pub struct Pack {
     pub past: StrainHistory,
     /// Sums of the last step.
     pub totals: StepTotals,
+    /// Nodes whose supports move.
+    pub watched: Vec<WatchedNode>,
 }
 
 impl Pack {
@@ -117,6 +119,7 @@ pub fn packs_at_rest(
                 earlier: past(),
             },
             totals: StepTotals::default(),
+            watched: Vec::new(),
         }
     });
     packs.collect()
@@ -204,6 +207,22 @@ impl Pack {
         NodeMaterial {
             block: &self.material[at / length],
             node: at % length,
+        }
+    }
+
+    /// Whether a node moves by the forces on it alone: it is not held, and is no shared tip.
+    pub fn moves_freely(&self, at: usize) -> bool {
+        let NodeMaterial { block, node } = self.node_material(at);
+        block.inverse_mass[node] > 0.0
+    }
+
+    /// Adds a mass to a node, unless it is held.
+    pub fn add_mass(&mut self, at: usize, mass: f64) {
+        if self.moves_freely(at) {
+            let length = self.material[0].mass.len();
+            let block = Arc::make_mut(&mut self.material[at / length]);
+            block.mass[at % length] += mass;
+            block.inverse_mass[at % length] = block.mass[at % length].recip();
         }
     }
 

@@ -270,6 +270,11 @@ impl Entries {
         self.entry(key, 0).is_some()
     }
 
+    /// Whether a value of the key is written in one of its tables, if there may be several.
+    pub(in crate::scenario) fn is_given_in_row(&self, key: Key, row: usize) -> bool {
+        self.entry(key, row).is_some()
+    }
+
     /// Whether a value of some key of this table is written.
     pub(in crate::scenario) fn has_key_of_table(&self, table: &str) -> bool {
         let mut keys = Key::all().filter(|key| key.table() == table);

@@ -31,6 +31,11 @@ const VECTOR_PROFILE_FORM: &str = "a load along the rods is a list [x, y, z], on
      { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 const LOAD_SCHEDULE_FORM: &str = "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }, with smooth = true without \
      kinks, or { mean = [0.0, 0.0, -1.0], amplitude = [0.0, 0.1, 0.0], frequency = 2.0, phase = 0.0 }";
+const MOTION_SCHEDULE_FORM: &str = "a motion is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]] }, with smooth = true without \
+     kinks, or { amplitude = [0.0, 0.0, 0.1], frequency = 2.0 }";
+const BASE_MOTION_FORM: &str = "the motion of bases is { at = [0.0, 1.0], move = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]], turn = [[0.0, 0.0, 0.0], \
+     [0.0, 0.5, 0.0]] }, one of both or both, with smooth = true without kinks, or \
+     { move = { amplitude = [0.0, 0.0, 0.1], frequency = 2.0 } }, and likewise turn";
 const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
 /// The value of a key, or a part of it.
@@ -581,10 +586,64 @@ impl<'e> EntryValue<'e> {
 
     /// A vector at given times; for some keys also one vector for all times.
     pub fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
-        if self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array() {
+        // Where supports are is more often still than in time.
+        let still = match self.key().table() {
+            "grip" | "tip" => !self.value.is_table(),
+            _ => self.key().form() == ValueSchema::VectorOrInTime && self.value.is_array(),
+        };
+        if still {
             return Ok(Schedule::constant(self.vector()?));
         }
-        self.schedule(["value", VECTORS], LOAD_SCHEDULE_FORM, |item| item.vector())
+        let form = match self.key().table() {
+            "grip" | "tip" => MOTION_SCHEDULE_FORM,
+            _ => LOAD_SCHEDULE_FORM,
+        };
+        self.schedule(["value", VECTORS], form, |item| item.vector())
+    }
+
+    /// Displacements and rotation vectors of bases in time: through values at common times, or each a quantity in
+    /// time of its own.
+    pub fn base_motion(&self) -> ScenarioResult<[Schedule<[f64; 3]>; 2]> {
+        let Some(table) = self.value.as_table() else {
+            return Err(self.value_error(format_args!("must be a table: {BASE_MOTION_FORM}")));
+        };
+        let is_common = table.contains_key("at");
+        let allowed: &[&str] = match is_common {
+            true => &["at", "move", "turn", "smooth"],
+            false => &["move", "turn"],
+        };
+        if let Some(key) = table.keys().find(|key| !allowed.contains(&key.as_str())) {
+            let key = shorten_excerpt(key);
+            return Err(self.value_error(format_args!("unknown key {key}: {BASE_MOTION_FORM}")));
+        }
+        let moves = ["move", "turn"].map(|name| self.list(name));
+        self.refuse_unless(
+            moves.iter().any(Option::is_some),
+            format_args!("move or turn is missing: {BASE_MOTION_FORM}"),
+        )?;
+        let read = |item: Option<EntryValue<'e>>| {
+            let Some(item) = item else {
+                return Ok(Schedule::constant([0.0; 3]));
+            };
+            let Some(at) = self.list("at") else {
+                let vector = |item: &EntryValue<'e>| item.vector();
+                return item.schedule(["value", VECTORS], BASE_MOTION_FORM, vector);
+            };
+            let at = at.increasing_numbers(KnotKind::Times)?;
+            let list = item.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
+            let values: Vec<[f64; 3]> = list
+                .map(|item| item.vector())
+                .collect::<ScenarioResult<_>>()?;
+            let smooth = self
+                .list("smooth")
+                .map_or(Ok(false), |item| item.switch())?;
+            Ok(match smooth {
+                true => Schedule::smooth(at, values),
+                false => Schedule::linear(at, values),
+            })
+        };
+        let [moved, turned] = moves;
+        Ok([read(moved)?, read(turned)?])
     }
 
     /// A place along a rod: a fraction of its length, greater than 0.

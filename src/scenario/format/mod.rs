@@ -160,6 +160,8 @@ keys! {
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
     TipMoment "load.tip_moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// factor in time of gravity, of `load.g` and of distributed loads; at rest that of time 0.
+    LoadFactor "load.factor": FactorInTime, [0, 0, 0], Derived;
     /// the rod that is loaded at a point, counted from 1.
     PointVein "load.point.vein": Whole, [0, 0, 0], Required("1");
     /// where the point is, a fraction of the length.
@@ -170,10 +172,16 @@ keys! {
     PointMoment "load.point.moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// mass of the point, which `load.g` pulls.
     PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
+    /// time at which the mass lands on the leaf; before that it is absent.
+    PointFrom "load.point.from": Number(NotNegative), [0, 0, 1], Default("0.0");
+    /// velocity with which it lands.
+    PointVelocity "load.point.velocity": Vector, [1, 0, -1], Default("[0.0, 0.0, 0.0]");
+    /// factor in time of the force and the moment on the point; at rest that of time 0.
+    PointFactor "load.point.factor": FactorInTime, [0, 0, 0], Derived;
     /// how the tips are held.
     TipHeld "tip.held": Text, [0, 0, 0], Default("\"free\"");
     /// where the joint tip, or the only rod's, is held.
-    TipPosition "tip.position": Vector, [1, 0, 0], Derived;
+    TipPosition "tip.position": VectorOrInTime, [1, 0, 0], Derived;
     /// of a clamped tip, the angles of the rods there, in radians.
     TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
@@ -188,7 +196,7 @@ keys! {
     /// whether the directions are held, too.
     GripHeld "grip.held": Text, [0, 0, 0], Default("\"pinned\"");
     /// by how much the grip has moved from its place in the natural leaf.
-    GripMove "grip.move": Vector, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
+    GripMove "grip.move": VectorOrInTime, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// by lab axis, how the grip holds the position: rigidly (`inf`), not at all (0), or by a spring of
     /// this force per displacement.
     GripStiffness "grip.stiffness": AxisStiffness, [-1, 1, 0], Default("[inf, inf, inf]");
@@ -223,6 +231,8 @@ keys! {
     TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Derived;
     /// factor of the rest curvatures in time.
     RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Derived;
+    /// how all bases move in time: displacements, and rotation vectors about their mean.
+    BaseInTime "dynamics.base": BaseMotion, [1, 0, 0], Derived;
     /// velocity of the air, steady or in time.
     WindVelocity "wind.velocity": VectorOrInTime, [1, 0, -1], Required("[2.0, 0.0, 0.0]");
     /// mass per volume of the air.
@@ -453,6 +463,8 @@ pub(crate) enum ValueSchema {
     VectorOrInTime,
     /// Factors at given times.
     FactorInTime,
+    /// Displacements and rotation vectors at given times.
+    BaseMotion,
 }
 
 /// Which numbers a key allows; never NaN.

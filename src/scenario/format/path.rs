@@ -8,8 +8,10 @@ use std::fmt;
 use toml::Value;
 
 /// Lists that the table of a profile or a schedule can have.
-const LIST_NAMES: [&str; 7] = [
+const LIST_NAMES: [&str; 9] = [
     "at",
+    "move",
+    "turn",
     "value",
     "factor",
     "amplitude",
@@ -110,7 +112,10 @@ impl EntryPath {
             ValueSchema::Text | ValueSchema::Switch if index.is_some() => {
                 Err("has no entries".into())
             }
-            ValueSchema::Vector | ValueSchema::AxisStiffness if index > Some(2) => {
+            ValueSchema::AxisStiffness if index > Some(2) => Err(COMPONENT_INDICES_HINT.into()),
+            ValueSchema::Vector | ValueSchema::VectorOrInTime
+                if self.list.is_none() && index > Some(2) =>
+            {
                 Err(COMPONENT_INDICES_HINT.into())
             }
             ValueSchema::VectorPerRod if self.indices[1] > Some(2) => {
@@ -119,9 +124,10 @@ impl EntryPath {
             ValueSchema::Quantity(_) | ValueSchema::Outline(_) | ValueSchema::VectorQuantity(_) => {
                 Ok(())
             }
-            ValueSchema::VectorInTime | ValueSchema::VectorOrInTime | ValueSchema::FactorInTime => {
-                Ok(())
-            }
+            ValueSchema::VectorInTime
+            | ValueSchema::VectorOrInTime
+            | ValueSchema::FactorInTime
+            | ValueSchema::BaseMotion => Ok(()),
             _ if self.list.is_some() => Err(format!("{path} has no lists within")),
             _ => Ok(()),
         }
@@ -139,9 +145,13 @@ impl EntryPath {
             ValueSchema::Text | ValueSchema::Switch => {
                 Err("takes no number that could vary".into())
             }
-            ValueSchema::VectorInTime | ValueSchema::FactorInTime if self.list.is_none() => Err(
-                format!("takes no number that could vary; its entries do: {path}.at[0]"),
-            ),
+            ValueSchema::VectorInTime | ValueSchema::FactorInTime | ValueSchema::BaseMotion
+                if self.list.is_none() =>
+            {
+                Err(format!(
+                    "takes no number that could vary; its entries do: {path}.at[0]"
+                ))
+            }
             ValueSchema::Vector
             | ValueSchema::AxisStiffness
             | ValueSchema::VectorOrInTime

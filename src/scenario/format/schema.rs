@@ -110,6 +110,26 @@ fn entry_schema(key: Key) -> Value {
         ValueSchema::FactorInTime => {
             schedule_schema(&["factor", "value"], number_schema(NumberRange::Finite))
         }
+        ValueSchema::BaseMotion => {
+            let vector = vector_schema(NumberRange::Finite);
+            let vectors = list_schema(vector.clone());
+            let common = json!({
+                "type": "object",
+                "properties": {
+                    "at": list_schema(number_schema(NumberRange::Finite)),
+                    "move": vectors, "turn": vectors, "smooth": { "type": "boolean" },
+                },
+                "required": ["at"],
+                "additionalProperties": false,
+            });
+            let own = schedule_schema(&["value"], vector);
+            let each = json!({
+                "type": "object",
+                "properties": { "move": own, "turn": own },
+                "additionalProperties": false,
+            });
+            json!({ "anyOf": [common, each] })
+        }
     };
     entry["description"] = json!(key.description());
     // Defaults are TOML; those that are also JSON are included.

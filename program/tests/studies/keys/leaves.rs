@@ -258,6 +258,24 @@ mass = 0.2
         boundary: None,
     },
     TestLeaf {
+        name: "struck",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+[load]
+tip_force = [0.1, 0.2, -0.3]
+gravity = [0.0, 0.3, -0.6]
+[[load.point]]
+vein = 1
+at = 0.5
+mass = 0.2
+from = 0.05
+velocity = [0.0, 1.0, -4.0]
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "photographed",
         text: "
 leaf = { rods = 1, length = 1.0, fan = [0.2] }

@@ -114,8 +114,46 @@ pub fn rows(key: Key) -> Vec<Row> {
             // Without a weight: what is left is its inertia.
             row("moving", "load.point[0].mass=0.4", Acts::Inertia, false),
         ],
+        Key::LoadFactor => vec![
+            row(
+                "veins",
+                "load.factor={at=[0.0],factor=[0.9]}",
+                Acts::Always,
+                false,
+            ),
+            row(
+                "veins",
+                "load.factor={at=[0.0,0.2],factor=[1.0,3.0]}",
+                Acts::Motions,
+                false,
+            ),
+        ],
+        Key::PointFactor => vec![
+            row(
+                "veins",
+                "load.point[0].factor={mean=0.7,amplitude=0.1,frequency=2.0}",
+                Acts::Always,
+                false,
+            ),
+            row(
+                "twisted",
+                "load.point[0].factor={at=[0.0,0.1],factor=[1.0,9.0]}",
+                Acts::Motions,
+                false,
+            ),
+        ],
+        Key::PointFrom => motions("struck", "load.point[0].from=0.1"),
+        Key::PointVelocity => motions("struck", "load.point[0].velocity=[0.0,2.0,-5.0]"),
         Key::TipHeld => always("pinned", "tip.held=clamped"),
-        Key::TipPosition => smooth("pinned", "tip.position[0]=0.91"),
+        Key::TipPosition => vec![
+            row("pinned", "tip.position[0]=0.91", Acts::Always, true),
+            row(
+                "pinned",
+                "tip.position={at=[0.0,0.1],value=[[0.9,0.1,-0.1],[0.9,0.2,-0.1]]}",
+                Acts::Motions,
+                false,
+            ),
+        ],
         Key::TipAngles => smooth("jaws", "tip.angles=0.25"),
         Key::TipTwist => smooth("jaws", "tip.twist=0.35"),
         Key::GripVein => always("gripped", "grip[0].vein=2"),
@@ -134,6 +172,12 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::FoundationStiffness => smooth("founded", "foundation.stiffness[2]=2.2"),
         Key::GripMove => vec![
             row("gripped", "grip[0].move[2]=0.06", Acts::Always, true),
+            row(
+                "gripped",
+                "grip[0].move={at=[0.0,0.1],value=[[0.0,0.03,0.05],[0.0,0.03,-0.05]]}",
+                Acts::Motions,
+                false,
+            ),
             row(
                 "gripped-in-wind",
                 "grip[0].move[2]=0.04",
@@ -176,6 +220,10 @@ pub fn rows(key: Key) -> Vec<Row> {
             "dynamics.tip_moment={at=[0.0,0.2],value=[[0.0,0.0,0.0],[0.0,1.0,1.0]]}",
         ),
         Key::RestInTime => motions("moving", "dynamics.rest={at=[0.0,0.2],factor=[1.0,0.0]}"),
+        Key::BaseInTime => motions(
+            "moving",
+            "dynamics.base={at=[0.0,0.1],move=[[0.0,0.0,0.0],[0.0,0.1,0.1]],turn=[[0.0,0.0,0.0],[0.0,0.3,0.0]]}",
+        ),
         Key::WindVelocity => always("windy", "wind.velocity=[0.5,0.9,1.1]"),
         Key::WindDensity => always("windy", "wind.density=1.3"),
         Key::WindDrag => always("windy", "wind.drag=2.2"),
