@@ -87,6 +87,14 @@ pub enum UnmodelledFeature {
         /// The method or the question.
         what: &'static str,
     },
+    /// Loads that turn with the section, or moments along veins.
+    #[error(
+        "load.follower, load.couple, load.point.follows: {what} does not take loads that turn with the section, or moments along veins, into account, as relaxation and motions do; leave them out"
+    )]
+    Followers {
+        /// The method or the question.
+        what: &'static str,
+    },
     /// Tissue that is rigid where shooting cannot keep it so.
     #[error("tissue.along, tissue.normal = inf: shooting does not solve {what}")]
     RigidTissue {

@@ -10,7 +10,7 @@
 //! which differ from those at its middle by a series in ds^2.
 
 use crate::leaf::state::State;
-use crate::leaf::{GrippedNode, Leaf, Loads};
+use crate::leaf::{FollowerLoad, GrippedNode, Leaf, Loads};
 use crate::natural::Natural;
 use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip};
@@ -55,6 +55,8 @@ pub struct DiscreteLeaf {
     pub(super) own_loads: Vec<DVec3>,
     /// Dead moments on points of a single rod, whole.
     pub(super) point_moments: Vec<NodalMoment>,
+    /// Loads without a potential on all nodes, rod after rod, before their factor; empty if there are none.
+    pub(super) followers: Vec<FollowerLoad>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
     /// Factor of all loads: one, except during continuation in the loads.
@@ -141,12 +143,14 @@ impl DiscreteLeaf {
             strips: Vec::new(),
             own_loads: Vec::new(),
             point_moments: Vec::new(),
+            followers: Vec::new(),
             grips: Vec::new(),
             load_factor: 1.0,
             loads: leaf.loads,
         };
         discrete.own_loads = discrete.nodal_own_loads(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
+        discrete.followers = discrete.nodal_followers();
         let gripped = !leaf.scenario().grips.is_empty();
         if leaf.has_tissue() || gripped {
             let natural = discrete.stress_free_state();
@@ -342,8 +346,9 @@ impl DiscreteLeaf {
             let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
             let gradient = segment.gradient(self.section(j, n - 1));
             let load = self.load(state, j, n);
-            force += load.force - gradient.x;
-            moments.push(load.moment + self.node_dead_moment(n) - gradient.b);
+            let follower = self.follower_wrench(state, j, n);
+            force += load.force + follower.force - gradient.x;
+            moments.push(load.moment + self.node_moment(state, j, n) - gradient.b);
         }
         TipReaction { force, moments }
     }

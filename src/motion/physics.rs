@@ -70,6 +70,8 @@ pub struct Physics {
     /// Part of the loads of single veins, and of the dead moments on points.
     rod_load_factor: f64,
     dead_moment_factor: f64,
+    /// Factor of the loads that turn with the sections, and of the moments along veins.
+    follower_factor: f64,
     point_masses: Vec<PointMass>,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
@@ -122,6 +124,7 @@ impl Physics {
         let mut physics = Physics {
             rod_load_factor: leaf.loads.rod_load_factor,
             dead_moment_factor: leaf.loads.dead_moment_factor,
+            follower_factor: leaf.loads.follower_factor,
             constant_loads: None,
             point_masses: Vec::new(),
             knots: schedule_knots(&dynamics, air.as_ref(), time),
@@ -203,6 +206,7 @@ impl Physics {
             tip_moment: tip_moment / self.scale.moment(),
             rod_load_factor: self.rod_load_factor,
             dead_moment_factor: self.dead_moment_factor,
+            follower_factor: self.follower_factor,
         }
     }
 

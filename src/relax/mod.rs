@@ -42,7 +42,7 @@ pub use crate::relax::remark::{
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, ShootingVariant, UnsupportedSetting,
-    check_tolerance, without_wind,
+    check_tolerance, without_wind_or_followers,
 };
 pub use crate::relax::rest::relax_from;
 pub(crate) use crate::relax::rest::{RelaxedLeaf, relax_on_grids};

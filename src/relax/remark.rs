@@ -25,6 +25,12 @@ remarks! {
             "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated"
         )]
         MomentWithoutPotential = "moment-without-potential",
+        /// A leaf at rest under loads that turn with the section, or moments along veins.
+        #[error(
+            "loads that turn with the section, and moments along veins, have no potential: energy is not stated, \
+             and no count of eigenvalues decides stability"
+        )]
+        FollowersWithoutPotential = "followers-without-potential",
         /// Negative eigenvalues that cannot be counted.
         #[error(
             "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \

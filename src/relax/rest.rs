@@ -19,7 +19,7 @@ use crate::relax::plan::{
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_natural_tips,
-    check_tolerance, check_wind_options,
+    check_tolerance, check_options_without_potential,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
 use crate::relax::solve_on_grid::{check_segments, explicit};
@@ -47,7 +47,7 @@ pub(crate) fn relax_on_grids(
 ) -> Result<RelaxedLeaf, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    check_wind_options(scenario, options)?;
+    check_options_without_potential(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
     check_natural_tips(scenario)?;
     let clock = Instant::now();
@@ -306,7 +306,7 @@ pub fn relax_from(
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    check_wind_options(scenario, options)?;
+    check_options_without_potential(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
     check_natural_tips(scenario)?;
     check_start(scenario, stations, rods)?;

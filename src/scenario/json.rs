@@ -81,6 +81,7 @@ impl Scenario {
             json!({
                 "vein": point.vein + 1, "at": point.at, "mass": point.mass,
                 "force": list_value(point.force), "moment": list_value(point.moment),
+                "follows": point.follows,
             })
         };
         let grip = |grip: &Grip| {
@@ -157,6 +158,10 @@ impl Scenario {
             }
             Key::G => list_value(self.g),
             Key::Distributed => vector_quantity(self.distributed.as_deref()?),
+            Key::Follower => vector_quantity(self.follower.as_deref()?),
+            Key::Couple => vector_quantity(self.couple.as_deref()?),
+            Key::CoupleFollows if self.couple.is_none() => return None,
+            Key::CoupleFollows => json!(self.couple_follows),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),

@@ -1,4 +1,5 @@
-//! Loads on a leaf and its motion: weight, loads on points and along veins, wind (the table `[wind]`),
+//! Loads on a leaf and its motion: weight, loads on points and along veins, dead or turning with the
+//! sections, wind (the table `[wind]`),
 //! and the mass, damping, duration and loads in time of a motion (the table `[dynamics]`).
 
 use crate::scenario::format::Key;
@@ -11,7 +12,7 @@ use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
 
-/// A dead load on a point of a vein.
+/// A load on a point of a vein.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLoad {
     /// The vein, counted from 0.
@@ -20,8 +21,11 @@ pub struct PointLoad {
     pub at: f64,
     /// The force, besides the weight of the mass.
     pub force: [f64; 3],
-    /// The moment about the lab axes; zero unless the leaf is a single rod.
+    /// The moment; zero unless the leaf is a single rod or the load follows.
     pub moment: [f64; 3],
+    /// Whether force and moment turn with the section: their components are along its directors d1, d2,
+    /// d3 then, else along the lab axes. The weight of the mass is dead.
+    pub follows: bool,
     /// The mass, which [`Scenario::g`](crate::scenario::Scenario::g) pulls; not negative.
     pub mass: f64,
 }
@@ -89,12 +93,13 @@ pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<[f6
     Ok(g)
 }
 
-/// Reads `load.distributed`; `None` if the entry is left out or zero.
-pub(super) fn read_distributed_loads(
+/// Reads loads per length of each vein; `None` if the entry is left out or zero.
+pub(super) fn read_loads_along_veins(
     entries: &Entries,
+    key: Key,
     rods: usize,
 ) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
-    let Some(item) = entries.given_value(Key::Distributed) else {
+    let Some(item) = entries.given_value(key) else {
         return Ok(None);
     };
     let loads = item.vector_profile_per_rod(rods)?;
@@ -114,12 +119,16 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
     let item = |key| entries.value_in_row(key, row);
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
-    check_single_rod_moments(turned, rods, &[moment])?;
+    let follows = item(Key::PointFollows)?.switch()?;
+    if !follows {
+        check_single_rod_moments(turned, rods, &[moment])?;
+    }
     Ok(PointLoad {
         vein: item(Key::PointVein)?.whole_number(rods)? - 1,
         at: item(Key::PointAt)?.fraction()?,
         force: item(Key::PointForce)?.vector()?,
         moment,
+        follows,
         mass: item(Key::PointMass)?.number()?,
     })
 }
@@ -132,7 +141,10 @@ pub(super) fn check_single_rod_moments(
 ) -> ScenarioResult<()> {
     let allowed = rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]);
     let (what, why) = match item.key() {
-        Key::PointMoment => ("on a point", "a dead moment has no potential"),
+        Key::PointMoment => (
+            "on a point",
+            "a dead moment has no potential; one that follows the section (follows = true) may act on any vein",
+        ),
         _ => ("at the tip", "joined tips pass on no moment"),
     };
     item.refuse_unless(

@@ -194,7 +194,9 @@ impl Entries {
         let tissue = read_tissue(self, rods.len() - 1, &source)?;
         let weights = loads::read_weights(self, rods.len())?;
         let g = loads::read_gravity_acceleration(self)?;
-        let distributed = loads::read_distributed_loads(self, rods.len())?;
+        let along = |key| loads::read_loads_along_veins(self, key, rods.len());
+        let distributed = along(Key::Distributed)?;
+        let (follower, couple) = (along(Key::Follower)?, along(Key::Couple)?);
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
@@ -224,6 +226,9 @@ impl Entries {
             own_gravity: weights.own,
             g,
             distributed,
+            follower,
+            couple,
+            couple_follows: self.value_or_default(Key::CoupleFollows)?.switch()?,
             points,
             tip_force,
             tip_moment,

@@ -94,6 +94,7 @@ class LoadPointTable(TypedDict, total=False):
     """``[load.point]``"""
 
     at: float
+    follows: bool
     force: Numbers
     mass: float
     moment: Numbers
@@ -103,7 +104,10 @@ class LoadPointTable(TypedDict, total=False):
 class LoadTable(TypedDict, total=False):
     """``[load]``"""
 
+    couple: Numbers | Vectors | Profile
+    couple_follows: bool
     distributed: Numbers | Vectors | Profile
+    follower: Numbers | Vectors | Profile
     g: Numbers
     gravity: Numbers | Vectors
     point: Sequence[LoadPointTable]

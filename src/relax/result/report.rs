@@ -65,6 +65,8 @@ pub fn equilibrium(
     let error_estimate = error.map(|error| (error + added_error) * scale.length);
     let DrawnCenterlines { grid, lines } = centerlines(found, finest);
     let energy = found.energy();
+    // Neither wind nor loads that turn with the section have a potential.
+    let has_energy = !problem.leaf.in_wind() && !problem.leaf.loads.has_followers();
     let on_bases = found.base_reactions();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = found
@@ -79,8 +81,7 @@ pub fn equilibrium(
         remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
-        // Wind has no potential.
-        energy: (!problem.leaf.in_wind()).then_some(energy.value * scale.moment()),
+        energy: has_energy.then_some(energy.value * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: found.reaction(),
@@ -120,7 +121,7 @@ pub fn equilibrium(
             tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
-            energy_error: (energy.error.filter(|_| !problem.leaf.in_wind()))
+            energy_error: (energy.error.filter(|_| has_energy))
                 .map(|error| error * scale.moment()),
         },
         attempts: Vec::new(),
@@ -324,6 +325,9 @@ pub fn outcome(
                 .is_none()
                 .then(|| match !problem.leaf.loads.has_moments() {
                     _ if problem.leaf.in_wind() => EquilibriumRemark::WindWithoutPotential,
+                    _ if problem.leaf.loads.has_followers() => {
+                        EquilibriumRemark::FollowersWithoutPotential
+                    }
                     true => EquilibriumRemark::IndexNotCounted,
                     false => EquilibriumRemark::MomentWithoutPotential,
                 }),
