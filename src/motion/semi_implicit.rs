@@ -457,7 +457,7 @@ impl SemiImplicit {
         for _ in 0..SETTINGS.most_iterations {
             self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(self.clock.time + h, w.gamma / (w.beta * h));
+            self.add_follower_forces(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
@@ -666,7 +666,7 @@ impl SemiImplicit {
     fn step_energy_exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
-            work: self.varying_load_work(h) + self.work_of_wind(h),
+            work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(),
         };
         if self.physics.retardation > 0.0 {
             let power = self.power_of_friction(h);
@@ -757,11 +757,12 @@ impl SemiImplicit {
 }
 
 impl SemiImplicit {
-    /// Adds the drag on the trial, which has the velocities at the end of the step, in the air of a
-    /// time to the equations; the derivative of a velocity by the displacement is `rate`. The
-    /// derivative by the direction of the rod is left out: it makes the matrix unsymmetric, and is
-    /// small beside that of inertia in steps that resolve the motion.
-    fn add_drag(&mut self, time: f64, rate: f64) {
+    /// Adds the loads that turn with the sections, and the drag on the trial, which has the velocities at
+    /// the end of the step, in the air of a time to the equations; the derivative of a velocity by the
+    /// displacement is `rate`. The derivatives by the directions of the sections are left out: they make
+    /// the matrix unsymmetric, and are small beside that of inertia in steps that resolve the motion.
+    fn add_follower_forces(&mut self, time: f64, rate: f64) {
+        self.leaf.add_followers(&self.trial, &mut self.system);
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
         let moves = |j: usize, i: usize| leaf.node_freedom(j, i).displacement;
@@ -780,6 +781,25 @@ impl SemiImplicit {
                 system.add_adjacent_node_spring(j, i, stiffness);
             }
         }
+    }
+
+    /// Work of the loads that turn with the sections, and of moments along veins, in the accepted step,
+    /// from the trial: the mean of the loads before and after it, times the displacement.
+    fn work_of_followers(&self) -> f64 {
+        if !self.leaf.has_followers() {
+            return 0.0;
+        }
+        let work = |(j, i)| {
+            let k = self.state.base(j) + i;
+            let [before, after] =
+                [&self.trial, &self.state].map(|state| self.leaf.follower_wrench(state, j, i));
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            0.5 * ((before.moment + after.moment).dot(turn)
+                + (before.force + after.force).dot(shift))
+        };
+        let nodes = self.leaf.rod_index_pairs(self.leaf.moving_nodes());
+        nodes.map(work).sum()
     }
 
     /// Work of the wind in the accepted step of `h`, from the trial: the mean of the forces before
@@ -847,7 +867,7 @@ impl SemiImplicit {
         self.trial.clone_from(&self.state);
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(0.0, 0.0);
+            self.add_follower_forces(0.0, 0.0);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
             let (inertia, per_mass) = (&self.inertia, FIRST_STEP.inverse_square);
             let inertial = |k: usize, tensor: &DMat3| {
@@ -871,7 +891,7 @@ impl SemiImplicit {
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         self.trial.clone_from(&self.state);
-        self.add_drag(0.0, 0.0);
+        self.add_follower_forces(0.0, 0.0);
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);

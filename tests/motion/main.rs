@@ -4,6 +4,7 @@ mod damping;
 mod driven;
 mod energy;
 mod error_bars;
+mod followers;
 mod grips;
 mod half_turn;
 mod hinges;
