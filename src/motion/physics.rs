@@ -84,6 +84,29 @@ pub struct Physics {
     knots: Vec<f64>,
 }
 
+/// What is assumed of the small motions of a leaf in place of what its scenario leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AssumedMotion {
+    /// The same mass per length everywhere.
+    pub uniform_density: bool,
+    /// Sections without rotary inertia.
+    pub no_rotary_inertia: bool,
+    /// No damping, outside wind.
+    pub no_damping: bool,
+}
+
+impl AssumedMotion {
+    /// What is assumed, in words.
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        let all = [
+            (self.uniform_density, "uniform density"),
+            (self.no_rotary_inertia, "no rotary inertia"),
+            (self.no_damping, "no damping"),
+        ];
+        all.into_iter().filter_map(|(is, word)| is.then_some(word))
+    }
+}
+
 impl Physics {
     /// Inertia, damping and loads of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
@@ -97,6 +120,28 @@ impl Physics {
         });
         physics.point_masses = masses.collect();
         physics
+    }
+
+    /// Inertia, damping and loads of the small motions about an equilibrium, on which a verdict on its
+    /// stability depends: only what the scenario gives, and what is assumed in place of what it leaves
+    /// out.
+    pub fn for_small_motions(leaf: &Leaf) -> (Self, AssumedMotion) {
+        let given = &leaf.scenario().dynamics;
+        let preset = Dynamics::default_for(&leaf.scenario().rods);
+        let assumed = AssumedMotion {
+            uniform_density: given.density == preset.density,
+            no_rotary_inertia: given.polar_inertia == PolarInertia::Excess(0.0),
+            no_damping: given.assumes_damping && given.internal_damping == 0.0,
+        };
+        let mut physics = Physics::new(leaf);
+        if assumed.no_rotary_inertia {
+            let none = vec![Profile::Constant(0.0); given.density.len()];
+            physics.dynamics.rotary_inertia = none;
+        }
+        if given.assumes_damping {
+            physics.damping = 0.0;
+        }
+        (physics, assumed)
     }
 
     /// The defaults for scenarios without dynamics, under the loads at

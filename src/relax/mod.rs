@@ -23,6 +23,7 @@ mod saddle;
 mod same_equilibrium;
 mod sensitivity;
 mod shooting;
+mod small_motions;
 pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
@@ -36,8 +37,8 @@ pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{
-    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
-    SpanHolder, VeinsRemark,
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, MotionVerdict,
+    RestObstacle, SpanHolder, VeinsRemark,
 };
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
@@ -54,6 +55,8 @@ pub use crate::relax::result::{
     Shape, Stability, TriedVeins,
 };
 pub use crate::relax::saddle::Saddle;
+pub use crate::motion::AssumedMotion;
+pub use crate::relax::small_motions::{MotionInstability, SmallMotions};
 pub(crate) use crate::relax::saddle::{
     INDEFINITE_NEWTON_EQUATIONS, NOISY_EIGENVALUE_THRESHOLD, converge_saddle,
 };

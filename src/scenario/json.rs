@@ -253,6 +253,13 @@ impl Scenario {
                 return None;
             }
             Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
+            // If given, it would count for the verdict on small motions.
+            Key::ExternalDamping
+                if dynamics.assumes_damping
+                    && dynamics.external_damping == dynamics.critical_damping(&self.rods) =>
+            {
+                return None;
+            }
             Key::ExternalDamping => number_value(dynamics.external_damping),
             Key::InternalDamping => number_value(dynamics.internal_damping),
             Key::Duration => number_value(dynamics.duration),

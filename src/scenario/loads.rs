@@ -242,6 +242,9 @@ pub struct Dynamics {
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
     pub external_damping: f64,
+    /// Whether the scenario leaves that out: motions are damped then, but no verdict on small motions
+    /// depends on it.
+    pub assumes_damping: bool,
     /// Retardation time of the material (Kelvin-Voigt): the stress is the
     /// stiffness times the strain and times this time the strain rate.
     pub internal_damping: f64,
@@ -334,6 +337,7 @@ impl Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
             polar_inertia: PolarInertia::Excess(0.0),
             external_damping: critical_damping(&density, time),
+            assumes_damping: true,
             density,
             internal_damping: 0.0,
             duration,
@@ -446,6 +450,7 @@ pub(super) fn read_dynamics(
         rotary_inertia,
         polar_inertia,
         external_damping,
+        assumes_damping: !entries.is_given(Key::ExternalDamping),
         internal_damping,
         duration,
         output_interval,

@@ -15,6 +15,7 @@ mod margin_random;
 mod mode_shapes;
 mod modes;
 mod point_masses;
+mod small_motions;
 mod taut_rods;
 mod trace_consistent;
 mod trace_of_grips;

@@ -93,6 +93,7 @@ pub fn equilibrium(
             neutral_directions: neutral_directions(scenario, &rods),
             modes: None,
             mode_shapes: problem.options.mode_shapes,
+            small_motions: None,
             saddle: found.history.saddle,
         },
         path: path_to_equilibrium(problem.leaf, found),
@@ -324,12 +325,12 @@ pub fn outcome(
                 .index
                 .is_none()
                 .then(|| match !problem.leaf.loads.has_moments() {
-                    _ if problem.leaf.in_wind() => EquilibriumRemark::WindWithoutPotential,
+                    _ if problem.leaf.in_wind() => EquilibriumRemark::WindWithoutPotential { verdict: None },
                     _ if problem.leaf.loads.has_followers() => {
-                        EquilibriumRemark::FollowersWithoutPotential
+                        EquilibriumRemark::FollowersWithoutPotential { verdict: None }
                     }
                     true => EquilibriumRemark::IndexNotCounted,
-                    false => EquilibriumRemark::MomentWithoutPotential,
+                    false => EquilibriumRemark::MomentWithoutPotential { verdict: None },
                 }),
         ),
         None => RunEnd::new(

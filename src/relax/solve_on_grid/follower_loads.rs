@@ -66,7 +66,15 @@ impl<'a> WithoutPotential<'a> {
     pub fn new(leaf: &'a DiscreteLeaf) -> Self {
         WithoutPotential {
             leaf,
-            wind: SteadyWind::new(leaf),
+            wind: SteadyWind::new(leaf, &Physics::for_relaxation(&leaf.leaf)),
+        }
+    }
+
+    /// These forces with times in the unit of a motion.
+    pub fn in_motion(leaf: &'a DiscreteLeaf, physics: &Physics) -> Self {
+        WithoutPotential {
+            leaf,
+            wind: SteadyWind::new(leaf, physics),
         }
     }
 
@@ -94,6 +102,17 @@ impl FollowerForces for WithoutPotential<'_> {
             wind.add_derivative(state, increments, forces);
         }
     }
+
+    fn add_velocity_derivative(
+        &self,
+        state: &State,
+        velocities: &NodalField,
+        forces: &mut NodalField,
+    ) {
+        if let Some(wind) = &self.wind {
+            wind.add_velocity_derivative(state, velocities, forces);
+        }
+    }
 }
 
 /// Steady wind on a leaf without velocity.
@@ -108,15 +127,11 @@ struct SteadyWind {
 }
 
 impl SteadyWind {
-    fn new(leaf: &DiscreteLeaf) -> Option<Self> {
-        if !leaf.leaf.in_wind() {
-            return None;
-        }
-        let physics = Physics::for_relaxation(&leaf.leaf);
+    fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
         let free = |(j, i)| leaf.node_freedom(j, i).displacement;
         Some(SteadyWind {
-            wind: WindDrag::new(leaf, &physics)?,
+            wind: WindDrag::new(leaf, physics)?,
             velocity: physics.air(0.0),
             free: leaf.rod_index_pairs(0..segments + 1).map(free).collect(),
             segments,
@@ -147,12 +162,38 @@ impl SteadyWind {
     }
 
     fn add_derivative(&self, state: &State, increments: &NodalField, forces: &mut NodalField) {
+        self.add_changes(state, increments, forces, |drag, [a, b]| {
+            drag.chord_derivative() * (b - a)
+        });
+    }
+
+    /// The drag changes by its derivative with respect to the air's velocity, less the mean velocity of
+    /// both ends.
+    fn add_velocity_derivative(
+        &self,
+        state: &State,
+        velocities: &NodalField,
+        forces: &mut NodalField,
+    ) {
+        self.add_changes(state, velocities, forces, |drag, [a, b]| {
+            drag.velocity_derivative() * (-0.5 * (a + b))
+        });
+    }
+
+    /// Adds the changes of the drag on all segments by the displacements, or velocities, of both ends.
+    fn add_changes(
+        &self,
+        state: &State,
+        fields: &NodalField,
+        forces: &mut NodalField,
+        change: impl Fn(&SegmentDrag, [DVec3; 2]) -> DVec3,
+    ) {
         for ((j, i), drag) in self.drags(state) {
-            let moved = |i: usize| match i.checked_sub(self.first) {
-                Some(i) => displacement_part(&increments[j][i]),
+            let end = |i: usize| match i.checked_sub(self.first) {
+                Some(i) => displacement_part(&fields[j][i]),
                 None => DVec3::ZERO,
             };
-            let half = 0.5 * (drag.chord_derivative() * (moved(i + 1) - moved(i)));
+            let half = 0.5 * change(&drag, [end(i), end(i + 1)]);
             for node in self.free_segment_ends(j, i) {
                 add_to_increment(&mut forces[j][node - self.first], DVec3::ZERO, half);
             }
