@@ -44,7 +44,7 @@ const SEARCH: RootSearch = RootSearch {
     starts: 3,
     most_directions: 300,
     check_every: 12,
-    accuracy: 1e-9,
+    accuracy: 1e-10,
     exhausted: 1e-13,
 };
 
@@ -68,7 +68,37 @@ pub struct MotionRoot {
     pub frequency: f64,
 }
 
+/// The roots of a linearised motion.
+pub enum MotionRoots {
+    /// Without damping: the squares lambda^2, conjugate ones both, the nearest to zero first. They are
+    /// analytic functions of the leaf where two meet and become complex, in their mean and the square of
+    /// their difference.
+    Squares(Vec<Square>),
+    /// With damping: one root of each conjugate pair, the nearest to zero first.
+    Damped(Vec<MotionRoot>),
+}
+
+/// The square of a root, and how close its mode is to that of the next in a list.
+#[derive(Clone, Copy, Debug)]
+pub struct Square {
+    pub value: c64,
+    /// Cosine of the angle between both modes: one where two meet and become complex, but not where
+    /// independent ones are equal.
+    pub alignment: f64,
+}
+
 impl MotionRoot {
+    /// The root of positive real part, or of positive imaginary part, of a square.
+    pub fn from_square(square: c64) -> Self {
+        // Without rounding in the part that is zero.
+        let root = match square.im == 0.0 {
+            true if square.re < 0.0 => c64::new(0.0, (-square.re).sqrt()),
+            true => c64::new(square.re.sqrt(), 0.0),
+            false => square.sqrt(),
+        };
+        MotionRoot::new(root)
+    }
+
     fn new(root: c64) -> Self {
         MotionRoot {
             growth: root.re,
@@ -96,8 +126,7 @@ struct LinearizedMotion<'a> {
     masses: MassMatrix,
 }
 
-/// The roots of the linearised motion next to zero, one of each conjugate pair, the nearest first; at least
-/// `count` of them if there are so many. `None` if memory is short, the time limit is exceeded, or they do
+/// The roots of the linearised motion next to zero, at least `count` of them if there are so many. `None` if memory is short, the time limit is exceeded, or they do
 /// not converge.
 pub fn lowest_roots(
     leaf: &DiscreteLeaf,
@@ -106,7 +135,7 @@ pub fn lowest_roots(
     forces: &dyn FollowerForces,
     count: usize,
     time: &Limit,
-) -> Option<Vec<MotionRoot>> {
+) -> Option<MotionRoots> {
     let mut system = System::new(leaf);
     leaf.assemble(state, &mut system);
     let solver = DirectSolver::for_coupling_pattern(&system).ok()?;
@@ -132,11 +161,27 @@ pub fn lowest_roots(
         stiffened,
     };
     let mut roots = match motion.is_damped_beside_masses() {
-        false => motion.roots_by_squares(&mut factors, count, time)?,
+        false => {
+            let squares = motion.squares(&mut factors, count, time)?;
+            if physics.damping == 0.0 {
+                return Some(MotionRoots::Squares(squares));
+            }
+            // One of each conjugate pair.
+            let squares = squares.iter().map(|it| it.value).filter(|it| it.im >= 0.0);
+            let half = 0.5 * physics.damping;
+            let root = |square: c64| {
+                let root = MotionRoot::from_square(square + half * half);
+                MotionRoot {
+                    growth: root.growth - half,
+                    ..root
+                }
+            };
+            squares.map(root).collect()
+        }
         true => motion.roots_of_states(&mut factors, count, time)?,
     };
     roots.sort_by(|a, b| a.size().total_cmp(&b.size()));
-    Some(roots)
+    Some(MotionRoots::Damped(roots))
 }
 
 impl DiscreteLeaf {
@@ -250,31 +295,25 @@ impl LinearizedMotion<'_> {
         self.masses.times(&vector)
     }
 
-    /// The roots where all damping is proportional to the masses: of each mode the one that grows fastest.
-    fn roots_by_squares(
+    /// The squares lambda^2 + a lambda = -1/nu of the roots where all damping is proportional to the masses.
+    fn squares(
         &self,
         factors: &mut MatrixFactors,
         count: usize,
         time: &Limit,
-    ) -> Option<Vec<MotionRoot>> {
+    ) -> Option<Vec<Square>> {
         let mut starts = Vec::new();
         for number in 0..SEARCH.starts {
             starts.push(self.inverse(factors, &self.start(number))?);
         }
         let apply = &mut |q: &[f64]| self.inverse(factors, &self.masses.times(q));
         let eigenvalues = largest_eigenvalues(starts, count, apply, time)?;
-        let half = 0.5 * self.physics.damping;
-        let root = |nu: c64| {
-            let square = half * half - nu.finv();
-            let root = match square.im == 0.0 {
-                true if square.re < 0.0 => c64::new(0.0, (-square.re).sqrt()),
-                true => c64::new(square.re.sqrt(), 0.0),
-                // The principal root, of positive real part.
-                false => square.sqrt(),
-            };
-            MotionRoot::new(root - half)
+        let square = |it: &RitzValue, next: Option<&RitzValue>| Square {
+            value: -it.eigenvalue.finv(),
+            alignment: next.map_or(0.0, |next| it.alignment(next)),
         };
-        Some(eigenvalues.into_iter().map(root).collect())
+        let pairs = eigenvalues.iter().zip(1..);
+        Some(pairs.map(|(it, k)| square(it, eigenvalues.get(k))).collect())
     }
 
     /// The roots with any damping.
@@ -300,12 +339,13 @@ impl LinearizedMotion<'_> {
             Some(image)
         };
         let eigenvalues = largest_eigenvalues(starts, 2 * count, apply, time)?;
-        let roots = eigenvalues.into_iter().map(|mu| MotionRoot::new(mu.finv()));
-        Some(roots.collect())
+        let upper = eigenvalues.iter().map(|it| it.eigenvalue);
+        let upper = upper.filter(|mu| mu.im >= 0.0);
+        Some(upper.map(|mu| MotionRoot::new(mu.finv())).collect())
     }
 }
 
-/// The eigenvalues of largest size of a matrix that is known by its products, one of each conjugate pair, at
+/// The eigenvalues of largest size of a matrix that is known by its products, conjugate ones both, at
 /// least `count` if there are so many besides zero: by the Arnoldi method from several starts at once (a
 /// band matrix in place of Hessenberg's).
 fn largest_eigenvalues(
@@ -313,7 +353,7 @@ fn largest_eigenvalues(
     count: usize,
     apply: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
     time: &Limit,
-) -> Option<Vec<c64>> {
+) -> Option<Vec<RitzValue>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut columns: Vec<Vec<f64>> = Vec::new();
     for mut start in starts {
@@ -326,12 +366,15 @@ fn largest_eigenvalues(
         let looks = done >= 2 * count && done.is_multiple_of(SEARCH.check_every);
         if looks || exhausted || full {
             let found = ritz_values(&columns, basis.len())?;
+            // A conjugate pair is not parted.
+            let parts = |it: &RitzValue| it.eigenvalue.im != 0.0;
+            let pairs = found.iter().take(count).filter(|it| parts(it)).count() % 2;
+            let count = count + pairs;
             let wanted = found.iter().take(count);
             let converged =
                 |it: &RitzValue| it.residual <= SEARCH.accuracy * it.eigenvalue.norm();
             if exhausted || found.len() >= count && wanted.into_iter().all(converged) {
-                let all = found.into_iter().take(count);
-                return Some(all.map(|it| it.eigenvalue).collect());
+                return Some(found.into_iter().take(count).collect());
             }
         }
         if full || time.reached() {
@@ -368,10 +411,20 @@ fn orthogonalize(vector: &mut [f64], basis: &mut Vec<Vec<f64>>) -> Vec<f64> {
     coefficients
 }
 
-/// An approximate eigenvalue, one of each conjugate pair, and the norm of its residual.
+/// An approximate eigenvalue, and the norm of its residual.
 struct RitzValue {
     eigenvalue: c64,
     residual: f64,
+    /// The eigenvector in the basis, of unit length.
+    vector: Vec<c64>,
+}
+
+impl RitzValue {
+    /// Cosine of the angle between two eigenvectors.
+    fn alignment(&self, other: &RitzValue) -> f64 {
+        let both = self.vector.iter().zip(&other.vector);
+        both.map(|(a, b)| a.conj() * b).sum::<c64>().norm()
+    }
 }
 
 /// The approximate eigenvalues but for those that are zero, the largest first, from the coefficients of the
@@ -382,16 +435,19 @@ fn ritz_values(columns: &[Vec<f64>], size: usize) -> Option<Vec<RitzValue>> {
     let eigen = Mat::from_fn(done, done, entry).eigen().ok()?;
     let (vectors, values) = (eigen.U(), eigen.S().column_vector());
     let mut found: Vec<RitzValue> = (0..done)
-        .filter(|&k| values[k].im >= 0.0 && values[k].norm() > 0.0)
+        .filter(|&k| values[k].norm() > 0.0)
         .map(|k| {
+            let vector: Vec<c64> = (0..done).map(|c| vectors[(c, k)]).collect();
+            let length = vector.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
+            let vector: Vec<c64> = vector.into_iter().map(|v| v / length).collect();
             let beyond = (done..size).map(|r| {
-                let sum: c64 = (0..done).map(|c| vectors[(c, k)] * entry(r, c)).sum();
-                sum.norm_sqr()
+                let parts = vector.iter().enumerate().map(|(c, v)| *v * entry(r, c));
+                parts.sum::<c64>().norm_sqr()
             });
-            let length: f64 = (0..done).map(|c| vectors[(c, k)].norm_sqr()).sum();
             RitzValue {
                 eigenvalue: values[k],
-                residual: (beyond.sum::<f64>() / length).sqrt(),
+                residual: beyond.sum::<f64>().sqrt(),
+                vector,
             }
         })
         .collect();

@@ -1,16 +1,17 @@
 //! Stability without a potential: the growth rates and frequencies of the linearised motion of a leaf at rest
 //! ([`crate::modes`]), on its grids and extrapolated.
 
-use crate::modes::linearized::{MotionRoot, lowest_roots};
+use crate::modes::linearized::{MotionRoot, MotionRoots, Square, lowest_roots};
 use crate::motion::{AssumedMotion, Physics};
-use crate::numbers::largest;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
-use crate::relax::solve_on_grid::follower_loads::WithoutPotential;
+use crate::relax::solve_on_grid::follower_loads::{WithoutPotential, balance_on_next_grid};
 use crate::words;
+use faer::c64;
 use serde::{Serialize, Serializer};
+use std::borrow::Cow;
 
 words! {
     /// How a leaf leaves an unstable equilibrium.
@@ -25,8 +26,8 @@ words! {
 /// Roots that are computed even if fewer are requested: one of the lowest modes is the first that grows.
 const LEAST_ROOTS: usize = 8;
 
-/// Growth, as a part of the size of a root, that is rounding.
-const GROWTH_ROUNDING: f64 = 1e-6;
+/// Growth of a damped motion, as a part of the size of its root, that is rounding.
+const GROWTH_ROUNDING: f64 = 1e-8;
 
 /// Growth rates and frequencies of the small motions about an equilibrium, in the scenario's unit of time.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,22 +47,104 @@ pub struct SmallMotions {
     pub assumed: AssumedMotion,
 }
 
+/// Segments of the finest grid from which on, and number of grids with which, roots may be accurate enough.
+const LEAST_SEGMENTS: usize = 32;
+const LEAST_GRIDS: usize = 3;
+
+/// Largest error of a root, as a part of it.
+const LARGEST_ERROR: f64 = 1e-4;
+
+fn unknowns(level: &GridLevel) -> usize {
+    6 * level.leaf.rods() * level.leaf.segments()
+}
+
+/// Roots on nested grids.
+#[derive(Default)]
+struct RootSeries {
+    squares: Vec<(usize, Vec<Square>)>,
+    damped: Vec<(usize, Vec<MotionRoot>)>,
+}
+
+impl RootSeries {
+    fn is_empty(&self) -> bool {
+        self.squares.is_empty() && self.damped.is_empty()
+    }
+
+    /// Adds the roots on the next grid; the finest few are kept.
+    fn push(&mut self, segments: usize, roots: MotionRoots) {
+        match roots {
+            MotionRoots::Squares(roots) => self.squares.push((segments, roots)),
+            MotionRoots::Damped(roots) => self.damped.push((segments, roots)),
+        }
+        let excess = |count: usize| count.saturating_sub(EXTRAPOLATED_GRIDS);
+        self.squares.drain(..excess(self.squares.len()));
+        self.damped.drain(..excess(self.damped.len()));
+    }
+
+    fn extrapolated(&self) -> Option<Vec<ExtrapolatedRoot>> {
+        match self.squares.is_empty() {
+            true => extrapolate_damped(&self.damped),
+            false => extrapolate_squares(&self.squares),
+        }
+    }
+
+    /// Whether there are grids enough for these roots: the lowest are accurate, and it is certain of all
+    /// whether they grow.
+    fn suffices(&self, roots: &[ExtrapolatedRoot]) -> bool {
+        let squares = self.squares.iter().map(|it| it.0);
+        let segments: Vec<usize> = squares.chain(self.damped.iter().map(|it| it.0)).collect();
+        let accurate = |it: &ExtrapolatedRoot| {
+            let error = it.error.unwrap_or(f64::INFINITY);
+            error <= LARGEST_ERROR * it.root.size()
+        };
+        segments.len() >= LEAST_GRIDS
+            && segments.last().is_some_and(|finest| *finest >= LEAST_SEGMENTS)
+            && roots.iter().take(LEAST_ROOTS / 2).all(accurate)
+            && roots.iter().all(|it| it.grows.is_some())
+    }
+}
+
+/// Imaginary part of the square of a difference, as a part of it, that is rounding.
+const COMPLEX_ROUNDING: f64 = 1e-6;
+
+/// Cosine of the angle between the modes of two real squares from which on they are about to meet.
+const MEETING_ALIGNMENT: f64 = 0.98;
+
 /// A root extrapolated over grids.
 #[derive(Clone, Copy)]
 struct ExtrapolatedRoot {
     root: MotionRoot,
     error: Option<f64>,
+    /// Whether it grows, if that is certain.
+    grows: Option<bool>,
 }
 
-impl ExtrapolatedRoot {
-    /// Whether it grows, if that is certain.
-    fn grows(&self) -> Option<bool> {
-        let growth = self.root.growth;
-        match self.error {
-            _ if growth.abs() <= GROWTH_ROUNDING * self.root.size() => Some(false),
-            Some(error) if growth.abs() <= error => None,
-            _ => Some(growth > 0.0),
+/// A number extrapolated over grids.
+#[derive(Clone, Copy)]
+struct ExtrapolatedNumber {
+    value: f64,
+    error: Option<f64>,
+}
+
+impl ExtrapolatedNumber {
+    /// Extrapolates the numbers on the finest grids in a row that have one.
+    fn new(grids: impl DoubleEndedIterator<Item = (usize, Option<f64>)>) -> Option<Self> {
+        let finest = grids.rev().map_while(|(segments, value)| Some((segments, vec![value?])));
+        let mut series: Vec<_> = finest.collect();
+        series.reverse();
+        if series.is_empty() {
+            return None;
         }
+        let table: Richardson = series.into_iter().collect();
+        Some(ExtrapolatedNumber {
+            value: *table.extrapolated().first()?,
+            error: table.best().map(|best| best.error),
+        })
+    }
+
+    /// Whether it is positive, if that is certain; on a single grid, if it is there.
+    fn is_positive(self) -> Option<bool> {
+        (self.value.abs() > self.error.unwrap_or(0.0)).then_some(self.value > 0.0)
     }
 }
 
@@ -74,8 +157,7 @@ pub fn small_motions(
     let (physics, assumed) = Physics::for_small_motions(problem.leaf);
     let count = LEAST_ROOTS.max(problem.options.modes);
     let on = |level: &GridLevel| {
-        let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-        if unknowns > UNKNOWNS.without_shapes {
+        if unknowns(level) > UNKNOWNS.without_shapes {
             return None;
         }
         let forces = WithoutPotential::in_motion(&level.leaf, &physics);
@@ -83,18 +165,33 @@ pub fn small_motions(
         lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit)
     };
     let skipped = found.levels.len().saturating_sub(EXTRAPOLATED_GRIDS);
-    let mut grids: Vec<(usize, Vec<MotionRoot>)> = Vec::new();
+    let mut series = RootSeries::default();
     for level in found.levels.iter().skip(skipped) {
         match on(level) {
-            Some(roots) => grids.push((level.leaf.segments(), roots)),
+            Some(roots) => series.push(level.leaf.segments(), roots),
             // The series needs consecutive grids.
-            None if grids.is_empty() => {}
+            None if series.is_empty() => {}
             None => break,
         }
     }
-    let (_, finest) = grids.last()?;
-    let roots: Vec<ExtrapolatedRoot> = (0..finest.len()).map(|k| extrapolated(&grids, k)).collect();
-    let grow: Vec<Option<bool>> = roots.iter().map(ExtrapolatedRoot::grows).collect();
+    let mut roots = series.extrapolated()?;
+    let mut finest = Cow::Borrowed(found.levels.last()?);
+    let fixed = problem.segments().is_some();
+    while !fixed && !series.suffices(&roots) && !problem.out_of_time() {
+        if 2 * unknowns(&finest) > UNKNOWNS.quick {
+            break;
+        }
+        let Some(next) = balance_on_next_grid(&finest, &problem.options.limit) else {
+            break;
+        };
+        let Some(further) = on(&next) else {
+            break;
+        };
+        series.push(next.leaf.segments(), further);
+        roots = series.extrapolated()?;
+        finest = Cow::Owned(next);
+    }
+    let grow: Vec<Option<bool>> = roots.iter().map(|it| it.grows).collect();
     let stable = match grow.contains(&Some(true)) {
         true => Some(false),
         false => (!grow.contains(&None)).then_some(true),
@@ -120,42 +217,97 @@ pub fn small_motions(
     })
 }
 
-/// The root with this number, extrapolated over the finest grids on which it is of one kind.
-fn extrapolated(grids: &[(usize, Vec<MotionRoot>)], k: usize) -> ExtrapolatedRoot {
-    let (_, finest) = &grids[grids.len() - 1];
-    let root = finest[k];
-    let kind = |it: &MotionRoot| {
-        let grows = it.growth > GROWTH_ROUNDING * it.size();
-        (grows, it.frequency > 0.0)
+/// Roots with damping, of which real and imaginary part are extrapolated. They pass zero growth without
+/// meeting another.
+fn extrapolate_damped(grids: &[(usize, Vec<MotionRoot>)]) -> Option<Vec<ExtrapolatedRoot>> {
+    let (_, finest) = grids.last()?;
+    let root = |(k, own): (usize, &MotionRoot)| {
+        let part = |of: fn(&MotionRoot) -> f64| {
+            let oscillates = own.frequency > 0.0;
+            let alike = |it: &&MotionRoot| (it.frequency > 0.0) == oscillates;
+            let values = grids
+                .iter()
+                .map(|(segments, roots)| (*segments, roots.get(k).filter(alike).map(of)));
+            ExtrapolatedNumber::new(values)
+        };
+        let (growth, frequency) = (part(|it| it.growth)?, part(|it| it.frequency)?);
+        let rounding = growth.value.abs() <= GROWTH_ROUNDING * own.size();
+        Some(ExtrapolatedRoot {
+            root: MotionRoot {
+                growth: growth.value,
+                frequency: frequency.value,
+            },
+            error: growth.error.zip(frequency.error).map(|(a, b)| a.max(b)),
+            grows: match rounding {
+                true => Some(false),
+                false => growth.is_positive(),
+            },
+        })
     };
-    let alike = grids.iter().rev().take_while(|(_, roots)| {
-        roots.get(k).is_some_and(|it| kind(it) == kind(&root))
-    });
-    let count = alike.count();
-    let series = &grids[grids.len() - count..];
-    let values = |it: &MotionRoot| vec![it.growth, it.frequency];
-    let table: Richardson = (series.iter().map(|(segments, roots)| (*segments, values(&roots[k])))).collect();
-    let [growth, frequency] = table.extrapolated() else {
-        return ExtrapolatedRoot { root, error: None };
+    finest.iter().enumerate().map(root).collect()
+}
+
+/// Roots without damping by their squares. Where two real ones meet, and become complex, their mean and the
+/// square of half of their difference are extrapolated: flutter begins where that becomes negative.
+fn extrapolate_squares(grids: &[(usize, Vec<Square>)]) -> Option<Vec<ExtrapolatedRoot>> {
+    let (_, finest) = grids.last()?;
+    let number = |of: &dyn Fn(&[Square]) -> Option<f64>| {
+        let values = grids.iter().map(|(segments, roots)| (*segments, of(roots)));
+        ExtrapolatedNumber::new(values)
     };
-    let all = grids.len();
-    let error = match table.best() {
-        Some(best) => Some(best.error + GROWTH_ROUNDING * root.size()),
-        // On the grid before it was another root.
-        None if all > 1 => {
-            let (_, before) = &grids[all - 2];
-            let sizes = before.get(k).map(|it| (it.growth - root.growth).hypot(it.frequency - root.frequency));
-            Some(largest(sizes))
+    let (mut roots, mut k) = (Vec::new(), 0);
+    while k < finest.len() {
+        let pair = |roots: &[Square]| Some([roots.get(k)?.value, roots.get(k + 1)?.value]);
+        let mean = number(&|roots| pair(roots).map(|[a, b]| 0.5 * (a.re + b.re)));
+        // Of squares of two different pairs there is none.
+        let difference = number(&|roots| {
+            let half = pair(roots).map(|[a, b]| 0.5 * (a - b))?;
+            let square = half * half;
+            (square.im.abs() <= COMPLEX_ROUNDING * square.norm()).then_some(square.re)
+        });
+        let meets = finest[k].value.im != 0.0 || finest[k].alignment > MEETING_ALIGNMENT;
+        if let Some((mean, it)) = mean.zip(difference).filter(|_| meets) {
+            let half = it.value.abs().sqrt();
+            let error = mean.error.zip(it.error);
+            let error = error.map(|(mean, square)| mean + square / (2.0 * half));
+            // Real ones may be zero, or positive.
+            let certain = it.is_positive();
+            let squares = match it.value < 0.0 {
+                true => vec![c64::new(mean.value, half)],
+                false => [-half, half].map(|by| c64::new(mean.value + by, 0.0)).into(),
+            };
+            roots.extend(squares.into_iter().map(|square| {
+                let root = MotionRoot::from_square(square);
+                ExtrapolatedRoot {
+                    root,
+                    error: error.map(|error| error / (2.0 * root.size())),
+                    grows: certain.map(|_| square.im != 0.0 || square.re > 0.0),
+                }
+            }));
+            k += 2;
+            continue;
         }
-        None => None,
-    };
-    ExtrapolatedRoot {
-        root: MotionRoot {
-            growth: *growth,
-            frequency: *frequency,
-        },
-        error,
+        let mut real = number(&|roots| roots.get(k).map(|it| it.value.re))?;
+        let own = finest[k].value.re;
+        let mut signs = grids.iter().filter_map(|(_, roots)| roots.get(k));
+        let same = signs.all(|it| (it.value.re > 0.0) == (own > 0.0));
+        if same && (real.value > 0.0) != (own > 0.0) {
+            // What coarse grids hardly resolve is not extrapolated.
+            real.error = Some((real.value - own).abs());
+            real.value = own;
+        }
+        let root = MotionRoot::from_square(c64::new(real.value, 0.0));
+        roots.push(ExtrapolatedRoot {
+            root,
+            error: real.error.map(|error| error / (2.0 * root.size())),
+            grows: match same {
+                true => Some(real.value > 0.0),
+                false => real.is_positive(),
+            },
+        });
+        k += 1;
     }
+    Some(roots)
 }
 
 impl SmallMotions {

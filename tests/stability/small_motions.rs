@@ -58,26 +58,22 @@ fn extrapolated(at: impl Fn(f64) -> Scenario, range: [f64; 2]) -> [f64; 2] {
 /// Loads of Beck (1952), Leipholz (1962), and of our own elements.
 #[test]
 fn columns_flutter_at_their_loads() {
+    let even = "dynamics = { density = 1.0 }";
     let beck = |more: &'static str| move |p: f64| column(&format!("{more}\n{}", tip(p, 0.0)));
     let leipholz = |q: f64| column(&format!("load.follower = [{:?}, 0.0, 0.0]", -q));
-    let [load, frequency] = extrapolated(beck(""), [15.0, 25.0]);
-    println!("Beck {load} {frequency}");
+    let [load, frequency] = extrapolated(beck(even), [15.0, 25.0]);
     close("Beck", load, 20.0509, 2e-4);
     close("Beck's frequency", frequency, 11.016, 2e-3);
     let [load, _] = extrapolated(leipholz, [30.0, 50.0]);
-    println!("Leipholz {load}");
     close("Leipholz", load, 40.054, 1e-3);
     let rotary = "dynamics = { density = 1.0, rotary_inertia = 0.01 }";
     let [load, _] = extrapolated(beck(rotary), [10.0, 25.0]);
-    println!("rotary {load}");
     close("with rotary inertia", load, 18.17, 5e-3);
     let external = "dynamics = { density = 1.0, external_damping = 7.032 }";
     let [load, _] = extrapolated(beck(external), [15.0, 30.0]);
-    println!("external {load}");
     close("with external damping", load, 22.38, 5e-3);
     let internal = "dynamics = { density = 1.0, internal_damping = 1e-4 }";
     let [load, _] = extrapolated(beck(internal), [5.0, 25.0]);
-    println!("internal {load}");
     close("with internal damping", load, 10.94, 5e-3);
 }
 
@@ -146,17 +142,17 @@ fn a_mass_at_the_tip_lowers_and_raises_the_load() {
                 false => stable = middle,
             }
         }
-        println!("Pflueger {mass} {load} {stable}");
-        close(&format!("mass {mass}"), load, stable, 5e-4);
+            close(&format!("mass {mass}"), load, stable, 5e-4);
         loads.push(load);
     }
     let least = loads.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(least < loads[0] - 2.0 && least < loads[3] - 0.1, "{loads:?}");
 }
 
-/// A rod on a compliant base that is pushed across itself diverges: told apart from flutter.
+/// What the scenario leaves out is named, and the verdict is that of extrapolated roots: between 20.0509
+/// and the load on a grid of 32 segments, 20.108, a column that flutters is not called stable.
 #[test]
-fn what_is_assumed_is_told() {
+fn verdicts_are_told_with_what_is_assumed() {
     let leaf = settle(&column(&tip(10.0, 0.0)), 1e-6);
     assert_eq!(leaf.stable(), Some(true));
     let Some(EquilibriumRemark::FollowersWithoutPotential { verdict: Some(told) }) = leaf.remark else {
@@ -166,7 +162,33 @@ fn what_is_assumed_is_told() {
         told.assumed.words().collect::<Vec<_>>(),
         ["uniform density", "no rotary inertia", "no damping"]
     );
-    let flutters = settle(&column(&tip(21.0, 0.0)), 1e-6);
-    assert_eq!(flutters.stable(), Some(false));
-    assert!(flutters.remark.unwrap().to_string().contains("flutter"));
+    for load in [20.04, 20.06, 25.0] {
+        let leaf = settle(&column(&tip(load, 0.0)), 1e-6);
+        let flutters = load > 20.0509;
+        assert_eq!(leaf.stable(), Some(!flutters), "{load}");
+        assert_eq!(leaf.remark.unwrap().to_string().contains("flutter"), flutters);
+    }
+}
+
+/// A moment on a tip that turns with it, about the axis of a rod bent by its weight, and a rod in wind:
+/// frequencies and decay with the drag's derivative by the velocity, beside those of the motion itself.
+#[test]
+fn a_leaf_in_wind_decays_by_the_drag() {
+    let text = format!(
+        "{COLUMN}\nwind = {{ velocity = [0.0, 0.0, 3.0], density = 1.0, drag = 1.0, width = 0.5 }}\n\
+         dynamics = {{ density = 1.0, external_damping = 0.0 }}"
+    );
+    let scenario = parse(&text);
+    let released = Options {
+        route: leafdyn::relax::Route::Release,
+        ..with_modes(2, to(1e-8))
+    };
+    let leaf = relaxed(&scenario, &released);
+    assert_eq!(leaf.stable(), Some(true));
+    let motions = motions(&leaf);
+    // Drag per length c |u| u, c = 1/2 w/2: beside the wind of speed u it damps by c |u| to 2 c |u|.
+    let rate = 0.25 * 3.0;
+    for growth in &motions.growth_rates {
+        assert!(*growth < -0.2 * rate && *growth > -rate, "{:?}", motions.growth_rates);
+    }
 }

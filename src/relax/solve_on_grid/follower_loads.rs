@@ -10,9 +10,14 @@ use crate::leaf::{
     DiscreteLeaf, Loads, NodalField, State, System, add_to_increment, displacement_part,
 };
 use crate::motion::{Physics, SegmentDrag, WindDrag};
-use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
+use crate::newton::{
+    EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration, SolverCounts,
+};
+use crate::relax::accuracy::transfer::{GridLevel, prolong};
+use crate::relax::same_equilibrium::is_near_guess;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::{RESOLVED_TURN, Wrench};
+use crate::run::Limit;
 use glam::DVec3;
 
 /// How forces without a potential are balanced, and how they grow.
@@ -55,6 +60,9 @@ const STEPS: StepSizes = StepSizes {
 /// The accuracy of balances in wind, radians and lengths: forces are balanced to rounding, as nothing
 /// else shows that the leaf rests.
 const WIND_ACCURACY: f64 = 1e-13;
+
+/// The accuracy of equilibria on finer grids for their small motions, radians and lengths.
+const NEXT_GRID_ACCURACY: f64 = 1e-9;
 
 /// All forces without a potential on a leaf without velocity.
 pub struct WithoutPotential<'a> {
@@ -235,6 +243,21 @@ fn balance_within(
     newton.solve(leaf, &mut rest.state, system, equations)
 }
 
+/// An equilibrium continued to the grid next to its own; `None` if Newton's method leads elsewhere.
+pub fn balance_on_next_grid(level: &GridLevel, limit: &Limit) -> Option<GridLevel> {
+    let leaf = DiscreteLeaf::new(&level.leaf.leaf, level.leaf.grid.refined());
+    let mut guess = prolong(&level.leaf, &level.state);
+    leaf.place_held_nodes(&mut guess);
+    let (mut system, mut work) = (System::new(&leaf), SolverCounts::default());
+    let mut ignored = |_, _| {};
+    let start = guess.clone();
+    let mut rest = GridRelaxation::new(start, NEXT_GRID_ACCURACY, &mut work, &mut ignored, limit);
+    let forces = WithoutPotential::new(&leaf);
+    balance_within(&leaf, &mut system, &forces, &mut rest, NEXT_GRID_ACCURACY).ok()?;
+    let state = rest.state;
+    is_near_guess(&guess, &state).then_some(GridLevel { leaf, state })
+}
+
 /// Corrects a state near rest, or lets all loads without a potential grow from a state of rest without
 /// them. [`EquilibriumFailure::Unresolved`]: the grid is too coarse.
 pub fn solve_with_followers(
@@ -303,9 +326,7 @@ pub fn solve_with_followers(
 mod tests {
     use super::*;
     use crate::leaf::{DirectSolver, Grid, Leaf};
-    use crate::newton::SolverCounts;
     use crate::relax::initial_state;
-    use crate::run::Limit;
     use crate::scenario::Scenario;
 
     const LEAF: &str = r#"
