@@ -81,7 +81,7 @@ pub enum UnmodelledFeature {
     },
     /// Wind.
     #[error(
-        "[wind]: {what} does not take wind into account, as motions do, and the release of a leaf in a steady one; leave it out"
+        "[wind]: {what} does not take wind into account, as motions do, and relaxation in a steady one; leave it out"
     )]
     Wind {
         /// The method or the question.

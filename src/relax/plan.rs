@@ -198,7 +198,7 @@ impl<'a> RelaxationProblem<'a> {
             && !self.leaf.has_placed_supports()
             && !self.leaf.turns_freely()
             && self.leaf.loads != Loads::default()
-            && self.leaf.has_load_potential()
+            && self.leaf.has_potential()
     }
 
     /// Whether a leaf that was released may be loaded slowly.
@@ -211,7 +211,7 @@ impl<'a> RelaxationProblem<'a> {
             && self.options.route == Route::Loading
             && !self.leaf.has_placed_supports()
             && !self.leaf.turns_freely()
-            && self.leaf.has_load_potential()
+            && self.leaf.has_potential()
             && !self.out_of_time()
     }
 

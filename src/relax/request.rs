@@ -464,8 +464,8 @@ pub fn check_natural_tips(scenario: &Scenario) -> Result<(), RelaxError> {
     }
 }
 
-/// Refuses a leaf in wind unless it is released, to move to rest by the semi-implicit method; and one
-/// under loads that turn with the section where a method needs a potential.
+/// Refuses wind that changes, and a leaf in wind, or under loads that turn with the section, where a method
+/// needs a potential.
 pub fn check_options_without_potential(
     scenario: &Scenario,
     options: &Options,
@@ -486,16 +486,11 @@ pub fn check_options_without_potential(
     let Some(wind) = &scenario.wind else {
         return Ok(());
     };
-    let what = match options.method {
-        _ if general.is_some() => general.unwrap_or_default(),
-        Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
-        _ if options.route == Route::Loading => "slow loading",
-        _ if !wind.velocity.is_constant() => {
-            return Err(RelaxError::ChangingWind);
-        }
-        _ if scenario.has_moments() => "a leaf under load.tip_moment or load.point.moment",
-        _ if followers => "a leaf under loads that turn with the section",
-        _ => return Ok(()),
+    let Some(what) = general else {
+        return match wind.velocity.is_constant() {
+            true => Ok(()),
+            false => Err(RelaxError::ChangingWind),
+        };
     };
     Err(UnmodelledFeature::Wind { what }.into())
 }

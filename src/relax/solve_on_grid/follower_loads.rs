@@ -78,6 +78,15 @@ impl<'a> WithoutPotential<'a> {
         }
     }
 
+    /// These forces under a part of the pressure of the wind.
+    fn under_pressure(leaf: &'a DiscreteLeaf, part: f64) -> Self {
+        let mut forces = WithoutPotential::new(leaf);
+        if let Some(wind) = &mut forces.wind {
+            wind.velocity *= part.sqrt();
+        }
+        forces
+    }
+
     /// These forces with times in the unit of a motion.
     pub fn in_motion(leaf: &'a DiscreteLeaf, physics: &Physics) -> Self {
         WithoutPotential {
@@ -260,18 +269,36 @@ pub fn balance_on_next_grid(level: &GridLevel, limit: &Limit) -> Option<GridLeve
 
 /// Corrects a state near rest, or lets all loads without a potential grow from a state of rest without
 /// them. [`EquilibriumFailure::Unresolved`]: the grid is too coarse.
+///
+/// The drag of wind then acts on the nodes as dead forces, in which all sums over the leaf are balanced.
 pub fn solve_with_followers(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
     rest: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
-    if rest.near_rest {
-        return balance_forces(leaf, system, &WithoutPotential::new(leaf), rest);
+    let remaining = match rest.near_rest {
+        true => balance_forces(leaf, system, &WithoutPotential::new(leaf), rest)?,
+        false => grow_to_full_size(leaf, system, rest)?,
+    };
+    if leaf.leaf.in_wind() {
+        let forces = WithoutPotential::new(leaf).wind_forces(&rest.state);
+        leaf.add_nodal_loads(&forces);
     }
+    Ok(remaining)
+}
+
+/// Lets all forces without a potential grow from a state of rest without them.
+fn grow_to_full_size(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rest: &mut GridRelaxation,
+) -> Result<f64, EquilibriumFailure> {
     let loads = leaf.loads;
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
-    let moment = leaf.leaf.moment_integral_bound() + leaf.leaf.follower_moment_bound();
+    let drag = WithoutPotential::new(leaf).wind_forces(&rest.state);
+    let drag: f64 = drag.iter().map(|force| force.length()).sum();
+    let moment = leaf.leaf.moment_integral_bound() + leaf.leaf.follower_moment_bound() + drag;
     let sizes = StepSizes {
         first: (GROWTH.moment_per_step * softest / moment).clamp(STEPS.shortest, 1.0),
         ..STEPS
@@ -290,9 +317,10 @@ pub fn solve_with_followers(
         };
         let accuracy = match step.to < 1.0 {
             true => GROWTH.step_accuracy,
+            false if leaf.leaf.in_wind() => WIND_ACCURACY,
             false => rest.accuracy,
         };
-        let forces = WithoutPotential::new(leaf);
+        let forces = WithoutPotential::under_pressure(leaf, step.to);
         let balanced = balance_within(leaf, system, &forces, rest, accuracy);
         let way = before.distance(&rest.state);
         match balanced {

@@ -16,7 +16,7 @@ use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, StrainEffects, is_large,
 };
 use crate::relax::log::WorkLog;
-use crate::relax::path::Event;
+use crate::relax::path::{Event, Route};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK, WayFromStart};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
@@ -134,9 +134,14 @@ fn find_unleaned_equilibrium(
         | InitialGuess::Predicted(state)
         | InitialGuess::Pushed(state) => state,
     };
-    let followers = leaf.has_followers();
-    let dead_moment = leaf.has_moments() && !followers;
-    let without_potential = dead_moment || followers;
+    let (followers, windy) = (leaf.has_followers(), leaf.leaf.in_wind());
+    // A leaf that is released in wind moves.
+    let grows = match windy {
+        true => problem.options.route == Route::Loading,
+        false => followers,
+    };
+    let dead_moment = leaf.has_moments() && !grows && !windy;
+    let without_potential = leaf.has_moments() || followers;
     let mut moved = false;
     let mut events = None;
     if grip {
@@ -152,7 +157,6 @@ fn find_unleaned_equilibrium(
         leaf.place_held_nodes(&mut state);
     }
     let explicit = problem.options.method.is_explicit();
-    let windy = leaf.leaf.in_wind();
     // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);
     moved |= windy && from_start;
@@ -160,7 +164,7 @@ fn find_unleaned_equilibrium(
         near_rest,
         cg_tolerance,
     };
-    if followers && !near_rest && !grip {
+    if grows && !near_rest && !grip {
         let calm = leaf.with_load_potential();
         let mut system = effort.workspace.equations(&calm);
         let level = GridLevel { leaf: calm, state };
@@ -207,8 +211,14 @@ fn find_unleaned_equilibrium(
         ..GridRelaxation::new(state, accuracy, work, progress, limit)
     };
     let rest = match (explicit, dead_moment) {
-        _ if followers => {
-            follower_loads::solve_with_followers(&mut leaf, &mut system, &mut relaxation)
+        _ if grows => {
+            match follower_loads::solve_with_followers(&mut leaf, &mut system, &mut relaxation) {
+                // Where the path of balances ends the leaf moves on.
+                Err(_) if windy && !near_rest => {
+                    no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation)
+                }
+                balanced => balanced,
+            }
         }
         _ if windy => no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation),
         (true, _) => explicit::relax_explicitly(&leaf, &mut system, &mut relaxation),

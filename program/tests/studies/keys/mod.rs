@@ -21,7 +21,7 @@ use verbs::{Answer, Verb, ask, largest_difference, tips};
 /// verb needs any more goes.
 const REFUSED: &str = "
 single-shooting shooting shooting-from-rest check chart | gripped | does not take grips
-relax explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit page figures | windy gripped-in-wind | does not take wind
+explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit | windy gripped-in-wind | does not take wind
 check single-shooting shooting shooting-from-rest | gripped-in-wind | does not take grips
 explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit | following | does not take loads that turn with the section
 single-shooting shooting | jaws pinned | a tip that is held (tip.held)
