@@ -81,9 +81,17 @@ pub enum UnmodelledFeature {
     },
     /// Wind.
     #[error(
-        "[wind]: {what} does not take wind into account, as motions do, and the release of a leaf in a steady one; leave it out"
+        "[wind]: {what} does not take wind into account, as motions do, and relaxation in a steady one; leave it out"
     )]
     Wind {
+        /// The method or the question.
+        what: &'static str,
+    },
+    /// Loads that turn with the section, or moments along veins.
+    #[error(
+        "load.follower, load.couple, load.point.follows: {what} does not take loads that turn with the section, or moments along veins, into account, as relaxation and motions do; leave them out"
+    )]
+    Followers {
         /// The method or the question.
         what: &'static str,
     },

@@ -223,6 +223,10 @@ impl Leaf {
         all.set_item(intern!(py, "energy"), found.energy)?;
         let negative = found.stability.negative_eigenvalues;
         all.set_item(intern!(py, "negative_eigenvalues"), negative)?;
+        let motions = found.stability.small_motions.as_ref();
+        let motions =
+            motions.map(|it| (it.stable, it.growth_rates.clone(), it.frequencies.clone()));
+        all.set_item(intern!(py, "_motions"), motions)?;
         let neutral = found.stability.neutral_directions;
         all.set_item(intern!(py, "neutral_directions"), neutral)?;
         let blade = found.blade.as_ref();

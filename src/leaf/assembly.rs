@@ -164,7 +164,7 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             let on_tissue = |i: usize| tissue.get(state.base(j) + i).copied().unwrap_or_default();
             let turned = on_tissue(0).moment
-                + self.node_dead_moment(0)
+                + self.node_moment(state, j, 0)
                 + self.spring_load(state, j, 0).moment;
             let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
@@ -181,8 +181,10 @@ impl DiscreteLeaf {
                 }
                 let load = self.load_with_tissue(state, j, i + 1, on_tissue(i + 1));
                 let springs = self.spring_load(state, j, i + 1);
-                force = load.force + springs.force - gradient.x;
-                moment = load.moment + springs.moment + self.node_dead_moment(i + 1) - gradient.b;
+                let follower = self.follower_wrench(state, j, i + 1);
+                force = load.force + springs.force + follower.force - gradient.x;
+                moment =
+                    load.moment + springs.moment + self.node_moment(state, j, i + 1) - gradient.b;
                 largest = larger(largest, largest_component(segment.gap));
             }
             // The holder balances the remaining force on a held tip.

@@ -12,7 +12,7 @@
 use crate::leaf::loads::ScheduledLoads;
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
-use crate::leaf::{GrippedNode, Leaf, Loads};
+use crate::leaf::{FollowerLoad, GrippedNode, Leaf, Loads};
 use crate::natural::Natural;
 use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip};
@@ -60,6 +60,8 @@ pub struct DiscreteLeaf {
     /// Loads of single veins that vary in time, if there are any. Their forces and moments are in
     /// `own_loads` and `point_moments`, which are those at rest until factors are set.
     pub scheduled_loads: Option<Box<ScheduledLoads>>,
+    /// Loads without a potential on all nodes, rod after rod, before their factor; empty if there are none.
+    pub(super) followers: Vec<FollowerLoad>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
     /// Springs of supports that give.
@@ -149,6 +151,7 @@ impl DiscreteLeaf {
             own_loads: Vec::new(),
             point_moments: Vec::new(),
             scheduled_loads: None,
+            followers: Vec::new(),
             grips: Vec::new(),
             springs: NodeSprings::default(),
             load_factor: 1.0,
@@ -157,6 +160,7 @@ impl DiscreteLeaf {
         discrete.own_loads = discrete.nodal_own_loads(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
         discrete.scheduled_loads = discrete.find_scheduled_loads();
+        discrete.followers = discrete.nodal_followers();
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
             discrete.grips = discrete.find_gripped_nodes(&natural);
@@ -352,8 +356,9 @@ impl DiscreteLeaf {
             let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
             let gradient = segment.gradient(self.section(j, n - 1));
             let load = self.load(state, j, n);
-            force += load.force - gradient.x;
-            moments.push(load.moment + self.node_dead_moment(n) - gradient.b);
+            let follower = self.follower_wrench(state, j, n);
+            force += load.force + follower.force - gradient.x;
+            moments.push(load.moment + self.node_moment(state, j, n) - gradient.b);
         }
         TipReaction { force, moments }
     }

@@ -77,7 +77,8 @@ impl Leaf {
     /// The dead moments on points, also those that are zero, before the factor in the loads.
     pub(super) fn point_dead_moments(&self) -> impl Iterator<Item = PointMoment> {
         let (points, unit) = (self.scenario().points.iter(), self.scale.moment());
-        points.map(move |it| PointMoment {
+        let dead = points.filter(|it| !it.follows);
+        dead.map(move |it| PointMoment {
             sigma: it.at,
             moment: DVec3::from_array(it.moment) / unit,
         })
@@ -257,9 +258,11 @@ impl DiscreteLeaf {
         self.dead_moments().next().is_some()
     }
 
-    /// This leaf without dead moments.
-    pub fn without_moments(&self) -> Self {
+    /// This leaf without dead moments and loads that turn with the sections: all loads but wind have a
+    /// potential.
+    pub fn with_load_potential(&self) -> Self {
         let mut without = self.clone();
+        without.loads.follower_factor = 0.0;
         without.loads.tip_moment = DVec3::ZERO;
         without.loads.dead_moment_factor = 0.0;
         without
@@ -340,7 +343,7 @@ impl DiscreteLeaf {
 }
 
 /// Largest distance, in fractions of the length, of a load from the node on which it acts.
-const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
+pub(super) const NODE_COINCIDENCE_TOLERANCE: f64 = 1e-11;
 
 impl Leaf {
     /// Load of rod `j` alone at a place, its weight and load along it, per unit of sigma; without

@@ -32,6 +32,8 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         tissue,
         tip_force,
         distributed,
+        follower,
+        couple,
         points,
         grips,
         foundation,
@@ -41,7 +43,9 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
     } = scenario;
     // Images of loads and supports of single veins are not looked for; a leaf on hinges may swing out
     // of its mirror plane.
-    let unmatched = distributed.is_some()
+    let unmatched = [distributed, follower, couple]
+        .into_iter()
+        .any(Option::is_some)
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
         || *base_held != BaseSupport::Clamped;

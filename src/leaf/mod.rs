@@ -13,6 +13,7 @@ mod derivative;
 mod direct;
 mod discrete;
 mod elastic_supports;
+mod followers;
 mod law;
 mod loads;
 mod mirror;
@@ -34,6 +35,7 @@ pub use crate::leaf::derivative::parameter::{
 pub use crate::leaf::direct::pattern::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment, NodeLoad};
+pub use crate::leaf::followers::FollowerLoad;
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,
@@ -164,6 +166,8 @@ pub struct Loads {
     pub rod_load_factor: f64,
     /// Factor of the dead moments on points of a single rod: zero without any.
     pub dead_moment_factor: f64,
+    /// Factor of the loads that turn with the sections, and of the moments along veins: zero without any.
+    pub follower_factor: f64,
 }
 
 impl std::ops::Sub for Loads {
@@ -176,6 +180,7 @@ impl std::ops::Sub for Loads {
             tip_moment: self.tip_moment - other.tip_moment,
             rod_load_factor: self.rod_load_factor - other.rod_load_factor,
             dead_moment_factor: self.dead_moment_factor - other.dead_moment_factor,
+            follower_factor: self.follower_factor - other.follower_factor,
         }
     }
 }
@@ -190,6 +195,7 @@ impl std::ops::Mul<f64> for Loads {
             tip_moment: self.tip_moment * factor,
             rod_load_factor: self.rod_load_factor * factor,
             dead_moment_factor: self.dead_moment_factor * factor,
+            follower_factor: self.follower_factor * factor,
         }
     }
 }
@@ -271,6 +277,7 @@ impl Leaf {
                 tip_moment: vector(scenario.tip_moment, scale.moment()),
                 rod_load_factor: 0.0,
                 dead_moment_factor: 0.0,
+                follower_factor: 0.0,
             },
             tip_support: scenario.held_tip.as_ref().map(|held| TipSupport {
                 position: vector(held.position, scale.length),
@@ -295,6 +302,9 @@ impl Leaf {
         if leaf.point_dead_moments().any(|it| it.moment != DVec3::ZERO) {
             leaf.loads.dead_moment_factor = 1.0;
         }
+        if leaf.scenario().has_followers() {
+            leaf.loads.follower_factor = 1.0;
+        }
         leaf
     }
 
@@ -303,10 +313,15 @@ impl Leaf {
         &self.scenario
     }
 
-    /// Whether all loads have a potential: a dead moment has none, nor has wind. Without a potential
-    /// an equilibrium is no minimum of an energy, and no eigenvalue tells whether it is stable.
+    /// Whether all loads have a potential: a dead moment has none, nor has wind or a load that turns with
+    /// the section. Without a potential an equilibrium is no minimum of an energy.
     pub fn has_potential(&self) -> bool {
-        !self.loads.has_moments() && !self.in_wind()
+        self.has_load_potential() && !self.in_wind()
+    }
+
+    /// Whether all loads but wind have a potential.
+    pub fn has_load_potential(&self) -> bool {
+        !self.loads.has_moments() && !self.loads.has_followers()
     }
 
     /// The scenario from which the leaf was made, shared.

@@ -200,6 +200,7 @@ impl<'a> RodIntegrator<'a> {
             run(self.arch, &mut kernel);
             self.add_tissue(place.sigma, i);
             self.add_own_loads(place, i);
+            self.add_followers(place, i);
         }
         self.set_stage(h, &RESULT_WEIGHTS);
         std::mem::swap(&mut self.fields, &mut self.stage.fields);
@@ -259,6 +260,24 @@ impl<'a> RodIntegrator<'a> {
         }
     }
 
+    /// Adds the loads along veins that turn with their sections, and moments along them, to the slopes of a
+    /// stage, at a place.
+    fn add_followers(&mut self, place: RodPlace, stage: usize) {
+        if !self.leaf.has_followers() {
+            return;
+        }
+        for j in 0..self.leaf.rods() {
+            let q = unpack_rod_fields(&self.stage.fields, j).q.normalize();
+            let load = self.leaf.follower_along(j, place).wrench(q);
+            let RodLane { group, lane } = rod_lane(j);
+            let slopes = &mut self.slopes[stage][group];
+            for c in 0..3 {
+                slopes[FORCE + c].0[lane] -= load.force[c];
+                slopes[MOMENT + c].0[lane] -= load.moment[c];
+            }
+        }
+    }
+
     /// Adds the loads of single veins to the slopes of a stage, at a place.
     fn add_own_loads(&mut self, place: RodPlace, stage: usize) {
         if self.leaf.loads.rod_load_factor == 0.0 {
@@ -279,8 +298,10 @@ impl<'a> RodIntegrator<'a> {
     /// Adds `sign` times the loads on points at `sigma` to the forces and moments of the rods.
     fn add_point_loads(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
-            let force = sign * self.leaf.point_force_at(j, sigma);
-            let moment = sign * self.leaf.dead_moment_at(sigma);
+            let q = unpack_rod_fields(&self.fields, j).q.normalize();
+            let follower = self.leaf.point_follower_at(j, sigma).wrench(q);
+            let force = sign * (self.leaf.point_force_at(j, sigma) + follower.force);
+            let moment = sign * (self.leaf.dead_moment_at(sigma) + follower.moment);
             let RodLane { group, lane } = rod_lane(j);
             let fields = &mut self.fields[group];
             for c in 0..3 {

@@ -260,7 +260,9 @@ impl DiscreteLeaf {
             segment.gradient(self.section(j, i))
         };
         let load = self.load(state, j, i);
-        let (mut moment, mut force) = (load.moment + self.node_dead_moment(i), load.force);
+        let follower = self.follower_wrench(state, j, i);
+        let mut moment = load.moment + self.node_moment(state, j, i);
+        let mut force = load.force + follower.force;
         if i > 0 {
             let before = gradient(i - 1);
             (moment, force) = (moment - before.b, force - before.x);

@@ -16,6 +16,7 @@
 //! in which no large stiffness enters.
 
 mod lanczos;
+pub(crate) mod linearized;
 
 use crate::leaf::{
     DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,

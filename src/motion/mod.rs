@@ -11,7 +11,9 @@ mod semi_implicit;
 use crate::leaf::{DiscreteLeaf, HalfTurn, State};
 pub use crate::motion::constraint_projection::project_constraints;
 pub use crate::motion::explicit::{Explicit, RigidRodError, StableStep};
-pub use crate::motion::physics::{Inertia, MotionTimes, Physics, SegmentDrag, WindDrag};
+pub use crate::motion::physics::{
+    AssumedMotion, Inertia, MotionTimes, Physics, SegmentDrag, WindDrag,
+};
 pub use crate::motion::semi_implicit::{SemiImplicit, StepControl};
 use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;

@@ -102,6 +102,8 @@ pub struct Physics {
     /// Part of the loads of single veins, and of the dead moments on points.
     rod_load_factor: f64,
     dead_moment_factor: f64,
+    /// Factor of the loads that turn with the sections, and of the moments along veins.
+    follower_factor: f64,
     point_masses: Vec<PointMass>,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
@@ -116,6 +118,29 @@ pub struct Physics {
     /// Times at which a load, the air's velocity or the factor may change its slope, in increasing
     /// order.
     knots: Vec<f64>,
+}
+
+/// What is assumed of the small motions of a leaf in place of what its scenario leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AssumedMotion {
+    /// The same mass per length everywhere.
+    pub uniform_density: bool,
+    /// Sections without rotary inertia.
+    pub no_rotary_inertia: bool,
+    /// No damping, outside wind.
+    pub no_damping: bool,
+}
+
+impl AssumedMotion {
+    /// What is assumed, in words.
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        let all = [
+            (self.uniform_density, "uniform density"),
+            (self.no_rotary_inertia, "no rotary inertia"),
+            (self.no_damping, "no damping"),
+        ];
+        all.into_iter().filter_map(|(is, word)| is.then_some(word))
+    }
 }
 
 impl Physics {
@@ -191,6 +216,28 @@ impl Physics {
         });
     }
 
+    /// Inertia, damping and loads of the small motions about an equilibrium, on which a verdict on its
+    /// stability depends: only what the scenario gives, and what is assumed in place of what it leaves
+    /// out.
+    pub fn for_small_motions(leaf: &Leaf) -> (Self, AssumedMotion) {
+        let given = &leaf.scenario().dynamics;
+        let preset = Dynamics::default_for(&leaf.scenario().rods);
+        let assumed = AssumedMotion {
+            uniform_density: given.density == preset.density,
+            no_rotary_inertia: given.polar_inertia == PolarInertia::Excess(0.0),
+            no_damping: given.assumes_damping && given.internal_damping == 0.0,
+        };
+        let mut physics = Physics::new(leaf);
+        if assumed.no_rotary_inertia {
+            let none = vec![Profile::Constant(0.0); given.density.len()];
+            physics.dynamics.rotary_inertia = none;
+        }
+        if given.assumes_damping {
+            physics.damping = 0.0;
+        }
+        (physics, assumed)
+    }
+
     /// The defaults for scenarios without dynamics, under the loads at
     /// rest: the damped motion of a relaxation, in which masses on points are weights alone.
     pub fn for_relaxation(leaf: &Leaf) -> Self {
@@ -224,6 +271,7 @@ impl Physics {
             } else {
                 leaf.loads.dead_moment_factor
             },
+            follower_factor: leaf.loads.follower_factor,
             constant_loads: None,
             point_masses: Vec::new(),
             knots: schedule_knots(&dynamics, air.as_ref(), leaf, &factors, time),
@@ -356,6 +404,7 @@ impl Physics {
             tip_moment: tip_moment / self.scale.moment(),
             rod_load_factor: self.rod_load_factor,
             dead_moment_factor: self.dead_moment_factor,
+            follower_factor: self.follower_factor,
         }
     }
 

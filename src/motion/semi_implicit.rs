@@ -483,7 +483,7 @@ impl SemiImplicit {
         for _ in 0..SETTINGS.most_iterations {
             self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(self.clock.time + h, w.gamma / (w.beta * h));
+            self.add_follower_forces(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let supports = &self.supports;
             let inertial = |k: usize, tensor: &DMat3| {
@@ -770,7 +770,7 @@ impl SemiImplicit {
     fn step_energy_exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
-            work: self.varying_load_work(h) + self.work_of_wind(h),
+            work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(),
         };
         exchange.work += self.work_of_supports();
         if self.physics.retardation > 0.0 {
@@ -867,11 +867,12 @@ impl SemiImplicit {
 }
 
 impl SemiImplicit {
-    /// Adds the drag on the trial, which has the velocities at the end of the step, in the air of a
-    /// time to the equations; the derivative of a velocity by the displacement is `rate`. The
-    /// derivative by the direction of the rod is left out: it makes the matrix unsymmetric, and is
-    /// small beside that of inertia in steps that resolve the motion.
-    fn add_drag(&mut self, time: f64, rate: f64) {
+    /// Adds the loads that turn with the sections, and the drag on the trial, which has the velocities at
+    /// the end of the step, in the air of a time to the equations; the derivative of a velocity by the
+    /// displacement is `rate`. The derivatives by the directions of the sections are left out: they make
+    /// the matrix unsymmetric, and are small beside that of inertia in steps that resolve the motion.
+    fn add_follower_forces(&mut self, time: f64, rate: f64) {
+        self.leaf.add_followers(&self.trial, &mut self.system);
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
         let free_axes = |j: usize, i: usize| {
@@ -893,6 +894,25 @@ impl SemiImplicit {
                 system.add_adjacent_node_spring(j, i, free[0] * stiffness * free[1]);
             }
         }
+    }
+
+    /// Work of the loads that turn with the sections, and of moments along veins, in the accepted step,
+    /// from the trial: the mean of the loads before and after it, times the displacement.
+    fn work_of_followers(&self) -> f64 {
+        if !self.leaf.has_followers() {
+            return 0.0;
+        }
+        let work = |(j, i)| {
+            let k = self.state.base(j) + i;
+            let [before, after] =
+                [&self.trial, &self.state].map(|state| self.leaf.follower_wrench(state, j, i));
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            0.5 * ((before.moment + after.moment).dot(turn)
+                + (before.force + after.force).dot(shift))
+        };
+        let nodes = self.leaf.rod_index_pairs(self.leaf.moving_nodes());
+        nodes.map(work).sum()
     }
 
     /// Work of the wind in the accepted step of `h`, from the trial: the mean of the forces before
@@ -973,7 +993,7 @@ impl SemiImplicit {
         }
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_drag(self.clock.time, 0.0);
+            self.add_follower_forces(self.clock.time, 0.0);
             let excess = |k: usize| {
                 let ([turn, shift], v) = (self.increment(k), self.node_motions[k].v);
                 [turn - h * v[0], shift - h * v[1]]
@@ -1002,7 +1022,7 @@ impl SemiImplicit {
         self.leaf.assemble(&self.state, &mut self.system);
         self.trial.clone_from(&self.state);
         self.next_node_motions.clone_from(&self.node_motions);
-        self.add_drag(self.clock.time, 0.0);
+        self.add_follower_forces(self.clock.time, 0.0);
         let damping = self.physics.damping;
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();

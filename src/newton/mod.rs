@@ -540,6 +540,14 @@ pub trait FollowerForces {
 
     /// Adds their derivative along increments of the nodes to forces.
     fn add_derivative(&self, state: &State, increments: &NodalField, forces: &mut NodalField);
+
+    /// Adds their derivative along velocities of the nodes of a leaf at rest to forces.
+    fn add_velocity_derivative(
+        &self,
+        state: &State,
+        velocities: &NodalField,
+        forces: &mut NodalField,
+    );
 }
 
 /// Solves for the increments under `forces`, with the derivative of the `following` ones, from the factors

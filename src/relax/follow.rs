@@ -11,7 +11,7 @@ use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
 use crate::relax::log::WorkLog;
 use crate::relax::nested_grids::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy};
-use crate::relax::request::{Options, Progress, RelaxError, check_wind_options};
+use crate::relax::request::{Options, Progress, RelaxError, check_options_without_potential};
 use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
 use crate::relax::same_equilibrium::{is_near_prediction, is_same_beside_fold};
@@ -287,7 +287,7 @@ impl EquilibriumTracker {
         options: &Options,
         guess: StateOnGrid,
     ) -> Result<(Equilibrium, Option<EquilibriumTracker>), RelaxError> {
-        check_wind_options(scenario, options)?;
+        check_options_without_potential(scenario, options)?;
         let clock = Instant::now();
         let scenario = Arc::new(scenario.clone());
         let leaf = Leaf::with_scale(Arc::clone(&scenario), scenario.scale());
@@ -331,7 +331,7 @@ impl EquilibriumTracker {
                 Ok(scenario) => Arc::new(scenario),
                 Err(refused) => return StepEnd::Ended(FollowEnd::Refused(refused)),
             };
-            if let Err(refused) = check_wind_options(&scenario, &self.options) {
+            if let Err(refused) = check_options_without_potential(&scenario, &self.options) {
                 return StepEnd::Ended(FollowEnd::Refused(E::from(refused)));
             }
             match self.step(Arc::clone(&scenario), step.to == 1.0) {
@@ -538,6 +538,8 @@ impl EquilibriumTracker {
             && own.tissue.is_some() == other.tissue.is_some()
             && own.wind.is_none()
             && other.wind.is_none()
+            && !own.has_followers()
+            && !other.has_followers()
             && held(own) == held(other)
             && own.points.len() == other.points.len()
             && own.grips.len() == other.grips.len()

@@ -23,10 +23,12 @@ mod saddle;
 mod same_equilibrium;
 mod sensitivity;
 mod shooting;
+mod small_motions;
 pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
 use crate::memory;
+pub use crate::motion::AssumedMotion;
 pub use crate::newton::{EquilibriumFailure, SolverCounts};
 pub(crate) use crate::relax::accuracy::NestedEquilibrium;
 pub(crate) use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, Stencil, rod_shapes};
@@ -36,13 +38,13 @@ pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{
-    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, RestObstacle,
-    SpanHolder, VeinsRemark,
+    CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, MotionVerdict,
+    RestObstacle, SpanHolder, VeinsRemark,
 };
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, ShootingVariant, UnsupportedSetting,
-    check_tolerance, without_wind,
+    check_tolerance, without_wind_or_followers,
 };
 pub use crate::relax::rest::relax_from;
 pub(crate) use crate::relax::rest::{RelaxedLeaf, relax_on_grids};
@@ -61,6 +63,7 @@ pub(crate) use crate::relax::sensitivity::{
     Linearized, NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
 };
 pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
+pub use crate::relax::small_motions::{MotionInstability, SmallMotions};
 pub(crate) use crate::relax::solve_on_grid::check_segments;
 pub(crate) use crate::relax::solve_on_grid::start::initial_state;
 pub(crate) use crate::relax::stability::{index_near, state_from_rod_shapes};

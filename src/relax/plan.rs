@@ -198,7 +198,7 @@ impl<'a> RelaxationProblem<'a> {
             && !self.leaf.has_placed_supports()
             && !self.leaf.turns_freely()
             && self.leaf.loads != Loads::default()
-            && !self.leaf.loads.has_moments()
+            && self.leaf.has_potential()
     }
 
     /// Whether a leaf that was released may be loaded slowly.
@@ -211,7 +211,7 @@ impl<'a> RelaxationProblem<'a> {
             && self.options.route == Route::Loading
             && !self.leaf.has_placed_supports()
             && !self.leaf.turns_freely()
-            && !self.leaf.loads.has_moments()
+            && self.leaf.has_potential()
             && !self.out_of_time()
     }
 
@@ -221,7 +221,7 @@ impl<'a> RelaxationProblem<'a> {
             return Some(Path::STABLE);
         }
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let moved = self.leaf.has_placed_supports() || self.leaf.loads.has_moments();
+        let moved = self.leaf.has_placed_supports() || !self.leaf.has_load_potential();
         (released && !moved).then_some(Path::Released)
     }
 

@@ -2,8 +2,10 @@
 //! help, what makes its result doubtful, and why a part of a margin is missing.
 
 use crate::leaf::HalfTurn;
+use crate::motion::AssumedMotion;
 use crate::numbers::{format_error_bound, format_two_digits};
 use crate::relax::path::{Path, PathPosition, Route};
+use crate::relax::small_motions::{MotionInstability, SmallMotions};
 use crate::run::remarks;
 use crate::scenario::PlausibilityWarning;
 use crate::shooting::{NeutralDirection, ShootingFailureReason};
@@ -15,16 +17,26 @@ remarks! {
     /// rest. Segments are those per rod of the finest grid.
     pub enum EquilibriumRemark {
         /// A leaf at rest in wind.
-        #[error(
-            "wind has no potential: energy and eigenvalues are not stated; the leaf rests where its damped motion \
-             came to rest, and is stable as that motion is"
-        )]
-        WindWithoutPotential = "wind-without-potential",
+        #[error("wind has no potential: {}", verdict_text(*.verdict))]
+        WindWithoutPotential {
+            /// What its small motions tell, if they are known.
+            verdict: Option<MotionVerdict>,
+        } = "wind-without-potential",
         /// A leaf at rest under a dead moment.
+        #[error("a dead moment has no potential: {}", verdict_text(*.verdict))]
+        MomentWithoutPotential {
+            /// What its small motions tell, if they are known.
+            verdict: Option<MotionVerdict>,
+        } = "moment-without-potential",
+        /// A leaf at rest under loads that turn with the section, or moments along veins.
         #[error(
-            "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated"
+            "loads that turn with the section, and moments along veins, have no potential: {}",
+            verdict_text(*.verdict)
         )]
-        MomentWithoutPotential = "moment-without-potential",
+        FollowersWithoutPotential {
+            /// What its small motions tell, if they are known.
+            verdict: Option<MotionVerdict>,
+        } = "followers-without-potential",
         /// Negative eigenvalues that cannot be counted.
         #[error(
             "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
@@ -437,6 +449,53 @@ fn obstacle_text(obstacle: &Option<Box<RestObstacle>>) -> String {
         .as_ref()
         .map(ToString::to_string)
         .unwrap_or_default()
+}
+
+/// What the small motions about an equilibrium tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionVerdict {
+    /// Whether none grows, if that is certain.
+    pub stable: Option<bool>,
+    /// How the one that grows fastest does.
+    pub instability: Option<MotionInstability>,
+    /// What is assumed of masses and damping.
+    pub assumed: AssumedMotion,
+}
+
+impl EquilibriumRemark {
+    /// Adds what the small motions tell to what is said of forces without a potential.
+    pub(crate) fn add_small_motions(&mut self, motions: &SmallMotions) {
+        if let EquilibriumRemark::WindWithoutPotential { verdict }
+        | EquilibriumRemark::MomentWithoutPotential { verdict }
+        | EquilibriumRemark::FollowersWithoutPotential { verdict } = self
+        {
+            *verdict = Some(MotionVerdict {
+                stable: motions.stable,
+                instability: motions.instability,
+                assumed: motions.assumed,
+            });
+        }
+    }
+}
+
+fn verdict_text(verdict: Option<MotionVerdict>) -> String {
+    let Some(verdict) = verdict else {
+        return "no count of eigenvalues decides stability, and the small motions about the equilibrium \
+                are not known"
+            .into();
+    };
+    let assumed: Vec<&str> = verdict.assumed.words().collect();
+    let given = match assumed.is_empty() {
+        true => "with the masses and the damping of the scenario".to_owned(),
+        false => format!("with {} where the scenario gives none", assumed.join(", ")),
+    };
+    let told = match (verdict.stable, verdict.instability) {
+        (Some(true), _) => "none grows",
+        (_, Some(MotionInstability::Flutter)) => "oscillations grow (flutter)",
+        (_, Some(MotionInstability::Divergence)) => "one grows without oscillations (divergence)",
+        _ => "whether one grows is within the error of its growth rate",
+    };
+    format!("stability is that of the small motions about the equilibrium, {given}: {told}")
 }
 
 fn reached_text(reached: Option<PathPosition>) -> String {

@@ -413,9 +413,14 @@ pub enum RelaxError {
     },
 }
 
-/// Refuses scenarios with wind for what does not take it into account.
-pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
+/// Refuses scenarios with wind, or with loads that turn with the section, for what does not take them
+/// into account.
+pub fn without_wind_or_followers(
+    scenario: &Scenario,
+    what: &'static str,
+) -> Result<(), RelaxError> {
     match scenario.wind {
+        _ if scenario.has_followers() => Err(UnmodelledFeature::Followers { what }.into()),
         None => Ok(()),
         Some(_) => Err(UnmodelledFeature::Wind { what }.into()),
     }
@@ -459,27 +464,33 @@ pub fn check_natural_tips(scenario: &Scenario) -> Result<(), RelaxError> {
     }
 }
 
-/// Refuses a leaf in wind unless it is released, to move to rest by the semi-implicit method.
-pub fn check_wind_options(scenario: &Scenario, options: &Options) -> Result<(), RelaxError> {
+/// Refuses wind that changes, and a leaf in wind, or under loads that turn with the section, where a method
+/// needs a potential.
+pub fn check_options_without_potential(
+    scenario: &Scenario,
+    options: &Options,
+) -> Result<(), RelaxError> {
+    let followers = scenario.has_followers();
+    let general = match options.method {
+        Method::SemiImplicit(how) if how.keep_unstable => {
+            Some("the search for an equilibrium of any index")
+        }
+        Method::SemiImplicit(_) if options.mode_shapes => Some("a list of modes"),
+        Method::SemiImplicit(_) => None,
+        Method::Explicit { .. } => Some("explicit relaxation"),
+        _ => Some("shooting"),
+    };
+    if let Some(what) = general.filter(|_| followers) {
+        return Err(UnmodelledFeature::Followers { what }.into());
+    }
     let Some(wind) = &scenario.wind else {
         return Ok(());
     };
-    let what = match options.method {
-        Method::SemiImplicit(how) if how.keep_unstable => {
-            "the search for an equilibrium of any index"
-        }
-        Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
-        Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
-        Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
-        Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
-            return Err(RelaxError::ChangingWind);
-        }
-        Method::SemiImplicit(_) if scenario.has_moments() => {
-            "a leaf under load.tip_moment or load.point.moment"
-        }
-        Method::SemiImplicit(_) => return Ok(()),
-        Method::Explicit { .. } => "explicit relaxation",
-        _ => "shooting",
+    let Some(what) = general else {
+        return match wind.velocity.is_constant() {
+            true => Ok(()),
+            false => Err(RelaxError::ChangingWind),
+        };
     };
     Err(UnmodelledFeature::Wind { what }.into())
 }

@@ -19,9 +19,10 @@ use crate::relax::plan::{
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark};
 use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_natural_tips,
-    check_tolerance, check_wind_options,
+    check_options_without_potential, check_tolerance,
 };
 use crate::relax::result::{Equilibrium, Outcome, report};
+use crate::relax::small_motions::small_motions;
 use crate::relax::solve_on_grid::{check_segments, explicit};
 use crate::relax::stability::{Decision, Verdict, decide, state_from_rod_shapes};
 use crate::relax::{eigenvalues, nested_grids};
@@ -47,7 +48,7 @@ pub(crate) fn relax_on_grids(
 ) -> Result<RelaxedLeaf, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    check_wind_options(scenario, options)?;
+    check_options_without_potential(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
     check_natural_tips(scenario)?;
     let clock = Instant::now();
@@ -247,6 +248,10 @@ pub(super) fn equilibrium_with_stability(
         (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
     leaf.stability.modes = modes.map(|it| it.modes);
+    if leaf.outcome.is_at_rest() && !problem.leaf.has_potential() {
+        leaf.stability.small_motions = small_motions(problem, &found);
+        leaf.tell_small_motions();
+    }
     leaf.attempts = std::mem::take(&mut effort.attempts);
     RelaxedLeaf {
         result: leaf,
@@ -255,6 +260,13 @@ pub(super) fn equilibrium_with_stability(
 }
 
 impl Equilibrium {
+    /// Says what the linearised motion tells of a leaf that has no potential.
+    fn tell_small_motions(&mut self) {
+        if let (Some(motions), Some(remark)) = (&self.stability.small_motions, &mut self.remark) {
+            remark.add_small_motions(motions);
+        }
+    }
+
     /// Takes the Morse index by extrapolated eigenvalues, if it is known, where those of single
     /// grids may have other signs.
     fn apply_stability_verdict(&mut self, verdict: Verdict) {
@@ -306,7 +318,7 @@ pub fn relax_from(
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
-    check_wind_options(scenario, options)?;
+    check_options_without_potential(scenario, options)?;
     check_hinge_equilibrium(scenario)?;
     check_natural_tips(scenario)?;
     check_start(scenario, stations, rods)?;

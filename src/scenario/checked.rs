@@ -61,7 +61,15 @@ pub struct Scenario {
     /// Gravity, [`Scenario::g`] and the distributed loads in time, if a factor multiplies them; those at rest are
     /// those of time 0.
     pub factored: Option<Box<FactoredLoads>>,
-    /// Dead loads on points.
+    /// Force per unit reference length along each vein that turns with its sections, by components along
+    /// the directors d1, d2, d3; `None` if there is none.
+    pub follower: Option<Vec<[Profile; 3]>>,
+    /// Moment per unit reference length along each vein, by components; `None` if there is none.
+    pub couple: Option<Vec<[Profile; 3]>>,
+    /// Whether that moment turns with the sections: its components are along the directors then, else
+    /// along the lab axes.
+    pub couple_follows: bool,
+    /// Loads on points.
     pub points: Vec<PointLoad>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
     pub tip_force: [f64; 3],
@@ -131,6 +139,8 @@ impl Scenario {
             .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
             .chain(self.distributed.iter().flatten().flatten())
             .chain(self.foundation.iter().flatten().flatten())
+            .chain(self.follower.iter().flatten().flatten())
+            .chain(self.couple.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
@@ -185,6 +195,8 @@ impl Scenario {
             g: none,
             distributed: None,
             factored: None,
+            follower: None,
+            couple: None,
             points: Vec::new(),
             tip_force: none,
             tip_moment: none,
@@ -254,6 +266,8 @@ impl Scenario {
                 Key::Gravity.path(),
             ),
             (self.distributed.is_some(), Key::Distributed.path()),
+            (self.follower.is_some(), Key::Follower.path()),
+            (self.couple.is_some(), Key::Couple.path()),
             (free_tips && acts(&self.tip_force), Key::TipForce.path()),
             (self.coupling.iter().any(acts), "coupling"),
             (self.wind.is_some(), Key::WindWidth.path()),
@@ -262,9 +276,21 @@ impl Scenario {
         keys.into_iter().find_map(|(acts, key)| acts.then_some(key))
     }
 
-    /// Whether dead moments act at rest.
+    /// Whether loads act that turn with the sections, or moments along veins: they have no potential, and
+    /// act on any vein.
+    pub fn has_followers(&self) -> bool {
+        let acts = |point: &PointLoad| {
+            point.follows && (point.force != [0.0; 3] || point.moment != [0.0; 3])
+        };
+        self.follower.is_some() || self.couple.is_some() || self.points.iter().any(acts)
+    }
+
+    /// Whether dead moments act at rest on a single rod, at its tip or on points.
     pub fn has_moments(&self) -> bool {
-        let on_points = || self.points.iter().any(|point| point.moment != [0.0; 3]);
+        let on_points = || {
+            let mut points = self.points.iter();
+            points.any(|point| !point.follows && point.moment != [0.0; 3])
+        };
         self.tip_moment != [0.0; 3] || on_points()
     }
 
@@ -288,10 +314,11 @@ impl Scenario {
             && self.grips.iter().all(|grip| flat(grip.displacement))
             && flat(self.tip_force)
             && !self.has_moments()
+            && !self.has_followers()
             && self.wind.is_none()
     }
 
-    /// The sum of all weights, and of the loads along veins and on points.
+    /// The sum of all weights, and of the dead loads along veins and on points.
     pub fn total_load(&self) -> DVec3 {
         let length: f64 = self.rods.iter().map(|rod| rod.length).sum();
         let mut total = length * DVec3::from_array(self.gravity);
@@ -314,9 +341,11 @@ impl Scenario {
         total + points.sum::<DVec3>()
     }
 
-    /// The force on a point: what is given, and the weight of its mass.
+    /// The dead force on a point: what is given, unless it follows the section, and the weight of its
+    /// mass.
     pub fn force_on(&self, point: &PointLoad) -> [f64; 3] {
-        [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])
+        let given = if point.follows { [0.0; 3] } else { point.force };
+        [0, 1, 2].map(|axis| given[axis] + point.mass * self.g[axis])
     }
 
     /// The moduli of a rod's section at a fraction of its length, of both sections where it jumps; of a

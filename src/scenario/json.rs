@@ -85,6 +85,7 @@ impl Scenario {
                 "vein": point.vein + 1, "at": point.at,
                 "mass": point.landing.map_or(point.mass, |landing| landing.mass),
                 "force": list_value(force), "moment": list_value(moment),
+                "follows": point.follows,
             });
             if let Some(landing) = point.landing {
                 row["from"] = number_value(landing.from);
@@ -174,6 +175,10 @@ impl Scenario {
                 return self.load_value(key);
             }
             Key::FoundationStiffness => vector_quantity(self.foundation.as_deref()?),
+            Key::Follower => vector_quantity(self.follower.as_deref()?),
+            Key::Couple => vector_quantity(self.couple.as_deref()?),
+            Key::CoupleFollows if self.couple.is_none() => return None,
+            Key::CoupleFollows => json!(self.couple_follows),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),
@@ -291,6 +296,13 @@ impl Scenario {
                 return None;
             }
             Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
+            // If given, it would count for the verdict on small motions.
+            Key::ExternalDamping
+                if dynamics.assumes_damping
+                    && dynamics.external_damping == dynamics.critical_damping(&self.rods) =>
+            {
+                return None;
+            }
             Key::ExternalDamping => number_value(dynamics.external_damping),
             Key::InternalDamping => number_value(dynamics.internal_damping),
             Key::Duration => number_value(dynamics.duration),

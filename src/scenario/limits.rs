@@ -567,7 +567,7 @@ fn check_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     check_bases(entries, scenario)?;
     check_tissue(entries, scenario)?;
     check_weights(entries, scenario)?;
-    check_distributed_loads(entries, scenario)?;
+    check_loads_along_veins(entries, scenario)?;
     check_springs(entries, scenario)?;
     check_point_loads(entries, scenario)?;
     check_wind(entries, scenario)
@@ -653,15 +653,21 @@ fn check_weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     Ok(())
 }
 
-fn check_distributed_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
-    let Some(item) = entries.given_value(Key::Distributed) else {
-        return Ok(());
-    };
-    let unit = smallest_unit(Key::Distributed, &scenario.rods);
-    let loads = scenario.distributed.iter().flatten();
-    for load in loads {
-        let most = load.each_ref().map(Profile::max_abs);
-        LIMITS.gravity.check(item, vector_norm(most) / unit)?;
+fn check_loads_along_veins(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let loads = [
+        (Key::Distributed, &scenario.distributed, &LIMITS.gravity),
+        (Key::Follower, &scenario.follower, &LIMITS.gravity),
+        (Key::Couple, &scenario.couple, &LIMITS.tip_moment),
+    ];
+    for (key, loads, limit) in loads {
+        let Some(item) = entries.given_value(key) else {
+            continue;
+        };
+        let unit = smallest_unit(key, &scenario.rods);
+        for load in loads.iter().flatten() {
+            let most = load.each_ref().map(Profile::max_abs);
+            limit.check(item, vector_norm(most) / unit)?;
+        }
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Loads on a leaf and its motion: weight, loads on points and along veins, wind (the table `[wind]`),
+//! Loads on a leaf and its motion: weight, loads on points and along veins, dead or turning with the
+//! sections, wind (the table `[wind]`),
 //! and the mass, damping, duration and loads in time of a motion (the table `[dynamics]`).
 
 use crate::scenario::format::Key;
@@ -11,7 +12,7 @@ use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
 
-/// A dead load on a point of a vein, at rest.
+/// A load on a point of a vein, at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLoad {
     /// The vein, counted from 0.
@@ -20,8 +21,11 @@ pub struct PointLoad {
     pub at: f64,
     /// The force, besides the weight of the mass.
     pub force: [f64; 3],
-    /// The moment about the lab axes; zero unless the leaf is a single rod.
+    /// The moment; zero unless the leaf is a single rod or the load follows.
     pub moment: [f64; 3],
+    /// Whether force and moment turn with the section: their components are along its directors d1, d2,
+    /// d3 then, else along the lab axes. The weight of the mass is dead.
+    pub follows: bool,
     /// The mass, which [`Scenario::g`](crate::scenario::Scenario::g) pulls; not negative.
     pub mass: f64,
     /// The force and the moment in time, if they vary; those at rest are those of time 0.
@@ -124,6 +128,10 @@ pub(super) fn read_load_factor(
         !entries.is_given(Key::GravityInTime),
         "dynamics.gravity is gravity in time, too: leave one of them out",
     )?;
+    item.refuse_unless(
+        !entries.is_given(Key::Follower) && !entries.is_given(Key::Couple),
+        "changes dead loads alone: leave it out, or load.follower and load.couple",
+    )?;
     Ok(Some(Box::new(FactoredLoads {
         factor: item.factors_in_time()?,
         gravity: weights.shared,
@@ -196,16 +204,8 @@ pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<[f6
     Ok(g)
 }
 
-/// Reads `load.distributed`; `None` if the entry is left out or zero.
-pub(super) fn read_distributed_loads(
-    entries: &Entries,
-    rods: usize,
-) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
-    read_vectors_along_rods(entries, Key::Distributed, rods)
-}
-
-/// Reads a key with vectors along rods; `None` if the entry is left out or zero.
-pub(super) fn read_vectors_along_rods(
+/// Reads loads per length of each vein; `None` if the entry is left out or zero.
+pub(super) fn read_loads_along_veins(
     entries: &Entries,
     key: Key,
     rods: usize,
@@ -230,7 +230,10 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
     let item = |key| entries.value_in_row(key, row);
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
-    check_single_rod_moments(turned, rods, &[moment])?;
+    let follows = item(Key::PointFollows)?.switch()?;
+    if !follows {
+        check_single_rod_moments(turned, rods, &[moment])?;
+    }
     let force = item(Key::PointForce)?.vector()?;
     let varying = match entries.is_given_in_row(Key::PointFactor, row) {
         true => Some(Box::new(VaryingPointLoad {
@@ -240,11 +243,18 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
         })),
         false => None,
     };
+    if varying.is_some() {
+        item(Key::PointFollows)?.refuse_unless(
+            !follows,
+            "turns the load with the section, and a factor in time changes dead loads only: leave one of them out",
+        )?;
+    }
     let given = PointLoad {
         vein: item(Key::PointVein)?.whole_number(rods)? - 1,
         at: item(Key::PointAt)?.fraction()?,
         force,
         moment,
+        follows,
         mass: item(Key::PointMass)?.number()?,
         in_time: varying,
         landing: read_landing(entries, row)?,
@@ -281,7 +291,10 @@ pub(super) fn check_single_rod_moments(
 ) -> ScenarioResult<()> {
     let allowed = rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]);
     let (what, why) = match item.key() {
-        Key::PointMoment => ("on a point", "a dead moment has no potential"),
+        Key::PointMoment => (
+            "on a point",
+            "a dead moment has no potential; one that follows the section (follows = true) may act on any vein",
+        ),
         _ => ("at the tip", "joined tips pass on no moment"),
     };
     item.refuse_unless(
@@ -379,6 +392,9 @@ pub struct Dynamics {
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
     pub external_damping: f64,
+    /// Whether the scenario leaves that out: motions are damped then, but no verdict on small motions
+    /// depends on it.
+    pub assumes_damping: bool,
     /// Retardation time of the material (Kelvin-Voigt): the stress is the
     /// stiffness times the strain and times this time the strain rate.
     pub internal_damping: f64,
@@ -471,6 +487,7 @@ impl Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
             polar_inertia: PolarInertia::Excess(0.0),
             external_damping: critical_damping(&density, time),
+            assumes_damping: true,
             density,
             internal_damping: 0.0,
             duration,
@@ -583,6 +600,7 @@ pub(super) fn read_dynamics(
         rotary_inertia,
         polar_inertia,
         external_damping,
+        assumes_damping: !entries.is_given(Key::ExternalDamping),
         internal_damping,
         duration,
         output_interval,

@@ -196,9 +196,10 @@ impl Entries {
         let tissue = read_tissue(self, rods.len() - 1, &source)?;
         let weights = loads::read_weights(self, rods.len())?;
         let g = loads::read_gravity_acceleration(self)?;
-        let distributed = loads::read_distributed_loads(self, rods.len())?;
-        let foundation =
-            loads::read_vectors_along_rods(self, Key::FoundationStiffness, rods.len())?;
+        let along = |key| loads::read_loads_along_veins(self, key, rods.len());
+        let distributed = along(Key::Distributed)?;
+        let foundation = along(Key::FoundationStiffness)?;
+        let (follower, couple) = (along(Key::Follower)?, along(Key::Couple)?);
         let factored = loads::read_load_factor(self, &weights, g, &distributed)?;
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
@@ -235,6 +236,9 @@ impl Entries {
             distributed,
             foundation,
             factored,
+            follower,
+            couple,
+            couple_follows: self.value_or_default(Key::CoupleFollows)?.switch()?,
             points,
             tip_force,
             tip_moment,

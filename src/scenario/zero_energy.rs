@@ -163,9 +163,13 @@ impl ZeroEnergyRotation {
 }
 
 impl Scenario {
-    /// The groups of veins that can turn without resistance: in wind only those that spin.
+    /// The groups of veins that can turn without resistance: in wind only those that spin, and none
+    /// under loads that turn with the sections.
     pub fn zero_energy_rotations(&self) -> Vec<ZeroEnergyRotation> {
         let mut rotations = Vec::new();
+        if self.has_followers() {
+            return rotations;
+        }
         let hinged = self.base_held == BaseSupport::Pinned;
         for rods in self.tied_groups() {
             let windy = self.wind.is_some();
@@ -248,7 +252,7 @@ impl Scenario {
     /// Moments that keep a leaf from resting: on a group of veins that turns as a rigid body while no
     /// force does work, their sum about the axis is not zero.
     pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
-        if self.base_held != BaseSupport::Pinned || self.wind.is_some() {
+        if self.base_held != BaseSupport::Pinned || self.wind.is_some() || self.has_followers() {
             return None;
         }
         self.tied_groups().into_iter().find_map(|group| {
@@ -354,7 +358,8 @@ impl Scenario {
             let points = |apart: Vec<DVec3>| self.support_line(&group, &apart).is_some();
             !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
         };
-        let hinged = self.base_held == BaseSupport::Pinned && self.wind.is_none();
+        let hinged =
+            self.base_held == BaseSupport::Pinned && self.wind.is_none() && !self.has_followers();
         hinged && self.tied_groups().into_iter().any(free)
     }
 

@@ -77,6 +77,9 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
     if !scenario.grips.is_empty() {
         return Err(UnmodelledFeature::Grips { what: "shooting" });
     }
+    if scenario.has_followers() {
+        return Err(UnmodelledFeature::Followers { what: "shooting" });
+    }
     if scenario.wind.is_some() {
         return Err(UnmodelledFeature::Wind { what: "shooting" });
     }

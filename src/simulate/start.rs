@@ -122,7 +122,7 @@ pub(crate) fn unstable_start_doubt(
 ) -> Option<MotionDoubt> {
     let mut leaf = leaf.clone();
     physics.apply_loads(&mut leaf, 0.0);
-    if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
+    if !leaf.leaf.has_potential() || leaf.loads.has_moments() || !physics.clamped() {
         // Its rest is no minimum of an energy, or it has none.
         return None;
     }

@@ -1,7 +1,8 @@
 //! Equilibria of a leaf, as far as many starts find them.
 
 use crate::relax::{
-    Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
+    Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index,
+    without_wind_or_followers,
 };
 use crate::run::{Instant, Limit, join_remarks};
 use crate::scenario::Scenario;
@@ -111,7 +112,7 @@ pub fn equilibria(
     limit: &Limit,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Equilibria, RelaxError> {
-    without_wind(scenario, "the search for all shapes")?;
+    without_wind_or_followers(scenario, "the search for all shapes")?;
     let clock = Instant::now();
     let mut all = Equilibria {
         scenario: scenario.name.clone(),

@@ -2,7 +2,7 @@
 
 use crate::relax::{
     Equilibrium, EquilibriumDoubt, EquilibriumTracker, Options, Parameter, Progress, RelaxError,
-    RelaxedLeaf, Sensitivity, relax_on_grids, sensitivities, without_wind,
+    RelaxedLeaf, Sensitivity, relax_on_grids, sensitivities, without_wind_or_followers,
 };
 use crate::scenario::Scenario;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
@@ -34,7 +34,7 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    without_wind(scenario, "a derivative")?;
+    without_wind_or_followers(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
     let RelaxedLeaf {
@@ -69,7 +69,7 @@ pub fn sensitivities_of_tracker(
     keys: &[ParameterKeys],
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
     let scenario = base.scenario();
-    without_wind(scenario, "a derivative")?;
+    without_wind_or_followers(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
     Ok(sensitivities(

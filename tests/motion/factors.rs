@@ -32,6 +32,7 @@ fn loaded(
     factor: &Schedule<f64>,
 ) {
     let load = PointLoad {
+        follows: false,
         vein,
         at,
         force,

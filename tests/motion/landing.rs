@@ -8,6 +8,7 @@ use leafdyn_testing::{DVec3, Leaf, PI, Scenario, largest};
 /// A mass that lands on a point of a vein.
 fn land(scenario: &mut Scenario, (vein, at): (usize, f64), landing: Landing) {
     scenario.points.push(PointLoad {
+        follows: false,
         vein,
         at,
         force: [0.0; 3],

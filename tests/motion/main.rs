@@ -6,6 +6,7 @@ mod driven;
 mod energy;
 mod error_bars;
 mod factors;
+mod followers;
 mod grips;
 mod half_turn;
 mod hinges;

@@ -268,6 +268,7 @@ fn stations_a_rounding_error_from_a_point_that_is_loaded() {
             at,
             force: [0.2, 0.3, 1.0],
             moment: [0.4, -0.5, 0.6],
+            follows: false,
             mass: 0.0,
             in_time: None,
             landing: None,

@@ -16,6 +16,7 @@ mod mode_shapes;
 mod modes;
 mod point_masses;
 mod rollers;
+mod small_motions;
 mod taut_rods;
 mod trace_consistent;
 mod trace_of_grips;

@@ -81,6 +81,7 @@ fn masses_on_one_point_add_up() {
     let mut two = one.clone();
     two.points[0].mass = 0.4;
     let other = leafdyn::scenario::PointLoad {
+        follows: false,
         mass: 0.3,
         ..two.points[0].clone()
     };

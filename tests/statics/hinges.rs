@@ -34,6 +34,7 @@ fn moment_at(at: f64, entries: &str) -> Scenario {
         at,
         force: [0.0; 3],
         moment: [0.3, 0.8, -0.4],
+        follows: false,
         mass: 0.0,
         in_time: None,
         landing: None,

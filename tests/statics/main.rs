@@ -15,6 +15,7 @@ mod error_in_veins;
 mod every_tolerance;
 mod explicit_relaxation;
 mod extreme_leaves;
+mod followers;
 mod foundation;
 mod from_shape;
 mod grips;

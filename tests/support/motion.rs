@@ -44,6 +44,7 @@ pub fn moments_on_points() -> Scenario {
         at,
         force: [0.0; 3],
         moment,
+        follows: false,
         mass: 0.0,
         in_time: None,
         landing: None,

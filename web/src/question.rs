@@ -109,6 +109,7 @@ impl Pull {
             at: self.at,
             force,
             moment: [0.0; 3],
+            follows: false,
             mass: 0.0,
             in_time: None,
             landing: None,

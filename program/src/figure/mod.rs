@@ -226,6 +226,7 @@ mod tests {
             at: 0.4,
             force: [0.0; 3],
             moment: [0.3, 0.2, 0.1],
+            follows: false,
             mass: 0.0,
             in_time: None,
             landing: None,

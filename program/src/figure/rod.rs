@@ -381,6 +381,7 @@ mod tests {
                 at: 0.5,
                 force: [0.0, 0.0, 0.5],
                 moment: [0.0; 3],
+                follows: false,
                 mass: 0.0,
                 in_time: None,
                 landing: None,

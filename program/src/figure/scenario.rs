@@ -106,7 +106,8 @@ pub struct SupportMark {
     pub held: SupportForm,
 }
 
-/// The dead loads on a leaf at rest, or on one in motion at this time. Gravity and wind, which act on
+/// The dead loads on a leaf at rest, or on one in motion at this time; what turns with a section has no
+/// direction before its section is known. Gravity and wind, which act on
 /// all veins alike, are directions of the whole figure.
 pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let scenario = &match time {
@@ -118,14 +119,19 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let g = DVec3::from_array(scenario.g);
     let points = scenario.points.iter();
     let on_points = points.clone().map(|it| {
-        let force = DVec3::from_array(it.force) + it.mass * g;
-        (it.vein + 1, it.at, force)
+        let given = if it.follows {
+            DVec3::ZERO
+        } else {
+            DVec3::from_array(it.force)
+        };
+        (it.vein + 1, it.at, given + it.mass * g)
     });
     // Tips at one point have one arrow.
     let tips = if scenario.joined { 1 } else { veins };
     let on_tips = (1..=tips).map(|vein| (vein, 1.0, tip_force));
     let single: Vec<_> = on_points.chain(on_tips).collect();
-    let moments = points.map(|it| (it.vein + 1, it.at, DVec3::from_array(it.moment)));
+    let moments = points.filter(|it| !it.follows);
+    let moments = moments.map(|it| (it.vein + 1, it.at, DVec3::from_array(it.moment)));
     let moments: Vec<_> = moments.chain([(1, 1.0, tip_moment)]).collect();
     let along = scenario.distributed.iter().flatten().zip(1..);
     let along: Vec<_> = along
@@ -400,6 +406,8 @@ const KEY_WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("load.gravity", "gravity", Along),
     ("load.g", "acceleration of gravity", Along),
     ("load.distributed", "force per length", Along),
+    ("load.follower", "following force per length", Along),
+    ("load.couple", "moment per length", About),
     ("load.tip_force", "force on the tip", Along),
     ("load.tip_moment", "moment on the tip", About),
     ("load.point.at", "place of point", Plain),

@@ -201,7 +201,14 @@ pub fn relaxation_verdict(equilibrium: &Equilibrium) -> String {
 }
 
 fn rest_phrase(equilibrium: &Equilibrium) -> String {
-    equilibrium_kind(equilibrium.stability.negative_eigenvalues)
+    let Some(motions) = &equilibrium.stability.small_motions else {
+        return equilibrium_kind(equilibrium.stability.negative_eigenvalues);
+    };
+    match (motions.stable, motions.instability) {
+        (Some(true), _) => "stable equilibrium".into(),
+        (Some(false), Some(how)) => format!("unstable equilibrium ({})", how.word()),
+        _ => "equilibrium of unknown stability".into(),
+    }
 }
 
 /// The title of what a map shows.

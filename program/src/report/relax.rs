@@ -16,6 +16,7 @@ use leafdyn::numbers::{format_two_digits, larger, largest};
 use leafdyn::relax::{
     Attempt, AxisDirection, Barrier, BladeReport, CriticalTipForce, Equilibrium, EquilibriumDoubt,
     Event, InstabilityKind, Margin, Mode, Model, Outcome, Path, PostcriticalBehavior, Sensitivity,
+    SmallMotions,
 };
 use leafdyn::scenario::units::{
     AREA, COUPLE_STIFFNESS, Dimension, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
@@ -81,6 +82,8 @@ impl ReportedResult for Equilibrium {
         let errors = errors.chain(error_in_veins_lines(self, units));
         lines.extend(label_first_line("error", errors));
         lines.extend(lowest_modes_line(self, units).map(|modes| ("modes", modes)));
+        let motions = self.stability.small_motions.as_ref();
+        lines.extend(motions.map(|motions| ("motions", small_motions_line(motions, units))));
         lines.extend(label_first_line("changes", tip_change_lines(self, units)));
         let blade = self.blade.as_ref().map(|it| blade_lines(it, units));
         lines.extend(label_first_line("blade", blade.unwrap_or_default()));
@@ -366,6 +369,23 @@ fn lowest_modes_line(equilibrium: &Equilibrium, units: &Units) -> Option<String>
         false => "",
     };
     (!phrases.is_empty()).then(|| phrases.join("; ") + note + neutral)
+}
+
+/// Growth rates and frequencies of the small motions about an equilibrium without a potential.
+fn small_motions_line(motions: &SmallMotions, units: &Units) -> String {
+    let per_time = units.unit_name(RATE).unwrap_or("per time".into());
+    let cycles = units.frequency().unwrap_or("cycles per time".into());
+    let listed = |numbers: &[f64], cycle: f64| {
+        let numbers = numbers.iter().take(MOST_MODES_LISTED);
+        let texts: Vec<String> = numbers.map(|it| format_five_digits(it / cycle)).collect();
+        texts.join(", ")
+    };
+    let growth = listed(&motions.growth_rates, 1.0);
+    let frequencies = listed(&motions.frequencies, TAU);
+    match motions.growth_rates.is_empty() {
+        true => "none listed".into(),
+        false => format!("growth rates {growth} {per_time}; frequencies {frequencies} {cycles}"),
+    }
 }
 
 /// The growth rate of a mode, or its frequency with cycles of so many radians.

@@ -70,6 +70,7 @@ class Equilibrium(Viewed):
         "Why `error_in_veins` was asked for and is not known, or how uncertain it is; none otherwise."
     )
     wall_seconds = Attribute[float]("The time of the solution alone, in seconds.")
+    _motions: tuple[bool | None, list[float], list[float]] | None
 
     def __init__(self, core: _leafdyn.Leaf, request: tuple[Scenario, dict[str, Any]] | None = None) -> None:
         self._files = core
@@ -85,7 +86,10 @@ class Equilibrium(Viewed):
 
     @property
     def stable(self) -> bool | None:
-        """Whether the leaf is stable; none if that is not known."""
+        """Whether the leaf is stable; none if that is not known. Under forces without a potential: whether no small motion
+        grows."""
+        if self._motions is not None:
+            return self._motions[0]
         return None if self.negative_eigenvalues is None else self.negative_eigenvalues == 0
 
     @property
@@ -258,8 +262,16 @@ class Equilibrium(Viewed):
         return None if angular is None else angular / (2.0 * np.pi)
 
     @property
+    def growth_rates(self) -> Array | None:
+        """Under forces without a potential: growth rates of the small motions whose frequencies are `frequencies`, shape
+        (motions,), per time, negative of those that decay; none of other leaves, and if not known."""
+        return None if self._motions is None else np.array(self._motions[1], dtype=np.float64)
+
+    @property
     def angular_frequencies(self) -> Array | None:
         """Angular frequencies omega, 2 pi times `frequencies`, shape (modes,), radians per time."""
+        if self._motions is not None:
+            return np.array(self._motions[2], dtype=np.float64)
         if self.eigenvalues is None:
             return None
         with np.errstate(invalid="ignore"):

@@ -151,6 +151,9 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "_files": files,
         "_request": None,
         "_modes": None if eigenvalues is None else (_array(eigenvalues), _array(errors)),
+        "_motions": None
+        if said.get("growth_rates") is None
+        else (said["stable"], said["growth_rates"], said["frequencies"]),
         "_reaction": _reaction(said),
         "name": scenario.name,
         "scenario": scenario,

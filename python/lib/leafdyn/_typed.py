@@ -113,6 +113,7 @@ LoadPointTable = TypedDict(
     {
         "at": float,
         "factor": Profile,
+        "follows": bool,
         "force": Numbers,
         "from": float,
         "mass": float,
@@ -128,8 +129,11 @@ LoadPointTable = TypedDict(
 class LoadTable(TypedDict, total=False):
     """``[load]``"""
 
+    couple: Numbers | Vectors | Profile
+    couple_follows: bool
     distributed: Numbers | Vectors | Profile
     factor: Profile
+    follower: Numbers | Vectors | Profile
     g: Numbers
     gravity: Numbers | Vectors
     point: Sequence[LoadPointTable]

@@ -392,6 +392,7 @@ impl Explicit {
         energy -= self.return_sliding_nodes();
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
+            work += length * applied.power_of_followers(self.layout, &self.packs);
             let free = |k: usize| !MovingSupports::holds(&self.supports, k, 1);
             work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity, free);
         }
@@ -660,14 +661,15 @@ impl TimeIntegrator for Explicit {
 /// The moment and the force on a node whose support moves, besides those of its segments.
 fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
     let load = leaf.load(state, it.rod, it.node);
+    let follower = leaf.follower_wrench(state, it.rod, it.node);
     let moment = match (it.holds_rotation, it.node) {
-        (true, _) => load.moment,
+        (true, _) => load.moment + follower.moment,
         (false, 0) => -leaf.spring_load(state, it.rod, 0).moment,
         (false, _) => DVec3::ZERO,
     };
     Wrench {
         moment,
-        force: load.force,
+        force: load.force + follower.force,
     }
 }
 
@@ -832,6 +834,16 @@ struct AppliedLoads {
     /// Moments and forces, laid out as positions.
     loads: [[AlignedArray; 3]; 2],
     nodes_in_wind: Option<NodesInWind>,
+    /// Loads that turn with the sections, and moments along veins, node by node; empty without any.
+    followers: Vec<FollowerOnNode>,
+}
+
+/// A load that turns with the section of a node, and the motion of the node before the last kick.
+#[derive(Clone, Copy, Default)]
+struct FollowerOnNode {
+    load: Wrench,
+    velocity: DVec3,
+    spin: NodeSpin,
 }
 
 struct NodesInWind {
@@ -853,7 +865,8 @@ impl AppliedLoads {
         let wind = WindDrag::new(leaf, physics);
         let dead = leaf.loads.rod_load_factor != 0.0;
         let moved = leaf.leaf.scenario().support_motion.is_some();
-        if !leaf.has_tissue() && !dead && !leaf.has_springs() && wind.is_none() && !moved {
+        let none = !leaf.has_tissue() && !dead && !leaf.has_springs() && !moved;
+        if none && wind.is_none() && !leaf.has_followers() {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -870,6 +883,14 @@ impl AppliedLoads {
                 velocity: at_rest(),
                 earlier_velocity: at_rest(),
             }),
+            followers: vec![
+                FollowerOnNode::default();
+                if leaf.has_followers() {
+                    state.x.len()
+                } else {
+                    0
+                }
+            ],
             state,
         })
     }
@@ -917,6 +938,24 @@ impl AppliedLoads {
                 node.force += *force;
             }
         }
+        if !self.followers.is_empty() {
+            for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
+                let PackPosition { pack, entry } = layout.pack_position(j, i);
+                let k = self.state.base(j) + i;
+                let momentum = packs[pack].momentum(entry);
+                let load = leaf.follower_wrench(&self.state, j, i);
+                self.nodes[k].moment += load.moment;
+                self.nodes[k].force += load.force;
+                self.followers[k] = FollowerOnNode {
+                    load,
+                    velocity: momentum.velocity,
+                    spin: NodeSpin {
+                        rotation: packs[pack].rotation(entry),
+                        angular_momentum: momentum.angular,
+                    },
+                };
+            }
+        }
         for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
             let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
             for (arrays, load) in self.loads.iter_mut().zip([node.moment, node.force]) {
@@ -950,6 +989,21 @@ impl AppliedLoads {
         power.sum()
     }
 
+    /// Power of the loads that turn with the sections at the mean of the motions before the last kick and of
+    /// the present ones.
+    fn power_of_followers(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
+        let nodes = self.state.segments() + 1;
+        let power = self.followers.iter().enumerate().map(|(k, before)| {
+            let PackPosition { pack, entry } = layout.pack_position(k / nodes, k % nodes);
+            let (pack, now) = (&packs[pack], packs[pack].momentum(entry));
+            let momentum = 0.5 * (before.spin.angular_momentum + now.angular);
+            let spin = pack.angular_velocity(entry, before.spin.rotation, momentum);
+            let velocity = 0.5 * (before.velocity + now.velocity);
+            before.load.moment.dot(spin) + before.load.force.dot(velocity)
+        });
+        power.sum()
+    }
+
     /// The velocities that further motion depends on.
     fn past_velocities(&self) -> Vec<DVec3> {
         (self.nodes_in_wind.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
@@ -972,6 +1026,7 @@ struct StepDeadMoments {
 }
 
 /// Rotation and angular momentum of a node.
+#[derive(Clone, Copy, Default)]
 struct NodeSpin {
     rotation: DQuat,
     angular_momentum: DVec3,

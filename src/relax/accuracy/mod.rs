@@ -597,7 +597,12 @@ impl NestedEquilibrium {
         let turns = |level: &GridLevel| !level.leaf.zero_energy_fields(&level.state).is_empty();
         // The defect is that of dead loads.
         let columns = match self.convergence_table.best() {
-            _ if problem.leaf.in_wind() || self.levels.last().is_some_and(turns) => None,
+            _ if problem.leaf.in_wind()
+                || problem.leaf.loads.has_followers()
+                || self.levels.last().is_some_and(turns) =>
+            {
+                None
+            }
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
             None => {

@@ -592,7 +592,9 @@ impl<'l> NodalResultants<'l> {
         let of_tissue = self.tissue_loads.get(state.base(j) + i).copied();
         let load = leaf.load_with_tissue(state, j, i, of_tissue.unwrap_or_default());
         let end = leaf.rigid_end_load(state, j, i);
-        let (mut force, mut moment) = (load.force + end.force, load.moment + end.moment);
+        let follower = leaf.follower_wrench(state, j, i);
+        let mut force = load.force + end.force + follower.force;
+        let mut moment = load.moment + end.moment + follower.moment;
         if let Some([_, tissue]) = &before {
             (force, moment) = (force + tissue.x, moment + tissue.b);
         }
@@ -615,7 +617,11 @@ impl<'l> NodalResultants<'l> {
                     false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
                 };
                 let part = left / (left + right);
-                (before.x - part * force - jump, before.b - part * moment)
+                let follower = leaf.follower_jump_before(state, j, i);
+                (
+                    before.x - part * force - jump - follower.force,
+                    before.b - part * moment - follower.moment,
+                )
             }
             (None, None) => (DVec3::ZERO, DVec3::ZERO),
         };

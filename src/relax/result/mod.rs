@@ -15,10 +15,12 @@ use crate::relax::remark::{
 use crate::relax::request::Method;
 use crate::relax::result::forces::{BaseReaction, GripReaction, Reaction, Stresses};
 use crate::relax::saddle::Saddle;
+use crate::relax::small_motions::SmallMotions;
 use crate::scenario::{Blade, Scenario};
 use crate::shape::{RodShape, Undulation, serialize_tips};
 use crate::{shape, words};
 use glam::DVec3;
+use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
@@ -179,25 +181,56 @@ pub struct Accuracy {
 }
 
 /// Whether an equilibrium is stable, as far as that is known.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stability {
     /// Morse index: negative eigenvalues of the energy's Hessian. `None` if
-    /// the leaf is not at rest.
-    #[serde(flatten, serialize_with = "serialize_index")]
+    /// the leaf is not at rest, or forces without a potential act on it.
     pub negative_eigenvalues: Option<usize>,
     /// Number of directions in which the leaf can move without resistance, as round veins
     /// clamped in line can, and veins on hinges: eigenvalues that are exactly zero, at no bifurcation.
     pub neutral_directions: usize,
     /// The lowest modes, ascending, without omissions. `None` if they were not requested or
     /// not found, if the leaf is not at rest, or for shooting.
-    #[serde(flatten, serialize_with = "serialize_eigenvalues")]
     pub modes: Option<Vec<Mode>>,
     /// Whether the shapes of the modes were requested.
-    #[serde(skip)]
     pub mode_shapes: bool,
+    /// The linearised motion, where forces without a potential act.
+    pub small_motions: Option<SmallMotions>,
     /// A saddle that was reached and left.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub saddle: Option<Saddle>,
+}
+
+impl Stability {
+    /// Whether the equilibrium is stable: no negative eigenvalue or, without a potential, no small motion that
+    /// grows.
+    pub fn stable(&self) -> Option<bool> {
+        match &self.small_motions {
+            Some(motions) => motions.stable,
+            None => self.negative_eigenvalues.map(|count| count == 0),
+        }
+    }
+}
+
+impl Serialize for Stability {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("stable", &self.stable())?;
+        map.serialize_entry("negative_eigenvalues", &self.negative_eigenvalues)?;
+        map.serialize_entry("neutral_directions", &self.neutral_directions)?;
+        let modes = self.modes.as_deref();
+        let eigenvalues: Option<Vec<f64>> =
+            modes.map(|modes| modes.iter().map(|mode| mode.eigenvalue).collect());
+        // Errors are given only if all are known.
+        let errors: Option<Vec<f64>> =
+            modes.and_then(|modes| modes.iter().map(|mode| mode.error).collect());
+        map.serialize_entry("lowest_eigenvalues", &eigenvalues)?;
+        map.serialize_entry("eigenvalue_errors", &errors)?;
+        SmallMotions::serialize_keys(self.small_motions.as_ref(), &mut map)?;
+        if let Some(saddle) = &self.saddle {
+            map.serialize_entry("saddle", saddle)?;
+        }
+        map.end()
+    }
 }
 
 /// Derivatives of the results of a leaf at rest with respect to a number of its scenario, in
@@ -354,9 +387,10 @@ pub struct Equilibrium {
 }
 
 impl Equilibrium {
-    /// Whether the equilibrium is stable: no negative eigenvalue.
+    /// Whether the equilibrium is stable: no negative eigenvalue or, without a potential, no small motion that
+    /// grows.
     pub fn stable(&self) -> Option<bool> {
-        (self.stability.negative_eigenvalues).map(|count| count == 0)
+        self.stability.stable()
     }
 }
 
@@ -373,25 +407,6 @@ pub fn serialize_index<S: Serializer>(
     Keys {
         stable: index.map(|count| count == 0),
         negative_eigenvalues: *index,
-    }
-    .serialize(serializer)
-}
-
-/// Modes as the keys `lowest_eigenvalues` and `eigenvalue_errors`; errors are given only if
-/// all are known.
-fn serialize_eigenvalues<S: Serializer>(
-    modes: &Option<Vec<Mode>>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Keys {
-        lowest_eigenvalues: Option<Vec<f64>>,
-        eigenvalue_errors: Option<Vec<f64>>,
-    }
-    let modes = modes.as_deref();
-    Keys {
-        lowest_eigenvalues: modes.map(|modes| modes.iter().map(|mode| mode.eigenvalue).collect()),
-        eigenvalue_errors: modes.and_then(|modes| modes.iter().map(|mode| mode.error).collect()),
     }
     .serialize(serializer)
 }

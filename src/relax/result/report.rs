@@ -65,6 +65,8 @@ pub fn equilibrium(
     let error_estimate = error.map(|error| (error + added_error) * scale.length);
     let DrawnCenterlines { grid, lines } = centerlines(found, finest);
     let energy = found.energy();
+    // Neither wind nor loads that turn with the section have a potential.
+    let has_energy = !problem.leaf.in_wind() && !problem.leaf.loads.has_followers();
     let on_bases = found.base_reactions();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = found
@@ -79,8 +81,7 @@ pub fn equilibrium(
         remark: end.remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
-        // Wind has no potential.
-        energy: (!problem.leaf.in_wind()).then_some(energy.value * scale.moment()),
+        energy: has_energy.then_some(energy.value * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: found.reaction(),
@@ -92,6 +93,7 @@ pub fn equilibrium(
             neutral_directions: neutral_directions(scenario, &rods),
             modes: None,
             mode_shapes: problem.options.mode_shapes,
+            small_motions: None,
             saddle: found.history.saddle,
         },
         path: path_to_equilibrium(problem.leaf, found),
@@ -120,8 +122,7 @@ pub fn equilibrium(
             tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
-            energy_error: (energy.error.filter(|_| !problem.leaf.in_wind()))
-                .map(|error| error * scale.moment()),
+            energy_error: (energy.error.filter(|_| has_energy)).map(|error| error * scale.moment()),
         },
         attempts: Vec::new(),
         work: found.work,
@@ -323,9 +324,14 @@ pub fn outcome(
                 .index
                 .is_none()
                 .then(|| match !problem.leaf.loads.has_moments() {
-                    _ if problem.leaf.in_wind() => EquilibriumRemark::WindWithoutPotential,
+                    _ if problem.leaf.in_wind() => {
+                        EquilibriumRemark::WindWithoutPotential { verdict: None }
+                    }
+                    _ if problem.leaf.loads.has_followers() => {
+                        EquilibriumRemark::FollowersWithoutPotential { verdict: None }
+                    }
                     true => EquilibriumRemark::IndexNotCounted,
-                    false => EquilibriumRemark::MomentWithoutPotential,
+                    false => EquilibriumRemark::MomentWithoutPotential { verdict: None },
                 }),
         ),
         None => RunEnd::new(

@@ -2,6 +2,7 @@
 //! saddles, with the count of its negative eigenvalues; and how many segments the coarsest grid needs.
 
 pub(crate) mod explicit;
+pub(crate) mod follower_loads;
 pub(crate) mod grips;
 pub(crate) mod no_potential;
 pub(crate) mod semi_implicit;
@@ -15,7 +16,7 @@ use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, StrainEffects, is_large,
 };
 use crate::relax::log::WorkLog;
-use crate::relax::path::Event;
+use crate::relax::path::{Event, Route};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK, WayFromStart};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
@@ -133,31 +134,54 @@ fn find_unleaned_equilibrium(
         | InitialGuess::Predicted(state)
         | InitialGuess::Pushed(state) => state,
     };
-    let dead_moment = leaf.has_moments();
+    let (followers, windy) = (leaf.has_followers(), leaf.leaf.in_wind());
+    // A leaf that is released in wind moves.
+    let grows = match windy {
+        true => problem.options.route == Route::Loading,
+        false => followers,
+    };
+    let dead_moment = leaf.has_moments() && !grows && !windy;
+    let without_potential = leaf.has_moments() || followers;
     let mut moved = false;
     let mut events = None;
     if grip {
-        // Dead moments act once it is held: only without them the path has an energy to follow.
-        let held = match dead_moment {
-            true => move_grips(problem, &leaf.without_moments(), state, effort),
+        // What has no potential acts once it is held: only without it the path has an energy to follow.
+        let held = match without_potential {
+            true => move_grips(problem, &leaf.with_load_potential(), state, effort),
             false => move_grips(problem, &leaf, state, effort),
         };
         (state, moved) = (held.state, held.left_convex_valley);
-        near_rest = held.near_rest && !dead_moment;
+        near_rest = held.near_rest && !without_potential;
         events = Some(held.events).filter(|_| leaf.leaf.has_potential());
     } else {
         leaf.place_held_nodes(&mut state);
     }
     let explicit = problem.options.method.is_explicit();
-    let windy = leaf.leaf.in_wind();
     // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);
     moved |= windy && from_start;
-    if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
-        let quality = GuessQuality {
-            near_rest,
-            cg_tolerance,
-        };
+    let quality = GuessQuality {
+        near_rest,
+        cg_tolerance,
+    };
+    if grows && !near_rest && !grip {
+        let calm = leaf.with_load_potential();
+        let mut system = effort.workspace.equations(&calm);
+        let level = GridLevel { leaf: calm, state };
+        let settled = solve_semi_implicit(problem, history, level, &mut system, quality, effort);
+        effort.workspace.take_back(system);
+        state = settled.level.state;
+        moved |= settled.left_convex_valley;
+        if settled.iteration_error.is_err() {
+            return GridSolution {
+                level: GridLevel { leaf, state },
+                iteration_error: settled.iteration_error,
+                left_convex_valley: moved,
+                events,
+            };
+        }
+    }
+    if !explicit && !without_potential && !windy && !problem.keeps_unstable() {
         let mut system = effort.workspace.equations(&leaf);
         let (start, steps) = (from_start.then(|| state.clone()), effort.work.steps);
         let level = GridLevel { leaf, state };
@@ -187,6 +211,15 @@ fn find_unleaned_equilibrium(
         ..GridRelaxation::new(state, accuracy, work, progress, limit)
     };
     let rest = match (explicit, dead_moment) {
+        _ if grows => {
+            match follower_loads::solve_with_followers(&mut leaf, &mut system, &mut relaxation) {
+                // Where the path of balances ends the leaf moves on.
+                Err(_) if windy && !near_rest => {
+                    no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation)
+                }
+                balanced => balanced,
+            }
+        }
         _ if windy => no_potential::solve_in_wind(&mut leaf, &mut system, &mut relaxation),
         (true, _) => explicit::relax_explicitly(&leaf, &mut system, &mut relaxation),
         (_, true) => no_potential::solve_with_dead_moments(&mut leaf, &mut system, &mut relaxation),

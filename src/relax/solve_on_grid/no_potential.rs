@@ -13,16 +13,14 @@
 //! Where it rests is thus stable as that motion is.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{
-    DiscreteLeaf, Grid, Leaf, Loads, NodalField, NodeFreedom, State, System, add_to_increment,
-    displacement_part,
-};
-use crate::motion::{Physics, SegmentDrag, SemiImplicit, StepControl, TimeIntegrator, WindDrag};
-use crate::newton::{EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, State, System};
+use crate::motion::{Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::numbers::{larger, largest};
 use crate::relax::same_equilibrium::is_same_balance;
+use crate::relax::solve_on_grid::follower_loads::{WithoutPotential, balance_forces};
 use crate::relax::solve_on_grid::start::GridRelaxation;
-use crate::rod::{RESOLVED_TURN, Section, Wrench};
+use crate::rod::{RESOLVED_TURN, Section};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -340,16 +338,6 @@ const MOTION: MotionInWind = MotionInWind {
     nearby: 10.0,
 };
 
-/// Newton iterations for the balance of forces in wind.
-const BALANCE_ITERATIONS: usize = 20;
-
-/// Their largest increment, radians and lengths.
-const LARGEST_BALANCE_INCREMENT: f64 = 1.0;
-
-/// Their accuracy, radians and lengths: forces are balanced to rounding, as nothing else shows that the
-/// leaf rests.
-const BALANCE_ACCURACY: f64 = 1e-13;
-
 /// A state in which all forces on a leaf in wind are balanced.
 struct WindBalance {
     state: State,
@@ -365,14 +353,11 @@ pub fn solve_in_wind(
     rest: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
     let physics = Physics::for_relaxation(&leaf.leaf);
-    let air = SteadyWind::new(leaf, &physics).ok_or(EquilibriumFailure::NoDescent)?;
     let remaining = match rest.near_rest {
-        true => balance_wind_forces(leaf, system, &air, rest)?,
-        false => approach_rest_in_wind(leaf, system, physics, &air, rest)?,
+        true => balance_forces(leaf, system, &WithoutPotential::new(leaf), rest)?,
+        false => approach_rest_in_wind(leaf, system, physics, rest)?,
     };
-    let mut forces = vec![DVec3::ZERO; rest.state.x.len()];
-    let still = |_| DVec3::ZERO;
-    (air.wind).set_forces(&rest.state, air.velocity, still, &mut forces);
+    let forces = WithoutPotential::new(leaf).wind_forces(&rest.state);
     leaf.add_nodal_loads(&forces);
     Ok(remaining)
 }
@@ -382,9 +367,9 @@ fn approach_rest_in_wind(
     leaf: &DiscreteLeaf,
     system: &mut System,
     physics: Physics,
-    air: &SteadyWind,
     rest: &mut GridRelaxation,
 ) -> Result<f64, EquilibriumFailure> {
+    let forces = WithoutPotential::new(leaf);
     let steps = StepControl::LocalError(MOTION.error);
     let mut motion = SemiImplicit::new(leaf.clone(), physics, &rest.state, steps);
     let (mut slow, mut until) = (MOTION.slow, MOTION.check_interval);
@@ -406,7 +391,7 @@ fn approach_rest_in_wind(
         rest.state = now.state;
         if speed < slow {
             let moving = rest.state.clone();
-            let balanced = balance_wind_forces(leaf, system, air, rest);
+            let balanced = balance_forces(leaf, system, &forces, rest);
             if balanced.is_ok() {
                 let away = moving.distance(&rest.state);
                 // A leaf that has come closer to a balance, however slowly, comes to rest there.
@@ -428,93 +413,4 @@ fn approach_rest_in_wind(
     rest.work.force_evaluations += motion.factorizations;
     rest.work.factorizations += motion.factorizations;
     end
-}
-
-/// Newton's method for the balance of forces.
-fn balance_wind_forces(
-    leaf: &DiscreteLeaf,
-    system: &mut System,
-    air: &SteadyWind,
-    rest: &mut GridRelaxation,
-) -> Result<f64, EquilibriumFailure> {
-    let newton = NewtonIteration {
-        accuracy: BALANCE_ACCURACY,
-        iterations: BALANCE_ITERATIONS,
-        work: rest.work,
-        progress: rest.progress,
-    };
-    let equations = NewtonEquations::Following {
-        forces: air,
-        largest: LARGEST_BALANCE_INCREMENT,
-    };
-    newton.solve(leaf, &mut rest.state, system, equations)
-}
-
-/// Steady wind on a leaf without velocity.
-struct SteadyWind {
-    wind: WindDrag,
-    velocity: DVec3,
-    /// What supports allow to each node, rod after rod.
-    free: Vec<NodeFreedom>,
-    segments: usize,
-    /// The first node of a rod with equations.
-    first: usize,
-}
-
-impl SteadyWind {
-    fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
-        let segments = leaf.segments();
-        let free = |(j, i)| leaf.node_freedom(j, i);
-        Some(SteadyWind {
-            wind: WindDrag::new(leaf, physics)?,
-            velocity: physics.air(0.0),
-            free: leaf.rod_index_pairs(0..segments + 1).map(free).collect(),
-            segments,
-            first: leaf.first_node(),
-        })
-    }
-
-    /// Rod and number of every segment, and the drag on it.
-    fn drags<'a>(
-        &'a self,
-        state: &'a State,
-    ) -> impl Iterator<Item = ((usize, usize), SegmentDrag)> + 'a {
-        self.wind.drags(state, self.velocity, |_| DVec3::ZERO)
-    }
-
-    /// The ends of a segment that supports let move, and what they allow.
-    fn free_segment_ends(
-        &self,
-        j: usize,
-        i: usize,
-    ) -> impl Iterator<Item = (usize, NodeFreedom)> + '_ {
-        let base = j * (self.segments + 1);
-        let ends = [i, i + 1].map(|i| (i, self.free[base + i]));
-        ends.into_iter().filter(|(_, free)| free.displacement.any())
-    }
-}
-
-impl FollowerForces for SteadyWind {
-    fn add_forces(&self, state: &State, system: &mut System) {
-        for ((j, i), drag) in self.drags(state) {
-            for (node, free) in self.free_segment_ends(j, i) {
-                let half = free.of_displacement(0.5 * drag.force());
-                system.add_load(j, node, Wrench::from_force(half));
-            }
-        }
-    }
-
-    fn add_derivative(&self, state: &State, increments: &NodalField, forces: &mut NodalField) {
-        for ((j, i), drag) in self.drags(state) {
-            let moved = |i: usize| match i.checked_sub(self.first) {
-                Some(i) => displacement_part(&increments[j][i]),
-                None => DVec3::ZERO,
-            };
-            let half = 0.5 * (drag.chord_derivative() * (moved(i + 1) - moved(i)));
-            for (node, free) in self.free_segment_ends(j, i) {
-                let half = free.of_displacement(half);
-                add_to_increment(&mut forces[j][node - self.first], DVec3::ZERO, half);
-            }
-        }
-    }
 }

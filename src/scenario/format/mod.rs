@@ -156,6 +156,12 @@ keys! {
     G "load.g": Vector, [1, 0, -2], Default("[0.0, 0.0, 0.0]");
     /// dead force per length of rod, which may vary along it.
     Distributed "load.distributed": VectorQuantity(Finite), [-1, 1, 0], Derived;
+    /// force per length of rod that turns with the section: along d1, d2, d3.
+    Follower "load.follower": VectorQuantity(Finite), [-1, 1, 0], Derived;
+    /// moment per length of rod, about x, y, z.
+    Couple "load.couple": VectorQuantity(Finite), [0, 1, 0], Derived;
+    /// whether the moment per length turns with the section: about d1, d2, d3.
+    CoupleFollows "load.couple_follows": Switch, [0, 0, 0], Default("false");
     /// dead force on the joint tip, or on every tip.
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
@@ -170,6 +176,8 @@ keys! {
     PointForce "load.point.force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the point, one rod only.
     PointMoment "load.point.moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// whether the force and the moment on the point turn with the section: along d1, d2, d3.
+    PointFollows "load.point.follows": Switch, [0, 0, 0], Default("false");
     /// mass of the point, which `load.g` pulls.
     PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
     /// time at which the mass lands on the leaf; before that it is absent.

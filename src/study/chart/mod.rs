@@ -10,7 +10,7 @@ mod remark;
 pub(super) mod result;
 
 use crate::read_and_write;
-use crate::relax::{MAX_NODES, Outcome, RelaxError, check_tolerance, without_wind};
+use crate::relax::{MAX_NODES, Outcome, RelaxError, check_tolerance, without_wind_or_followers};
 use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
 use crate::simulate::SimulationError;
@@ -86,7 +86,7 @@ pub fn chart(
     if options.motion {
         return chart_motion(scenario, options, progress);
     }
-    without_wind(scenario, "a chart")?;
+    without_wind_or_followers(scenario, "a chart")?;
     let each = |&who: &SolverConfig| {
         let knobs = who.charted_settings().into_iter();
         knobs.map(move |knob| RepeatedRuns::new(scenario, who, knob))

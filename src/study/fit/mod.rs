@@ -21,7 +21,7 @@ pub(super) mod result;
 mod statistics;
 mod table;
 
-use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
+use crate::relax::{Options, RelaxError, check_tolerance, without_wind_or_followers};
 use crate::run::{Instant, Limit};
 use crate::study::BaseScenario;
 use crate::study::fit::columns::FitError;
@@ -91,7 +91,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance).map_err(RelaxError::from)?;
     }
-    without_wind(base.scenario(), "a fit")?;
+    without_wind_or_followers(base.scenario(), "a fit")?;
     request.data.check_columns()?;
     request.data.check_choices()?;
     let coordinates = fit_coordinates(request)?;

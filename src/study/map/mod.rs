@@ -11,7 +11,7 @@ mod remark;
 pub(super) mod result;
 
 use crate::memory::TooMuch;
-use crate::relax::{RelaxError, check_tolerance, without_wind};
+use crate::relax::{RelaxError, check_tolerance, without_wind_or_followers};
 use crate::run::{Limit, RefusedOption};
 use crate::study::map::cell::MapCell;
 pub use crate::study::map::remark::{MapMotionFailure, MapRemark};
@@ -96,7 +96,7 @@ impl MapRequest {
         tolerance: Option<f64>,
         cell_seconds: f64,
     ) -> Result<Self, MapRefused> {
-        without_wind(base.scenario(), "a map")?;
+        without_wind_or_followers(base.scenario(), "a map")?;
         let refuse = |why: String| Err(MapRefused::Map(why));
         if !(1..=2).contains(&axes.len()) {
             return refuse(format!("{} axes: a map has one or two axes", axes.len()));

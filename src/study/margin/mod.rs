@@ -17,7 +17,7 @@ use crate::relax::solve_on_grid::relax_from_state;
 use crate::relax::{
     AxisDirection, CriticalTipForce, CriticalTipForceRemark, Equilibrium, GridLevel,
     InstabilityKind, Margin, MarginRemark, Neighbour, Options, PostcriticalBehavior, RelaxError,
-    RelaxedLeaf, relax_on_grids, without_wind,
+    RelaxedLeaf, relax_on_grids, without_wind_or_followers,
 };
 use crate::run::Instant;
 use crate::scenario::Scenario;
@@ -108,7 +108,7 @@ pub fn relax_with_margin(
     if scenario.has_moments() {
         return Err(MarginError::Moment);
     }
-    without_wind(scenario, "the margin")?;
+    without_wind_or_followers(scenario, "the margin")?;
     let RelaxedLeaf {
         result: mut leaf,
         on_grids: found,

@@ -14,7 +14,8 @@ use crate::branch::{
 use crate::leaf::Grid;
 use crate::memory;
 use crate::relax::{
-    Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax, without_wind,
+    Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax,
+    without_wind_or_followers,
 };
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{EntryPath, Key, Scenario, plausibility_warnings};
@@ -79,7 +80,7 @@ pub enum TraceError {
 impl TraceRequest {
     /// Validates the request before it is run.
     pub(super) fn validate(&self) -> Result<(), TraceError> {
-        without_wind(self.base.scenario(), "following a branch")?;
+        without_wind_or_followers(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
         if keys.is_whole() {

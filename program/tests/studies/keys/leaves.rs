@@ -218,6 +218,25 @@ width = { at = [0.0, 0.3, 1.0], value = [1.2, 2.0, 0.0] }
         boundary: None,
     },
     TestLeaf {
+        name: "following",
+        text: "
+leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }
+coupling = { x = 1.0, y = 2.0, z = 1.5 }
+[load]
+gravity = [0.0, 0.0, -0.6]
+follower = [0.1, 0.2, 0.2]
+couple = [0.1, 0.1, 0.1]
+[[load.point]]
+vein = 1
+at = 0.5
+force = [0.1, 0.2, 0.4]
+follows = true
+",
+        vary: WEIGHS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "windy",
         text: "
 leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }

@@ -1,0 +1,343 @@
+//! Stability without a potential: the growth rates and frequencies of the linearised motion of a leaf at rest
+//! ([`crate::modes`]), on its grids and extrapolated.
+
+use crate::modes::linearized::{MotionRoot, MotionRoots, Square, lowest_roots};
+use crate::motion::{AssumedMotion, Physics};
+use crate::relax::accuracy::NestedEquilibrium;
+use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Richardson};
+use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
+use crate::relax::solve_on_grid::follower_loads::{WithoutPotential, balance_on_next_grid};
+use crate::words;
+use faer::c64;
+use serde::{Serialize, Serializer};
+use std::borrow::Cow;
+
+words! {
+    /// How a leaf leaves an unstable equilibrium.
+    pub enum MotionInstability {
+        /// In oscillations that grow.
+        Flutter = "flutter",
+        /// Without oscillations.
+        Divergence = "divergence",
+    }
+}
+
+/// Roots that are computed even if fewer are requested: one of the lowest modes is the first that grows.
+const LEAST_ROOTS: usize = 8;
+
+/// Growth of a damped motion, as a part of the size of its root, that is rounding.
+const GROWTH_ROUNDING: f64 = 1e-8;
+
+/// Growth rates and frequencies of the small motions about an equilibrium, in the scenario's unit of time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmallMotions {
+    /// Rates of growth, negative where a motion decays: of the lowest modes, and of all further ones that
+    /// were found to grow; the slowest motions first.
+    pub growth_rates: Vec<f64>,
+    /// Their angular frequencies, radians per time; zero of what does not oscillate.
+    pub frequencies: Vec<f64>,
+    /// Bounds on the errors of either, if there are grids to compare.
+    pub errors: Option<Vec<f64>>,
+    /// Whether no motion grows; `None` where grids tell otherwise, or growth is within its error.
+    pub stable: Option<bool>,
+    /// How the motion that grows fastest does, if one does.
+    pub instability: Option<MotionInstability>,
+    /// What is assumed of masses and damping.
+    pub assumed: AssumedMotion,
+}
+
+/// Segments of the finest grid from which on, and number of grids with which, roots may be accurate enough.
+const LEAST_SEGMENTS: usize = 32;
+const LEAST_GRIDS: usize = 3;
+
+/// Largest error of a root, as a part of it.
+const LARGEST_ERROR: f64 = 1e-4;
+
+fn unknowns(level: &GridLevel) -> usize {
+    6 * level.leaf.rods() * level.leaf.segments()
+}
+
+/// Roots on nested grids.
+#[derive(Default)]
+struct RootSeries {
+    squares: Vec<(usize, Vec<Square>)>,
+    damped: Vec<(usize, Vec<MotionRoot>)>,
+}
+
+impl RootSeries {
+    fn is_empty(&self) -> bool {
+        self.squares.is_empty() && self.damped.is_empty()
+    }
+
+    /// Adds the roots on the next grid; the finest few are kept.
+    fn push(&mut self, segments: usize, roots: MotionRoots) {
+        match roots {
+            MotionRoots::Squares(roots) => self.squares.push((segments, roots)),
+            MotionRoots::Damped(roots) => self.damped.push((segments, roots)),
+        }
+        let excess = |count: usize| count.saturating_sub(EXTRAPOLATED_GRIDS);
+        self.squares.drain(..excess(self.squares.len()));
+        self.damped.drain(..excess(self.damped.len()));
+    }
+
+    fn extrapolated(&self) -> Option<Vec<ExtrapolatedRoot>> {
+        match self.squares.is_empty() {
+            true => extrapolate_damped(&self.damped),
+            false => extrapolate_squares(&self.squares),
+        }
+    }
+
+    /// Whether there are grids enough for these roots: the lowest are accurate, and it is certain of all
+    /// whether they grow.
+    fn suffices(&self, roots: &[ExtrapolatedRoot]) -> bool {
+        let squares = self.squares.iter().map(|it| it.0);
+        let segments: Vec<usize> = squares.chain(self.damped.iter().map(|it| it.0)).collect();
+        let accurate = |it: &ExtrapolatedRoot| {
+            let error = it.error.unwrap_or(f64::INFINITY);
+            error <= LARGEST_ERROR * it.root.size()
+        };
+        segments.len() >= LEAST_GRIDS
+            && segments
+                .last()
+                .is_some_and(|finest| *finest >= LEAST_SEGMENTS)
+            && roots.iter().take(LEAST_ROOTS / 2).all(accurate)
+            && roots.iter().all(|it| it.grows.is_some())
+    }
+}
+
+/// Imaginary part of the square of a difference, as a part of it, that is rounding.
+const COMPLEX_ROUNDING: f64 = 1e-6;
+
+/// Cosine of the angle between the modes of two real squares from which on they are about to meet.
+const MEETING_ALIGNMENT: f64 = 0.98;
+
+/// A root extrapolated over grids.
+#[derive(Clone, Copy)]
+struct ExtrapolatedRoot {
+    root: MotionRoot,
+    error: Option<f64>,
+    /// Whether it grows, if that is certain.
+    grows: Option<bool>,
+}
+
+/// A number extrapolated over grids.
+#[derive(Clone, Copy)]
+struct ExtrapolatedNumber {
+    value: f64,
+    error: Option<f64>,
+}
+
+impl ExtrapolatedNumber {
+    /// Extrapolates the numbers on the finest grids in a row that have one.
+    fn new(grids: impl DoubleEndedIterator<Item = (usize, Option<f64>)>) -> Option<Self> {
+        let finest = grids
+            .rev()
+            .map_while(|(segments, value)| Some((segments, vec![value?])));
+        let mut series: Vec<_> = finest.collect();
+        series.reverse();
+        if series.is_empty() {
+            return None;
+        }
+        let table: Richardson = series.into_iter().collect();
+        Some(ExtrapolatedNumber {
+            value: *table.extrapolated().first()?,
+            error: table.best().map(|best| best.error),
+        })
+    }
+
+    /// Whether it is positive, if that is certain; on a single grid, if it is there.
+    fn is_positive(self) -> Option<bool> {
+        (self.value.abs() > self.error.unwrap_or(0.0)).then_some(self.value > 0.0)
+    }
+}
+
+/// The small motions of a leaf at rest; `None` if they cannot be computed: the leaf is too large, or roots do
+/// not converge.
+pub fn small_motions(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+) -> Option<SmallMotions> {
+    let (physics, assumed) = Physics::for_small_motions(problem.leaf);
+    let count = LEAST_ROOTS.max(problem.options.modes);
+    let on = |level: &GridLevel| {
+        if unknowns(level) > UNKNOWNS.without_shapes {
+            return None;
+        }
+        let forces = WithoutPotential::in_motion(&level.leaf, &physics);
+        let limit = &problem.options.limit;
+        lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit)
+    };
+    let skipped = found.levels.len().saturating_sub(EXTRAPOLATED_GRIDS);
+    let mut series = RootSeries::default();
+    for level in found.levels.iter().skip(skipped) {
+        match on(level) {
+            Some(roots) => series.push(level.leaf.segments(), roots),
+            // The series needs consecutive grids.
+            None if series.is_empty() => {}
+            None => break,
+        }
+    }
+    let mut roots = series.extrapolated()?;
+    let mut finest = Cow::Borrowed(found.levels.last()?);
+    let fixed = problem.segments().is_some();
+    while !fixed && !series.suffices(&roots) && !problem.out_of_time() {
+        if 2 * unknowns(&finest) > UNKNOWNS.quick {
+            break;
+        }
+        let Some(next) = balance_on_next_grid(&finest, &problem.options.limit) else {
+            break;
+        };
+        let Some(further) = on(&next) else {
+            break;
+        };
+        series.push(next.leaf.segments(), further);
+        roots = series.extrapolated()?;
+        finest = Cow::Owned(next);
+    }
+    let grow: Vec<Option<bool>> = roots.iter().map(|it| it.grows).collect();
+    let stable = match grow.contains(&Some(true)) {
+        true => Some(false),
+        false => (!grow.contains(&None)).then_some(true),
+    };
+    let fastest = (roots.iter().zip(&grow)).filter(|(_, grows)| **grows == Some(true));
+    let fastest = fastest.max_by(|(a, _), (b, _)| a.root.growth.total_cmp(&b.root.growth));
+    let instability = fastest.map(|(it, _)| match it.root.frequency > 0.0 {
+        true => MotionInstability::Flutter,
+        false => MotionInstability::Divergence,
+    });
+    let listed: Vec<ExtrapolatedRoot> = (roots.iter().zip(&grow).enumerate())
+        .filter(|(k, (_, grows))| *k < problem.options.modes || **grows == Some(true))
+        .map(|(_, (root, _))| *root)
+        .collect();
+    let rate = 1.0 / physics.time_unit;
+    Some(SmallMotions {
+        growth_rates: listed.iter().map(|it| it.root.growth * rate).collect(),
+        frequencies: listed.iter().map(|it| it.root.frequency * rate).collect(),
+        errors: listed.iter().map(|it| Some(it.error? * rate)).collect(),
+        stable,
+        instability,
+        assumed,
+    })
+}
+
+/// Roots with damping, of which real and imaginary part are extrapolated. They pass zero growth without
+/// meeting another.
+fn extrapolate_damped(grids: &[(usize, Vec<MotionRoot>)]) -> Option<Vec<ExtrapolatedRoot>> {
+    let (_, finest) = grids.last()?;
+    let root = |(k, own): (usize, &MotionRoot)| {
+        let part = |of: fn(&MotionRoot) -> f64| {
+            let oscillates = own.frequency > 0.0;
+            let alike = |it: &&MotionRoot| (it.frequency > 0.0) == oscillates;
+            let values = grids
+                .iter()
+                .map(|(segments, roots)| (*segments, roots.get(k).filter(alike).map(of)));
+            ExtrapolatedNumber::new(values)
+        };
+        let (growth, frequency) = (part(|it| it.growth)?, part(|it| it.frequency)?);
+        let rounding = growth.value.abs() <= GROWTH_ROUNDING * own.size();
+        Some(ExtrapolatedRoot {
+            root: MotionRoot {
+                growth: growth.value,
+                frequency: frequency.value,
+            },
+            error: growth.error.zip(frequency.error).map(|(a, b)| a.max(b)),
+            grows: match rounding {
+                true => Some(false),
+                false => growth.is_positive(),
+            },
+        })
+    };
+    finest.iter().enumerate().map(root).collect()
+}
+
+/// Roots without damping by their squares. Where two real ones meet, and become complex, their mean and the
+/// square of half of their difference are extrapolated: flutter begins where that becomes negative.
+fn extrapolate_squares(grids: &[(usize, Vec<Square>)]) -> Option<Vec<ExtrapolatedRoot>> {
+    let (_, finest) = grids.last()?;
+    let number = |of: &dyn Fn(&[Square]) -> Option<f64>| {
+        let values = grids.iter().map(|(segments, roots)| (*segments, of(roots)));
+        ExtrapolatedNumber::new(values)
+    };
+    let (mut roots, mut k) = (Vec::new(), 0);
+    while k < finest.len() {
+        let pair = |roots: &[Square]| Some([roots.get(k)?.value, roots.get(k + 1)?.value]);
+        let mean = number(&|roots| pair(roots).map(|[a, b]| 0.5 * (a.re + b.re)));
+        // Of squares of two different pairs there is none.
+        let difference = number(&|roots| {
+            let half = pair(roots).map(|[a, b]| 0.5 * (a - b))?;
+            let square = half * half;
+            (square.im.abs() <= COMPLEX_ROUNDING * square.norm()).then_some(square.re)
+        });
+        let meets = finest[k].value.im != 0.0 || finest[k].alignment > MEETING_ALIGNMENT;
+        if let Some((mean, it)) = mean.zip(difference).filter(|_| meets) {
+            let half = it.value.abs().sqrt();
+            let error = mean.error.zip(it.error);
+            let error = error.map(|(mean, square)| mean + square / (2.0 * half));
+            // Real ones may be zero, or positive.
+            let certain = it.is_positive();
+            let squares = match it.value < 0.0 {
+                true => vec![c64::new(mean.value, half)],
+                false => [-half, half]
+                    .map(|by| c64::new(mean.value + by, 0.0))
+                    .into(),
+            };
+            roots.extend(squares.into_iter().map(|square| {
+                let root = MotionRoot::from_square(square);
+                ExtrapolatedRoot {
+                    root,
+                    error: error.map(|error| error / (2.0 * root.size())),
+                    grows: certain.map(|_| square.im != 0.0 || square.re > 0.0),
+                }
+            }));
+            k += 2;
+            continue;
+        }
+        let mut real = number(&|roots| roots.get(k).map(|it| it.value.re))?;
+        let own = finest[k].value.re;
+        let mut signs = grids.iter().filter_map(|(_, roots)| roots.get(k));
+        let same = signs.all(|it| (it.value.re > 0.0) == (own > 0.0));
+        if same && (real.value > 0.0) != (own > 0.0) {
+            // What coarse grids hardly resolve is not extrapolated.
+            real.error = Some((real.value - own).abs());
+            real.value = own;
+        }
+        let root = MotionRoot::from_square(c64::new(real.value, 0.0));
+        roots.push(ExtrapolatedRoot {
+            root,
+            error: real.error.map(|error| error / (2.0 * root.size())),
+            grows: match same {
+                true => Some(real.value > 0.0),
+                false => real.is_positive(),
+            },
+        });
+        k += 1;
+    }
+    Some(roots)
+}
+
+impl SmallMotions {
+    /// As the keys `growth_rates`, `frequencies`, `motion_errors`, `instability` and `assumed`.
+    pub(crate) fn serialize_keys<M: serde::ser::SerializeMap>(
+        motions: Option<&SmallMotions>,
+        map: &mut M,
+    ) -> Result<(), M::Error> {
+        let Some(motions) = motions else {
+            return Ok(());
+        };
+        map.serialize_entry("growth_rates", &motions.growth_rates)?;
+        map.serialize_entry("frequencies", &motions.frequencies)?;
+        map.serialize_entry("motion_errors", &motions.errors)?;
+        map.serialize_entry("instability", &motions.instability)?;
+        map.serialize_entry("assumed", &Assumptions(motions.assumed))
+    }
+}
+
+/// What is assumed, as a list of words.
+struct Assumptions(AssumedMotion);
+
+impl Serialize for Assumptions {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.words())
+    }
+}
