@@ -80,7 +80,7 @@ pub struct MovingSupports {
 impl MovingSupports {
     /// The supports at time 0; `None` if none moves.
     pub fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
-        let motion = leaf.leaf.scenario().support_motion.as_deref()?;
+        let motion = physics.support_motion.as_deref()?;
         let (rods, n) = (leaf.rods(), leaf.segments());
         let place = |rod: usize, node: usize, support, start, holds_rotation| MovingNode {
             rod,

@@ -9,7 +9,7 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, Scale, State};
 use crate::rotation::outer;
-use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule};
+use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule, SupportMotion};
 use glam::{DMat3, DQuat, DVec3};
 use std::cmp::Ordering;
 
@@ -109,6 +109,8 @@ pub struct Physics {
     air: Option<Schedule<[f64; 3]>>,
     /// Factors of loads of single veins that vary in time.
     load_factors: Vec<LoadFactor>,
+    /// The supports that move, if any do.
+    pub support_motion: Option<Box<SupportMotion>>,
     /// The masses that have not landed, the next one last.
     landing_masses: Vec<LandingMass>,
     /// The loads, if they are constant.
@@ -149,7 +151,8 @@ impl Physics {
         let scenario = leaf.scenario();
         let factors: Vec<_> = scenario.load_factors().cloned().collect();
         let dynamics = scenario.dynamics.clone();
-        let mut physics = Physics::from_dynamics(leaf, dynamics, factors);
+        let supports = scenario.support_motion.clone();
+        let mut physics = Physics::from_dynamics(leaf, dynamics, factors, supports);
         physics.add_landing_masses(leaf);
         let unit = physics.density_unit * physics.scale.length;
         let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
@@ -244,10 +247,15 @@ impl Physics {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
         let loaded = dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment);
-        Physics::from_dynamics(leaf, loaded, Vec::new())
+        Physics::from_dynamics(leaf, loaded, Vec::new(), None)
     }
 
-    fn from_dynamics(leaf: &Leaf, dynamics: Dynamics, factors: Vec<Schedule<f64>>) -> Self {
+    fn from_dynamics(
+        leaf: &Leaf,
+        dynamics: Dynamics,
+        factors: Vec<Schedule<f64>>,
+        support_motion: Option<Box<SupportMotion>>,
+    ) -> Self {
         let scale = leaf.scale;
         let densities = dynamics.density.iter().map(|density| density.at(0.5));
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
@@ -274,7 +282,11 @@ impl Physics {
             follower_factor: leaf.loads.follower_factor,
             constant_loads: None,
             point_masses: Vec::new(),
-            knots: schedule_knots(&dynamics, air.as_ref(), leaf, &factors, time),
+            knots: {
+                let supports = support_motion.iter().flat_map(|it| it.schedules());
+                let vectors = load_schedules(&dynamics).into_iter().chain(&air);
+                schedule_knots(&dynamics, vectors.chain(supports), &factors, time)
+            },
             load_factors: (factors.into_iter())
                 .map(|factor| LoadFactor {
                     first: factor.at(0.0),
@@ -283,6 +295,7 @@ impl Physics {
                 })
                 .collect(),
             landing_masses: Vec::new(),
+            support_motion,
             air,
             constant_rest_factor: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
@@ -460,7 +473,11 @@ impl Physics {
     /// knots, in the scenario's unit.
     pub fn unresolved_pulse_time(&self) -> Option<f64> {
         let (d, shortest) = (&self.dynamics, MIN_KNOT_STEP * self.time_unit);
-        let mut loads = load_schedules(d).into_iter().chain(&self.air);
+        let supports = self.support_motion.iter().flat_map(|it| it.schedules());
+        let mut loads = load_schedules(d)
+            .into_iter()
+            .chain(&self.air)
+            .chain(supports);
         let of_loads = loads.find_map(|load| load.pulse_within(shortest));
         let mut factors = self
             .load_factors
@@ -517,17 +534,13 @@ fn load_schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
 }
 
 /// The knots of everything that varies in time, over the unit of time.
-fn schedule_knots(
-    dynamics: &Dynamics,
-    air: Option<&Schedule<[f64; 3]>>,
-    leaf: &Leaf,
+fn schedule_knots<'s>(
+    dynamics: &'s Dynamics,
+    vectors: impl Iterator<Item = &'s Schedule<[f64; 3]>>,
     factors: &[Schedule<f64>],
     unit: f64,
 ) -> Vec<f64> {
-    let supports = leaf.scenario().support_motion.iter();
-    let supports = supports.flat_map(|it| it.schedules());
-    let (end, loads) = (dynamics.duration, load_schedules(dynamics).into_iter());
-    let vectors = loads.chain(air).chain(supports);
+    let end = dynamics.duration;
     let knots = vectors.flat_map(|vector| vector.knot_times(end));
     let factors = factors.iter().chain([&dynamics.rest]);
     let knots = knots.chain(factors.flat_map(|factor| factor.knot_times(end)));

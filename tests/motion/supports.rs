@@ -6,7 +6,7 @@ use leafdyn::internals::motion::Snapshot;
 use leafdyn::scenario::{BaseMotion, Sine, SupportMotion};
 use leafdyn::simulate;
 use leafdyn_testing::motion::*;
-use leafdyn_testing::{DVec3, Leaf, PI, Scenario, Schedule, largest, settled, to};
+use leafdyn_testing::{DVec3, Leaf, Method, PI, Scenario, Schedule, by, largest, settled, to};
 
 /// The displacement of the tip of a cantilever of unit length, stiffness and mass, per displacement of its base that
 /// oscillates with the angular frequency omega, damped in space: w'''' = (omega^2 - i omega c) w with w(0) = 1,
@@ -388,6 +388,10 @@ fn at_rest_supports_are_where_they_are_at_time_zero() {
     let still = made("grip = [{ vein = 1, at = 0.5, move = [0, 0, 0.1] }]", &[]);
     let rest = |it: &Scenario| leafdyn_testing::tip(&settled(it, &to(1e-9)));
     assert_eq!(rest(&moving), rest(&still));
+    // Also by the motion of an explicit relaxation.
+    let explicit = by(Method::Explicit { segments: Some(8) }, to(1e-6));
+    let explicit = |it: &Scenario| leafdyn_testing::tip(&settled(it, &explicit));
+    assert_eq!(explicit(&moving), explicit(&still));
     let tip = "tip = { held = \"pinned\", position = { mean = [0.9, 0, 0], amplitude = [0, 0, 0.1], frequency = 1.0, phase = 1.5707963267948966 } }";
     let moving_tip = made(
         tip,

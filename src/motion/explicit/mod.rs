@@ -27,27 +27,29 @@
 //! mean of the velocities before and after it, whatever the loads are within it. Only
 //! the excess over the loads at time 0 is counted, which have a potential.
 
+mod applied_loads;
 mod kernel;
 mod layout;
 mod packs;
 mod stable_step;
+mod supports;
 #[cfg(test)]
 mod tests;
 
-use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, NodalMoment, State};
-use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw, WatchedNode};
+use crate::leaf::{DiscreteLeaf, Loads, NodalMoment, State};
+use crate::motion::explicit::applied_loads::{AppliedLoads, KickAir};
+use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
-use crate::motion::explicit::packs::{NodeMomentum, Pack, SlidingNode};
+use crate::motion::explicit::packs::{NodeMomentum, NodeSpin, Pack, SlidingNode};
 pub use crate::motion::explicit::stable_step::StableStep;
 use crate::motion::moving_supports::{MovingNode, MovingSupports};
-use crate::motion::physics::{Physics, WindDrag};
+use crate::motion::physics::Physics;
 use crate::motion::{
-    Collision, EnergyBalance, Exchange, Impact, MotionClock, NodeMotionComponents, Snapshot,
-    Stopped, TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure,
-    rate_weights,
+    Collision, EnergyBalance, Exchange, Impact, MotionClock, Snapshot, Stopped,
+    TIME_ROUNDING_FRACTION, TimeIntegrator, Velocity, check_resolution, measure, rate_weights,
 };
 use crate::numbers::largest;
-use crate::rod::{RESOLVED_TURN, Wrench};
+use crate::rod::RESOLVED_TURN;
 use crate::simd::widest_arch;
 use glam::{BVec3, DQuat, DVec3};
 use pulp::Arch;
@@ -150,16 +152,6 @@ struct KickEnergy {
     exchange: Exchange,
     /// Twice the kinetic energy in the middle of the kick.
     twice_kinetic: f64,
-}
-
-/// The air in a kick.
-#[derive(Clone, Copy, Debug)]
-struct KickAir {
-    /// Mean velocity over the kick.
-    velocity: DVec3,
-    /// The velocities of nodes at the time of the positions are the last ones plus this times their
-    /// last change.
-    extrapolation: f64,
 }
 
 /// A rigid rod, whose stiffness the method cannot handle.
@@ -351,10 +343,8 @@ impl Explicit {
                 },
             };
             applied.update(&self.leaf, self.layout, &self.positions, &self.packs, air);
-            for it in self.supports.iter_mut().flat_map(|it| &mut it.nodes) {
-                it.load = support_load(&self.leaf, &applied.state, it);
-            }
         }
+        self.set_support_loads();
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
         self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
@@ -658,89 +648,7 @@ impl TimeIntegrator for Explicit {
     }
 }
 
-/// The moment and the force on a node whose support moves, besides those of its segments.
-fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
-    let load = leaf.load(state, it.rod, it.node);
-    let follower = leaf.follower_wrench(state, it.rod, it.node);
-    let moment = match (it.holds_rotation, it.node) {
-        (true, _) => load.moment + follower.moment,
-        (false, 0) => -leaf.spring_load(state, it.rod, 0).moment,
-        (false, _) => DVec3::ZERO,
-    };
-    Wrench {
-        moment,
-        force: load.force + follower.force,
-    }
-}
-
 impl Explicit {
-    /// Watches the nodes whose supports move, and sets their velocities at the start.
-    fn start_supports(&mut self) {
-        let Some(supports) = &mut self.supports else {
-            return;
-        };
-        for it in &mut supports.nodes {
-            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
-            it.watched = self.packs[pack].watched.len();
-            self.packs[pack].watched.push(WatchedNode {
-                entry,
-                force: [0.0; 3],
-                moment: [0.0; 3],
-            });
-        }
-        supports.move_to(0.0, &mut self.leaf);
-        let inertia = |it: &MovingNode| self.physics.inertia(&self.leaf, it.rod, it.node);
-        supports.kinetic_energy = supports.kinetic_energy(inertia);
-    }
-
-    /// Moves supports on by the time `drift`, and returns the work that they did: half of it in the step before,
-    /// half in this one.
-    fn drive_supports(&mut self, drift: f64) -> f64 {
-        let Some(supports) = &mut self.supports else {
-            return 0.0;
-        };
-        supports.move_to(self.last_step_time + drift, &mut self.leaf);
-        let mut work = 0.0;
-        for it in &mut supports.nodes {
-            let PackPosition { pack, entry } = self.layout.pack_position(it.rod, it.node);
-            let pack = &mut self.packs[pack];
-            let own = pack.watched[it.watched];
-            let step = it.step();
-            let last = match self.past.velocity_lag() > 0.0 {
-                true => it.last_step,
-                false => NodeMotionComponents::default(),
-            };
-            let force = it.load.force + DVec3::from(own.force);
-            let mut moment = it.load.moment;
-            if it.holds_rotation {
-                moment += DVec3::from(own.moment);
-            }
-            work -= 0.5 * force.dot(last.displacement + step.displacement);
-            work -= 0.5 * moment.dot(last.rotation + step.rotation);
-            let velocity = match drift > 0.0 {
-                true => step.displacement / drift,
-                false => it.velocity.linear,
-            };
-            let at = self.layout.node_index(it.rod, it.node);
-            for c in 0..3 {
-                self.positions[c][at] = it.now.position[c];
-                pack.motion.v[c][entry] = velocity[c];
-            }
-            if it.holds_rotation {
-                let before = pack.quaternion(entry);
-                let q = it.now.rotation;
-                let aligned = if before.dot(q) < 0.0 { -q } else { q };
-                for (array, value) in pack.motion.q.iter_mut().zip(aligned.to_array()) {
-                    array[entry] = value;
-                }
-            }
-        }
-        if drift > 0.0 {
-            supports.accept();
-        }
-        work
-    }
-
     /// Goes to the time at which the next mass lands, by a step of its own, and lets it land on its node: the
     /// velocities jump, and steps begin anew.
     fn land_next_mass(&mut self) {
@@ -824,212 +732,12 @@ impl Explicit {
     }
 }
 
-/// The moments and forces on the nodes besides those of segments, coupling and dead loads.
-struct AppliedLoads {
-    state: State,
-    /// How sections at the tissue's strips are aligned at the start.
-    alignments: Vec<bool>,
-    /// Moments and forces, node by node.
-    nodes: Vec<Wrench>,
-    /// Moments and forces, laid out as positions.
-    loads: [[AlignedArray; 3]; 2],
-    nodes_in_wind: Option<NodesInWind>,
-    /// Loads that turn with the sections, and moments along veins, node by node; empty without any.
-    followers: Vec<FollowerOnNode>,
-}
-
-/// A load that turns with the section of a node, and the motion of the node before the last kick.
-#[derive(Clone, Copy, Default)]
-struct FollowerOnNode {
-    load: Wrench,
-    velocity: DVec3,
-    spin: NodeSpin,
-}
-
-struct NodesInWind {
-    wind: WindDrag,
-    forces: Vec<DVec3>,
-    /// Velocities before the last kick, and before the one before it.
-    velocity: Vec<DVec3>,
-    earlier_velocity: Vec<DVec3>,
-}
-
-impl AppliedLoads {
-    /// The moments and forces on a leaf that moves from `start`; `None` if there are none.
-    fn new(
-        leaf: &DiscreteLeaf,
-        physics: &Physics,
-        start: &State,
-        layout: PackLayout,
-    ) -> Option<Self> {
-        let wind = WindDrag::new(leaf, physics);
-        let dead = leaf.loads.rod_load_factor != 0.0;
-        let moved = leaf.leaf.scenario().support_motion.is_some();
-        let none = !leaf.has_tissue() && !dead && !leaf.has_springs() && !moved;
-        if none && wind.is_none() && !leaf.has_followers() {
-            return None;
-        }
-        let array = || AlignedArray::zeros(layout.leaf_array_length());
-        let vectors = || std::array::from_fn(|_| array());
-        let state = leaf.stress_free_state();
-        let at_rest = || vec![DVec3::ZERO; state.x.len()];
-        Some(AppliedLoads {
-            nodes: vec![Wrench::default(); state.x.len()],
-            alignments: leaf.strip_alignments(start),
-            loads: [vectors(), vectors()],
-            nodes_in_wind: wind.map(|wind| NodesInWind {
-                wind,
-                forces: at_rest(),
-                velocity: at_rest(),
-                earlier_velocity: at_rest(),
-            }),
-            followers: vec![
-                FollowerOnNode::default();
-                if leaf.has_followers() {
-                    state.x.len()
-                } else {
-                    0
-                }
-            ],
-            state,
-        })
-    }
-
-    /// Moments and forces, laid out as positions.
-    fn loads(&self) -> &[[AlignedArray; 3]; 2] {
-        &self.loads
-    }
-
-    /// The sum of the forces on all tips.
-    fn tip_force_sum(&self, layout: PackLayout) -> DVec3 {
-        let tips = (0..layout.rods)
-            .map(|j| vector_at(&self.loads[1], layout.node_index(j, layout.segments)));
-        tips.sum()
-    }
-
-    /// Sets the moments and forces to those of the present positions and rotations.
-    fn update(
-        &mut self,
-        leaf: &DiscreteLeaf,
-        layout: PackLayout,
-        positions: &[AlignedArray; 3],
-        packs: &[Pack],
-        air: KickAir,
-    ) {
-        for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
-            let PackPosition { pack, entry } = layout.pack_position(j, i);
-            let k = self.state.base(j) + i;
-            self.state.x[k] = vector_at(positions, layout.node_index(j, i));
-            self.state.q[k] = packs[pack].rotation(entry);
-            if let Some(blown) = &mut self.nodes_in_wind {
-                blown.earlier_velocity[k] = blown.velocity[k];
-                blown.velocity[k] = packs[pack].momentum(entry).velocity;
-            }
-        }
-        self.nodes.fill(Wrench::default());
-        leaf.add_tissue_loads(&self.state, &mut self.nodes);
-        leaf.add_own_forces(&mut self.nodes);
-        leaf.add_spring_loads(&self.state, &mut self.nodes);
-        if let Some(blown) = &mut self.nodes_in_wind {
-            let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);
-            let velocity = |k: usize| now[k] + air.extrapolation * (now[k] - earlier[k]);
-            (blown.wind).set_forces(&self.state, air.velocity, velocity, &mut blown.forces);
-            for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
-                node.force += *force;
-            }
-        }
-        if !self.followers.is_empty() {
-            for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
-                let PackPosition { pack, entry } = layout.pack_position(j, i);
-                let k = self.state.base(j) + i;
-                let momentum = packs[pack].momentum(entry);
-                let load = leaf.follower_wrench(&self.state, j, i);
-                self.nodes[k].moment += load.moment;
-                self.nodes[k].force += load.force;
-                self.followers[k] = FollowerOnNode {
-                    load,
-                    velocity: momentum.velocity,
-                    spin: NodeSpin {
-                        rotation: packs[pack].rotation(entry),
-                        angular_momentum: momentum.angular,
-                    },
-                };
-            }
-        }
-        for (j, i) in leaf.rod_index_pairs(0..=layout.segments) {
-            let (at, node) = (layout.node_index(j, i), self.nodes[self.state.base(j) + i]);
-            for (arrays, load) in self.loads.iter_mut().zip([node.moment, node.force]) {
-                for (c, array) in arrays.iter_mut().enumerate() {
-                    array[at] = load[c];
-                }
-            }
-        }
-    }
-
-    /// Where sections had passed half a turn against each other when loads were last set.
-    fn half_turn(&self, leaf: &DiscreteLeaf) -> Option<HalfTurn> {
-        leaf.half_turn_since(&self.alignments, &self.state)
-    }
-
-    /// Power of the wind, on the nodes that count, at the mean of the velocities before the last kick and of these.
-    fn power_of_wind(
-        &self,
-        velocity: impl Fn(usize, usize) -> DVec3,
-        counts: impl Fn(usize) -> bool,
-    ) -> f64 {
-        let Some(blown) = &self.nodes_in_wind else {
-            return 0.0;
-        };
-        let nodes = self.state.segments() + 1;
-        let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
-        let forces = forces.filter(|(k, _)| counts(*k));
-        let power = forces.map(|(k, (force, before))| {
-            force.dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
-        });
-        power.sum()
-    }
-
-    /// Power of the loads that turn with the sections at the mean of the motions before the last kick and of
-    /// the present ones.
-    fn power_of_followers(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
-        let nodes = self.state.segments() + 1;
-        let power = self.followers.iter().enumerate().map(|(k, before)| {
-            let PackPosition { pack, entry } = layout.pack_position(k / nodes, k % nodes);
-            let (pack, now) = (&packs[pack], packs[pack].momentum(entry));
-            let momentum = 0.5 * (before.spin.angular_momentum + now.angular);
-            let spin = pack.angular_velocity(entry, before.spin.rotation, momentum);
-            let velocity = 0.5 * (before.velocity + now.velocity);
-            before.load.moment.dot(spin) + before.load.force.dot(velocity)
-        });
-        power.sum()
-    }
-
-    /// The velocities that further motion depends on.
-    fn past_velocities(&self) -> Vec<DVec3> {
-        (self.nodes_in_wind.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
-    }
-
-    /// Replaces the velocities that further motion depends on.
-    fn set_past_velocities(&mut self, past: Vec<DVec3>) {
-        if let Some(blown) = &mut self.nodes_in_wind {
-            blown.velocity = past;
-        }
-    }
-}
-
 /// The dead moments on a single rod in a step.
 #[derive(Default)]
 struct StepDeadMoments {
     nodal_moments: Vec<NodalMoment>,
     /// Motions of these nodes before the step.
     spins_before: Vec<NodeSpin>,
-}
-
-/// Rotation and angular momentum of a node.
-#[derive(Clone, Copy, Default)]
-struct NodeSpin {
-    rotation: DQuat,
-    angular_momentum: DVec3,
 }
 
 impl StepDeadMoments {

@@ -23,6 +23,13 @@ pub struct Pack {
     pub watched: Vec<WatchedNode>,
 }
 
+/// Rotation and angular momentum of a node.
+#[derive(Clone, Copy, Default)]
+pub struct NodeSpin {
+    pub rotation: DQuat,
+    pub angular_momentum: DVec3,
+}
+
 impl Pack {
     /// The mass of a node.
     pub fn mass(&self, entry: usize) -> f64 {
