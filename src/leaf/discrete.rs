@@ -9,7 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
-use crate::leaf::loads::ScheduledLoads;
+use crate::leaf::nodal_loads::{NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
 use crate::leaf::{FollowerLoad, GrippedNode, Leaf, Loads};
@@ -70,13 +70,6 @@ pub struct DiscreteLeaf {
     pub load_factor: f64,
     /// Loads that all rods share, before the factor.
     pub loads: Loads,
-}
-
-/// A dead moment on a node of a single rod, along the lab axes.
-#[derive(Clone, Copy, Debug)]
-pub struct NodalMoment {
-    pub node: usize,
-    pub moment: DVec3,
 }
 
 /// What a held tip exerts on its holder.

@@ -9,68 +9,13 @@
 
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::NODE_COINCIDENCE_TOLERANCE;
+use crate::leaf::nodal_loads::FollowerLoad;
 use crate::leaf::state::{NodalField, State, add_to_increment, rotation_part};
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
 use crate::scenario::{Profile, RodPlace};
-use glam::{DQuat, DVec3};
-use std::ops::{Add, Mul};
-
-/// Loads without a potential on a node, or their density along a rod.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FollowerLoad {
-    /// Force along the directors.
-    pub force: DVec3,
-    /// Moment along the directors.
-    pub moment: DVec3,
-    /// Dead moment, along the lab axes.
-    pub dead_moment: DVec3,
-}
-
-impl Add for FollowerLoad {
-    type Output = FollowerLoad;
-
-    fn add(self, other: FollowerLoad) -> FollowerLoad {
-        FollowerLoad {
-            force: self.force + other.force,
-            moment: self.moment + other.moment,
-            dead_moment: self.dead_moment + other.dead_moment,
-        }
-    }
-}
-
-impl Mul<f64> for FollowerLoad {
-    type Output = FollowerLoad;
-
-    fn mul(self, factor: f64) -> FollowerLoad {
-        FollowerLoad {
-            force: self.force * factor,
-            moment: self.moment * factor,
-            dead_moment: self.dead_moment * factor,
-        }
-    }
-}
-
-impl FollowerLoad {
-    /// Moment and force on a section with this rotation.
-    pub fn wrench(self, q: DQuat) -> Wrench {
-        Wrench {
-            moment: q * self.moment + self.dead_moment,
-            force: q * self.force,
-        }
-    }
-
-    /// What a small rotation of the section adds to the right-hand side of the linear equations of its
-    /// node.
-    fn derivative(self, q: DQuat, turn: DVec3) -> Wrench {
-        let half = 0.5 * (q * self.moment - self.dead_moment);
-        Wrench {
-            moment: turn.cross(half),
-            force: turn.cross(q * self.force),
-        }
-    }
-}
+use glam::DVec3;
 
 impl Loads {
     /// Whether loads act that turn with the sections, or moments along veins.

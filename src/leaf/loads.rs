@@ -5,7 +5,8 @@
 //! in `system`.
 
 use crate::leaf::block_tridiagonal::rod_lane;
-use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment};
+use crate::leaf::discrete::{DiscreteLeaf, Grid};
+use crate::leaf::nodal_loads::{NodalMoment, ScheduledForce, ScheduledLoads};
 use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
@@ -27,43 +28,6 @@ pub struct PointForce {
     pub rod: usize,
     pub sigma: f64,
     pub force: DVec3,
-}
-
-/// A dead force on a node of a rod, along the lab axes, by a load whose factor varies in time.
-#[derive(Clone, Copy, Debug)]
-pub struct ScheduledForce {
-    /// Number of the factor: those of [`Scenario::load_factors`](crate::scenario::Scenario::load_factors), then one
-    /// for each of [`Scenario::landings`](crate::scenario::Scenario::landings).
-    pub factor: usize,
-    pub rod: usize,
-    pub node: usize,
-    /// The force at a factor of one.
-    pub force: DVec3,
-}
-
-/// Loads of single veins whose factors vary in time: first those with a factor of their own, then the weights of
-/// masses that land.
-#[derive(Clone, Debug, Default)]
-pub struct ScheduledLoads {
-    /// The present factors.
-    pub factors: Vec<f64>,
-    /// The forces, at factors of one.
-    pub forces: Vec<ScheduledForce>,
-    /// Dead moments on points, at factors of one, each with the number of its factor.
-    pub moments: Vec<(usize, NodalMoment)>,
-    /// Forces on all nodes, and dead moments on points, whose factors do not vary.
-    constant_forces: Vec<DVec3>,
-    constant_moments: Vec<NodalMoment>,
-}
-
-impl ScheduledLoads {
-    /// The forces with their present factors.
-    pub fn present_forces(&self) -> impl Iterator<Item = ScheduledForce> {
-        self.forces.iter().map(|it| ScheduledForce {
-            force: self.factors[it.factor] * it.force,
-            ..*it
-        })
-    }
 }
 
 impl Loads {

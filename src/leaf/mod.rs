@@ -17,6 +17,7 @@ mod followers;
 mod law;
 mod loads;
 mod mirror;
+mod nodal_loads;
 #[cfg(test)]
 mod not_a_number;
 mod rod_ode;
@@ -34,12 +35,12 @@ pub use crate::leaf::derivative::parameter::{
 };
 pub use crate::leaf::direct::pattern::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
-pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodalMoment, NodeLoad};
-pub use crate::leaf::followers::FollowerLoad;
+pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodeLoad};
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,
 };
+pub use crate::leaf::nodal_loads::{FollowerLoad, NodalMoment};
 pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFields};
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::springs::SpringEnd;

@@ -15,7 +15,8 @@ use crate::leaf::block_tridiagonal::{
     set_lane_increment,
 };
 use crate::leaf::direct::pattern::MatrixPattern;
-use crate::leaf::discrete::{DiscreteLeaf, NodalMoment, NodeMass};
+use crate::leaf::discrete::{DiscreteLeaf, NodeMass};
+use crate::leaf::nodal_loads::NodalMoment;
 use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
 use crate::rod::{NodeBlock, Wrench};

@@ -362,7 +362,7 @@ fn the_schema_has_tables_within_tables() {
         .unwrap()
         .keys()
         .collect();
-    assert_eq!(names, ["at", "force", "mass", "moment", "vein"]);
+    assert_eq!(names, ["at", "follows", "force", "mass", "moment", "vein"]);
     assert_eq!(
         schema["properties"]["grip"]["items"]["required"],
         json!(["vein", "at"])
