@@ -622,7 +622,7 @@ fn missing_number(value: &Value) -> Option<String> {
                     }
                 }
                 let energy = entries.get("energy");
-                if energy.is_some_and(Value::is_null) && value["stable"].is_boolean() {
+                if energy.is_some_and(Value::is_null) && value["negative_eigenvalues"].is_number() {
                     return Some("no energy".into());
                 }
             }
