@@ -362,7 +362,12 @@ fn the_schema_has_tables_within_tables() {
         .unwrap()
         .keys()
         .collect();
-    assert_eq!(names, ["at", "force", "mass", "moment", "vein"]);
+    assert_eq!(
+        names,
+        [
+            "at", "factor", "force", "from", "mass", "moment", "vein", "velocity"
+        ]
+    );
     assert_eq!(
         schema["properties"]["grip"]["items"]["required"],
         json!(["vein", "at"])
