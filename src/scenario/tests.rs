@@ -226,7 +226,7 @@ fn what_cannot_be_is_refused() {
         grip[0].vein=4 => set grip[0].vein=4: grip[0].vein = 4: must be a whole number from 1 to 3
         grip[2].vein=1 => grip[2].vein: there are 2 of [[grip]], counted from 0: write it first
         grip.vein=1 => say which one, counted from 0: grip[0].vein
-        grip[0]=1 => name an entry of it: vein, at, held, move, as in grip[0].vein
+        grip[0]=1 => name an entry of it: vein, at, held, move, stiffness, turn_stiffness, as in grip[0].vein
         grip[x].vein=1 => an index is a whole number from 0
         grip[0].mov=1 => did you mean grip.move?
         grip[0].monsoon=1 => unknown key grip.monsoon: [[grip]] has vein, at, held, move
@@ -362,7 +362,12 @@ fn the_schema_has_tables_within_tables() {
         .unwrap()
         .keys()
         .collect();
-    assert_eq!(names, ["at", "follows", "force", "mass", "moment", "vein"]);
+    assert_eq!(
+        names,
+        [
+            "at", "factor", "follows", "force", "from", "mass", "moment", "vein", "velocity"
+        ]
+    );
     assert_eq!(
         schema["properties"]["grip"]["items"]["required"],
         json!(["vein", "at"])

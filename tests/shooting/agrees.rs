@@ -56,7 +56,7 @@ fn on_every_figure_of_the_paper() {
 /// the file lists vein by vein does not forbid it.
 #[test]
 fn on_every_classic_problem() {
-    let (classic, mut accepted) = (files("classic"), 0);
+    let (classic, mut accepted) = (classic_files_to_shoot(), 0);
     assert!(classic.len() >= 18);
     for file in &classic {
         let leaf = read(file, "");

@@ -15,7 +15,9 @@ fn scenes() -> Vec<Scenario> {
     let veins = |count: usize| format!("leaf.rods={count}");
     let paper = files("paper").into_iter();
     let paper = paper.flat_map(|file| [1, 2, 3, 5].map(|count| read(&file, &veins(count))));
-    let classic = files("classic").into_iter().map(|file| read(&file, ""));
+    let classic = classic_files_to_shoot()
+        .into_iter()
+        .map(|file| read(&file, ""));
     // So soft that only many intervals succeed.
     let soft = [
         ("fig08", "load.tip_force=[5, 0, 0]"),

@@ -68,6 +68,13 @@ pub fn resting_files() -> Vec<PathBuf> {
     all
 }
 
+/// The classic problems that shooting solves: those without grips.
+pub fn classic_files_to_shoot() -> Vec<PathBuf> {
+    let mut all = files("classic");
+    all.retain(|file| read(file, "").grips.is_empty());
+    all
+}
+
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
 pub fn path(name: &str) -> PathBuf {
     root().join("scenarios").join(format!("{name}.toml"))
