@@ -74,6 +74,26 @@ impl DiscreteLeaf {
         (self.grid).node_integral(i, |place| self.leaf.foundation_stiffness(j, place))
     }
 
+    /// The forces of the foundation on the halves of the segments before and after node `i` of rod `j`.
+    pub fn foundation_forces(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+        let k = state.base(j) + i;
+        let foundation = |spring: &&NodeSpring| spring.grip.is_none() && spring.turn_stiffness == 0.0;
+        let Some(spring) = self.springs.on_node(k).iter().find(foundation) else {
+            return [DVec3::ZERO; 2];
+        };
+        let stretch = spring.position - state.x[k];
+        let width = |i: Option<usize>| match i {
+            Some(i) if i < self.segments() => self.grid.segment_width(i),
+            _ => 0.0,
+        };
+        let [before, after] = RodPlace::both_sides(self.grid.sigma()[i])
+            .map(|place| self.leaf.foundation_stiffness(j, place) * stretch);
+        [
+            0.5 * width(i.checked_sub(1)) * before,
+            0.5 * width(Some(i)) * after,
+        ]
+    }
+
     /// Adds the springs of grips that do not hold rigidly. The spring of a stretch is spread over its nodes
     /// by the lengths that belong to them.
     fn add_grip_springs(&self, natural: &State, springs: &mut Vec<NodeSpring>) {

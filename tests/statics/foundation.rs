@@ -123,6 +123,7 @@ fn shooting_finds_the_same() {
         for (a, b) in nodes(&relaxed.shape.rods).zip(nodes(&shot.rods)) {
             assert!(a.position.distance(b.position) < 2e-9);
             assert!(a.m.distance(b.m) < 1e-6);
+            assert!(a.n.distance(b.n) < 1e-5, "{} {}", a.n, b.n);
         }
         close("energy", relaxed.energy.unwrap(), shot.energy, 1e-8);
     }

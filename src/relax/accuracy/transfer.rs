@@ -593,6 +593,7 @@ impl<'l> NodalResultants<'l> {
         let load = leaf.load_with_tissue(state, j, i, of_tissue.unwrap_or_default());
         let end = leaf.rigid_end_load(state, j, i);
         let follower = leaf.follower_wrench(state, j, i);
+        let [ground_before, ground_after] = leaf.foundation_forces(state, j, i);
         let mut force = load.force + end.force + follower.force;
         let mut moment = load.moment + end.moment + follower.moment;
         if let Some([_, tissue]) = &before {
@@ -602,7 +603,7 @@ impl<'l> NodalResultants<'l> {
             (force, moment) = (force - tissue.x, moment + tissue.a);
         }
         let (force, moment) = match (before, after) {
-            (None, Some([next, _])) => (next.x + force, moment - next.a),
+            (None, Some([next, _])) => (next.x + force + ground_after, moment - next.a),
             (Some([before, _]), _) => {
                 // The part of the nodal load that belongs to the left half-cell.
                 let jump = leaf.own_load_jump_before(j, i);
@@ -619,7 +620,7 @@ impl<'l> NodalResultants<'l> {
                 let part = left / (left + right);
                 let follower = leaf.follower_jump_before(state, j, i);
                 (
-                    before.x - part * force - jump - follower.force,
+                    before.x - part * force - jump - follower.force - ground_before,
                     before.b - part * moment - follower.moment,
                 )
             }
