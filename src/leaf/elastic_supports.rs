@@ -77,7 +77,8 @@ impl DiscreteLeaf {
     /// The forces of the foundation on the halves of the segments before and after node `i` of rod `j`.
     pub fn foundation_forces(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
         let k = state.base(j) + i;
-        let foundation = |spring: &&NodeSpring| spring.grip.is_none() && spring.turn_stiffness == 0.0;
+        let foundation =
+            |spring: &&NodeSpring| spring.grip.is_none() && spring.turn_stiffness == 0.0;
         let Some(spring) = self.springs.on_node(k).iter().find(foundation) else {
             return [DVec3::ZERO; 2];
         };

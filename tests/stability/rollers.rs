@@ -16,7 +16,7 @@ const COLUMN: &str = r#"
 #[test]
 fn columns_on_ground_buckle_in_waves() {
     let on_ground = |n: f64| (n * PI).powi(2) + 500.0 / (n * PI).powi(2);
-    let mut loads = vec![
+    let mut loads = [
         on_ground(1.0),
         on_ground(2.0),
         on_ground(3.0),

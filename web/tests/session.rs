@@ -131,7 +131,7 @@ fn a_motion_goes_on_after_what_only_asks() {
     }
 }
 
-/// Under a dead moment, which has no potential, it is found anew for every value.
+/// Under a dead moment, which has no potential, the leaf is found anew for every value.
 #[test]
 fn a_leaf_under_a_moment_is_not_said_to_be_left() {
     let mut session = Session::default();
@@ -144,7 +144,8 @@ fn a_leaf_under_a_moment_is_not_said_to_be_left() {
             "{}",
             set["answer"]
         );
-        assert_eq!(set["stable"].is_null(), moment != 0.0);
+        // Its stability is that of its small motions.
+        assert!(set["stable"].is_boolean(), "{}", set["stable"]);
     }
 }
 

@@ -311,6 +311,9 @@ pub fn serialize_spread<S: Serializer>(
     }
 }
 
+/// Runs a setting once; also returns the time, in seconds.
+pub type RunOnce<'f, 's, R, E> = dyn Fn(&RepeatedRuns<'s, R, E>) -> Result<Timed<R>, E> + 'f;
+
 /// Runs all settings once by `run_once`, in order, and those that are not slow a few times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
@@ -318,7 +321,7 @@ pub fn serialize_spread<S: Serializer>(
 pub fn time_runs<'s, R, E>(
     all: &mut [RepeatedRuns<'s, R, E>],
     budget: f64,
-    run_once: &dyn Fn(&RepeatedRuns<'s, R, E>) -> Result<Timed<R>, E>,
+    run_once: &RunOnce<'_, 's, R, E>,
     progress: &mut (dyn FnMut(&ChartProgress) + Send),
 ) -> usize {
     let mut run = |runs: &RepeatedRuns<'s, R, E>, round: usize, rounds: usize| {
