@@ -4,6 +4,7 @@ use crate::numbers::{larger, largest};
 use crate::rod::NodePair;
 use crate::rotation;
 use glam::{DQuat, DVec3};
+use std::ops::{BitAnd, BitOr};
 
 /// The state of a discretized leaf with N rods of n segments, rod after rod,
 /// base to tip. Of a joined leaf all last positions are equal.
@@ -183,5 +184,44 @@ impl State {
     pub fn advance_node(&mut self, k: usize, increment: &Increment, step: f64) {
         self.q[k] = (rotation::exp(step * rotation_part(increment)) * self.q[k]).normalize();
         self.x[k] += step * displacement_part(increment);
+    }
+}
+
+/// A set of the components of a node's increment: rotations, then displacements, along the lab axes. Bit `c`
+/// stands for component `c`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ComponentSet(u8);
+
+impl ComponentSet {
+    pub const NONE: ComponentSet = ComponentSet(0);
+    pub const ROTATION: ComponentSet = ComponentSet(0b000111);
+    pub const DISPLACEMENT: ComponentSet = ComponentSet(0b111000);
+    /// Zero for a node in the mirror plane: rotations about x and z, the displacement along y.
+    pub const ACROSS_MIRROR: ComponentSet = ComponentSet(0b010101);
+
+    /// The displacement along a lab axis.
+    pub fn displacement_along(axis: usize) -> Self {
+        ComponentSet(1 << (3 + axis))
+    }
+
+    /// The components of the set.
+    pub fn iter(self) -> impl Iterator<Item = usize> {
+        (0..6).filter(move |c| self.0 >> c & 1 == 1)
+    }
+}
+
+impl BitOr for ComponentSet {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        ComponentSet(self.0 | other.0)
+    }
+}
+
+impl BitAnd for ComponentSet {
+    type Output = Self;
+
+    fn bitand(self, other: Self) -> Self {
+        ComponentSet(self.0 & other.0)
     }
 }

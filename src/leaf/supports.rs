@@ -11,8 +11,8 @@
 use crate::leaf::assembly::largest_component;
 use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, rod_lane};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{NodalField, NodeIncrement, State};
-use crate::leaf::system::{ComponentSet, HeldComponents, System};
+use crate::leaf::state::{ComponentSet, NodalField, NodeIncrement, State};
+use crate::leaf::system::{HeldComponents, System};
 use crate::leaf::{GrippedNode, Leaf};
 use crate::rod::{UNKNOWNS, Wrench};
 use crate::rotation::outer;

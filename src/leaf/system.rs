@@ -17,7 +17,7 @@ use crate::leaf::block_tridiagonal::{
 use crate::leaf::direct::pattern::MatrixPattern;
 use crate::leaf::discrete::{DiscreteLeaf, NodeMass};
 use crate::leaf::nodal_loads::NodalMoment;
-use crate::leaf::state::{Increment, NodalField, displacement_part, rotation_part};
+use crate::leaf::state::{ComponentSet, Increment, NodalField, displacement_part, rotation_part};
 use crate::numbers::larger;
 use crate::rod::{NodeBlock, Wrench};
 use crate::scenario::Scenario;
@@ -25,7 +25,7 @@ use crate::simd::{GROUP, GroupKernel, Lanes, NumberGroup, widest_arch};
 use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
-use std::ops::{BitAnd, BitOr, Range};
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// Number of nodes from which on groups of rods are distributed over threads. Measured: with fewer
@@ -72,45 +72,6 @@ pub struct DiagonalBlocks {
     pub rotary: DMat3,
     /// Against displacements, the same in all directions.
     pub translational: f64,
-}
-
-/// A set of the components of a node's increment: rotations, then displacements, along the lab axes. Bit `c`
-/// stands for component `c`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ComponentSet(u8);
-
-impl ComponentSet {
-    pub const NONE: ComponentSet = ComponentSet(0);
-    pub const ROTATION: ComponentSet = ComponentSet(0b000111);
-    pub const DISPLACEMENT: ComponentSet = ComponentSet(0b111000);
-    /// Zero for a node in the mirror plane: rotations about x and z, the displacement along y.
-    pub const ACROSS_MIRROR: ComponentSet = ComponentSet(0b010101);
-
-    /// The displacement along a lab axis.
-    pub fn displacement_along(axis: usize) -> Self {
-        ComponentSet(1 << (3 + axis))
-    }
-
-    /// The components of the set.
-    pub fn iter(self) -> impl Iterator<Item = usize> {
-        (0..6).filter(move |c| self.0 >> c & 1 == 1)
-    }
-}
-
-impl BitOr for ComponentSet {
-    type Output = Self;
-
-    fn bitor(self, other: Self) -> Self {
-        ComponentSet(self.0 | other.0)
-    }
-}
-
-impl BitAnd for ComponentSet {
-    type Output = Self;
-
-    fn bitand(self, other: Self) -> Self {
-        ComponentSet(self.0 & other.0)
-    }
 }
 
 /// Components of the increment of a node that a hinge or grip holds.

@@ -8,6 +8,7 @@ use crate::leaf::{
 use crate::newton::EquilibriumFailure;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, transfer};
+use crate::relax::linear_response::Linearized;
 use crate::relax::log::WorkLog;
 use crate::relax::nested_grids::{solve_from_guesses, solve_on_given_grids};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy};
@@ -15,7 +16,6 @@ use crate::relax::request::{Options, Progress, RelaxError, check_options_without
 use crate::relax::rest::{RelaxedLeaf, equilibrium_with_stability, relax_on_grids};
 use crate::relax::result::Equilibrium;
 use crate::relax::same_equilibrium::{is_near_prediction, is_same_beside_fold};
-use crate::relax::sensitivity::Linearized;
 use crate::relax::stability::state_from_rod_shapes;
 use crate::relax::{Outcome, nested_grids};
 use crate::run::Instant;

@@ -10,6 +10,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod eigenvalues;
 mod follow;
+mod linear_response;
 mod loading;
 mod log;
 pub(crate) mod nested_grids;
@@ -34,6 +35,7 @@ pub(crate) use crate::relax::accuracy::NestedEquilibrium;
 pub(crate) use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid, Stencil, rod_shapes};
 pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
+pub(crate) use crate::relax::linear_response::Linearized;
 pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
 pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
@@ -60,7 +62,7 @@ pub(crate) use crate::relax::saddle::{
     INDEFINITE_NEWTON_EQUATIONS, NOISY_EIGENVALUE_THRESHOLD, converge_saddle,
 };
 pub(crate) use crate::relax::sensitivity::{
-    Linearized, NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
+    NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
 };
 pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
 pub use crate::relax::small_motions::{MotionInstability, SmallMotions};

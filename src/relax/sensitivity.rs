@@ -4,14 +4,14 @@
 //! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{
-    DenseParameterForces, DirectSolver, DiscreteLeaf, ForceCarriers, Leaf, LeafParameterDerivative,
-    LinearResponse, LinearSolveOutcome, MatrixFactors, NodalField, ParameterForces, State, System,
-    Weighted, displacement_part, rotation_part,
+    DiscreteLeaf, Leaf, LeafParameterDerivative, LinearResponse, ParameterForces, State, Weighted,
+    displacement_part, rotation_part,
 };
 use crate::modes::Eigenpair;
 use crate::motion::Physics;
 use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::linear_response::Linearized;
 use crate::relax::plan::UNKNOWNS;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
@@ -645,164 +645,6 @@ impl Parameter<'_> {
         };
         Some(found.into_iter().map(shared).collect())
     }
-}
-
-/// Relative accuracy of the conjugate gradients, as a part of the tolerance, and its lower
-/// limit.
-const CONJUGATE_GRADIENT_ACCURACY: f64 = 3e-3;
-
-const BEST_CONJUGATE_GRADIENT_ACCURACY: f64 = 1e-11;
-
-/// A leaf at rest (all rods, in space) with its equations linearized and factorized once for
-/// all right-hand sides.
-pub(crate) struct Linearized {
-    system: System,
-    carriers: ForceCarriers,
-    /// Relative accuracy of the conjugate gradients.
-    accuracy: f64,
-    /// Whether the matrix is factorized rod by rod; otherwise a sparse direct factorization is
-    /// used.
-    factorized: bool,
-    /// Right-hand sides for which the equations were solved so far.
-    pub solves: usize,
-    /// How often the matrix was factorized so far.
-    pub factorizations: usize,
-}
-
-impl Linearized {
-    /// Linearizes about the state of a level.
-    pub fn new(level: &GridLevel, tolerance: f64) -> Linearized {
-        let (leaf, state) = (&level.leaf, &level.state);
-        let mut system = System::new(leaf);
-        leaf.assemble(state, &mut system);
-        leaf.add_phase_conditions(state, &mut system);
-        let factorized = match leaf.has_moments() {
-            false => system.factorize(0.0),
-            true => system.factorize_indefinite(),
-        };
-        Linearized {
-            system,
-            carriers: leaf.force_carriers(state),
-            accuracy: (CONJUGATE_GRADIENT_ACCURACY * tolerance)
-                .clamp(BEST_CONJUGATE_GRADIENT_ACCURACY, 1e-4),
-            factorized,
-            solves: 0,
-            factorizations: 1,
-        }
-    }
-
-    /// The forces by which parameter changes of the leaf unbalance that state.
-    pub fn forces(
-        &self,
-        level: &GridLevel,
-        rates: &[LeafParameterDerivative],
-    ) -> Vec<ParameterForces> {
-        let force = |rate| {
-            level
-                .leaf
-                .parameter_forces(&level.state, &self.carriers, rate)
-        };
-        rates.iter().map(force).collect()
-    }
-
-    /// The responses to forces. `None` if the matrix is singular.
-    pub fn responses(
-        &mut self,
-        level: &GridLevel,
-        loads: &[ParameterForces],
-    ) -> Option<Vec<LinearResponse>> {
-        self.responses_to(level, loads, self.accuracy)
-    }
-
-    /// The responses to forces, to another relative accuracy.
-    pub fn responses_to(
-        &mut self,
-        level: &GridLevel,
-        loads: &[ParameterForces],
-        accuracy: f64,
-    ) -> Option<Vec<LinearResponse>> {
-        let (leaf, carriers, solves) = (&level.leaf, &self.carriers, &mut self.solves);
-        if self.factorized {
-            let system = &mut self.system;
-            let mut by_rods = |rhs: &NodalField| {
-                *solves += 1;
-                system.set_rhs(rhs);
-                match system.solve(None, accuracy) {
-                    LinearSolveOutcome::Converged(_) => Some(system.solution()),
-                    _ => None,
-                }
-            };
-            let found: Option<Vec<_>> = (loads.iter())
-                .map(|load| response(leaf, carriers, load, &mut by_rods))
-                .collect();
-            if found.is_some() {
-                return found;
-            }
-            self.factorized = false;
-        }
-        leaf.assemble(&level.state, &mut self.system);
-        leaf.add_phase_conditions(&level.state, &mut self.system);
-        self.factorizations += 1;
-        let pattern = DirectSolver::new(&self.system).ok()?;
-        let mut factor: MatrixFactors = pattern.factorize(&self.system, 0.0).ok()?;
-        let mut direct = |rhs: &NodalField| {
-            *solves += 1;
-            Some(factor.solve_bordered(rhs, &[]).increments)
-        };
-        (loads.iter())
-            .map(|load| response(leaf, carriers, load, &mut direct))
-            .collect()
-    }
-
-    /// The work of forces on the response to others: by symmetry also that of the others on
-    /// the response to these.
-    pub fn work(
-        &self,
-        level: &GridLevel,
-        forces: &ParameterForces,
-        response: &LinearResponse,
-    ) -> f64 {
-        level.leaf.mutual_work(&self.carriers, forces, response)
-    }
-}
-
-fn response(
-    leaf: &DiscreteLeaf,
-    carriers: &ForceCarriers,
-    load: &ParameterForces,
-    solve: &mut dyn FnMut(&NodalField) -> Option<NodalField>,
-) -> Option<LinearResponse> {
-    let DenseParameterForces {
-        nodes: mut rhs,
-        mut gaps,
-    } = load.dense(leaf);
-    let mut response = LinearResponse {
-        nodes: NodalField::new(),
-        force_changes: vec![DVec3::ZERO; gaps.len()],
-    };
-    leaf.condense_gaps(carriers, &gaps, &mut rhs);
-    // In the matrix held components have a large stiffness, and a neighbor's coupling moves them a little.
-    let solve = &mut |forces: &NodalField| {
-        let mut nodes = solve(forces)?;
-        leaf.zero_held_components(&mut nodes);
-        Some(nodes)
-    };
-    response.nodes = solve(&rhs)?;
-    leaf.carried_force_changes(
-        carriers,
-        &response.nodes,
-        &mut gaps,
-        &mut response.force_changes,
-    );
-    leaf.complete_law(carriers, &mut response, &mut gaps, true, solve);
-    // Held nodes move with their holders.
-    for (rod, moved) in response.nodes.iter_mut().zip(&load.support_increments) {
-        let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());
-        nodes.for_each(|(sum, value)| *sum += value);
-    }
-    let mut numbers = response.nodes.iter().flatten().flatten();
-    let finite = numbers.all(|value| value.is_finite());
-    finite.then_some(response)
 }
 
 /// The state, moved along a response.

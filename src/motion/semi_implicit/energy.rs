@@ -1,0 +1,150 @@
+//! What an accepted step exchanges: the energy that friction and damping dissipate, and the work of loads, rest
+//! shapes, wind and supports that change or move.
+
+use crate::leaf::{NodalMoment, State};
+use crate::motion::moving_supports::MovingSupports;
+use crate::motion::semi_implicit::SemiImplicit;
+use crate::motion::{Exchange, rate_weights};
+use crate::rod::Section;
+use crate::rotation;
+use glam::DVec3;
+
+impl SemiImplicit {
+    /// What the accepted step of `h` exchanged.
+    pub(super) fn step_energy_exchange(&mut self, h: f64) -> Exchange {
+        let mut exchange = Exchange {
+            dissipated: self.physics.damping * self.momentum_times_displacement(),
+            work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(),
+        };
+        exchange.work += self.work_of_supports();
+        if self.physics.retardation > 0.0 {
+            let power = self.power_of_friction(h);
+            exchange.dissipated += 0.5 * h * (self.friction_power + power);
+            self.friction_power = power;
+        }
+        exchange
+    }
+
+    /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of
+    /// the states before (the trial) and after.
+    fn varying_load_work(&mut self, h: f64) -> f64 {
+        let (from, to) = (self.clock.time, self.clock.time + h);
+        let mut work = 0.0;
+        if self.physics.loads_vary() {
+            let mut potential = |time: f64| {
+                self.physics.apply_loads(&mut self.leaf, time);
+                self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
+            };
+            let before = potential(from);
+            work += 0.5 * (potential(to) - before);
+        }
+        if self.physics.rest_curvature_varies() {
+            let bending =
+                |rest: f64| self.bending(&self.trial, rest) + self.bending(&self.state, rest);
+            work += 0.5
+                * (bending(self.physics.rest_curvature_factor(to))
+                    - bending(self.physics.rest_curvature_factor(from)));
+        }
+        for time in [from, to] {
+            self.physics.apply_loads(&mut self.leaf, time);
+            let moments = self.leaf.dead_moments_under(self.leaf.loads);
+            for NodalMoment { node, moment } in moments {
+                let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
+                work += 0.5 * moment.dot(turn);
+            }
+        }
+        work
+    }
+
+    /// Energy of bending in a state with the rest curvatures times `rest`.
+    fn bending(&self, state: &State, rest: f64) -> f64 {
+        let segments = self.leaf.rod_index_pairs(0..self.leaf.segments());
+        let energy = |((j, i), own): (_, &Section)| {
+            let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
+            let bent = u - rest * own.rest_curvature;
+            0.5 * own.ds * bent.dot(own.couple_stiffness * bent)
+        };
+        segments.zip(&self.sections).map(energy).sum()
+    }
+
+    /// Power of internal friction at the end of a step of `h`.
+    pub(super) fn power_of_friction(&self, h: f64) -> f64 {
+        let [c0, c1, c2] = rate_weights(h, self.past_step);
+        let mut power = 0.0;
+        for (i, now) in self.strains().iter().enumerate() {
+            let section = &self.sections[i];
+            let rate = |kind: usize| {
+                c0 * now[kind]
+                    + c1 * self.strain_history[0][i][kind]
+                    + c2 * self.strain_history[1][i][kind]
+            };
+            let (v, u) = (rate(0), rate(1));
+            for c in 0..3 {
+                if section.compliance[c] > 0.0 {
+                    power += section.ds * v[c] * v[c] / section.compliance[c];
+                }
+                power += section.ds * u[c] * u[c] * section.couple_stiffness[c];
+            }
+        }
+        self.physics.retardation * power
+    }
+
+    /// The mean momentum of the accepted step times its displacement: the work of
+    /// external damping over its rate. It contains nothing of the unresolved motion,
+    /// which alternates.
+    fn momentum_times_displacement(&self) -> f64 {
+        let mut sum = 0.0;
+        for (k, inertia) in self.inertia.iter().enumerate() {
+            let (before, after) = (&self.next_node_motions[k], &self.node_motions[k]);
+            let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            if !MovingSupports::holds(&self.supports, k, 0) {
+                sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
+            }
+            if !MovingSupports::holds(&self.supports, k, 1) {
+                sum += inertia.mass * shift.dot(mean(1));
+            }
+        }
+        sum
+    }
+
+    /// Work of the loads that turn with the sections, and of moments along veins, in the accepted step,
+    /// from the trial: the mean of the loads before and after it, times the displacement.
+    fn work_of_followers(&self) -> f64 {
+        if !self.leaf.has_followers() {
+            return 0.0;
+        }
+        let work = |(j, i)| {
+            let k = self.state.base(j) + i;
+            let [before, after] =
+                [&self.trial, &self.state].map(|state| self.leaf.follower_wrench(state, j, i));
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            0.5 * ((before.moment + after.moment).dot(turn)
+                + (before.force + after.force).dot(shift))
+        };
+        let nodes = self.leaf.rod_index_pairs(self.leaf.moving_nodes());
+        nodes.map(work).sum()
+    }
+
+    /// Work of the wind in the accepted step of `h`, from the trial: the mean of the forces before
+    /// and after it, times the displacement.
+    fn work_of_wind(&self, h: f64) -> f64 {
+        let Some(wind) = &self.wind else { return 0.0 };
+        let [from, to] = [self.clock.time, self.clock.time + h].map(|time| self.physics.air(time));
+        let before = wind.drags(&self.trial, from, |k| self.next_node_motions[k].v[1]);
+        let after = wind.drags(&self.state, to, |k| self.node_motions[k].v[1]);
+        let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
+            let node = self.state.base(j) + i;
+            // What presses on a support that moves does no work on the leaf.
+            let moved = |k: usize| match MovingSupports::holds(&self.supports, k, 1) {
+                true => DVec3::ZERO,
+                false => self.state.x[k] - self.trial.x[k],
+            };
+            let force = 0.5 * (before.force() + after.force());
+            force.dot(0.5 * (moved(node) + moved(node + 1)))
+        });
+        pairs.sum()
+    }
+}
