@@ -47,7 +47,7 @@ pub fn examples() -> Texts {
             "bend45_300" "bend45_600" "cantilever_heavy" "cantilever_heavy_cosserat"
             "cantilever_tip" "cantilever_tip_cosserat" "elastica_buckled" "fan_2" "fan_3" "fan_5"
             "hanging_curved" "helical_rollup" "lens_30" "lens_60" "lens_coupled" "lens_midrib"
-            "princeton" "rollup" "twisted_strip"),
+            "princeton" "rollup" "three_point_bending" "twisted_strip"),
         &texts!("scenarios/measured":
             "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "pull"),
         &texts!("scenarios/motion": "curl" "drop" "gust" "strike" "swing"),

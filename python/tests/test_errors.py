@@ -164,7 +164,7 @@ def test_unknown_keys_are_named_with_what_was_meant() -> None:
     for slip, set_, key, remedy in [
         ({"stiffness": {"torsoin": 1}}, None, "stiffness.torsoin", "did you mean stiffness.torsion?"),
         ({}, {"stiffness.bending2": 1}, "stiffness.bending2", "did you mean stiffness.bending_2?"),
-        ({"load": {"gold": 1}}, None, "load.gold", "allowed here: gravity, g, distributed, follower, couple, couple_follows, tip_force, tip_moment, point"),
+        ({"load": {"gold": 1}}, None, "load.gold", "allowed here: gravity, g, distributed, follower, couple, couple_follows, tip_force, tip_moment, factor, point"),
     ]:
         with pytest.raises(leafdyn.ScenarioError) as refused:
             leafdyn.relax({**fan(3), **slip}, set=set_)

@@ -38,7 +38,7 @@ def paths(table: Any, within: str = "") -> set[str]:
     found = set()
     for name, kind in get_type_hints(table, vars(_typed)).items():
         inner = next((kind for kind in (kind, *get_args(kind)) if is_typeddict(kind)), None)
-        if inner is None or inner is _typed.Profile:
+        if inner is None or inner in (_typed.Profile, _typed.BaseMotion):
             found.add(within + name)
         else:
             found |= paths(inner, f"{within}{name}.")

@@ -50,13 +50,19 @@ impl ReportedResult for Equilibrium {
             let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
             lines.push(("left", left));
         }
-        // Where shooting failed, the shape is not that of the leaf: it has no energy, and
-        // its tip is meaningless.
+        // Where shooting failed, the shape is not that of the leaf: it has no energy, and its tip is
+        // meaningless. Nor has a leaf under loads without a potential, whose tip is known.
+        let is_known = match self.energy {
+            Some(energy) => energy.is_finite(),
+            None => self.outcome.is_success(),
+        };
+        if let [tip] = self.tips.as_slice()
+            && is_known
+        {
+            let tip = format_position(tip.to_array(), position_decimals(self));
+            lines.push(("tip", number_in_unit(tip, units, LENGTH)));
+        }
         if let Some(energy) = self.energy.filter(|energy| energy.is_finite()) {
-            if let [tip] = self.tips.as_slice() {
-                let tip = format_position(tip.to_array(), position_decimals(self));
-                lines.push(("tip", number_in_unit(tip, units, LENGTH)));
-            }
             let energy = format_as_accurate(self, energy, energy);
             lines.push(("energy", number_in_unit(energy, units, ENERGY)));
         }

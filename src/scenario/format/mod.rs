@@ -194,8 +194,7 @@ keys! {
     TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
     TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Default("0.0");
-    /// of springs along the veins, force per length of rod and displacement from the natural place, by
-    /// lab axis; it may vary along a rod.
+    /// of springs along the veins, force per length and displacement from the natural place, by lab axis.
     FoundationStiffness "foundation.stiffness": VectorQuantity(NotNegative), [-2, 1, 0], Required("[0.0, 0.0, 2.0]");
     /// the rod that is gripped, counted from 1, or a list of them: a grip on each.
     GripVein "grip.vein": WholeOrList, [0, 0, 0], Required("1");
@@ -205,11 +204,9 @@ keys! {
     GripHeld "grip.held": Text, [0, 0, 0], Default("\"pinned\"");
     /// by how much the grip has moved from its place in the natural leaf.
     GripMove "grip.move": VectorOrInTime, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
-    /// by lab axis, how the grip holds the position: rigidly (`inf`), not at all (0), or by a spring of
-    /// this force per displacement.
+    /// how the position is held, by lab axis: rigidly (inf), not (0), or by a spring, force per displacement.
     GripStiffness "grip.stiffness": AxisStiffness, [-1, 1, 0], Default("[inf, inf, inf]");
-    /// of a clamped grip, how it holds the directions: rigidly (`inf`), or by a spring of this moment per
-    /// radian.
+    /// of a clamped grip, how directions are held: rigidly (inf), or by a spring, moment per radian.
     GripTurnStiffness "grip.turn_stiffness": Number(PositiveOrInfinite), [1, 1, 0], Default("inf");
     /// wanted accuracy, relative to the longest rod.
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
