@@ -18,6 +18,12 @@ impl Leaf {
         self.base_turn_stiffness(j) * turn
     }
 
+    /// The energy of the spring at the base of rod `j` with the rotation `q`.
+    pub fn base_spring_energy(&self, j: usize, q: DQuat) -> f64 {
+        let turn = rotation::log(q * self.base_pose(j).rotation.conjugate());
+        0.5 * self.base_turn_stiffness(j) * turn.length_squared()
+    }
+
     /// Whether a foundation holds the veins.
     pub fn has_foundation(&self) -> bool {
         self.scenario().foundation.is_some()

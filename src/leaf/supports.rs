@@ -170,10 +170,12 @@ impl DiscreteLeaf {
     /// Force on every grip, and the moment about its middle if it is clamped.
     pub fn grip_reactions(&self, state: &State) -> Vec<Wrench> {
         let grips = &self.leaf.scenario().grips;
+        // Of nodes that slide or give, the middle of where they are.
         let middle = |number: usize| {
             let held = self.grips.iter().filter(|it| it.grip == number);
             let (sum, count) = held.fold((DVec3::ZERO, 0.0), |(sum, count), it| {
-                (sum + it.position, count + 1.0)
+                let x = state.x[state.base(it.rod) + it.node];
+                (sum + x, count + 1.0)
             });
             sum / count
         };

@@ -549,6 +549,15 @@ impl BoundaryValueProblem<'_> {
         self.base_turn_stiffness(j) * self.base_turn(j, q)
     }
 
+    /// The energy of the springs at the bases in the state there.
+    pub fn base_potential(&self, y: &[f64]) -> f64 {
+        let energy = |j: usize| {
+            let turn = self.base_turn(j, RodState::from_flat_state(y, j).q);
+            0.5 * self.base_turn_stiffness(j) * turn.length_squared()
+        };
+        (0..self.rods()).map(energy).sum()
+    }
+
     /// The rotation vector from the natural direction of the base of rod `j` to `q`.
     fn base_turn(&self, j: usize, q: DQuat) -> DVec3 {
         rotation::log(q * self.scenario.base(j).1.conjugate())

@@ -245,7 +245,8 @@ fn solve_near(
     };
     let (coarse, fine) = (at(LOCAL_ERRORS.comparison * tolerance)?, at(tolerance)?);
     let (rods, tip) = (fine.shape(equations), fine.tip());
-    let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
+    let of_ends = equations.tip_potential(tip) + equations.base_potential(&newton.nodes.states[0]);
+    let energy = tip[tip.len() - 1] + of_ends;
     // Steps that end at the same stations share errors, which the
     // difference does not show: it is at least one local error.
     let difference = Difference::between(&coarse.shape(equations), &rods);

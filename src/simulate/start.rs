@@ -8,7 +8,7 @@ use crate::modes::{Eigenpair, ModeRequest, lowest};
 use crate::motion::{Physics, project_constraints};
 use crate::newton::{NewtonIteration, SolverCounts};
 use crate::relax;
-use crate::relax::{INDEFINITE_NEWTON_EQUATIONS, Route, converge_saddle};
+use crate::relax::{INDEFINITE_NEWTON_EQUATIONS, converge_saddle};
 use crate::run::Limit;
 use crate::scenario::{MotionStart, Scenario, Schedule};
 use crate::simulate::remark::MotionDoubt;
@@ -62,10 +62,6 @@ pub(super) fn state_at_rest(
         method: relax::SemiImplicit::on_grid(Some(grid.segments())).into(),
         tolerance: Some(tolerance),
         limit,
-        route: match scenario.wind {
-            Some(_) => Route::Release,
-            None => Route::default(),
-        },
         ..relax::Options::default()
     };
     let found = relax::relax(&scenario, &options, &mut |_| {})?;

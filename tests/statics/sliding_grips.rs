@@ -115,6 +115,20 @@ fn a_spring_holds_a_direction() {
     }
 }
 
+/// The moment on a clamp is about the point that it holds, wherever that has gone: here that of its weak spring.
+#[test]
+fn a_moment_is_about_the_point_that_is_held() {
+    let grip = "held = \"clamped\", stiffness = [0.0, 0.0, 5.0], turn_stiffness = 0.001";
+    let text = cantilever(grip, [0.0, 0.0, -1.0]).replace("at = 1.0", "at = 0.5");
+    let leaf = settle(&parse(&text), 1e-10);
+    let nodes = &leaf.shape.rods[0].nodes;
+    let held = &nodes[nodes.len() / 2];
+    assert!(held.position.z < -0.02);
+    let moment = only(&leaf.grip_reactions).moment.unwrap();
+    let turn = held.rotation.to_scaled_axis();
+    assert!(moment.distance(0.001 * turn) < 1e-9, "{moment} {turn}");
+}
+
 /// A leaf in space, some veins of which are held by this.
 fn leaf(grips: &str) -> String {
     format!(

@@ -318,7 +318,8 @@ impl SemiImplicit {
             return false;
         };
         let mut jumps = false;
-        while supports.jumps.pop_if(|time| *time <= now).is_some() {
+        while supports.jumps.last().is_some_and(|time| *time <= now) {
+            supports.jumps.pop();
             jumps = true;
         }
         if !jumps || !rigid {

@@ -297,6 +297,9 @@ fn integrate_to_midpoints(
     }
     for (j, known) in known.iter().enumerate() {
         energy -= known.last().map_or(0.0, |tip| leaf.tip_force(j).dot(tip.x));
+        energy += known
+            .first()
+            .map_or(0.0, |base| leaf.leaf.base_spring_energy(j, base.q));
         let nodes = parts.sigma()[..n].iter().zip(known);
         let work = nodes.map(|(&sigma, node)| leaf.point_force_at(j, sigma).dot(node.x));
         energy -= work.sum::<f64>();
