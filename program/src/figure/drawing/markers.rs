@@ -71,7 +71,7 @@ pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportForm) {
     match held {
         SupportForm::Clamped => draw_clamp_marker(page, at),
         SupportForm::Pinned => Marker::Triangle.draw(page, at, TEXT_COLOR),
-        SupportForm::Sliding => Marker::Ring.draw(page, at, TEXT_COLOR),
+        SupportForm::Sliding => Marker::Circle.draw(page, at, TEXT_COLOR),
         SupportForm::Elastic => Marker::Diamond.draw(page, at, TEXT_COLOR),
     }
 }

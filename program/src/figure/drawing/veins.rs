@@ -373,7 +373,7 @@ fn draw_grip_markers(
     let marker = match grip.support {
         SupportForm::Clamped => Marker::Square,
         SupportForm::Pinned => Marker::Triangle,
-        SupportForm::Sliding => Marker::Ring,
+        SupportForm::Sliding => Marker::Circle,
         SupportForm::Elastic => Marker::Diamond,
     };
     if let [first, .., last] = points.as_slice() {
