@@ -12,16 +12,19 @@ use crate::scenario::{RodPlace, SupportKind};
 use glam::{DMat3, DQuat, DVec3};
 
 impl Leaf {
+    /// The rotation vector, along the lab axes, from the natural direction of the base of rod `j` to `q`.
+    fn base_turn(&self, j: usize, q: DQuat) -> DVec3 {
+        rotation::log(q * self.base_pose(j).rotation.conjugate())
+    }
+
     /// The moment of rod `j` at a base with the rotation `q`: that of its spring, or none.
     pub fn base_spring_moment(&self, j: usize, q: DQuat) -> DVec3 {
-        let turn = rotation::log(q * self.base_pose(j).rotation.conjugate());
-        self.base_turn_stiffness(j) * turn
+        self.base_turn_stiffness(j) * self.base_turn(j, q)
     }
 
     /// The energy of the spring at the base of rod `j` with the rotation `q`.
     pub fn base_spring_energy(&self, j: usize, q: DQuat) -> f64 {
-        let turn = rotation::log(q * self.base_pose(j).rotation.conjugate());
-        0.5 * self.base_turn_stiffness(j) * turn.length_squared()
+        0.5 * self.base_turn_stiffness(j) * self.base_turn(j, q).length_squared()
     }
 
     /// Whether a foundation holds the veins.

@@ -98,30 +98,55 @@ pub fn chart(
         let rows = result::chart_rows(&all, found.as_ref().map(|it| &it.solution));
         Ok::<_, RelaxError>((found.map(|it| it.reference), rows, rounds))
     })?;
-    let rods = scenario.rods.len();
-    let longest = longest(&scenario.rods);
-    let PeerRows {
-        peers,
-        remarks: others,
-    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest, false);
-    let mut remarks = result::chart_remarks(&rows, &options.contenders, reference.as_ref());
-    remarks.extend(others);
-    let chart = Chart {
-        scenario: scenario.name.clone(),
-        motion: false,
+    let measured = Measurement {
         default: SolverConfig::ALL[0],
-        rods,
-        joined: scenario.joined,
-        threads: 1,
         rounds,
+        remarks: result::chart_remarks(&rows, &options.contenders, reference.as_ref()),
         reference,
-        remarks,
         rows,
-        peers,
-        decades: Vec::new(),
-        scaling: None,
     };
-    Ok(chart.with_comparisons())
+    Ok(measured.into_chart(scenario, options))
+}
+
+/// What the runs of a chart have shown.
+struct Measurement {
+    /// The contender that a leaf has unless a method is requested.
+    default: SolverConfig,
+    rounds: usize,
+    reference: Option<ReferenceSolution>,
+    rows: Vec<ChartRow>,
+    /// Remarks on the rows.
+    remarks: Vec<ChartRemark>,
+}
+
+impl Measurement {
+    /// The chart with the measurements of other programs.
+    fn into_chart(self, scenario: &Scenario, options: &ChartOptions) -> Chart {
+        let rods = scenario.rods.len();
+        let PeerRows { peers, remarks } = result::combine_peer_measurements(
+            &options.peers,
+            &scenario.name,
+            rods,
+            longest(&scenario.rods),
+            options.motion,
+        );
+        let chart = Chart {
+            scenario: scenario.name.clone(),
+            motion: options.motion,
+            default: self.default,
+            rods,
+            joined: scenario.joined,
+            threads: 1,
+            rounds: self.rounds,
+            reference: self.reference,
+            remarks: self.remarks.into_iter().chain(remarks).collect(),
+            rows: self.rows,
+            peers,
+            decades: Vec::new(),
+            scaling: None,
+        };
+        chart.with_comparisons()
+    }
 }
 
 /// Charts speed against accuracy for the motion of a leaf.
@@ -142,30 +167,14 @@ fn chart_motion(
         Ok::<_, SimulationError>((found, rows, rounds))
     })?;
     let reference = found.map(|it| it.reference);
-    let rods = scenario.rods.len();
-    let longest = longest(&scenario.rods);
-    let PeerRows {
-        peers,
-        remarks: others,
-    } = result::combine_peer_measurements(&options.peers, &scenario.name, rods, longest, true);
-    let mut remarks = result::motion_remarks(&rows, reference.as_ref());
-    remarks.extend(others);
-    let chart = Chart {
-        scenario: scenario.name.clone(),
-        motion: true,
+    let measured = Measurement {
         default,
-        rods,
-        joined: scenario.joined,
-        threads: 1,
         rounds,
+        remarks: result::motion_remarks(&rows, reference.as_ref()),
         reference,
-        remarks,
         rows,
-        peers,
-        decades: Vec::new(),
-        scaling: None,
     };
-    Ok(chart.with_comparisons())
+    Ok(measured.into_chart(scenario, options))
 }
 
 /// Calls a function on one thread, if it may take so many `seconds`.
