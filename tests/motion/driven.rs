@@ -251,13 +251,7 @@ fn the_work_of_oscillations_is_accounted_for() {
                 phase: 0.0,
             });
             let leaf = Leaf::new(&rod);
-            let mut method = method(scheme, &leaf, &released(&leaf, 4), h);
-            let mut balances = Vec::new();
-            for k in 0..=40 {
-                method.advance(0.05 * f64::from(k)).unwrap();
-                balances.push(method.snapshot().energy.balance());
-            }
-            largest(balances.iter().map(|it| (it - balances[0]).abs()))
+            energy_imbalance(scheme, &leaf, &released(&leaf, 4), h, (40, 0.05))
         };
         let [long, short] = [4e-3, 2e-3].map(imbalance);
         assert!(

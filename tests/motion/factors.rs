@@ -311,13 +311,7 @@ fn the_work_of_loads_on_points_is_accounted_for() {
             );
             loaded(&mut rod, (0, 0.75), [[0.0, 0.4, 0.0], [0.0; 3]], &smooth());
             let leaf = Leaf::new(&rod);
-            let mut method = method(scheme, &leaf, &released(&leaf, 4), h);
-            let mut balances = Vec::new();
-            for k in 0..=40 {
-                method.advance(0.05 * f64::from(k)).unwrap();
-                balances.push(method.snapshot().energy.balance());
-            }
-            largest(balances.iter().map(|it| (it - balances[0]).abs()))
+            energy_imbalance(scheme, &leaf, &released(&leaf, 4), h, (40, 0.05))
         };
         let [long, short] = [4e-3, 2e-3].map(imbalance);
         assert!(

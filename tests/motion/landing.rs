@@ -1,9 +1,9 @@
 //! Masses that land on a leaf in motion: the modes of a beam with a mass, momentum and energy, and both methods alike.
 
-use leafdyn::internals::motion::{Physics, Snapshot};
+use leafdyn::internals::motion::Physics;
 use leafdyn::scenario::{Landing, PointLoad};
 use leafdyn_testing::motion::*;
-use leafdyn_testing::{DVec3, Leaf, PI, Scenario, largest};
+use leafdyn_testing::{DVec3, Leaf, PI, Scenario};
 
 /// A mass that lands on a point of a vein.
 fn land(scenario: &mut Scenario, (vein, at): (usize, f64), landing: Landing) {
@@ -306,13 +306,7 @@ fn the_work_of_masses_is_accounted_for() {
         let imbalance = |h: f64| {
             let scenario = struck((0.4, 0.0));
             let leaf = Leaf::new(&scenario);
-            let mut method = method(scheme, &leaf, &released(&leaf, 4), h);
-            let balance = |it: Snapshot| it.energy.balance();
-            let mut balances = vec![balance(method.snapshot())];
-            for k in 1..=20 {
-                balances.push(balance(method.advance(0.03 * f64::from(k)).unwrap()));
-            }
-            largest(balances.iter().map(|it| (it - balances[0]).abs()))
+            energy_imbalance(scheme, &leaf, &released(&leaf, 4), h, (20, 0.03))
         };
         let [long, short] = [2e-3, 1e-3].map(imbalance);
         assert!(

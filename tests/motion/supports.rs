@@ -2,11 +2,10 @@
 //! closed forms and the same motions seen from elsewhere.
 
 use crate::driven::Complex;
-use leafdyn::internals::motion::Snapshot;
 use leafdyn::scenario::{BaseMotion, Sine, SupportMotion};
 use leafdyn::simulate;
 use leafdyn_testing::motion::*;
-use leafdyn_testing::{DVec3, Leaf, Method, PI, Scenario, Schedule, by, largest, settled, to};
+use leafdyn_testing::{DVec3, Leaf, Method, PI, Scenario, Schedule, by, settled, to};
 
 /// The displacement of the tip of a cantilever of unit length, stiffness and mass, per displacement of its base that
 /// oscillates with the angular frequency omega, damped in space: w'''' = (omega^2 - i omega c) w with w(0) = 1,
@@ -238,15 +237,7 @@ fn the_work_of_holders_is_accounted_for() {
             _ => released(&leaf, 8),
         };
         for scheme in BOTH {
-            let imbalance = |h: f64| {
-                let mut method = method(scheme, &leaf, &start, h);
-                let balance = |it: Snapshot| it.energy.balance();
-                let mut balances = vec![balance(method.snapshot())];
-                for k in 1..=20 {
-                    balances.push(balance(method.advance(0.04 * f64::from(k)).unwrap()));
-                }
-                largest(balances.iter().map(|it| (it - balances[0]).abs()))
-            };
+            let imbalance = |h: f64| energy_imbalance(scheme, &leaf, &start, h, (20, 0.04));
             let [long, short] = [2e-3, 1e-3].map(imbalance);
             assert!(
                 short < 0.35 * long && short < 2e-3,

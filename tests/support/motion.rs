@@ -246,6 +246,24 @@ pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn Tim
     }
 }
 
+/// How far the balance of energy is off at so many outputs, an interval apart, of a motion by steps of `h`.
+#[track_caller]
+pub fn energy_imbalance(
+    scheme: Scheme,
+    leaf: &Leaf,
+    start: &State,
+    h: f64,
+    (outputs, interval): (u32, f64),
+) -> f64 {
+    let mut method = method(scheme, leaf, start, h);
+    let before = method.snapshot().energy.balance();
+    let off = (1..=outputs).map(|k| {
+        let now = method.advance(interval * f64::from(k)).unwrap();
+        (now.energy.balance() - before).abs()
+    });
+    crate::largest(off)
+}
+
 /// Where a leaf is at `until`, having moved by steps of `h`.
 #[track_caller]
 pub fn at(scheme: Scheme, leaf: &Leaf, state: &State, h: f64, until: f64) -> Snapshot {
