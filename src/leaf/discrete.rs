@@ -157,6 +157,7 @@ impl DiscreteLeaf {
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
             discrete.grips = discrete.find_gripped_nodes(&natural);
+            discrete.stiffen_directed_segments();
             discrete.springs = discrete.springs_from(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
@@ -273,8 +274,14 @@ impl DiscreteLeaf {
 
     /// Rounding error of the eigenvalues of the matrix.
     pub fn eigenvalue_rounding(&self) -> f64 {
-        let sections = self.sections.iter();
-        let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
+        let n = self.segments();
+        let stiffest = largest(self.rod_index_pairs(0..n).map(|(j, i)| {
+            // Nodes at both ends of a segment that holders direct do not move.
+            match self.holders_direct_segment(j, i) {
+                true => self.section(j, i).condensing.x,
+                false => self.section(j, i).condensing.max_element(),
+            }
+        }));
         f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
     }
 

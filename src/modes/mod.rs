@@ -221,9 +221,12 @@ fn softened_leaf_modes(
 fn soften_leaf(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
-    for section in &mut soft.sections {
-        *section = section
-            .limit_condensing_stiffness(SOFTENING.stiffness.max(SOFTENING.force_ratio * tension));
+    let (n, limit) = (
+        leaf.segments(),
+        SOFTENING.stiffness.max(SOFTENING.force_ratio * tension),
+    );
+    for (k, section) in soft.sections.iter_mut().enumerate() {
+        *section = leaf.limit_directed_segment(k / n, k % n, *section, DVec3::splat(limit));
         let added = section.condensing.recip() - section.compliance;
         section.condensing = (section.compliance + times * added).recip();
     }

@@ -84,8 +84,13 @@ impl Section {
     /// matrix is that of a softer rod while the residual stays exact: a proximal step in the
     /// force, which leaves solutions unchanged, adds linear convergence with a factor of the
     /// order of 1/`largest`, and keeps the pivots within double precision.
-    pub fn limit_condensing_stiffness(mut self, largest: f64) -> Self {
-        self.condensing = self.compliance.recip().min(DVec3::splat(largest));
+    pub fn limit_condensing_stiffness(self, largest: f64) -> Self {
+        self.limit_condensing_stiffnesses(DVec3::splat(largest))
+    }
+
+    /// As [`Section::limit_condensing_stiffness`], with a limit in each direction.
+    pub fn limit_condensing_stiffnesses(mut self, largest: DVec3) -> Self {
+        self.condensing = self.compliance.recip().min(largest);
         self
     }
 }

@@ -20,6 +20,7 @@ mod foundation;
 mod from_shape;
 mod grips;
 mod growth;
+mod held_stretches;
 mod held_tips;
 mod helix;
 mod hinges;

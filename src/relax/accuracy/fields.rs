@@ -10,6 +10,9 @@ use glam::{DQuat, DVec3};
 /// A node's values that are extrapolated: position, quaternion, n and m along the directors.
 type PackedNode = [f64; 13];
 
+/// The first of these values, of position and rotation.
+const POSE_VALUES: usize = 7;
+
 /// Nodes of the interpolation of lower order, whose distance from the usual one is taken for the error
 /// of both.
 const LOWER_ORDER_NODES: usize = 5;
@@ -126,22 +129,50 @@ fn add_remainder(
     };
     let stencils: Vec<_> = finer.grid.sigma().iter().map(stencil).collect();
     let mut error = 0.0_f64;
-    for (nodes, known) in nodes.iter_mut().zip(known) {
+    for (j, (nodes, known)) in nodes.iter_mut().zip(known).enumerate() {
+        let beyond = stencils_beyond_grips(j, [coarser, finer]);
         let own = nodes.iter().step_by(stride);
         let remainder = |(a, b): (&PackedNode, &PackedNode)| -> PackedNode {
             std::array::from_fn(|k| a[k] - b[k])
         };
         let remainders: Vec<PackedNode> = known.iter().zip(own).map(remainder).collect();
         let position = |i: usize| DVec3::from_slice(&remainders[i]);
-        for (node, (stencil, lower)) in nodes.iter_mut().zip(&stencils) {
+        for (k, (node, (stencil, lower))) in nodes.iter_mut().zip(&stencils).enumerate() {
             let difference = stencil.value(position) - lower.value(position);
             error = larger(error, difference.length());
+            let (pose, resultants) = node.split_at_mut(POSE_VALUES);
             for (i, weight) in stencil.terms() {
-                (node.iter_mut().zip(&remainders[i])).for_each(|(sum, it)| *sum += weight * it);
+                (pose.iter_mut().zip(&remainders[i])).for_each(|(sum, it)| *sum += weight * it);
+            }
+            let beyond = beyond.get(k).and_then(Option::as_ref);
+            for (i, weight) in beyond.unwrap_or(stencil).terms() {
+                let remainder = &remainders[i][POSE_VALUES..];
+                (resultants.iter_mut().zip(remainder)).for_each(|(sum, it)| *sum += weight * it);
             }
         }
     }
     error
+}
+
+/// The interpolation of the stress resultants of rod `j` from the nodes of a coarser grid to those of a
+/// finer one where it differs from that of positions: beyond grips, at whose last nodes resultants jump and those
+/// before the jump are known. Empty for a rod without grips.
+fn stencils_beyond_grips(j: usize, [coarser, finer]: [&DiscreteLeaf; 2]) -> Vec<Option<Stencil>> {
+    let grips = coarser.leaf.scenario().grips.iter();
+    let ends: Vec<f64> = grips
+        .filter(|grip| grip.vein == j)
+        .map(|grip| grip.at[1])
+        .collect();
+    if ends.is_empty() {
+        return Vec::new();
+    }
+    let stencil = |&sigma: &f64| {
+        let mut beyond = ends
+            .iter()
+            .map(|end| Stencil::beyond_jump(coarser, *end, sigma));
+        beyond.find_map(|stencil| stencil)
+    };
+    finer.grid.sigma().iter().map(stencil).collect()
 }
 
 /// Ratio of the largest changes of positions by the last grid at the nodes of the grid before and
@@ -242,11 +273,22 @@ pub struct KnownSection<'s> {
     pub section: &'s LeafSection,
 }
 
+/// At which of two stations the stress resultants of a vein between them are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KnownResultants {
+    /// At both.
+    Both,
+    /// At the second: a grip holds the first, where they jump, and those before it are known.
+    AtSecond,
+    /// At none: a grip holds the vein all along.
+    Nowhere,
+}
+
 /// A leaf at points between two stations.
 pub struct SectionsBetween {
     pub sections: Vec<LeafSection>,
-    /// The largest error of a position in addition to those at the stations.
-    pub added_error: f64,
+    /// The error of the positions of every vein in addition to those at the stations.
+    pub added_errors: Vec<f64>,
 }
 
 /// A leaf at rest at `points` between two stations: the mean of what is integrated from
@@ -254,12 +296,14 @@ pub struct SectionsBetween {
 /// integrated from one station miss the other by more than the distance of the two.
 ///
 /// Let a and b be the vectors by which the two miss. Errors that grow linearly from either
-/// station have a + b = 0 if the mean is free of them; otherwise its error is at most |a + b|/4.
+/// station have a + b = 0 if the mean is free of them; otherwise its error is at most |a + b|/4. What is
+/// integrated from the second station alone has an error of at most |b|.
 pub fn integrate_between_stations(
     flow: &mut RodIntegrator,
     kinks: &[f64],
     ends: [KnownSection; 2],
     points: &[f64],
+    known: impl Fn(usize) -> KnownResultants,
 ) -> Option<SectionsBetween> {
     let [from, to] = ends.map(|end| end.sigma);
     let [begin, end] = ends.map(|end| end.section);
@@ -268,35 +312,46 @@ pub fn integrate_between_stations(
     let backward = points.iter().rev().copied().chain([from]);
     let mut behind = integrate_from_section(flow, kinks, ends[1], backward);
     let (there, here) = (before.pop()?, behind.pop()?);
-    let mut error = 0.0_f64;
-    for j in 0..begin.len() {
+    let mut added_errors = vec![0.0; begin.len()];
+    for (j, added) in added_errors.iter_mut().enumerate() {
         let (a, b) = (there[j].x - end[j].x, here[j].x - begin[j].x);
         // Also where the integration yields no numbers.
         let near = |miss: DVec3| miss.is_finite() && miss.length() <= to - from;
-        if !near(a) || !near(b) {
+        let (known, error) = match known(j) {
+            KnownResultants::Both => (near(a) && near(b), 0.25 * (a + b).length()),
+            KnownResultants::AtSecond => (near(b), b.length()),
+            KnownResultants::Nowhere => (true, 0.0),
+        };
+        if !known {
             return None;
         }
-        error = larger(error, 0.25 * (a + b).length());
+        *added = SAFETY * error;
     }
     behind.reverse();
     let sections = before.iter().zip(&behind).zip(points);
-    let sections =
-        sections.map(|((a, b), at)| weighted_mean_section([a, b], (at - from) / (to - from)));
+    let sections = sections.map(|((a, b), at)| {
+        let weight = (at - from) / (to - from);
+        let weight = |j: usize| match known(j) {
+            KnownResultants::AtSecond => 1.0,
+            KnownResultants::Both | KnownResultants::Nowhere => weight,
+        };
+        weighted_mean_section([a, b], weight)
+    });
     Some(SectionsBetween {
         sections: sections.collect(),
-        added_error: SAFETY * error,
+        added_errors,
     })
 }
 
-/// The mean of two sections, the second with this weight.
-fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: f64) -> LeafSection {
-    let rod = |(a, b): (&RodFields, &RodFields)| RodFields {
-        x: a.x.lerp(b.x, weight),
-        q: a.q.lerp(b.q, weight),
-        n: a.n.lerp(b.n, weight),
-        m: a.m.lerp(b.m, weight),
+/// The mean of two sections, the second with this weight in each vein.
+fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: impl Fn(usize) -> f64) -> LeafSection {
+    let rod = |(j, (a, b)): (usize, (&RodFields, &RodFields))| RodFields {
+        x: a.x.lerp(b.x, weight(j)),
+        q: a.q.lerp(b.q, weight(j)),
+        n: a.n.lerp(b.n, weight(j)),
+        m: a.m.lerp(b.m, weight(j)),
     };
-    a.iter().zip(b).map(rod).collect()
+    a.iter().zip(b).enumerate().map(rod).collect()
 }
 
 /// The sections at `points`, one after the other, integrated from one section; no step reaches

@@ -19,11 +19,14 @@ use crate::numbers::larger;
 use crate::relax::accuracy::defect::{CorrectionGoal, DefectEstimate, FactorizedLevel};
 use crate::relax::accuracy::fields::{FieldsAtNodes, finer_nodes};
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
-use crate::relax::accuracy::transfer::{GridLevel, Stencil, mirror_level, positions, weights};
+use crate::relax::accuracy::transfer::{
+    GridLevel, NodalResultants, Stencil, mirror_level, positions, weights,
+};
 use crate::relax::path::Path;
 use crate::relax::plan::{GRIDS, RelaxationProblem, WayFromStart};
 use crate::relax::request::MAX_NODES;
 use crate::relax::saddle::Saddle;
+use crate::scenario::Grip;
 use glam::DVec3;
 
 /// Changes of the energy from grid to grid below this part of it, or of A/L, are rounding.
@@ -223,6 +226,8 @@ impl NestedEquilibrium {
         self.weights = vec![0.0; first];
         self.weights
             .extend(weights(&segments[first..], f64::INFINITY));
+        let in_held_stretches = unresolved_shear_layers(&self.levels, &self.weights);
+        self.unresolved = larger(self.unresolved, in_held_stretches);
         self.estimate = None;
         if self.levels.len() < 2 {
             self.factorized_level = None;
@@ -477,6 +482,56 @@ const BAR: ErrorBar = ErrorBar {
     unreachable: 3e3,
     correction_remainder: 1e-2,
 };
+
+/// Safety factor on what is missed of the shear in held stretches, whose moments are those on the same
+/// grid.
+const LAYER_SAFETY: f64 = 2.0;
+
+/// The displacement, in lengths of the leaf, that grids with these weights in the extrapolated values miss of
+/// what shear does in stretches whose places grips hold and whose directions are free.
+///
+/// Beyond the end of such a stretch acts a moment m. The section there turns by m l/A with the layer
+/// l = sqrt(A/H), and within l the turn decays. On segments of length ds > l the turn alternates from
+/// segment to segment, and decays over ds^2/(4 l): a stretch much longer than that ends as one of any
+/// segments would, and with x = 2 s l/ds^2 one of length s turns by up to coth(x) times as much. That is no
+/// series in ds^2, and where x is small on all grids these know nothing of the shear.
+fn unresolved_shear_layers(levels: &[GridLevel], weights: &[f64]) -> f64 {
+    let Some(finest) = levels.last() else {
+        return 0.0;
+    };
+    let (leaf, resultants) = (&finest.leaf, NodalResultants::on_level(finest));
+    let (n, grips) = (leaf.segments(), &leaf.leaf.scenario().grips);
+    let is_directed = |grip: &&Grip| {
+        grip.rigid_axes() == [true; 3] && !grip.holds_directions() && grip.at[0] < grip.at[1]
+    };
+    let mut missed = 0.0;
+    for grip in grips.iter().filter(is_directed) {
+        let [from, to] = grip.at.map(|sigma| leaf.grid.nearest_node(sigma));
+        let length = leaf.leaf.length(grip.vein) * (grip.at[1] - grip.at[0]);
+        // Of the moments at a node those before it are known.
+        let ends = [(from, from), ((to + 1).min(n), to.saturating_sub(1))];
+        for (node, segment) in ends.into_iter().filter(|(node, _)| *node > 0) {
+            let [_, moment] = resultants.at(grip.vein, node);
+            let section = leaf.section(grip.vein, segment);
+            for (bending, shear) in [(2, 1), (1, 2)] {
+                let stiffness = section.couple_stiffness[bending];
+                let layer = (stiffness * section.compliance[shear]).sqrt();
+                if layer == 0.0 {
+                    continue;
+                }
+                let turn = |level: &GridLevel| {
+                    let ds = section.ds * n as f64 / level.leaf.segments() as f64;
+                    (2.0 * length * layer / ds.powi(2)).tanh().recip()
+                };
+                let turns = levels.iter().zip(weights);
+                let extrapolated: f64 = turns.map(|(level, weight)| weight * turn(level)).sum();
+                let part = (extrapolated - 1.0).abs();
+                missed += LAYER_SAFETY * part * (moment[bending] / stiffness).abs() * layer;
+            }
+        }
+    }
+    missed
+}
 
 /// For leaves with more nodes than this no equations are kept while others are solved, which
 /// saves memory at the cost of another factorization on a coarse grid.

@@ -389,6 +389,21 @@ impl<const MOST: usize> Stencil<MOST> {
         self.terms().map(|(i, weight)| weight * at(i)).sum()
     }
 
+    /// The stencil of the value at a fraction of the length between two kinks through nodes after the first
+    /// kink, at which the value jumps; `None` at a kink, and where no node is between the kinks.
+    pub fn beyond_jump(leaf: &DiscreteLeaf, jump: f64, sigma: f64) -> Option<Self> {
+        let (nodes, kinks) = (leaf.grid.sigma(), leaf.leaf.kinks());
+        let next = kinks.iter().find(|&&kink| kink > jump + 1e-12);
+        let next = next.copied().unwrap_or(1.0);
+        let [low, high] = [jump, next].map(|at| nodes.partition_point(|&node| node < at - 1e-12));
+        if sigma <= jump + 1e-12 || sigma > next + 1e-12 || low + 1 >= high {
+            return None;
+        }
+        let width = nodes[low + 1] - nodes[low];
+        let place = (sigma - nodes[low + 1]) / width;
+        Some(Stencil::new(low + 1, high - low, place))
+    }
+
     /// The stencils of the value at a fraction of the length, and of its derivative with sigma, of
     /// values at nodes numbered from 0; linear extrapolation beyond the ends of the rod.
     pub fn value_and_derivative_stencils(leaf: &DiscreteLeaf, sigma: f64) -> [Self; 2] {

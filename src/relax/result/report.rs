@@ -2,10 +2,11 @@
 //! others; with doubts about results that indicate wrong input.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields, RodIntegrator};
+use crate::natural::Natural;
 use crate::newton::EquilibriumFailure;
 use crate::numbers::larger;
 use crate::relax::accuracy::fields::{
-    KnownSection, LeafSection, align_quaternion_sign, integrate_between_stations,
+    KnownResultants, KnownSection, LeafSection, align_quaternion_sign, integrate_between_stations,
 };
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants, VeinStation, is_planar_level};
 use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
@@ -16,8 +17,8 @@ use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::rotation::Pose;
 use crate::scenario::{
-    LARGEST_PLAUSIBLE_STRETCH, Scenario, Tissue, held_tip_out_of_reach, plausibility_warnings,
-    probable_obstacle_to_rest,
+    Grip, LARGEST_PLAUSIBLE_STRETCH, Scenario, Tissue, held_tip_out_of_reach,
+    plausibility_warnings, probable_obstacle_to_rest,
 };
 use crate::shape::{
     Centerline, InterpolationWeights, NodeState, RodShape, STATION_TOLERANCE, Undulation,
@@ -584,6 +585,7 @@ impl Equilibrium {
             rods.map(|rod| transfer::fields_from_node_state(&leaf, &rod.nodes[i]))
                 .collect()
         };
+        let held = HeldStretches::new(scenario);
         let mut between = 0.0_f64;
         let tied = (scenario.tissue.iter().flatten()).any(Tissue::has_unknown_forces);
         let (kinks, strain_jumps) = (scenario.kinks(), scenario.strain_jumps());
@@ -611,26 +613,33 @@ impl Equilibrium {
             let ends = ends.map(|(sigma, section)| KnownSection { sigma, section });
             // The equations of a single rod do not determine the forces of tissue that is rigid, or contracts.
             let found = match at_rest && !tied {
-                true => integrate_between_stations(&mut flow, leaf.kinks(), ends, points),
+                true => {
+                    let known = |vein: usize| held.known_resultants(vein, [station, next]);
+                    integrate_between_stations(&mut flow, leaf.kinks(), ends, points, known)
+                }
                 false => None,
             };
-            let Some(found) = found else {
-                for at in points {
-                    let through = StationInterpolation::new(stations, [&kinks, &strain_jumps], *at);
-                    for (interpolated, rod) in rods.iter_mut().zip(known) {
-                        interpolated.push(through.node_state(&rod.nodes));
-                        if at_rest {
-                            between = larger(between, through.error(&rod.nodes));
-                        }
+            for (vein, (there, rod)) in rods.iter_mut().zip(known).enumerate() {
+                let grip = held.grip(vein, [station, next]).filter(|_| at_rest);
+                if let (Some(found), None) = (&found, grip) {
+                    between = larger(between, found.added_errors[vein] * leaf.scale.length);
+                    for (&sigma, section) in points.iter().zip(&found.sections) {
+                        let at = VeinStation { vein, sigma };
+                        there.push(transfer::node_state_from_fields(&leaf, at, &section[vein]));
                     }
+                    continue;
                 }
-                continue;
-            };
-            between = larger(between, found.added_error * leaf.scale.length);
-            for (&sigma, section) in points.iter().zip(&found.sections) {
-                for (vein, fields) in section.iter().enumerate() {
-                    let at = VeinStation { vein, sigma };
-                    rods[vein].push(transfer::node_state_from_fields(&leaf, at, fields));
+                for &sigma in points {
+                    let kinks = [kinks.as_slice(), &strain_jumps];
+                    let through = StationInterpolation::new(stations, kinks, sigma);
+                    let node = through.node_state(&rod.nodes);
+                    there.push(match grip {
+                        Some(grip) => held.place(grip, sigma, node),
+                        None => node,
+                    });
+                    if at_rest && grip.is_none() {
+                        between = larger(between, through.error(&rod.nodes));
+                    }
                 }
             }
         }
@@ -648,6 +657,63 @@ impl Equilibrium {
             *error += between;
         }
         self
+    }
+}
+
+/// The stretches of veins whose places rigid grips hold: positions there are known between stations, too.
+struct HeldStretches<'a> {
+    grips: Vec<&'a Grip>,
+    /// The natural leaf, if there are such stretches.
+    natural: Option<Natural<'a>>,
+    /// All grips, beyond whose ends stress resultants are others than before.
+    ends: &'a [Grip],
+}
+
+impl<'a> HeldStretches<'a> {
+    fn new(scenario: &'a Scenario) -> Self {
+        let is_stretch = |grip: &&Grip| grip.at[0] < grip.at[1] && grip.rigid_axes() == [true; 3];
+        let grips: Vec<&Grip> = scenario.grips.iter().filter(is_stretch).collect();
+        let natural = (!grips.is_empty()).then(|| Natural::new(scenario, true));
+        HeldStretches {
+            grips,
+            natural,
+            ends: &scenario.grips,
+        }
+    }
+
+    /// At which of two stations the stress resultants of a vein are known.
+    fn known_resultants(&self, vein: usize, [from, to]: [f64; 2]) -> KnownResultants {
+        let ends = |grip: &Grip| grip.vein == vein && (grip.at[1] - from).abs() < STATION_TOLERANCE;
+        match self.grip(vein, [from, to]) {
+            Some(_) => KnownResultants::Nowhere,
+            None if self.ends.iter().any(ends) => KnownResultants::AtSecond,
+            None => KnownResultants::Both,
+        }
+    }
+
+    /// The grip that holds a vein between two stations.
+    fn grip(&self, vein: usize, [from, to]: [f64; 2]) -> Option<&'a Grip> {
+        let holds = |grip: &&&Grip| {
+            let [begin, end] = grip.at;
+            grip.vein == vein && begin <= from + STATION_TOLERANCE && to <= end + STATION_TOLERANCE
+        };
+        self.grips.iter().find(holds).copied()
+    }
+
+    /// An interpolated node of a vein at the place where the grip holds it.
+    fn place(&self, grip: &Grip, sigma: f64, node: NodeState) -> NodeState {
+        let Some(natural) = &self.natural else {
+            return node;
+        };
+        let pose = natural.vein_pose(grip.vein, sigma);
+        NodeState {
+            position: pose.position + DVec3::from_array(grip.displacement),
+            rotation: match grip.holds_directions() {
+                true => align_quaternion_sign(pose.rotation, node.rotation),
+                false => node.rotation,
+            },
+            ..node
+        }
     }
 }
 
