@@ -185,7 +185,8 @@ impl DiscreteLeaf {
                 force = load.force + springs.force + follower.force - gradient.x;
                 moment =
                     load.moment + springs.moment + self.node_moment(state, j, i + 1) - gradient.b;
-                largest = larger(largest, largest_component(segment.gap));
+                let gap = self.closable_gap(j, i, segment.gap);
+                largest = larger(largest, largest_component(gap));
             }
             // The holder balances the remaining force on a held tip.
             let on_tip = self.node_freedom(j, n).of_wrench(Wrench { moment, force });

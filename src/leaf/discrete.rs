@@ -157,7 +157,7 @@ impl DiscreteLeaf {
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
             discrete.grips = discrete.find_gripped_nodes(&natural);
-            discrete.stiffen_directed_segments();
+            discrete.limit_held_segments();
             discrete.springs = discrete.springs_from(&natural);
             if leaf.has_tissue() {
                 discrete.strips = match leaf.scenario().tissue_grown {
@@ -241,7 +241,8 @@ impl DiscreteLeaf {
             let rigid = section.compliance.cmpeq(DVec3::ZERO);
             let strained = self.strained_segment(state, j, i);
             state.n[j * n + i] = strained.frame * strained.nu;
-            let off = DVec3::select(rigid, strained.gap, DVec3::ZERO);
+            let gap = self.closable_gap(j, i, strained.gap);
+            let off = DVec3::select(rigid, gap, DVec3::ZERO);
             violation = largest([violation, off.x.abs(), off.y.abs(), off.z.abs()]);
         }
         violation
@@ -259,6 +260,7 @@ impl DiscreteLeaf {
                     return 0.0;
                 }
                 let gap = self.segment(state, j, i, state.n[j * n + i]).gap;
+                let gap = self.closable_gap(j, i, gap);
                 DVec3::select(nearly_rigid, gap, DVec3::ZERO).length()
             };
             (0..n).map(gap).sum()
@@ -277,7 +279,7 @@ impl DiscreteLeaf {
         let n = self.segments();
         let stiffest = largest(self.rod_index_pairs(0..n).map(|(j, i)| {
             // Nodes at both ends of a segment that holders direct do not move.
-            match self.holders_direct_segment(j, i) {
+            match self.segment_hold(j, i).directs {
                 true => self.section(j, i).condensing.x,
                 false => self.section(j, i).condensing.max_element(),
             }

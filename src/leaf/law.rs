@@ -20,7 +20,7 @@ use crate::leaf::system::System;
 use crate::leaf::tissue::rigid::ForceCarriers;
 use crate::numbers::largest;
 use crate::rod::Section;
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 /// Largest missing part of the law of a segment, 1 - C k, by rounding.
 const MISSING_LAW_ROUNDING: f64 = 1e-12;
@@ -46,6 +46,17 @@ const LAW_COMPLETION_LIMITS: KrylovLimits = KrylovLimits {
         remainder: 0.99,
     }),
 };
+
+/// What holders determine of a segment.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SegmentHold {
+    /// Whether they place both ends along some axis, and an end can turn: then its direction is theirs.
+    pub directs: bool,
+    /// Whether they hold the places of both ends.
+    pub has_length: bool,
+    /// Whether they hold both sections.
+    pub has_sections: bool,
+}
 
 impl DiscreteLeaf {
     /// The part of the law of segment `i` of rod `j` that a linear solution does not satisfy.
@@ -73,7 +84,8 @@ impl DiscreteLeaf {
         let n = self.segments();
         let mut segments = self.rod_index_pairs(0..n);
         segments.any(|(j, i)| {
-            self.segment(state, j, i, state.n[j * n + i]).gap.length() > LARGEST_ROUNDED_GAP
+            let gap = self.segment(state, j, i, state.n[j * n + i]).gap;
+            self.closable_gap(j, i, gap).length() > LARGEST_ROUNDED_GAP
         })
     }
 
@@ -85,7 +97,8 @@ impl DiscreteLeaf {
             let section = self.section(j, i);
             let change = (after.n[j * n + i] - before.n[j * n + i]).length();
             let missing = self.missing_law_fraction(j, i) * self.completed_components(j, i, false);
-            (missing / section.condensing).max_element() * change
+            let soft = DVec3::select(missing.cmpgt(DVec3::ZERO), section.condensing, DVec3::ONE);
+            (missing / soft).max_element() * change
         };
         largest(self.rod_index_pairs(0..n).map(missing))
     }
@@ -109,51 +122,67 @@ impl DiscreteLeaf {
         largest(self.sections.iter().map(stiffness))
     }
 
-    /// The parts of the law that a completion closes: all, or without `rigid` directions those of a
-    /// finite stiffness. A straight rigid rod between holders has no force of its own, and its
+    /// The parts of the law that a completion closes: all that have a force to close them, or without `rigid`
+    /// directions those of a finite stiffness. A straight rigid rod between holders has no force of its own, and its
     /// length depends on its deflection in second order: Newton's method with its exact length
     /// would converge slowly there, where that with a limited stiffness keeps it straight. Where
     /// holders place both ends of an unshearable segment, its direction is theirs in first order,
     /// and its shear forces are closed in any case: they carry the moment that a held stretch receives at its end.
     fn completed_components(&self, j: usize, i: usize, rigid: bool) -> DVec3 {
-        let is_rigid = self.section(j, i).compliance.cmpeq(DVec3::ZERO);
+        let section = self.section(j, i);
+        let carried = DVec3::select(
+            section.condensing.cmpgt(DVec3::ZERO),
+            DVec3::ONE,
+            DVec3::ZERO,
+        );
+        let is_rigid = section.compliance.cmpeq(DVec3::ZERO);
         if rigid || !is_rigid.any() {
-            return DVec3::ONE;
+            return carried;
         }
-        let of_rigid = match self.holders_direct_segment(j, i) {
+        let of_rigid = match self.segment_hold(j, i).directs {
             true => DVec3::new(0.0, 1.0, 1.0),
             false => DVec3::ZERO,
         };
-        DVec3::select(is_rigid, of_rigid, DVec3::ONE)
+        carried * DVec3::select(is_rigid, of_rigid, DVec3::ONE)
     }
 
-    /// Condenses out the shear forces of segments whose direction is that of their holders with a larger
-    /// stiffness. Such forces alternate from segment to segment in answer to a moment at the end of
-    /// the held stretch, and only the bending of the segments resists: with the stiffness of other
-    /// segments each solution would close next to nothing of their law. No soft mode is lost, as
-    /// the nodes do not move.
-    pub(super) fn stiffen_directed_segments(&mut self) {
+    /// The part of a gap of segment `i` of rod `j` that its force can close.
+    pub(super) fn closable_gap(&self, j: usize, i: usize, gap: DVec3) -> DVec3 {
+        let carried = self.section(j, i).condensing.cmpgt(DVec3::ZERO);
+        DVec3::select(carried, gap, DVec3::ZERO)
+    }
+
+    /// Condenses out the forces of segments between holders with the stiffnesses of
+    /// [`DiscreteLeaf::limit_held_segment`].
+    pub(super) fn limit_held_segments(&mut self) {
         if !self.has_grips() {
             return;
         }
         for (j, i) in self.rod_index_pairs(0..self.segments()) {
             let section = self.section(j, i);
-            let stiffened = self.limit_directed_segment(j, i, *section, section.condensing);
+            let limited = self.limit_held_segment(j, i, *section, section.condensing);
             let k = j * self.segments() + i;
-            self.sections[k] = stiffened;
+            self.sections[k] = limited;
         }
     }
 
     /// The section of segment `i` of rod `j`, whose force is condensed out with at most the stiffness
-    /// `largest`, or in shear more where holders direct the segment.
-    pub fn limit_directed_segment(
+    /// `largest`, but for what holders determine.
+    ///
+    /// Where they direct the segment its shear forces alternate from segment to segment in answer to a moment at
+    /// the end of the held stretch, and only the bending of the segments resists: with the stiffness of
+    /// other segments each solution would close next to nothing of their law. With a larger one no soft
+    /// mode is lost, as the nodes do not move. What is rigid of a segment in whose law nothing is free has no force: none
+    /// is determined, and on the way to where they are held its ends need not have their distance.
+    pub fn limit_held_segment(
         &self,
         j: usize,
         i: usize,
         section: Section,
         largest: DVec3,
     ) -> Section {
-        let limit = match self.holders_direct_segment(j, i) {
+        let hold = self.segment_hold(j, i);
+        let limit = match hold.directs {
             true => {
                 let bending = section.couple_stiffness.y.max(section.couple_stiffness.z);
                 let stiffness = DIRECTED_SEGMENT_STIFFNESS * bending / section.ds.powi(2);
@@ -161,16 +190,26 @@ impl DiscreteLeaf {
             }
             false => largest,
         };
-        section.limit_condensing_stiffnesses(limit)
+        let mut limited = section.limit_condensing_stiffnesses(limit);
+        let known = BVec3::new(hold.has_length, hold.has_sections, hold.has_sections);
+        let forceless = known & section.compliance.cmpeq(DVec3::ZERO);
+        limited.condensing = DVec3::select(forceless, DVec3::ZERO, limited.condensing);
+        limited
     }
 
-    /// Whether grips place both ends of segment `i` of rod `j`, one of which can turn.
-    pub(super) fn holders_direct_segment(&self, j: usize, i: usize) -> bool {
+    /// What holders determine of segment `i` of rod `j`.
+    pub(super) fn segment_hold(&self, j: usize, i: usize) -> SegmentHold {
         if !self.has_grips() {
-            return false;
+            return SegmentHold::default();
         }
         let ends = [i, i + 1].map(|node| self.node_freedom(j, node));
-        ends.iter().all(|end| !end.displacement.all()) && ends.iter().any(|end| end.rotation)
+        let turns = ends.iter().any(|end| end.rotation);
+        let has_length = ends.iter().all(|end| !end.displacement.any());
+        SegmentHold {
+            directs: turns && ends.iter().all(|end| !end.displacement.all()),
+            has_length,
+            has_sections: has_length && !turns,
+        }
     }
 
     /// Completes the law in the `response` of a leaf with these `segments`: `gaps` are the lengths

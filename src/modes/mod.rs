@@ -226,7 +226,7 @@ fn soften_leaf(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
         SOFTENING.stiffness.max(SOFTENING.force_ratio * tension),
     );
     for (k, section) in soft.sections.iter_mut().enumerate() {
-        *section = leaf.limit_directed_segment(k / n, k % n, *section, DVec3::splat(limit));
+        *section = leaf.limit_held_segment(k / n, k % n, *section, DVec3::splat(limit));
         let added = section.condensing.recip() - section.compliance;
         section.condensing = (section.compliance + times * added).recip();
     }

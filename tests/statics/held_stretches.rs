@@ -133,3 +133,25 @@ fn stations_beside_held_stretches_are_accurate() {
         }
     }
 }
+
+/// A clamped stretch of an unshearable vein is brought to its place from anywhere: on the way its sections need not
+/// have their distances.
+#[test]
+fn unshearable_veins_come_to_clamps() {
+    let mut compared = 0;
+    for at in [[0.394, 0.642], [0.471, 0.72], [0.25, 0.3]] {
+        for bends in [[-2.2, -1.0], [1.3, 0.0], [2.5, 2.0]] {
+            let grip = pinned(at, [0.043, 0.048, -0.048]).replace("pinned", "clamped");
+            let [rigid, stiff] =
+                ["inf", "1e10"].map(|shear| settle(&parse(&rod(shear, bends, &grip)), 1e-7));
+            let bars = [&rigid, &stiff].map(|leaf| leaf.accuracy.error_estimate.unwrap());
+            let off = distance(&rigid, &stiff);
+            assert!(
+                off <= bars[0] + bars[1] + 1e-8,
+                "{at:?} {bends:?}: {off:.1e}"
+            );
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 9);
+}
