@@ -115,6 +115,7 @@ mod shooting;
 mod simd;
 pub mod simulate;
 pub mod study;
+pub mod surface;
 
 #[doc(hidden)]
 #[deprecated(note = "is leafdyn::run")]

@@ -338,6 +338,20 @@ impl Radii {
         Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
     }
 
+    /// Half of the width of a rod's section, along d2, at a fraction of its length; `None` as of
+    /// [`Radii::at`].
+    pub fn half_width(&self, rod: usize, sigma: f64) -> Option<f64> {
+        let section = self.0.get(rod)?;
+        Some(0.5 * section.width.at(sigma))
+    }
+
+    /// The thickness of a rod's section, along d3, at a fraction of its length; `None` as of
+    /// [`Radii::at`].
+    pub fn thickness(&self, rod: usize, sigma: f64) -> Option<f64> {
+        let section = self.0.get(rod)?;
+        Some(section.thickness.at(sigma))
+    }
+
     /// The moduli of the section of a rod at a fraction of its length: of both sections where it jumps.
     pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Vec<Moduli> {
         let sections = self.0.get(rod).into_iter();
