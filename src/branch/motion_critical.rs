@@ -14,8 +14,8 @@ use crate::relax::MotionInstability;
 use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::accuracy::transfer::transfer;
 use crate::relax::balanced::{
-    GrowingMotions, balance_on_grid, growing_motions, has_quick_small_motions, has_small_motions,
-    is_softened, state_on_line,
+    GrowingMotion, GrowingMotions, balance_on_grid, growing_motions, has_quick_small_motions,
+    has_small_motions, is_softened, rounding_of_squares, state_on_line,
 };
 use crate::relax::{GridLevel, StateOnGrid};
 
@@ -63,6 +63,9 @@ const SEARCH: Search = Search {
 const SAFETY: f64 = 2.0;
 const ROUNDING: f64 = 1e-9;
 
+/// The error of the interpolation as a part of its difference from that of one order less.
+const UNCERTAINTY_PART: f64 = 0.03;
+
 /// A point of a branch on which the number of roots with growth is known.
 #[derive(Clone, Copy)]
 pub(crate) struct KnownStability<'l> {
@@ -93,7 +96,7 @@ pub(crate) struct MotionCriticalPoint {
 struct OnGrid {
     fraction: f64,
     frequency: f64,
-    /// Uncertainty of the fraction.
+    /// Error of the fraction by interpolation and rounding.
     uncertainty: f64,
     unstable_roots: [usize; 2],
 }
@@ -127,8 +130,13 @@ pub(crate) fn locate_critical_point(
         };
         series.push((search.grid.segments(), found));
         let point = extrapolated(&series);
-        let error = point.fraction_error.unwrap_or(f64::INFINITY);
-        best = Some(point);
+        let bound = |it: &MotionCriticalPoint| it.fraction_error.unwrap_or(f64::INFINITY);
+        let error = bound(&point);
+        // Rounding grows on finer grids.
+        best = match best {
+            Some(best) if bound(&best) < error => Some(best),
+            _ => Some(point),
+        };
         if series.len() >= SEARCH.least_grids && error <= tolerance {
             break;
         }
@@ -139,7 +147,7 @@ pub(crate) fn locate_critical_point(
 /// Extrapolates the critical point over grids.
 fn extrapolated(series: &[(usize, OnGrid)]) -> MotionCriticalPoint {
     let uncertainty = series.iter().map(|(_, it)| it.uncertainty);
-    let uncertainty = ROUNDING.max(0.1 * uncertainty.fold(0.0, f64::max));
+    let uncertainty = uncertainty.fold(ROUNDING, f64::max);
     let number = |of: fn(&OnGrid) -> f64, noise: f64| {
         let grids = series.iter().map(|(n, it)| (*n, vec![of(it)]));
         let table = grids.collect::<Richardson>().with_noise(noise);
@@ -167,7 +175,19 @@ fn extrapolated(series: &[(usize, OnGrid)]) -> MotionCriticalPoint {
 struct GrowingProbe {
     fraction: f64,
     measure: f64,
+    square: Option<f64>,
     frequency: f64,
+}
+
+impl GrowingProbe {
+    fn new(fraction: f64, motion: GrowingMotion) -> Self {
+        GrowingProbe {
+            fraction,
+            measure: motion.measure,
+            square: motion.square,
+            frequency: motion.frequency,
+        }
+    }
 }
 
 /// Balances of a family on one grid.
@@ -255,11 +275,7 @@ impl<'f> GridSearch<'f> {
         };
         let probe = |fraction: f64, motions: &GrowingMotions| {
             let slowest = motions.slowest()?;
-            Some(GrowingProbe {
-                fraction,
-                measure: slowest.measure,
-                frequency: slowest.frequency,
-            })
+            Some(GrowingProbe::new(fraction, slowest))
         };
         let mut probes = vec![probe(loud, motions)?];
         let mut loud_count = motions.unstable_roots;
@@ -303,7 +319,7 @@ impl<'f> GridSearch<'f> {
         Some(OnGrid {
             fraction: stiff.fraction,
             frequency: stiff.frequency,
-            uncertainty: best.uncertainty,
+            uncertainty: UNCERTAINTY_PART * best.uncertainty + self.rounding(&probes, best),
             unstable_roots: match before < after {
                 true => [quiet_count, loud_count],
                 false => [loud_count, quiet_count],
@@ -313,36 +329,66 @@ impl<'f> GridSearch<'f> {
 }
 
 impl GridSearch<'_> {
-    /// The zero without the compliance by which the matrix of nearly rigid segments is softened: twice as much of
-    /// it moves the zero twice as far.
+    /// The zero without the compliance by which the matrices of nearly rigid segments are softened: that of
+    /// one, two and three times as much of it, extrapolated to none.
     fn without_softening(&self, probes: &[GrowingProbe], root: Interpolation) -> Interpolation {
-        let softer = |probe: &GrowingProbe| {
-            let known = self.known.iter().find(|(at, _)| *at == probe.fraction);
-            let slowest = known
-                .and_then(|(_, level)| growing_motions(level, 2.0, &self.family.limit)?.slowest());
-            slowest.map(|it| GrowingProbe {
-                fraction: probe.fraction,
-                measure: it.measure,
-                frequency: it.frequency,
-            })
+        let upto = root.last.min(probes.len());
+        let nearest = &probes[upto.saturating_sub(Interpolation::MOST)..upto];
+        let softer = |times: f64| {
+            let softer = |probe: &GrowingProbe| {
+                let (_, level) = self.known.iter().find(|(at, _)| *at == probe.fraction)?;
+                let slowest = growing_motions(level, times, &self.family.limit)?.slowest()?;
+                Some(GrowingProbe::new(probe.fraction, slowest))
+            };
+            let soft: Option<Vec<GrowingProbe>> = nearest.iter().map(softer).collect();
+            soft.map(|probes| Interpolation::of(&probes))
         };
-        let rigid = |(_, level): &(f64, GridLevel)| is_softened(&level.leaf);
+        let rigid = |(_, level): &(f64, GridLevel)| is_softened(level);
         if !self.known.last().is_some_and(rigid) {
             return root;
         }
-        let upto = root.last.min(probes.len());
-        let nearest = &probes[upto.saturating_sub(Interpolation::MOST)..upto];
-        let soft: Option<Vec<GrowingProbe>> = nearest.iter().map(softer).collect();
-        let Some(soft) = soft.map(|probes| Interpolation::of(&probes)) else {
-            return root;
-        };
-        Interpolation {
-            fraction: 2.0 * root.fraction - soft.fraction,
-            frequency: 2.0 * root.frequency - soft.frequency,
-            ..root
+        match (softer(2.0), softer(3.0)) {
+            (Some(twice), Some(thrice)) => {
+                let none = |of: fn(&Interpolation) -> f64| {
+                    let values = [&root, &twice, &thrice].map(of);
+                    let weighted = values.iter().zip(NO_SOFTENING_WEIGHTS);
+                    weighted.map(|(value, weight)| weight * value).sum()
+                };
+                Interpolation {
+                    fraction: none(|it| it.fraction),
+                    frequency: none(|it| it.frequency),
+                    ..root
+                }
+            }
+            _ => root,
+        }
+    }
+
+    /// The error of the zero by rounding of the matrix.
+    fn rounding(&self, probes: &[GrowingProbe], root: Interpolation) -> f64 {
+        let rounding = self
+            .known
+            .last()
+            .map_or(0.0, |it| rounding_of_squares(&it.1));
+        let amplified = NO_SOFTENING_WEIGHTS.iter().map(|it| it.abs()).sum::<f64>() * rounding;
+        let last = root.last.min(probes.len()) - 1;
+        let (near, far) = (probes[last], probes[last.saturating_sub(1)]);
+        match (near.square, far.square) {
+            (Some(one), Some(other)) => {
+                amplified * ((near.fraction - far.fraction) / (one - other)).abs()
+            }
+            _ => {
+                amplified
+                    * ((near.fraction - root.fraction) / near.measure)
+                        .abs()
+                        .sqrt()
+            }
         }
     }
 }
+
+/// Weights of values at softenings of 1, 2 and 3 for extrapolation to none, by a parabola.
+const NO_SOFTENING_WEIGHTS: [f64; 3] = [3.0, -3.0, 1.0];
 
 /// The zero of the measure by inverse interpolation through the last probes, and the frequency there.
 #[derive(Clone, Copy)]
@@ -428,6 +474,7 @@ mod tests {
         let probe = |fraction: f64| GrowingProbe {
             fraction,
             measure: (fraction - 0.3) * (2.0 + fraction),
+            square: None,
             frequency: 5.0 + fraction * fraction,
         };
         let near = [0.5, 0.34, 0.308, 0.3016].map(probe);

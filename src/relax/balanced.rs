@@ -8,6 +8,7 @@ use crate::leaf::{DiscreteLeaf, Leaf, State, System};
 use crate::modes::linearized::{MotionRoot, MotionRoots, lowest_roots};
 use crate::motion::Physics;
 use crate::newton::{EquilibriumFailure, SolverCounts};
+use crate::numbers::largest;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::transfer::{GridLevel, StateOnGrid};
 use crate::relax::log::WorkLog;
@@ -39,6 +40,9 @@ pub(crate) struct GrowingMotion {
     /// damping two frequencies meet in flutter, and growth begins as a root: this is the square of the
     /// imaginary part of lambda^2, in divergence lambda^2 itself. With damping it is the growth.
     pub measure: f64,
+    /// Square of the size of the root, with which rounding of the matrix moves the zero of the measure; `None` in
+    /// flutter without damping, where it moves it as it does the root of the measure.
+    pub square: Option<f64>,
     /// Angular frequency in the scenario's unit of time; zero in divergence.
     pub frequency: f64,
 }
@@ -78,22 +82,44 @@ pub(crate) fn has_quick_small_motions(leaf: &DiscreteLeaf) -> bool {
     unknowns(leaf) <= UNKNOWNS.quick
 }
 
-/// Stiffness in stretch and shear, in units of A/L^2, above which matrices are softened: a larger one loses
-/// digits of the roots, a smaller one is harder to extrapolate to none.
-const STIFFEST: f64 = 1e6;
+/// Stiffness in stretch and shear above which matrices are softened: a larger one loses digits of the roots, a
+/// smaller one is harder to extrapolate to none.
+struct Softening {
+    /// In units of A/L^2.
+    stiffness: f64,
+    /// Over the largest force of the rods, if that is more.
+    force_ratio: f64,
+}
+
+const SOFTENING: Softening = Softening {
+    stiffness: 1e5,
+    force_ratio: 1e3,
+};
+
+fn softened_stiffness(state: &State) -> f64 {
+    let tension = largest(state.n.iter().map(|n| n.length()));
+    SOFTENING.stiffness.max(SOFTENING.force_ratio * tension)
+}
 
 /// Whether the matrix of a leaf is softened.
-pub(crate) fn is_softened(leaf: &DiscreteLeaf) -> bool {
-    let stiff = |section: &Section| section.compliance.min_element() * STIFFEST < 1.0;
-    leaf.sections.iter().any(stiff)
+pub(crate) fn is_softened(level: &GridLevel) -> bool {
+    let stiffest = softened_stiffness(&level.state);
+    let stiff = |section: &Section| section.compliance.min_element() * stiffest < 1.0;
+    level.leaf.sections.iter().any(stiff)
+}
+
+/// Rounding of the squares of roots: that of the matrix.
+pub(crate) fn rounding_of_squares(level: &GridLevel) -> f64 {
+    f64::EPSILON * softened_stiffness(&level.state) * (level.leaf.segments() as f64).powi(2)
 }
 
 /// The leaf with matrices of nearly rigid segments that have this multiple of the least compliance besides
 /// their own.
-fn softened(leaf: &DiscreteLeaf, times: f64) -> DiscreteLeaf {
+fn softened(GridLevel { leaf, state }: &GridLevel, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
+    let least = DVec3::splat(1.0 / softened_stiffness(state));
     for section in &mut soft.sections {
-        let added = (DVec3::splat(1.0 / STIFFEST) - section.compliance).max(DVec3::ZERO);
+        let added = (least - section.compliance).max(DVec3::ZERO);
         section.condensing = (section.compliance + times * added).recip();
     }
     soft
@@ -107,7 +133,7 @@ pub(crate) fn growing_motions(
     limit: &Limit,
 ) -> Option<GrowingMotions> {
     let (physics, _) = Physics::for_small_motions(&level.leaf.leaf);
-    let leaf = softened(&level.leaf, softening);
+    let leaf = softened(level, softening);
     let forces = WithoutPotential::in_motion(&leaf, &physics);
     let roots = lowest_roots(&leaf, &physics, &level.state, &forces, LEAST_ROOTS, limit)?;
     let rate = 1.0 / physics.time_unit;
@@ -121,6 +147,7 @@ pub(crate) fn growing_motions(
                     true if square.im > 0.0 => growing.add(GrowingMotion {
                         growth: MotionRoot::from_square(square).growth,
                         measure: square.im * square.im,
+                        square: None,
                         frequency: MotionRoot::from_square(c64::new(square.re, 0.0))
                             .frequency
                             .max(f64::MIN_POSITIVE)
@@ -129,6 +156,7 @@ pub(crate) fn growing_motions(
                     false if square.re > 0.0 => growing.add(GrowingMotion {
                         growth: square.re.sqrt(),
                         measure: square.re,
+                        square: Some(square.re),
                         frequency: 0.0,
                     }),
                     _ => {}
@@ -141,6 +169,7 @@ pub(crate) fn growing_motions(
                 growing.add(GrowingMotion {
                     growth: root.growth,
                     measure: root.growth,
+                    square: Some(root.size().powi(2)),
                     frequency: root.frequency * rate,
                 });
             }
