@@ -390,6 +390,32 @@ fn a_cantilever_gives_way_to_the_wind() {
     }
 }
 
+/// Where a buckled column folds back it ends, and says so: beside the fold of the same column without the
+/// load that follows, which is too small to matter.
+#[test]
+fn a_branch_that_folds_back_ends_there() {
+    let column = "stiffness.bending_3=10.0; load.tip_force=[-2.8, 0.0, 0.5]";
+    let vary = "load.tip_force[2]=0.5..-0.5";
+    let mut request = branch::request(base(ROD, column), vary, 1e-6, 2000);
+    let with_potential = trace(&request, &mut |_, _, _| {}).unwrap();
+    let fold = events(&with_potential)[0].value;
+    request.base = base(ROD, &format!("{column}; load.follower=[0.0, 1e-9, 0.0]"));
+    request.keep_unstable = false;
+    let found = trace(&request, &mut |_, _, _| {}).unwrap();
+    let branch = &found.branches[0];
+    assert_eq!(branch.end.word(), "turns-back");
+    assert!(!found.complete && branch.remark().is_some());
+    let last = branch.points.last().unwrap();
+    println!("ends at {}, fold at {fold}", last.value);
+    assert!(last.value > fold && last.value - fold < 1e-3);
+    assert!(
+        branch
+            .points
+            .iter()
+            .all(|point| point.stable() != Some(false))
+    );
+}
+
 /// Branches that cross, starts of any index and boundaries are those of a potential.
 #[test]
 fn what_needs_a_potential_is_refused() {
@@ -402,8 +428,8 @@ fn what_needs_a_potential_is_refused() {
         change(&mut request);
         trace(&request, &mut |_, _, _| {}).unwrap_err().to_string()
     };
-    assert!(refused(|it| it.switch = true).contains("switch"));
-    assert!(refused(|it| it.keep_unstable = true).contains("keep-unstable"));
+    assert!(refused(|it| it.switch = true).contains("branches that cross"));
+    assert!(refused(|it| it.keep_unstable = true).contains("of any index"));
     let mut dead = request("", "dynamics.density=1..2", 1e-6);
     dead.keep_unstable = true;
     let told = trace(&dead, &mut |_, _, _| {}).unwrap_err().to_string();

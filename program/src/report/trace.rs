@@ -310,17 +310,17 @@ pub fn write_trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// The columns of small motions; none with a potential.
-fn motion_cells(point: &TracePoint) -> Vec<Option<f64>> {
+fn motion_cells(point: &TracePoint) -> Vec<impl Serialize> {
     let cells = point.motion.map(|motion| {
         let dominant = motion.dominant;
-        [
-            motion.unstable_roots.map(|roots| roots as f64),
+        (
+            motion.unstable_roots,
             dominant.map(|it| it.growth_rate),
             dominant.map(|it| it.frequency),
             dominant.and_then(|it| it.error),
-        ]
+        )
     });
-    cells.into_iter().flatten().collect()
+    cells.into_iter().collect()
 }
 
 /// The columns from `kind` to `twist`.

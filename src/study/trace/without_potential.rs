@@ -6,9 +6,10 @@ use crate::branch::{
 };
 use crate::relax::balanced::told_with_small_motions;
 use crate::relax::{
-    AssumedMotion, DominantMotion, MotionInstability, Options, check_segments, relax_on_grids,
+    AssumedMotion, DominantMotion, MotionInstability, Options, RelaxError, check_segments,
+    relax_on_grids,
 };
-use crate::run::{Instant, RefusedOption};
+use crate::run::{Instant, UnmodelledFeature};
 use crate::scenario::{Scenario, plausibility_warnings};
 use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::result::{PointKind, PointMotion, Trace, TraceBranch, TracePoint};
@@ -32,18 +33,15 @@ impl TraceRequest {
 
     /// Refuses what is told of branches with a potential alone.
     pub(super) fn validate_without_potential(&self) -> Result<(), TraceError> {
-        let refused = |option, why| Err(RefusedOption::new(option, true, why).into());
-        if self.switch {
-            let why = "branches that cross are followed where loads have a potential, which wind and loads that \
-                       turn with the section do not: leave it out";
-            return refused("switch", why);
-        }
-        if self.keep_unstable {
-            let why = "wind and loads that turn with the section have no potential: begin where the leaf comes \
-                       to rest, and leave it out";
-            return refused("keep-unstable", why);
-        }
-        Ok(())
+        let what = match (self.switch, self.keep_unstable) {
+            (true, _) => "following branches that cross",
+            (_, true) => "a start at an equilibrium of any index",
+            _ => return Ok(()),
+        };
+        Err(match self.base.scenario().wind {
+            Some(_) => RelaxError::from(UnmodelledFeature::Wind { what }).into(),
+            None => RelaxError::from(UnmodelledFeature::Followers { what }).into(),
+        })
     }
 }
 
