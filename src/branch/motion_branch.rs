@@ -22,6 +22,9 @@ struct Steps {
     growth: f64,
     /// Largest displacement from the prediction.
     farthest: f64,
+    /// Segments of the finest grid on which the next point is looked for: beside a fold coarser grids have
+    /// none.
+    finest: usize,
 }
 
 const STEPS: Steps = Steps {
@@ -29,6 +32,7 @@ const STEPS: Steps = Steps {
     failure: 0.25,
     growth: 2.0,
     farthest: 0.05,
+    finest: 256,
 };
 
 /// Critical points between two regular ones, at most.
@@ -68,6 +72,13 @@ impl MotionBranchPoint {
         &self.levels[self.levels.len() - 1]
     }
 
+    /// The leaf on the coarsest of its grids with at least so many segments, or on the finest.
+    fn level_from(&self, least: usize) -> &GridLevel {
+        let mut levels = self.levels.iter();
+        let fine = levels.find(|level| level.leaf.segments() >= least);
+        fine.unwrap_or(self.finest())
+    }
+
     /// Segments of the finest of its grids.
     pub fn finest_segments(&self) -> usize {
         self.finest().leaf.segments()
@@ -104,6 +115,48 @@ pub(crate) struct MotionBranch {
     pub unlocated: Option<usize>,
 }
 
+impl MotionBranch {
+    /// Segments of the coarsest grid of the last regular point with at least so many.
+    fn coarsest_segments(&self, least: usize) -> usize {
+        let last = self.points.iter().rev().find(|it| it.critical.is_none());
+        last.map_or(least, |last| {
+            least.max(last.level_from(least).leaf.segments())
+        })
+    }
+}
+
+/// The state at a fraction on the line through two points, on the coarsest grid of the first with at least so
+/// many segments, or one with nodes where the leaf needs them.
+fn guess(
+    leaf: &Leaf,
+    [last, before]: [&MotionBranchPoint; 2],
+    fraction: f64,
+    least: usize,
+) -> StateOnGrid {
+    let level = last.level_from(least);
+    let same_nodes = level.leaf.leaf.kinks() == leaf.kinks();
+    if !same_nodes || level.leaf.segments() < least {
+        let segments = least.max(level.leaf.segments());
+        let grid = match same_nodes {
+            true => level.leaf.grid.refined(),
+            false => Grid::new(segments, leaf.kinks()),
+        };
+        let state = transfer(&level.leaf, &level.state, &grid);
+        return StateOnGrid { grid, state };
+    }
+    let grid = level.leaf.grid.clone();
+    let alike = |it: &&GridLevel| it.leaf.grid.sigma() == grid.sigma();
+    let before_here = before.levels.iter().find(alike);
+    let state = match before_here.filter(|_| before.fraction != last.fraction) {
+        Some(other) => {
+            let at = (fraction - before.fraction) / (last.fraction - before.fraction);
+            state_on_line(&other.state, &level.state, at)
+        }
+        None => level.state.clone(),
+    };
+    StateOnGrid { grid, state }
+}
+
 impl MotionContinuation<'_> {
     /// Follows the branch of the first point, at the fraction 0, to 1. `progress` takes the number of points and
     /// the fraction of the last.
@@ -119,6 +172,7 @@ impl MotionContinuation<'_> {
             unlocated: None,
         };
         let (mut step, mut at) = (self.longest, 0.0);
+        let mut least = self.segments.unwrap_or(0);
         progress(1, at);
         while at < 1.0 {
             if family.limit.reached() {
@@ -133,7 +187,7 @@ impl MotionContinuation<'_> {
                 true => 1.0,
                 false => at + step,
             };
-            match self.point_at(family, &branch.points, next) {
+            match self.point_at(family, &branch.points, next, least) {
                 Ok(point) => {
                     at = next;
                     step = (STEPS.growth * step).min(self.longest);
@@ -145,6 +199,13 @@ impl MotionContinuation<'_> {
                 }
                 Err(_) if step > STEPS.shortest && !family.limit.reached() => {
                     step *= STEPS.failure;
+                }
+                Err(_)
+                    if branch.coarsest_segments(least) < STEPS.finest
+                        && !family.limit.reached() =>
+                {
+                    least = 2 * branch.coarsest_segments(least);
+                    step = self.longest;
                 }
                 Err(failure) => {
                     branch.end = match family.limit.reached() {
@@ -164,13 +225,14 @@ impl MotionContinuation<'_> {
         family: &LeafFamily,
         points: &[MotionBranchPoint],
         fraction: f64,
+        least: usize,
     ) -> Result<MotionBranchPoint, CorrectorFailure> {
         let leaf = family.leaf([fraction])?;
         let mut regular = points.iter().rev().filter(|it| it.critical.is_none());
         let (Some(last), before) = (regular.next(), regular.next()) else {
             return Err(CorrectorFailure::NotConverged);
         };
-        let guess = self.guess(&leaf, last, before, fraction);
+        let guess = guess(&leaf, [last, before.unwrap_or(last)], fraction, least);
         let expected = guess.state.clone();
         let relaxed = self.rest(&leaf, guess)?;
         let near = (relaxed.on_grids.levels.first())
@@ -188,39 +250,6 @@ impl MotionContinuation<'_> {
             EquilibriumFailure::Memory => CorrectorFailure::TooLarge,
             _ => CorrectorFailure::TurnsBack,
         })
-    }
-
-    /// The state at a fraction on the line through two points, on the grid on which these begin, or one with
-    /// nodes where the leaf needs them.
-    fn guess(
-        &self,
-        leaf: &Leaf,
-        last: &MotionBranchPoint,
-        before: Option<&MotionBranchPoint>,
-        fraction: f64,
-    ) -> StateOnGrid {
-        let level = &last.levels[0];
-        let same = level.leaf.leaf.kinks() == leaf.kinks()
-            && self.segments.is_none_or(|it| it == level.leaf.segments());
-        if !same {
-            let segments = self.segments.unwrap_or(level.leaf.segments());
-            let grid = Grid::new(segments, leaf.kinks());
-            let state = transfer(&level.leaf, &level.state, &grid);
-            return StateOnGrid { grid, state };
-        }
-        let alike = before.filter(|it| {
-            it.levels[0].leaf.grid.sigma() == level.leaf.grid.sigma()
-                && it.fraction != last.fraction
-        });
-        let state = match alike {
-            Some(before) => {
-                let at = (fraction - before.fraction) / (last.fraction - before.fraction);
-                state_on_line(&before.levels[0].state, &level.state, at)
-            }
-            None => level.state.clone(),
-        };
-        let grid = level.leaf.grid.clone();
-        StateOnGrid { grid, state }
     }
 
     /// Adds a point, and before it the critical points between it and the last point whose stability is
@@ -276,7 +305,7 @@ impl MotionContinuation<'_> {
         BESIDE_CRITICAL.iter().find_map(|beside| {
             let fraction = critical.fraction + beside;
             let leaf = family.leaf([fraction]).ok()?;
-            let guess = self.guess(&leaf, to, Some(from), fraction);
+            let guess = guess(&leaf, [to, from], fraction, 0);
             let relaxed = self.rest(&leaf, guess).ok()?;
             Some(MotionBranchPoint {
                 fraction: critical.fraction,
