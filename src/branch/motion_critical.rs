@@ -285,10 +285,11 @@ impl<'f> GridSearch<'f> {
             if (loud - quiet).abs() <= SEARCH.accuracy || worse == SEARCH.worse {
                 break;
             }
-            if let Some(found) = best.filter(|it| it.uncertainty <= SEARCH.uncertainty) {
-                if found.lies_between(quiet, loud) {
-                    break;
-                }
+            let certain = |it: Interpolation| {
+                it.uncertainty <= SEARCH.uncertainty && it.lies_between(quiet, loud)
+            };
+            if best.is_some_and(certain) {
+                break;
             }
             let [low, high] = [quiet.min(loud), quiet.max(loud)];
             let next = root.fraction + SEARCH.approach * (loud - root.fraction);
