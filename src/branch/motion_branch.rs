@@ -38,6 +38,9 @@ const STEPS: Steps = Steps {
 /// Critical points between two regular ones, at most.
 const MOST_BETWEEN: usize = 8;
 
+/// Largest bound on the error of a critical value, as a part of the distance of the points beside it.
+const LARGEST_ERROR: f64 = 0.1;
+
 /// Distance behind a critical point, as a part of the range, from which the next is looked for.
 const BEHIND_CRITICAL: f64 = 1e-5;
 
@@ -265,34 +268,64 @@ impl MotionContinuation<'_> {
         let mut found: Vec<MotionBranchPoint> = Vec::new();
         if let (Some(known), Some(after)) = (known, point.unstable_roots()) {
             let from = &branch.points[known];
-            let mut start = from.fraction;
-            let mut before = from.unstable_roots().unwrap_or(after);
-            while before != after && found.len() < MOST_BETWEEN {
-                let end = |fraction: f64, unstable_roots: usize, of| KnownStability {
-                    fraction,
-                    unstable_roots,
-                    level: MotionBranchPoint::finest(of),
-                };
-                let ends = [end(start, before, from), end(point.fraction, after, &point)];
-                let Some(critical) = locate_critical_point(family, ends, self.tolerance) else {
-                    branch.unlocated = Some(known);
-                    break;
-                };
-                let Some(at) = self.critical_point(family, [from, &point], critical) else {
-                    branch.unlocated = Some(known);
-                    break;
-                };
-                let behind = critical.fraction + BEHIND_CRITICAL;
-                before = critical.unstable_roots[1];
-                found.push(at);
-                if behind >= point.fraction || behind <= start {
-                    break;
-                }
-                start = behind;
+            let before = from.unstable_roots().unwrap_or(after);
+            let ends = [(from.fraction, before), (point.fraction, after)];
+            if !self.locate_all(family, ends, [from, &point], &mut found) {
+                branch.unlocated = Some(known);
             }
         }
         branch.points.extend(found);
         branch.points.push(point);
+        // Between may be points at which it is not certain what grows.
+        let first = known.map_or(0, |known| known + 1);
+        branch.points[first..].sort_by(|a, b| a.fraction.total_cmp(&b.fraction));
+    }
+
+    /// Locates all critical points between two ends, fractions with their numbers of roots with growth, beside
+    /// points of the branch; whether these are all.
+    fn locate_all(
+        &self,
+        family: &LeafFamily,
+        ends: [(f64, usize); 2],
+        beside: [&MotionBranchPoint; 2],
+        found: &mut Vec<MotionBranchPoint>,
+    ) -> bool {
+        let [(from, before), (to, after)] = ends;
+        if before == after {
+            return true;
+        }
+        if found.len() >= MOST_BETWEEN || to - from <= BEHIND_CRITICAL || family.limit.reached() {
+            return false;
+        }
+        let [low, high] = beside;
+        let known = |(fraction, unstable_roots), of: &'_ MotionBranchPoint| KnownStability {
+            fraction,
+            unstable_roots,
+            level: of.finest().clone(),
+        };
+        let located = locate_critical_point(
+            family,
+            [known(ends[0], low), known(ends[1], high)],
+            self.tolerance,
+        );
+        let certain = |it: &MotionCriticalPoint| {
+            let error = it.fraction_error.unwrap_or(0.0);
+            let within = it.fraction >= from - error && it.fraction <= to + error;
+            within && error <= LARGEST_ERROR * (to - from)
+        };
+        let Some(critical) = located.filter(certain) else {
+            return false;
+        };
+        let Some(point) = self.critical_point(family, beside, critical) else {
+            return false;
+        };
+        let [below, above] = critical.unstable_roots;
+        let under = [ends[0], (critical.fraction - BEHIND_CRITICAL, below)];
+        let over = [(critical.fraction + BEHIND_CRITICAL, above), ends[1]];
+        let all_below = self.locate_all(family, under, [low, &point], found);
+        let all_above = self.locate_all(family, over, [&point, high], found);
+        found.push(point);
+        all_below && all_above
     }
 
     /// The leaf at a critical point between two regular ones.

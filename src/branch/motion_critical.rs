@@ -67,14 +67,13 @@ const ROUNDING: f64 = 1e-9;
 const UNCERTAINTY_PART: f64 = 0.03;
 
 /// A point of a branch on which the number of roots with growth is known.
-#[derive(Clone, Copy)]
-pub(crate) struct KnownStability<'l> {
+pub(crate) struct KnownStability {
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
     /// Roots with growth, both of a conjugate pair.
     pub unstable_roots: usize,
     /// The leaf there, on any grid.
-    pub level: &'l GridLevel,
+    pub level: GridLevel,
 }
 
 /// A critical point extrapolated over grids.
@@ -116,7 +115,7 @@ pub(crate) fn locate_critical_point(
     let mut series: Vec<(usize, OnGrid)> = Vec::new();
     let mut best = None;
     for _ in 0..SEARCH.grids {
-        let mut search = GridSearch::new(family, grid.clone(), ends);
+        let mut search = GridSearch::new(family, grid.clone(), &ends);
         let quick = search.is_quick()?;
         if family.limit.reached() || !quick && series.len() >= SEARCH.least_grids {
             break;
@@ -200,8 +199,8 @@ struct GridSearch<'f> {
 }
 
 impl<'f> GridSearch<'f> {
-    fn new(family: &'f LeafFamily<'f>, grid: Grid, ends: [KnownStability; 2]) -> Self {
-        let known = ends.map(|end| {
+    fn new(family: &'f LeafFamily<'f>, grid: Grid, ends: &[KnownStability; 2]) -> Self {
+        let known = ends.each_ref().map(|end| {
             let state = transfer(&end.level.leaf, &end.level.state, &grid);
             let leaf = DiscreteLeaf::new(&end.level.leaf.leaf, grid.clone());
             (end.fraction, GridLevel { leaf, state })
@@ -210,7 +209,9 @@ impl<'f> GridSearch<'f> {
             family,
             grid,
             known: known.into(),
-            ends: ends.map(|end| (end.fraction, end.unstable_roots)),
+            ends: ends
+                .each_ref()
+                .map(|end| (end.fraction, end.unstable_roots)),
         }
     }
 
