@@ -38,6 +38,9 @@ struct Search {
     largest_uncertainty: f64,
     /// Balances in a row that make the zero no more certain, after which there is only rounding.
     worse: usize,
+    /// Distance of the nearest balance without the growth from the zero, as a part of the range: two motions that
+    /// begin to grow within it are taken for one.
+    confirmed: f64,
     /// Distance of the next balance from the zero, as a part of that of the last one.
     approach: f64,
     /// Width of a bracket, as a part of the range, below which interpolation is trusted.
@@ -54,6 +57,7 @@ const SEARCH: Search = Search {
     uncertainty: 1e-8,
     largest_uncertainty: 1e-5,
     worse: 2,
+    confirmed: 1e-4,
     approach: 0.2,
     trusted: 0.05,
 };
@@ -249,31 +253,34 @@ impl<'f> GridSearch<'f> {
         let [mut from, mut to] = self.ends.map(|end| end.0);
         let width = to - from;
         let mut counts = [self.motions_at(from)?, self.motions_at(to)?];
-        for _ in 0..SEARCH.widenings {
-            if counts[0].unstable_roots != counts[1].unstable_roots {
+        let [before, after] = self.ends.map(|end| end.1);
+        let (quiet_count, begins) = (before.min(after), before < after);
+        for _ in 0..=SEARCH.widenings {
+            let [grows_before, grows_after] =
+                (counts.each_ref()).map(|it| it.unstable_roots > quiet_count);
+            if grows_before != begins && grows_after == begins {
                 break;
             }
             // What lies between the ends on finer grids may lie beside them on this one.
-            match counts[1].unstable_roots == self.ends[0].1 {
-                true => {
+            match grows_after == begins {
+                false => {
                     to += width;
                     counts[1] = self.motions_at(to)?;
                 }
-                false => {
+                true => {
                     from -= width;
                     counts[0] = self.motions_at(from)?;
                 }
             }
         }
-        let [before, after] = counts.each_ref().map(|it| it.unstable_roots);
-        if before == after {
+        let [at_start, at_end] = &counts;
+        let (mut quiet, mut loud, [still, motions]) = match begins {
+            true => (from, to, [at_start, at_end]),
+            false => (to, from, [at_end, at_start]),
+        };
+        if still.unstable_roots > quiet_count || motions.unstable_roots <= quiet_count {
             return None;
         }
-        let quiet_count = before.min(after);
-        let (mut quiet, mut loud, motions) = match before < after {
-            true => (from, to, &counts[1]),
-            false => (to, from, &counts[0]),
-        };
         let probe = |fraction: f64, motions: &GrowingMotions| {
             let slowest = motions.slowest()?;
             Some(GrowingProbe::new(fraction, slowest))
@@ -283,26 +290,36 @@ impl<'f> GridSearch<'f> {
         let mut root = Interpolation::of(&probes);
         let (mut best, mut worse) = (None::<Interpolation>, 0);
         for _ in 0..SEARCH.probes {
-            if (loud - quiet).abs() <= SEARCH.accuracy || worse == SEARCH.worse {
+            if (loud - quiet).abs() <= SEARCH.accuracy {
                 break;
             }
-            let certain = |it: Interpolation| {
-                it.uncertainty <= SEARCH.uncertainty && it.lies_between(quiet, loud)
+            let certain = |it: &Interpolation| {
+                let settled = it.uncertainty <= SEARCH.uncertainty || worse >= SEARCH.worse;
+                settled && it.lies_between(quiet, loud)
             };
-            if best.is_some_and(certain) {
-                break;
-            }
-            let [low, high] = [quiet.min(loud), quiet.max(loud)];
-            let next = root.fraction + SEARCH.approach * (loud - root.fraction);
-            let next = match next > low && next < high && root.count > 1 {
-                true => next,
-                false => 0.5 * (quiet + loud),
+            let found = best.filter(certain);
+            let next = match found {
+                Some(found) if (found.fraction - quiet).abs() <= SEARCH.confirmed => break,
+                // Another motion may begin to grow before the one that was followed.
+                Some(found) => found.fraction - 0.5 * SEARCH.confirmed * (loud - quiet).signum(),
+                None => {
+                    let [low, high] = [quiet.min(loud), quiet.max(loud)];
+                    let next = root.fraction + SEARCH.approach * (loud - root.fraction);
+                    match next > low && next < high && root.count > 1 && worse < SEARCH.worse {
+                        true => next,
+                        false => 0.5 * (quiet + loud),
+                    }
+                }
             };
             let motions = self.motions_at(next)?;
             match motions.unstable_roots > quiet_count {
                 true => {
                     loud = next;
                     loud_count = motions.unstable_roots;
+                    if found.is_some() {
+                        probes.clear();
+                        (best, worse) = (None, 0);
+                    }
                     probes.push(probe(next, &motions)?);
                     root = Interpolation::of(&probes);
                     match best.is_none_or(|best| root.uncertainty < best.uncertainty) {
@@ -322,7 +339,7 @@ impl<'f> GridSearch<'f> {
             fraction: stiff.fraction,
             frequency: stiff.frequency,
             uncertainty: UNCERTAINTY_PART * best.uncertainty + self.rounding(&probes, best),
-            unstable_roots: match before < after {
+            unstable_roots: match begins {
                 true => [quiet_count, loud_count],
                 false => [loud_count, quiet_count],
             },

@@ -318,6 +318,31 @@ fn a_round_column_flutters_in_both_planes() {
     assert!((event.value + wanted[0]).abs() < 1e-5, "{}", event.value);
 }
 
+/// Planes of which one is a little stiffer flutter one after the other, within one step of the trace.
+#[test]
+fn planes_flutter_one_after_the_other() {
+    let stiffer = 1.005;
+    let load = tip(-1.0, 0.0, true);
+    let mut request = request(&load, "load.point[0].force[0]=-1..-24", 1e-7);
+    let set = format!("stiffness.bending_2={stiffer}; dynamics.density=1.0");
+    request.base = base(&format!("{COLUMN}\n{load}"), &set);
+    let found = trace(&request, &mut |_, _, _| {}).unwrap();
+    assert!(found.complete && found.branches[0].remark().is_none());
+    let wanted = onset(
+        |p| Beam {
+            p,
+            ..Beam::default()
+        },
+        [20.05, 11.0],
+    );
+    let events = events(&found);
+    assert_eq!(events.iter().map(|it| it.index).collect::<Vec<_>>(), [2, 4]);
+    for (event, stiffness) in events.iter().zip([1.0_f64, stiffer]) {
+        let wanted = [-stiffness * wanted[0], stiffness.sqrt() * wanted[1]];
+        is_at("one plane", event, PointKind::Flutter, wanted, 1e-5);
+    }
+}
+
 /// Drag over that of a rigid rod, and the place of the tip, of an inextensible cantilever across the wind:
 /// theta''' = -C sin^2 theta - theta'^3/2, integrated from the tip, where theta' = theta'' = 0, to the angle
 /// pi/2 at the base.
