@@ -496,7 +496,7 @@ mod tests {
             square: None,
             frequency: 5.0 + fraction * fraction,
         };
-        let near = [0.5, 0.34, 0.308, 0.3016].map(probe);
+        let near = [0.34, 0.308, 0.3016, 0.30032].map(probe);
         let root = Interpolation::of(&near);
         assert!((root.fraction - 0.3).abs() < 1e-9, "{}", root.fraction);
         assert!((root.frequency - 5.09).abs() < 1e-8, "{}", root.frequency);
