@@ -50,6 +50,9 @@ pub enum CorrectorFailure {
     /// Newton's method does not converge.
     #[error("Newton's method does not lead back to the branch")]
     NotConverged,
+    /// Without a potential no equilibrium beyond is a continuation of the last one.
+    #[error("the branch turns back or ends near here: beyond, no equilibrium continues it")]
+    TurnsBack,
     /// The matrix does not fit into memory.
     #[error("the sparse factorisation of the leaf does not fit into memory")]
     TooLarge,

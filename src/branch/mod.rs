@@ -27,7 +27,8 @@
 //! Equations (`equations`) of a family of leaves (`family`) are solved at a step (`correct`);
 //! steps make a branch on one grid (`continuation`) with its critical points (`critical`);
 //! points are verified on finer grids (`convergence`, `refine`), and so is the branch
-//! (`verified_branch`). Boundaries of stability have a room of their own (`boundary`).
+//! (`verified_branch`). Where forces act that have no potential, a branch (`motion_branch`) is critical where its
+//! small motions begin to grow (`motion_critical`). Boundaries of stability have a room of their own (`boundary`).
 
 pub(crate) mod boundary;
 mod continuation;
@@ -36,6 +37,8 @@ mod correct;
 mod critical;
 mod equations;
 mod family;
+mod motion_branch;
+mod motion_critical;
 mod points;
 mod refine;
 mod saddle_search;
@@ -46,6 +49,9 @@ pub use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
 pub use crate::branch::critical::{CriticalKind, CriticalPoint};
 pub use crate::branch::equations::{BranchEquations, CorrectorFailure};
 pub use crate::branch::family::{LeafFamily, ParameterRange, value_at_fraction};
+pub(crate) use crate::branch::motion_branch::{
+    MotionBranch, MotionBranchPoint, MotionContinuation,
+};
 pub use crate::branch::points::EquilibriumPoint;
 pub(crate) use crate::branch::points::{increments_between, prolong_field, scale_field};
 pub(crate) use crate::branch::refine::{NEARLY_RIGID, on_finer, verify_at_parameter};

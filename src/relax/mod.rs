@@ -8,6 +8,7 @@
 //! `eigenvalues` where the grids disagree, and `result` is what was found.
 
 pub(crate) mod accuracy;
+pub(crate) mod balanced;
 pub(crate) mod eigenvalues;
 mod follow;
 mod linear_response;
@@ -65,7 +66,7 @@ pub(crate) use crate::relax::sensitivity::{
     NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
 };
 pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
-pub use crate::relax::small_motions::{MotionInstability, SmallMotions};
+pub use crate::relax::small_motions::{DominantMotion, MotionInstability, SmallMotions};
 pub(crate) use crate::relax::solve_on_grid::check_segments;
 pub(crate) use crate::relax::solve_on_grid::start::initial_state;
 pub(crate) use crate::relax::stability::{index_near, state_from_rod_shapes};

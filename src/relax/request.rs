@@ -478,7 +478,7 @@ pub fn check_options_without_potential(
         Method::SemiImplicit(_) if options.mode_shapes => Some("a list of modes"),
         Method::SemiImplicit(_) => None,
         Method::Explicit { .. } => Some("explicit relaxation"),
-        _ => Some("shooting"),
+        _ => None,
     };
     if let Some(what) = general.filter(|_| followers) {
         return Err(UnmodelledFeature::Followers { what }.into());

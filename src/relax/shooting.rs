@@ -147,6 +147,10 @@ fn relax_from_rest(
     };
     let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
     found.stability.saddle = rest.stability.saddle;
+    if let (Some(motions), Some(remark)) = (rest.stability.small_motions, &mut found.remark) {
+        remark.add_small_motions(&motions);
+        found.stability.small_motions = Some(motions);
+    }
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
     Ok(found)
@@ -204,10 +208,12 @@ fn shoot(
             accuracy.intervals = Some(solution.intervals.len() - 1);
             accuracy.residual = Some(solution.defect);
             accuracy.error_estimate = Some(solution.error.position);
-            energy = Some(solution.energy);
             errors = Some(solution.error);
             let rods = rods_at_stations(&own, &stations, &solution.rods);
-            index = index_near(scenario, grid, &rods, solution.error.position);
+            if without_potential(scenario).is_none() {
+                energy = Some(solution.energy);
+                index = index_near(scenario, grid, &rods, solution.error.position);
+            }
             let end = outcome_of_solution(scenario, &solution, index, tolerance);
             (end, solution.work, solution.rods)
         }
@@ -286,6 +292,16 @@ fn shoot(
     }
 }
 
+/// What is said of a leaf on which forces without a potential act: it has no energy and no index.
+fn without_potential(scenario: &Scenario) -> Option<EquilibriumRemark> {
+    let verdict = None;
+    match scenario.wind {
+        Some(_) => Some(EquilibriumRemark::WindWithoutPotential { verdict }),
+        None => (scenario.has_followers())
+            .then_some(EquilibriumRemark::FollowersWithoutPotential { verdict }),
+    }
+}
+
 /// The end of a run in which shooting found a solution.
 fn outcome_of_solution(
     scenario: &Scenario,
@@ -303,7 +319,10 @@ fn outcome_of_solution(
         ),
         Some(1..) => RunEnd::new(Outcome::Saddle, EquilibriumRemark::ShotSaddle),
         Some(0) => RunEnd::new(Outcome::Converged, None),
-        None => RunEnd::new(Outcome::Converged, EquilibriumRemark::ShotIndexUnknown),
+        None => RunEnd::new(
+            Outcome::Converged,
+            without_potential(scenario).unwrap_or(EquilibriumRemark::ShotIndexUnknown),
+        ),
     };
     let neutral = || (solution.neutral.clone()).map(EquilibriumRemark::NeutralDirection);
     RunEnd::new(end.outcome, end.remark.or_else(neutral))

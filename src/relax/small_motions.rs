@@ -1,6 +1,7 @@
 //! Stability without a potential: the growth rates and frequencies of the linearised motion of a leaf at rest
 //! ([`crate::modes`]), on its grids and extrapolated.
 
+use crate::leaf::DiscreteLeaf;
 use crate::modes::linearized::{MotionRoot, MotionRoots, Square, lowest_roots};
 use crate::motion::{AssumedMotion, Physics};
 use crate::relax::accuracy::NestedEquilibrium;
@@ -24,7 +25,7 @@ words! {
 }
 
 /// Roots that are computed even if fewer are requested: one of the lowest modes is the first that grows.
-const LEAST_ROOTS: usize = 8;
+pub const LEAST_ROOTS: usize = 8;
 
 /// Growth of a damped motion, as a part of the size of its root, that is rounding.
 const GROWTH_ROUNDING: f64 = 1e-8;
@@ -43,8 +44,24 @@ pub struct SmallMotions {
     pub stable: Option<bool>,
     /// How the motion that grows fastest does, if one does.
     pub instability: Option<MotionInstability>,
+    /// Roots with growth, both of a conjugate pair; `None` where it is not certain of all that were
+    /// computed.
+    pub unstable_roots: Option<usize>,
+    /// The motion that grows fastest or, if none grows, decays slowest.
+    pub dominant: Option<DominantMotion>,
     /// What is assumed of masses and damping.
     pub assumed: AssumedMotion,
+}
+
+/// Growth and frequency of a small motion, in the scenario's unit of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DominantMotion {
+    /// Rate of growth, negative where it decays.
+    pub growth_rate: f64,
+    /// Angular frequency, radians per time; zero if it does not oscillate.
+    pub frequency: f64,
+    /// A bound on the error of either, if there are grids to compare.
+    pub error: Option<f64>,
 }
 
 /// Segments of the finest grid from which on, and number of grids with which, roots may be accurate enough.
@@ -65,8 +82,9 @@ fn told_error(it: &ExtrapolatedRoot) -> Option<f64> {
     Some(ROOT_SAFETY * it.error? + ROOT_ACCURACY * it.root.size())
 }
 
-fn unknowns(level: &GridLevel) -> usize {
-    6 * level.leaf.rods() * level.leaf.segments()
+/// Unknowns of a leaf on a grid.
+pub fn unknowns(leaf: &DiscreteLeaf) -> usize {
+    6 * leaf.rods() * leaf.segments()
 }
 
 /// Roots on nested grids.
@@ -172,7 +190,7 @@ pub fn small_motions(
     let (physics, assumed) = Physics::for_small_motions(problem.leaf);
     let count = LEAST_ROOTS.max(problem.options.modes);
     let on = |level: &GridLevel| {
-        if unknowns(level) > UNKNOWNS.without_shapes {
+        if unknowns(&level.leaf) > UNKNOWNS.without_shapes {
             return None;
         }
         let forces = WithoutPotential::in_motion(&level.leaf, &physics);
@@ -193,7 +211,7 @@ pub fn small_motions(
     let mut finest = Cow::Borrowed(found.levels.last()?);
     let fixed = problem.segments().is_some();
     while !fixed && !series.suffices(&roots) && !problem.out_of_time() {
-        if 2 * unknowns(&finest) > UNKNOWNS.quick {
+        if 2 * unknowns(&finest.leaf) > UNKNOWNS.quick {
             break;
         }
         let Some(next) = balance_on_next_grid(&finest, &problem.options.limit) else {
@@ -222,7 +240,25 @@ pub fn small_motions(
         .map(|(_, (root, _))| *root)
         .collect();
     let rate = 1.0 / physics.time_unit;
+    let conjugate = |it: &ExtrapolatedRoot| match (it.grows, it.root.frequency > 0.0) {
+        (Some(true), true) => Some(2),
+        (grows, _) => grows.map(usize::from),
+    };
+    // Of equal growth, as without damping, the first: the slowest motion.
+    let dominant = roots
+        .iter()
+        .reduce(|most, it| match most.root.growth < it.root.growth {
+            true => it,
+            false => most,
+        });
+    let dominant = dominant.map(|it| DominantMotion {
+        growth_rate: it.root.growth * rate,
+        frequency: it.root.frequency * rate,
+        error: told_error(it).map(|error| error * rate),
+    });
     Some(SmallMotions {
+        unstable_roots: roots.iter().map(conjugate).sum(),
+        dominant,
         growth_rates: listed.iter().map(|it| it.root.growth * rate).collect(),
         frequencies: listed.iter().map(|it| it.root.frequency * rate).collect(),
         errors: listed

@@ -25,9 +25,14 @@ use crate::rod::Wrench;
 use crate::rotation;
 use crate::rotation::Pose;
 use crate::run::Limit;
-use crate::scenario::{BaseSupport, Profile, RodPlace, Scenario, ZeroEnergyRotation, longest};
+use crate::scenario::{
+    BaseSupport, PointLoad, Profile, RodPlace, Scenario, ZeroEnergyRotation, longest,
+};
 use crate::shape::NodeState;
-use crate::shooting::rod_state::{RodState, STATE_SIZE, SlopeDerivatives, rotation_difference};
+use crate::shooting::follower_loads::FollowerLoads;
+use crate::shooting::rod_state::{
+    RodState, STATE_SIZE, SlopeDerivatives, cross_matrix, rotation_difference,
+};
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
 use crate::shooting::tissue_stresses::{RodSection, TissueState};
 use glam::{DMat3, DQuat, DVec3};
@@ -51,6 +56,8 @@ pub struct BoundaryValueProblem<'a> {
     foundation: Option<Natural<'a>>,
     /// Whether veins have loads of their own.
     own_loads: bool,
+    /// Loads without a potential, if there are such.
+    followers: Option<FollowerLoads<'a>>,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
@@ -172,6 +179,7 @@ impl<'a> BoundaryValueProblem<'a> {
             tissue,
             foundation: (scenario.foundation.is_some()).then(|| Natural::new(scenario, true)),
             own_loads: scenario.has_own_loads(),
+            followers: FollowerLoads::new(scenario, length, force),
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
@@ -413,12 +421,18 @@ impl<'a> BoundaryValueProblem<'a> {
                 energy += 0.5 * stretch.dot(held);
                 load += held;
             }
+            let mut couple = by_tissue.moment;
+            if let Some(followers) = &self.followers {
+                let all = followers.along(j, length, place, rod.q, tangent);
+                load += self.load_lambda * all.force;
+                couple -= self.load_lambda * all.moment;
+            }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
             RodState {
                 r: tangent,
                 q,
                 n: by_tissue.force - load,
-                m: rod.n.cross(tangent) + by_tissue.moment,
+                m: rod.n.cross(tangent) + couple,
             }
             .write_flat_state(slopes, j);
         }
@@ -456,6 +470,10 @@ impl<'a> BoundaryValueProblem<'a> {
             n_r: self.foundation_stiffness(j, place),
             m_theta: cross_matrix(rod.n) * r_theta,
             m_n: cross_matrix(rod.n) * r_n - tangent,
+            by_loads: self.followers.as_ref().map(|followers| {
+                let slope = (frame * rates.position, [r_theta, r_n]);
+                followers.derivatives(j, self.lengths[j], place, rod.q, slope)
+            }),
         }
     }
 
@@ -467,10 +485,11 @@ impl<'a> BoundaryValueProblem<'a> {
         let rods: Vec<RodState> = (0..self.rods())
             .map(|j| RodState::from_flat_state(y, j))
             .collect();
+        let followers = self.tip_followers(y);
         let forces = rods
             .iter()
             .enumerate()
-            .map(|(j, rod)| rod.n - self.tip_point_load(j).force);
+            .map(|(j, rod)| rod.n - self.tip_point_load(j, &followers).force);
         let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
@@ -478,7 +497,9 @@ impl<'a> BoundaryValueProblem<'a> {
                     (TipConstraint::Joint, 0) => force - self.load_lambda * self.tip_force,
                     (TipConstraint::Joint, _) => rod.r - rods[0].r,
                     (TipConstraint::Free, _) => {
-                        rod.n - self.load_lambda * self.tip_force - self.tip_point_load(j).force
+                        rod.n
+                            - self.load_lambda * self.tip_force
+                            - self.tip_point_load(j, &followers).force
                     }
                     (TipConstraint::Pinned | TipConstraint::Clamped, _) => {
                         rod.r - self.held_tips[j].position
@@ -488,7 +509,11 @@ impl<'a> BoundaryValueProblem<'a> {
                     TipConstraint::Clamped => {
                         rotation_difference(rod.q, self.held_tips[j].rotation)
                     }
-                    _ => rod.m - self.load_lambda * self.tip_moment - self.tip_point_load(j).moment,
+                    _ => {
+                        rod.m
+                            - self.load_lambda * self.tip_moment
+                            - self.tip_point_load(j, &followers).moment
+                    }
                 };
                 [first.to_array(), second.to_array()].concat()
             })
@@ -515,11 +540,6 @@ impl<'a> BoundaryValueProblem<'a> {
             .map(|(j, load)| load.force.dot(RodState::from_flat_state(y, j).r));
         -self.load_lambda * work - points.sum::<f64>()
     }
-}
-
-/// The matrix \[a\] with \[a\] b = a x b.
-fn cross_matrix(a: DVec3) -> DMat3 {
-    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
 }
 
 impl BoundaryValueProblem<'_> {
@@ -639,6 +659,13 @@ impl BoundaryValueProblem<'_> {
     /// if there are none.
     pub fn apply_point_loads(&self, sigma: f64, y: &mut [f64]) -> bool {
         let mut any = false;
+        for (j, load) in self.follower_points_at(sigma, y) {
+            let mut rod = RodState::from_flat_state(y, j);
+            rod.n -= load.force;
+            rod.m -= load.moment;
+            rod.write_flat_state(y, j);
+            any = true;
+        }
         for (j, load) in self.point_loads_at(sigma) {
             let mut rod = RodState::from_flat_state(y, j);
             rod.n -= load.force;
@@ -650,7 +677,37 @@ impl BoundaryValueProblem<'_> {
         any
     }
 
-    /// The loads on points at `sigma`, each with its rod.
+    /// What loads on points at `sigma` that turn with the section exert in this state, each with its rod.
+    pub fn follower_points_at(&self, sigma: f64, y: &[f64]) -> Vec<(usize, Wrench)> {
+        let Some(followers) = &self.followers else {
+            return Vec::new();
+        };
+        let points = self.scenario.points.iter().filter(|it| it.follows);
+        let here = points.filter(|point| (point.at - sigma).abs() < FRACTION_TOLERANCE);
+        let load = |point: &PointLoad| {
+            let rod = RodState::from_flat_state(y, point.vein);
+            (
+                point.vein,
+                followers.on_point(point, &rod, self.load_lambda),
+            )
+        };
+        here.map(load).collect()
+    }
+
+    /// What loads that turn with the section exert on the tip of every rod in this state; empty without any.
+    pub fn tip_followers(&self, y: &[f64]) -> Vec<Wrench> {
+        if self.followers.is_none() {
+            return Vec::new();
+        }
+        let mut all = vec![Wrench::default(); self.rods()];
+        for (j, load) in self.follower_points_at(1.0, y) {
+            all[j].force += load.force;
+            all[j].moment += load.moment;
+        }
+        all
+    }
+
+    /// The dead loads on points at `sigma`, each with its rod.
     fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = (usize, Wrench)> {
         let points = self
             .scenario
@@ -660,18 +717,23 @@ impl BoundaryValueProblem<'_> {
         let unit = self.load_lambda / self.force_unit;
         let moment_unit = unit / self.length_unit;
         points.map(move |point| {
+            let dead_moment = match point.follows {
+                true => DVec3::ZERO,
+                false => moment_unit * DVec3::from_array(point.moment),
+            };
             let load = Wrench {
                 force: unit * DVec3::from_array(self.scenario.force_on(point)),
-                moment: moment_unit * DVec3::from_array(point.moment),
+                moment: dead_moment,
             };
             (point.vein, load)
         })
     }
 
-    /// What loads on points exert on the tip of rod `j`.
-    fn tip_point_load(&self, j: usize) -> Wrench {
+    /// What loads on points exert on the tip of rod `j`, those that turn with it in this state.
+    fn tip_point_load(&self, j: usize, followers: &[Wrench]) -> Wrench {
         let here = self.point_loads_at(1.0).filter(|(rod, _)| *rod == j);
-        here.fold(Wrench::default(), |sum, (_, load)| Wrench {
+        let own = followers.get(j).copied().unwrap_or_default();
+        here.fold(own, |sum, (_, load)| Wrench {
             force: sum.force + load.force,
             moment: sum.moment + load.moment,
         })

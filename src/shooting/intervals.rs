@@ -11,6 +11,7 @@
 mod tests;
 
 use crate::numbers::{larger, largest};
+use crate::rod::Wrench;
 use crate::shooting::equations::{BoundaryValueProblem, TipConstraint};
 use crate::shooting::integrate::{
     InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
@@ -384,17 +385,20 @@ pub struct CondensedEquations {
     /// The first of the components that are free at the base.
     free_at_base: usize,
     units: PerturbationUnits,
+    /// What loads that turn with the section exert on the tips; empty without any.
+    tip_followers: Vec<Wrench>,
 }
 
 impl CondensedEquations {
     /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turns` of
     /// veins that can turn without resistance, at the base, are left undetermined where they are
-    /// what the conditions determine least.
+    /// what the conditions determine least. `tip_followers` are the loads on the tips that turn with the section.
     pub fn new(
         equations: &BoundaryValueProblem,
         units: &PerturbationUnits,
         maps: Vec<Mat<f64>>,
         turns: &[Vec<f64>],
+        tip_followers: Vec<Wrench>,
     ) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
@@ -407,7 +411,7 @@ impl CondensedEquations {
         }
         let tip = equations.tip_constraint();
         let columns: Vec<Vec<f64>> = (reached.col_iter())
-            .map(|column| linearized_tip_conditions(tip, units, column))
+            .map(|column| linearized_tip_conditions(tip, units, &tip_followers, column))
             .collect();
         let conditions = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
         if !conditions.is_all_finite() {
@@ -427,6 +431,7 @@ impl CondensedEquations {
             tip,
             free_at_base: equations.first_free_component(),
             units: units.clone(),
+            tip_followers,
         };
         let least = orthonormal_basis(
             (0..turns.len()).map(|k| march.weakly_determined_direction(k).swap_remove(0)),
@@ -482,6 +487,7 @@ impl CondensedEquations {
             for (sum, value) in missed.iter_mut().zip(linearized_tip_conditions(
                 self.tip,
                 &self.units,
+                &self.tip_followers,
                 carried.as_ref(),
             )) {
                 *sum -= value;
@@ -543,14 +549,29 @@ impl CondensedEquations {
     }
 }
 
-/// Linearized tip conditions of a perturbation at the tip.
+/// Linearized tip conditions of a perturbation at the tip, where these loads turn with the section.
 fn linearized_tip_conditions(
     tip: TipConstraint,
     units: &PerturbationUnits,
+    followers: &[Wrench],
     perturbation: ColRef<f64>,
 ) -> Vec<f64> {
     let rods = perturbation.nrows() / PERTURBATION_SIZE;
-    let get = |j: usize, k: usize| perturbation[PERTURBATION_SIZE * j + k];
+    let own = |j: usize, k: usize| perturbation[PERTURBATION_SIZE * j + k];
+    // Force and moment but for the changes of these loads.
+    let get = |j: usize, k: usize| match followers.get(j).filter(|_| k >= 6) {
+        None => own(j, k),
+        Some(load) => {
+            let turn = DVec3::from_array([3, 4, 5].map(|k| own(j, k)));
+            let change = match k < 9 {
+                true => turn.cross(load.force)[k - 6],
+                false => turn.cross(load.moment)[k - 9],
+            };
+            let [rotation, resultant] =
+                [3, k].map(|k| units.component_unit(PERTURBATION_SIZE * j + k));
+            own(j, k) - change * (rotation / resultant)
+        }
+    };
     (0..rods)
         .flat_map(|j| (0..6).map(move |k| (j, k)))
         .map(|(j, k)| match (tip, k) {

@@ -44,6 +44,7 @@
 //! This file has the requests to the boundary-value solver and its results.
 
 mod equations;
+mod follower_loads;
 mod integrate;
 mod intervals;
 mod newton;

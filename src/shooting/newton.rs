@@ -335,11 +335,13 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
         self.cost_sum += self.linearization_cost();
+        let last = integrated.last().expect("there is an interval");
         self.condensed = CondensedEquations::new(
             self.equations,
             &self.units,
             maps,
             &self.zero_energy_changes(),
+            self.equations.tip_followers(&last.end_state),
         );
         match self.condensed {
             Some(_) => Ok(residuals),

@@ -74,6 +74,24 @@ pub struct SlopeDerivatives {
     pub m_theta: DMat3,
     /// Derivative of m' with respect to n.
     pub m_n: DMat3,
+    /// Derivatives by loads without a potential, if there are such.
+    pub by_loads: Option<LoadDerivatives>,
+}
+
+/// Derivatives of n' and m' by loads without a potential.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LoadDerivatives {
+    /// Derivative of n' with respect to the rotation.
+    pub n_theta: DMat3,
+    /// Derivative of n' with respect to n.
+    pub n_n: DMat3,
+    /// Derivative of m' with respect to the rotation.
+    pub m_theta: DMat3,
+}
+
+/// The matrix \[a\] with \[a\] b = a x b.
+pub fn cross_matrix(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
 }
 
 /// The rotation vector from `b` to `a`, to first order.

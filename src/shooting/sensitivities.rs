@@ -3,10 +3,11 @@
 //! itself.
 
 use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
+use crate::rod::Wrench;
 use crate::scenario::RodPlace;
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
-use crate::shooting::rod_state::{PERTURBATION_SIZE, SlopeDerivatives};
+use crate::shooting::rod_state::{PERTURBATION_SIZE, SlopeDerivatives, cross_matrix};
 use crate::shooting::tissue::{GapTangent, PAIR_PERTURBATION_SIZE};
 use crate::shooting::tissue_stresses::{LinearStresses, StressChanges, TissueState};
 use glam::DMat3;
@@ -25,6 +26,8 @@ pub struct LinearStep {
     tissue: Vec<GapMatrix>,
     /// Stage by stage, the linearized stresses that are unknowns; empty if there are none.
     stresses: Vec<LinearStresses>,
+    /// Loads on points that turn with the section, each with its rod, at the beginning of the step.
+    followers: Vec<(usize, Wrench)>,
 }
 
 impl LinearStep {
@@ -43,6 +46,7 @@ impl LinearStep {
             derivatives: Vec::with_capacity(STAGES * rods),
             tissue: Vec::new(),
             stresses: Vec::new(),
+            followers: integrator.passed_followers.clone(),
         };
         let mut state = TissueState::default();
         for (y, node) in integrator.stages.iter().zip(STAGE_NODES) {
@@ -99,6 +103,22 @@ impl<const W: usize> Perturbations<W> {
         }
     }
 
+    /// Passes a load on a point that turns with the section: by it n and m jump, and their perturbations by its
+    /// change.
+    fn pass_follower(&mut self, first: usize, load: &Wrench) {
+        let (force, moment) = (cross_matrix(load.force), cross_matrix(load.moment));
+        let rows: &mut [[f64; W]] = self.entries.as_chunks_mut().0;
+        for r in 0..3 {
+            for c in 0..3 {
+                for w in 0..W {
+                    let turn = rows[first + 3 + c][w];
+                    rows[first + 6 + r][w] += force.col(c)[r] * turn;
+                    rows[first + 9 + r][w] += moment.col(c)[r] * turn;
+                }
+            }
+        }
+    }
+
     /// The rows of all rods.
     pub fn rows(&self) -> &[[f64; W]] {
         self.entries.as_chunks().0
@@ -106,6 +126,11 @@ impl<const W: usize> Perturbations<W> {
 
     /// Propagates the perturbations through a step.
     pub fn propagate(&mut self, equations: &BoundaryValueProblem, step: &LinearStep) {
+        for (j, load) in &step.followers {
+            if self.rods.contains(j) {
+                self.pass_follower(PERTURBATION_SIZE * (j - self.rods.start), load);
+            }
+        }
         for i in 0..STAGES {
             weighted_slope_sum(
                 &self.entries,
@@ -183,6 +208,22 @@ fn linearized_slopes<const W: usize>(
             }
             out[6 + k] = force;
         }
+        if let Some(loads) = &d.by_loads {
+            add_products(&mut out[6..9], &loads.n_theta, theta);
+            add_products(&mut out[6..9], &loads.n_n, n);
+            add_products(&mut out[9..12], &loads.m_theta, theta);
+        }
+    }
+}
+
+/// Adds a matrix times rows to `out`.
+fn add_products<const W: usize>(out: &mut [[f64; W]], matrix: &DMat3, rows: &[[f64; W]]) {
+    for r in 0..3 {
+        for c in 0..3 {
+            for w in 0..W {
+                out[r][w] += matrix.col(c)[r] * rows[c][w];
+            }
+        }
     }
 }
 
@@ -258,7 +299,10 @@ mod tests {
 
     /// Two coupled veins and a third one, all with different properties.
     fn three() -> Scenario {
-        let text = r#"
+        Scenario::from_toml(THREE).unwrap()
+    }
+
+    const THREE: &str = r#"
             name = "three"
             leaf = { rods = 3, length = [1.0, 1.2, 0.9], fan = [-0.5, 0.4, 1.0] }
             stiffness = { torsion = 0.8, bending_2 = { at = [0.0, 1.0], value = [1.0, 2.0] }, bending_3 = [1.5, 0.7, 1.1], axial = 20.0, shear_2 = inf, shear_3 = 10.0 }
@@ -266,8 +310,6 @@ mod tests {
             coupling = { x = [1.0, 0.0], y = [3.0, 0.0], z = [2.0, 0.0] }
             load = { gravity = [0.2, -0.3, -2.0] }
         "#;
-        Scenario::from_toml(text).unwrap()
-    }
 
     /// An arbitrary state of all rods, not at the clamp. Tissue between veins that turn by half a turn
     /// against each other has no derivatives.
@@ -347,6 +389,37 @@ mod tests {
     fn sensitivities_are_the_derivatives_of_the_integration() {
         let groups = |j: usize| if j < 2 { 0..2 } else { 2..3 };
         assert_sensitivities_are_differences("none", &three(), groups);
+    }
+
+    /// Loads along veins and on points that turn with the section, moments that do and that do not, and wind.
+    #[test]
+    fn sensitivities_with_followers_are_the_derivatives_of_the_integration() {
+        let groups = |j: usize| if j < 2 { 0..2 } else { 2..3 };
+        for follows in [true, false] {
+            let text = format!(
+                r#"
+                [load]
+                gravity = [0.2, -0.3, -2.0]
+                follower = [0.5, -0.3, 1.0]
+                couple = [0.4, 0.2, -0.6]
+                couple_follows = {follows}
+                [[load.point]]
+                vein = 1
+                at = 0.4
+                force = [0.7, -0.2, 0.5]
+                moment = [0.1, 0.3, -0.4]
+                follows = true
+                [wind]
+                velocity = [0.5, 0.8, 1.0]
+                density = 1.2
+                drag = 2.0
+                width = 0.3
+                "#
+            );
+            let (head, _) = THREE.split_once("load =").unwrap();
+            let scenario = Scenario::from_toml(&format!("{head}{text}")).unwrap();
+            assert_sensitivities_are_differences("followers", &scenario, groups);
+        }
     }
 
     /// Finite, rigid and contracting tissue, in a state that is not that of a leaf at rest.

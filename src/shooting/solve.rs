@@ -3,7 +3,7 @@
 
 use crate::homotopy::{StepEnd, StepSizes};
 use crate::run::UnmodelledFeature;
-use crate::scenario::{BaseSupport, Scenario, longest};
+use crate::scenario::{BaseSupport, Scenario, Wind, longest};
 use crate::shape::{Difference, equally_spaced};
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::LeafTrajectory;
@@ -77,11 +77,11 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
     if !scenario.grips.is_empty() {
         return Err(UnmodelledFeature::Grips { what: "shooting" });
     }
-    if scenario.has_followers() {
-        return Err(UnmodelledFeature::Followers { what: "shooting" });
-    }
-    if scenario.wind.is_some() {
-        return Err(UnmodelledFeature::Wind { what: "shooting" });
+    let changing = |wind: &Wind| !wind.velocity.is_constant();
+    if scenario.wind.as_ref().is_some_and(changing) {
+        return Err(UnmodelledFeature::Wind {
+            what: "shooting in wind that changes",
+        });
     }
     if let Some(what) = rigid_tissue_obstacle(scenario) {
         return Err(UnmodelledFeature::RigidTissue { what });
@@ -98,6 +98,14 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
         return from_arcs(
             "a joint leaf with rigid tissue (tissue.along, tissue.normal) is led to rest by the relaxation",
         );
+    }
+    if scenario.has_followers() {
+        return from_arcs(
+            "a leaf under loads that turn with the section is led to rest by the relaxation",
+        );
+    }
+    if scenario.wind.is_some() {
+        return from_arcs("a leaf in wind is led to rest by the relaxation");
     }
     if scenario.foundation.is_some() {
         return from_arcs("a leaf on a foundation is led to rest by the relaxation");

@@ -346,6 +346,8 @@ fn solve_by_shooting(
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
+            // There is no index without a potential.
+            Ok(_) if scenario.has_followers() || scenario.wind.is_some() => None,
             Ok(solution) => morse_index_near(
                 scenario,
                 grid,

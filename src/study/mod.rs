@@ -65,7 +65,7 @@ pub use crate::study::remark::{
 pub use crate::study::sensitivity::{
     SensitivityError, relax_with_sensitivities, sensitivities_of_tracker,
 };
-pub use crate::study::trace::result::{ForceDisplacementLine, TraceShow, TraceUntil};
+pub use crate::study::trace::result::{ForceDisplacementLine, PointMotion, TraceShow, TraceUntil};
 pub use crate::study::trace::{
     MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
     TraceRequest, trace, trace_through,

@@ -80,6 +80,14 @@ remarks! {
             /// The number that varies, there.
             value: String,
         } = "crossing-not-followed",
+        /// Without a potential, a change of stability whose place is not found.
+        #[error(
+            "beyond {value} stability changes where no grid tells: follow it in smaller steps, or on other segments"
+        )]
+        CriticalPointNotLocated {
+            /// The number that varies, at the point before.
+            value: String,
+        } = "critical-point-not-located",
     }
 
     /// Why a boundary of stability has no curve, or fewer than there may be.

@@ -2,6 +2,7 @@
 
 mod agrees;
 mod error;
+mod followers;
 mod kinks;
 mod rigid_tissue;
 mod singular;

@@ -6,6 +6,7 @@ mod boundary;
 mod boundary_random;
 mod branch_ends;
 mod eigenvalue_bars;
+mod flutter;
 mod follower;
 mod hinges;
 mod lateral_buckling;

@@ -14,7 +14,7 @@ use crate::figure::drawing::{
     Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
     curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::scenario::{FigureSetting, SupportForm};
+use crate::figure::scenario::{FigureSetting, SupportForm, with_followers_as_dead};
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
@@ -184,7 +184,8 @@ impl<'a> DrawnRod<'a> {
             let count = unloaded.iter().take_while(near).count();
             unloaded.truncate(count);
         }
-        let forces = force_arrows(scenario, veins.largest_extent(), |sigma| {
+        let loaded = with_followers_as_dead(scenario, leaf);
+        let forces = force_arrows(&loaded, veins.largest_extent(), |sigma| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
             Some(RodPoint {
                 position: point(sigma)?,
@@ -407,6 +408,37 @@ mod tests {
                 .iter()
                 .any(|svg| svg.contains(">free tip<"))
         );
+    }
+
+    /// It is drawn as the dead force that has its direction on the section there.
+    #[test]
+    fn a_load_that_follows_is_drawn_where_it_points() {
+        let rod = sample::sample_equilibrium(1, 8);
+        let turn = rod.shape.rods[0].nodes[4].rotation;
+        let own = DVec3::new(0.2, 0.0, 0.5);
+        let loaded = |force: DVec3, follows: bool| {
+            svg(|it| {
+                it.points = vec![PointLoad {
+                    vein: 0,
+                    at: rod.shape.stations[4],
+                    force: force.to_array(),
+                    moment: [0.0; 3],
+                    follows,
+                    mass: 0.0,
+                    in_time: None,
+                    landing: None,
+                }];
+            })
+        };
+        let drawn = loaded(own, true);
+        assert!(drawn.contains(">force 0.5385<"));
+        assert_eq!(drawn, loaded(turn * own, false));
+        let along = svg(|it| {
+            it.follower = Some(vec![
+                [0.0, 0.0, 0.3].map(leafdyn::scenario::Profile::Constant),
+            ]);
+        });
+        assert_ne!(along, svg(|_| ()));
     }
 
     #[test]

@@ -7,7 +7,8 @@
 use crate::report::numbers::format_four_digits;
 use ListEntryOwner::*;
 use glam::DVec3;
-use leafdyn::scenario::{BaseSupport, Grip, Key, Scenario, Schedule, SupportKind, Units};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::{BaseSupport, Grip, Key, Profile, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -104,6 +105,49 @@ pub struct SupportMark {
     /// Fractions of the length of the vein, from and to.
     pub at: [f64; 2],
     pub held: SupportForm,
+}
+
+/// A scenario in which loads that turn with the section are dead ones: as they act on this leaf at rest.
+pub fn with_followers_as_dead<'s>(scenario: &'s Scenario, leaf: &Equilibrium) -> Cow<'s, Scenario> {
+    if !scenario.has_followers() {
+        return Cow::Borrowed(scenario);
+    }
+    let stations = &leaf.shape.stations;
+    let turned = |vein: usize, sigma: f64, load: [f64; 3]| -> [f64; 3] {
+        let after = stations.partition_point(|&at| at < sigma);
+        let nodes = leaf.shape.rods.get(vein).map(|rod| &rod.nodes);
+        let node = nodes.and_then(|nodes| nodes.get(after).or(nodes.last()));
+        let load = DVec3::from_array(load);
+        node.map_or(load, |node| node.rotation * load).to_array()
+    };
+    let mut dead = scenario.clone();
+    for point in dead.points.iter_mut().filter(|it| it.follows) {
+        point.force = turned(point.vein, point.at, point.force);
+        point.moment = turned(point.vein, point.at, point.moment);
+        point.follows = false;
+    }
+    if let Some(follower) = dead.follower.take() {
+        let last = LOAD_ARROWS.distributed_count - 1;
+        let at: Vec<f64> = (0..=last).map(|k| k as f64 / last as f64).collect();
+        let along = |vein: usize| {
+            let values: Vec<[f64; 3]> = (at.iter())
+                .map(|&sigma| {
+                    let own = follower[vein].each_ref().map(|load| load.at(sigma));
+                    let dead = (scenario.distributed.as_ref()).map_or([0.0; 3], |all| {
+                        all[vein].each_ref().map(|load| load.at(sigma))
+                    });
+                    let own = turned(vein, sigma, own);
+                    [0, 1, 2].map(|axis| own[axis] + dead[axis])
+                })
+                .collect();
+            [0, 1, 2].map(|axis| Profile::Linear {
+                at: at.clone(),
+                value: values.iter().map(|value| value[axis]).collect(),
+            })
+        };
+        dead.distributed = Some((0..follower.len()).map(along).collect());
+    }
+    Cow::Owned(dead)
 }
 
 /// The dead loads on a leaf at rest, or on one in motion at this time; what turns with a section has no

@@ -12,7 +12,7 @@ use crate::figure::drawing::{
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
 use crate::report::{
-    branch_end_phrase, error_location_words, passes_crossings, slope_unit, stability_phrase,
+    branch_end_phrase, error_location_words, passes_crossings, point_stability_phrase, slope_unit,
 };
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
@@ -174,7 +174,7 @@ fn largest_leaf_distance(one: &TracePoint, other: &TracePoint) -> f64 {
 
 fn leaf_caption(point: &TracePoint, unit: Option<&str>) -> String {
     let kind = match point.kind {
-        PointKind::Regular => stability_phrase(point.index),
+        PointKind::Regular => point_stability_phrase(point),
         kind => kind.word().replace('-', " "),
     };
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
@@ -295,9 +295,12 @@ fn draw_branches(
         }
         labels.avoid_curve(&axes, &line);
     }
-    for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
+    for CriticalMarker {
+        marker, is_of_kind, ..
+    } in CRITICAL_MARKERS.into_iter().rev()
+    {
         let critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
-        let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
+        let of_kind = critical.filter(|(_, point)| is_of_kind(point.kind));
         axes.draw_markers(
             page,
             of_kind.map(|(_, point)| at(point)),
@@ -327,19 +330,52 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
         }
     });
     key.add_curves(page, branches);
-    let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
-    let critical = || trace.branches.iter().flat_map(TraceBranch::critical_points);
-    if critical().any(|point| !folds(point)) {
-        let how = match passes_crossings(trace) {
-            true => "--switch follows them",
-            false => "",
-        };
-        key.add_marker(page, "branches cross", how, Marker::Diamond, TEXT_COLOR);
-    }
-    if critical().any(folds) {
-        key.add_marker(page, "fold", "", Marker::Ring, TEXT_COLOR);
+    for CriticalMarker {
+        marker,
+        name,
+        is_of_kind,
+    } in CRITICAL_MARKERS
+    {
+        let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
+        if critical.any(|(_, point)| is_of_kind(point.kind)) {
+            let how = match marker == Marker::Diamond && passes_crossings(trace) {
+                true => "--switch follows them",
+                false => "",
+            };
+            key.add_marker(page, name, how, marker, TEXT_COLOR);
+        }
     }
 }
+
+/// How critical points of a kind are drawn.
+struct CriticalMarker {
+    marker: Marker,
+    name: &'static str,
+    is_of_kind: fn(PointKind) -> bool,
+}
+
+const CRITICAL_MARKERS: [CriticalMarker; 4] = [
+    CriticalMarker {
+        marker: Marker::Diamond,
+        name: "branches cross",
+        is_of_kind: |kind| matches!(kind, PointKind::Branching(_)),
+    },
+    CriticalMarker {
+        marker: Marker::Ring,
+        name: "fold",
+        is_of_kind: |kind| kind == PointKind::Fold,
+    },
+    CriticalMarker {
+        marker: Marker::Triangle,
+        name: "flutter",
+        is_of_kind: |kind| kind == PointKind::Flutter,
+    },
+    CriticalMarker {
+        marker: Marker::Square,
+        name: "divergence",
+        is_of_kind: |kind| kind == PointKind::Divergence,
+    },
+];
 
 /// Successive segments of a branch that are all stable, or all unstable.
 struct StretchOfBranch {

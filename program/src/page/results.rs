@@ -181,7 +181,13 @@ impl PageResult for Trace {
         let leaf = |point: &TracePoint| {
             let label = match point.kind {
                 PointKind::Regular => {
-                    let kind = equilibrium_kind(Some(point.index));
+                    let kind = match point.motion {
+                        None => equilibrium_kind(Some(point.index)),
+                        Some(_) => match point.stable() {
+                            Some(false) => "unstable equilibrium".into(),
+                            stable => equilibrium_kind(stable.map(|_| 0)),
+                        },
+                    };
                     format!("{}: {kind}", format_five_digits(point.value))
                 }
                 kind => {
@@ -190,7 +196,10 @@ impl PageResult for Trace {
                 }
             };
             PageLeaf {
-                summary: vec![("energy", format_ten_digits(point.energy))],
+                summary: match point.energy.is_nan() {
+                    true => Vec::new(),
+                    false => vec![("energy", format_ten_digits(point.energy))],
+                },
                 ..PageLeaf::from_centerlines(
                     label,
                     &point.stations,

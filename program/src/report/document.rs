@@ -286,6 +286,7 @@ pub fn branch_end_phrase(end: &BranchEnd) -> &'static str {
         }
         BranchEnd::StepFailed(CorrectorFailure::OutOfRange(_)) => "ends where no leaf is",
         BranchEnd::StepFailed(CorrectorFailure::Unresolved) => "ends: grid too coarse",
+        BranchEnd::StepFailed(CorrectorFailure::TurnsBack) => "ends: turns back",
         BranchEnd::StepFailed(_) => "lost",
         BranchEnd::PointUnverified(_) => "ends: not verified further",
     }

@@ -24,6 +24,6 @@ pub use crate::report::map::{ReportedMap, write_map_table};
 pub use crate::report::relax::doubt_with_option;
 pub use crate::report::table::{write_centerlines, write_modes_table, write_sensitivity_table};
 pub use crate::report::trace::{
-    error_location_words, index_change_text, is_codimension_two, passes_crossings, slope_unit,
-    write_boundary_table, write_trace_table,
+    error_location_words, index_change_text, is_codimension_two, passes_crossings,
+    point_stability_phrase, slope_unit, write_boundary_table, write_trace_table,
 };

@@ -12,12 +12,13 @@ use crate::report::table::{
 };
 use glam::DVec3;
 use leafdyn::scenario::Units;
-use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH};
+use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH, RATE};
 use leafdyn::study::{
     BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd, CorrectorFailure, ForceDisplacementLine,
     PointKind, StabilityBoundary, Trace, TraceBranch, TracePoint, VerificationFailure,
 };
 use serde::Serialize;
+use std::f64::consts::TAU;
 use std::io;
 use std::io::Write;
 
@@ -25,6 +26,9 @@ use std::io::Write;
 /// the joint one, or the first rod's.
 const TRACE_COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
     negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
+
+/// Further columns where loads have no potential.
+const MOTION_COLUMNS: &str = ",unstable_roots,growth_rate,frequency,motion_error";
 
 /// Further columns if tips are held: the force on their holder.
 const REACTION_COLUMNS: &str = ",reaction_x,reaction_y,reaction_z";
@@ -48,6 +52,11 @@ impl ReportedResult for Trace {
         let branches = self.branches.iter().enumerate();
         let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
         lines.extend(label_first_line("branch", branches));
+        let assumed = self.assumed.iter().flat_map(|it| it.words());
+        let assumed: Vec<&str> = assumed.collect();
+        if !assumed.is_empty() {
+            lines.push(("assumed", assumed.join(", ")));
+        }
         lines.extend(
             self.law
                 .iter()
@@ -109,7 +118,7 @@ fn option_advice(trace: &Trace) -> Vec<String> {
 /// Whether other branches cross those of a trace, and were not to be followed.
 pub fn passes_crossings(trace: &Trace) -> bool {
     let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
-    !trace.switch && critical.any(|(_, point)| point.kind != PointKind::Fold)
+    !trace.switch && critical.any(|(_, point)| matches!(point.kind, PointKind::Branching(_)))
 }
 
 /// How a branch ended, its ends and its critical points.
@@ -160,7 +169,7 @@ pub fn error_location_words(trace: &Trace) -> &'static str {
 }
 
 fn point_values_text(trace: &Trace, point: &TracePoint) -> String {
-    let stability = stability_phrase(point.index);
+    let stability = point_stability_phrase(point);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
             let error = point.error.unwrap_or(DEFAULT_TIP_ERROR * tip.length());
@@ -207,6 +216,9 @@ fn critical_point_line(trace: &Trace, point: &TracePoint, before: usize) -> Stri
         PointKind::Fold => "fold".into(),
         PointKind::Branching(1) | PointKind::Regular => "branches cross".into(),
         PointKind::Branching(modes) => format!("branches cross in {modes} directions"),
+        kind @ (PointKind::Flutter | PointKind::Divergence) => {
+            return motion_event_line(trace, point, kind, before);
+        }
     };
     let within = match point.value_error {
         Some(error) => format!(", within {}", format_error_bound(error)),
@@ -214,6 +226,49 @@ fn critical_point_line(trace: &Trace, point: &TracePoint, before: usize) -> Stri
     };
     let (value, after) = (varied_value_text(trace, point), point.index);
     format!("{what} at {value}{within}: index {before} to {after}")
+}
+
+/// Where growth begins or ends, with the frequency there.
+fn motion_event_line(trace: &Trace, point: &TracePoint, kind: PointKind, before: usize) -> String {
+    let what = match point.index > before {
+        true => "begins",
+        false => "ends",
+    };
+    let within = match point.value_error {
+        Some(error) => format!(", within {}", format_error_bound(error)),
+        None => String::new(),
+    };
+    let dominant = point.motion.and_then(|motion| motion.dominant);
+    let frequency = dominant.filter(|it| it.frequency > 0.0).map(|it| {
+        let per_time = trace.units.unit_name(RATE).unwrap_or("per time".into());
+        let angular = match it.error {
+            Some(error) => format_within_error(it.frequency, error),
+            None => format_five_digits(it.frequency),
+        };
+        let cycles = format_five_digits(it.frequency / TAU);
+        format!(", angular frequency {angular} {per_time} ({cycles} cycles)")
+    });
+    let value = varied_value_text(trace, point);
+    let unstable = match point.index {
+        0 => "stable beyond".into(),
+        1 => "1 root grows beyond".into(),
+        roots => format!("{roots} roots grow beyond"),
+    };
+    format!(
+        "{} {what} at {value}{within}{}: {unstable}",
+        kind.word(),
+        frequency.unwrap_or_default()
+    )
+}
+
+/// The stability of a point, in one phrase.
+pub fn point_stability_phrase(point: &TracePoint) -> String {
+    match (point.motion, point.stable()) {
+        (None, _) => stability_phrase(point.index),
+        (Some(_), Some(true)) => "stable".into(),
+        (Some(_), Some(false)) => "unstable".into(),
+        (Some(_), None) => "of unknown stability".into(),
+    }
 }
 
 /// `trace.csv`: one row per branch and point.
@@ -224,7 +279,13 @@ pub fn write_trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
         ("", 0)
     };
     let grips: String = (0..trace.grips).map(grip_reaction_columns).collect();
-    out.write_all(&table_header(&[TRACE_COLUMNS, reaction, &grips].concat()))?;
+    let motion = match trace.assumed {
+        Some(_) => MOTION_COLUMNS,
+        None => "",
+    };
+    out.write_all(&table_header(
+        &[TRACE_COLUMNS, reaction, &grips, motion].concat(),
+    ))?;
     let mut table = csv_writer_without_header(out);
     for (number, branch) in trace.branches.iter().enumerate() {
         for point in &branch.points {
@@ -236,10 +297,30 @@ pub fn write_trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
             let forces = reaction.into_iter().take(more).chain(grips);
             // Adding zero turns -0 into 0.
             let forces: Vec<f64> = forces.map(|x| x + 0.0).collect();
-            table.serialize((number + 1, point.point, trace_table_cells(point), forces))?;
+            let motion = motion_cells(point);
+            table.serialize((
+                (number + 1, point.point),
+                trace_table_cells(point),
+                forces,
+                motion,
+            ))?;
         }
     }
     table.flush()
+}
+
+/// The columns of small motions; none with a potential.
+fn motion_cells(point: &TracePoint) -> Vec<impl Serialize> {
+    let cells = point.motion.map(|motion| {
+        let dominant = motion.dominant;
+        (
+            motion.unstable_roots,
+            dominant.map(|it| it.growth_rate),
+            dominant.map(|it| it.frequency),
+            dominant.and_then(|it| it.error),
+        )
+    });
+    cells.into_iter().collect()
 }
 
 /// The columns from `kind` to `twist`.
@@ -252,10 +333,12 @@ fn trace_table_cells(point: &TracePoint) -> impl Serialize {
         _ => None,
     };
     let margin = point.undulation.margin();
+    let energy = Some(point.energy).filter(|energy| !energy.is_nan());
+    let index = point.motion.is_none().then_some(point.index);
     (
         (point.kind.word(), point.value, point.value_error),
-        (tip, point.error, point.energy),
-        (point.index, point.index == 0, multiplicity),
+        (tip, point.error, energy),
+        (index, point.index == 0, multiplicity),
         margin.map(|vein| vein.waves()),
         margin.map(|vein| vein.amplitude),
         point.undulation.twist() + 0.0,

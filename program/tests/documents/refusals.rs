@@ -45,14 +45,16 @@ const REFUSED: &str = "
     relax scenarios/motion/gust.toml --path release --method explicit => [wind]: explicit relaxation does not
     relax scenarios/motion/gust.toml --path release --modes 3 => [wind]: a list of modes does not
     relax scenarios/motion/gust.toml --keep-unstable => [wind]: the search for an equilibrium of any index does not
-    relax scenarios/motion/gust.toml --method shooting => [wind]: shooting does not
-    relax scenarios/motion/gust.toml --method shooting-from-rest => [wind]: shooting does not
+    relax scenarios/motion/gust.toml --method shooting => [wind]: shooting in wind that changes does not
+    relax scenarios/motion/gust.toml --method shooting-from-rest => [wind]: shooting in wind that changes does not
     relax scenarios/motion/gust.toml --margin => [wind]: the margin does not
     relax scenarios/motion/gust.toml --all => [wind]: the search for all shapes does not
     relax scenarios/motion/gust.toml --sensitivity leaf.length => [wind]: a derivative does not
-    check scenarios/motion/gust.toml => [wind]: shooting does not
-    trace scenarios/motion/gust.toml --vary leaf.length=20..30 => [wind]: following a branch does not
-    trace scenarios/motion/gust.toml --vary leaf.length=20..30 --vary section.young=1e5..2e5 => [wind]: following a branch does not
+    check scenarios/motion/gust.toml => [wind]: shooting in wind that changes does not
+    trace scenarios/motion/gust.toml --vary leaf.length=20..30 => wind.velocity: a leaf comes to rest in steady wind only
+    trace scenarios/motion/gust.toml --vary leaf.length=20..30 --vary section.young=1e5..2e5 => [wind]: a boundary of stability does not
+    trace scenarios/motion/gust.toml --set wind.velocity=[1,0,0] --vary leaf.length=20..30 --switch => [wind]: following branches that cross does not
+    trace scenarios/motion/gust.toml --set wind.velocity=[1,0,0] --vary leaf.length=20..30 --keep-unstable => [wind]: a start at an equilibrium of any index does not
     map scenarios/motion/gust.toml --vary leaf.length=20..30 => [wind]: a map does not
     chart scenarios/motion/gust.toml => [wind]: a chart does not
     simulate leaf.toml --step 0 => step 0: must be greater

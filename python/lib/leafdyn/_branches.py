@@ -102,7 +102,7 @@ class Branch:
 
     @property
     def negative_eigenvalues(self) -> NDArray[np.int64]:
-        """The Morse index, shape (P,)."""
+        """The Morse index, shape (P,); NaN under wind and loads that turn with the section, which have none."""
         return self.columns["negative_eigenvalues"]
 
     @property
@@ -112,12 +112,23 @@ class Branch:
 
     @property
     def kinds(self) -> NDArray[np.str_]:
-        """``"regular"``, ``"fold"`` or ``"branch-point"``, shape (P,)."""
+        """``"regular"``, ``"fold"`` or ``"branch-point"``; without a potential ``"flutter"``, ``"divergence"``, shape (P,)."""
         return self.columns["kind"]
 
     @property
+    def growth_rates(self) -> Array | None:
+        """Growth of the small motion that grows fastest or decays slowest, shape (P,); none with a potential."""
+        return self.columns.get("growth_rate")
+
+    @property
+    def frequencies(self) -> Array | None:
+        """Its angular frequency, at critical points that of the motion whose growth begins or ends there, shape (P,); none
+        with a potential."""
+        return self.columns.get("frequency")
+
+    @property
     def critical(self) -> NDArray[np.int64]:
-        """Where the folds and branch points are."""
+        """Where the folds and branch points are, or flutter and divergence begin or end."""
         return np.flatnonzero(self.kinds != "regular")
 
     @property
@@ -208,7 +219,7 @@ class Trace(Table, Viewed):
         return self.vary
 
     def plot(self, ax: Any = None, *, show: str | None = None, **style: Any) -> Any:
-        """Draw it with matplotlib: solid where the leaf is stable, dashed where not, dots where branches fold or cross.
+        """Draw it with matplotlib: solid where the leaf is stable, dashed where not, dots where branches fold, cross or lose stability.
 
         Parameters
         ----------

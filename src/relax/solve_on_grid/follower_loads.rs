@@ -62,8 +62,14 @@ const STEPS: StepSizes = StepSizes {
 /// else shows that the leaf rests.
 const WIND_ACCURACY: f64 = 1e-13;
 
+/// The accuracy of balances next to a guess, radians and lengths.
+const NEAR_ACCURACY: f64 = 1e-11;
+
 /// The accuracy of equilibria on finer grids for their small motions, radians and lengths.
 const NEXT_GRID_ACCURACY: f64 = 1e-9;
+
+/// Largest displacement from a guess to its balance, in lengths: a farther one is another equilibrium.
+const LONGEST_WAY_TO_BALANCE: f64 = 0.2;
 
 /// All forces without a potential on a leaf without velocity.
 pub struct WithoutPotential<'a> {
@@ -273,6 +279,22 @@ pub fn balance_on_next_grid(level: &GridLevel, limit: &Limit) -> Option<GridLeve
     balance_within(&leaf, &mut system, &forces, &mut rest, NEXT_GRID_ACCURACY).ok()?;
     let state = rest.state;
     is_near_guess(&guess, &state).then_some(GridLevel { leaf, state })
+}
+
+/// The balance of all forces next to a guess; `None` if Newton's method leads elsewhere, or nowhere.
+pub fn balance_near(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    guess: State,
+    work: &mut SolverCounts,
+    limit: &Limit,
+) -> Option<State> {
+    let mut ignored = |_, _| {};
+    let mut rest = GridRelaxation::new(guess.clone(), NEAR_ACCURACY, work, &mut ignored, limit);
+    let forces = WithoutPotential::new(leaf);
+    balance_within(leaf, system, &forces, &mut rest, NEAR_ACCURACY).ok()?;
+    let state = rest.state;
+    (guess.largest_displacement_to(&state) < LONGEST_WAY_TO_BALANCE).then_some(state)
 }
 
 /// Corrects a state near rest, or lets all loads without a potential grow from a state of rest without

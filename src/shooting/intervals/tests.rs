@@ -18,7 +18,7 @@ fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<CondensedEquations> {
     let scenario = scenario(joined);
     let equations = BoundaryValueProblem::new(&scenario);
     let units = PerturbationUnits::new(&equations, &LeafTrajectory::straight(&equations));
-    CondensedEquations::new(&equations, &units, maps, &[])
+    CondensedEquations::new(&equations, &units, maps, &[], Vec::new())
 }
 
 /// Pseudo-random numbers in -1..1.
@@ -125,8 +125,12 @@ fn conditions_are_in_the_units_of_the_unknowns() {
         let found = condensed.scaled_tip_conditions(&equations.tip_conditions(&y));
         let step = Col::from_fn(36, |i| step[i]);
         let wanted = tip_rows(joined, &condensed.units) * &step;
-        let linear =
-            linearized_tip_conditions(equations.tip_constraint(), &condensed.units, step.as_ref());
+        let linear = linearized_tip_conditions(
+            equations.tip_constraint(),
+            &condensed.units,
+            &[],
+            step.as_ref(),
+        );
         for (i, found) in found.iter().enumerate() {
             assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
             assert!((linear[i] - wanted[i]).abs() < 1e-14);

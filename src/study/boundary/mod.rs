@@ -11,6 +11,7 @@ use crate::branch::boundary::{
     VerifiedBoundaryPoint, coarsened, leaves_beside_boundary, refine_on_path,
 };
 use crate::branch::{BranchEnd, CriticalKind, ParameterRange, boundary, value_at_fraction};
+use crate::relax::without_wind_or_followers;
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::{PlausibilityWarning, Scenario};
 use crate::shape::serialize_tips;
@@ -44,6 +45,7 @@ pub struct BoundaryRequest {
 impl BoundaryRequest {
     /// Validates the request before it is run.
     fn validate(&self) -> Result<(), TraceError> {
+        without_wind_or_followers(self.trace.base.scenario(), "a boundary of stability")?;
         self.trace.validate()?;
         let second = TraceRequest {
             vary: self.across.clone(),

@@ -5,6 +5,7 @@
 //! that a tensile test would measure ([`ForceDisplacementLine`]).
 
 pub(super) mod result;
+mod without_potential;
 
 use crate::branch::{
     BranchEnd, ContinuationOptions, CriticalKind, CriticalPoint, EquilibriumPoint,
@@ -23,6 +24,7 @@ use crate::shape::Undulation;
 use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::result::{ForceDisplacementLine, LoadedTip, TraceUntil};
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
+use crate::study::trace::without_potential::trace_without_potential;
 use crate::study::vary::{BaseScenario, ParameterSweep};
 use crate::study::{VariableTarget, VaryError};
 use glam::DVec3;
@@ -80,8 +82,8 @@ pub enum TraceError {
 impl TraceRequest {
     /// Validates the request before it is run.
     pub(super) fn validate(&self) -> Result<(), TraceError> {
-        without_wind_or_followers(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
+        let lacks_potential = self.lacks_potential();
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
         if keys.is_whole() {
             return Err(refuse(
@@ -95,6 +97,7 @@ impl TraceRequest {
                     Key::TipMoment => DEAD_MOMENT_REFUSAL,
                     Key::Tolerance => "changes no leaf",
                     Key::Density if self.base.scenario().g != [0.0; 3] => continue,
+                    key if lacks_potential && changes_small_motions(key) => continue,
                     key if ["dynamics.", "wind."]
                         .iter()
                         .any(|it| key.path().starts_with(it)) =>
@@ -112,11 +115,24 @@ impl TraceRequest {
         if self.base.scenario().has_moments() {
             return Err(refuse(DEAD_MOMENT_REFUSAL));
         }
+        if lacks_potential {
+            self.validate_without_potential()?;
+        }
         if self.most_points < 2 {
             return Err(RefusedOption::new("points", self.most_points, "must be 2 or more").into());
         }
         Ok(())
     }
+}
+
+/// Whether a number of a motion decides on the stability of an equilibrium without a potential, or on the
+/// equilibrium itself.
+fn changes_small_motions(key: Key) -> bool {
+    key.path().starts_with("wind.")
+        || matches!(
+            key,
+            Key::Density | Key::RotaryInertia | Key::ExternalDamping | Key::InternalDamping
+        )
 }
 
 const DEAD_MOMENT_REFUSAL: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";
@@ -188,6 +204,16 @@ fn trace_with_points_from(
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<TraceWithPoints, TraceError> {
     request.validate()?;
+    if request.lacks_potential() {
+        if given.is_some() {
+            without_wind_or_followers(request.base.scenario(), "following a branch both ways")?;
+        }
+        return Ok(TraceWithPoints {
+            trace: trace_without_potential(request, progress)?,
+            first_point: None,
+            critical_points: Vec::new(),
+        });
+    }
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
     let ends = vary.ends();
@@ -251,6 +277,7 @@ fn trace_with_points_from(
         until: request.until,
         complete: false,
         remark: None,
+        assumed: None,
         doubts: plausibility_warnings(&scenario),
         branches: Vec::new(),
         law: None,
@@ -591,6 +618,7 @@ impl BranchTracer<'_, '_> {
             error: Some(refined.position_error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
+            motion: None,
             undulation: self.undulation_at(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),
             curves: self.family.curves(&refined.state),

@@ -2,6 +2,7 @@
 
 use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
 use crate::numbers::largest;
+use crate::relax::{AssumedMotion, DominantMotion, MotionInstability};
 use crate::run::join_remarks;
 use crate::scenario::{PlausibilityWarning, Units};
 use crate::shape::{Undulation, serialize_tips};
@@ -10,7 +11,7 @@ use crate::study::trace::serialize_axis;
 use crate::study::vary::AXIS_NAMES;
 use crate::study::{ParameterKeys, UnknownWord};
 use glam::DVec3;
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::ser::{Serialize, SerializeMap, SerializeStruct, Serializer};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
@@ -59,6 +60,12 @@ pub struct Trace {
     /// Why there is no branch, or fewer than there are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<TraceRemark>,
+    /// What is assumed of masses and damping, where loads have no potential.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "serialize_assumed"
+    )]
+    pub assumed: Option<AssumedMotion>,
     /// What in the scenario is probably not what was intended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<PlausibilityWarning>,
@@ -87,7 +94,7 @@ pub struct TraceBranch {
 }
 
 /// A point of a branch, in the scenario's units.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug)]
 pub struct TracePoint {
     /// Its number on the branch, from 1.
     pub point: usize,
@@ -98,34 +105,49 @@ pub struct TracePoint {
     /// Bound on its error, if it is computed and not prescribed.
     pub value_error: Option<f64>,
     /// The shared tip alone, or every tip.
-    #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
     /// The reaction at held tips.
-    #[serde(rename = "tip_reaction", skip_serializing_if = "Option::is_none")]
     pub reaction: Option<DVec3>,
     /// The forces on the grips.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub grip_reactions: Vec<DVec3>,
     /// Bound on the error of the tips, or, if they are held, of the midpoints of the rods, and
     /// of both with grips: within the tolerance.
     pub error: Option<f64>,
-    /// Potential energy.
+    /// Potential energy; NaN in wind.
     pub energy: f64,
-    /// Morse index; at a critical point the one after it.
-    #[serde(flatten, serialize_with = "serialize_index")]
+    /// Morse index, or, where loads have no potential, the number of roots of the linearised motion with
+    /// growth, both of a conjugate pair; at a critical point the one after it.
     pub index: usize,
+    /// Its small motions, where loads have no potential.
+    pub motion: Option<PointMotion>,
     /// Waves and twist of the veins.
-    #[serde(skip)]
     pub undulation: Undulation,
     /// Fractions of the length of the nodes of the finest grid.
-    #[serde(skip)]
     pub stations: Vec<f64>,
     /// Centerlines on the finest grid, one per rod.
-    #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
 }
 
+/// The small motions about a point of a branch without a potential.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointMotion {
+    /// Roots with growth, both of a conjugate pair; at a critical point those after it. `None` where it is
+    /// not certain which grow: then the index is that of the point before.
+    pub unstable_roots: Option<usize>,
+    /// The motion that grows fastest or decays slowest; at a critical point the one whose growth begins or
+    /// ends. `None` if roots are not found.
+    pub dominant: Option<DominantMotion>,
+}
+
 impl TracePoint {
+    /// Whether it is stable, if that is certain.
+    pub fn stable(&self) -> Option<bool> {
+        match self.motion {
+            Some(motion) => motion.unstable_roots.map(|roots| roots == 0),
+            None => Some(self.index == 0),
+        }
+    }
+
     /// The force on the tip along an axis, if that varies or the tip is held.
     pub fn force_on_tip(&self, axis: usize) -> f64 {
         self.reaction.map_or(self.value, |reaction| -reaction[axis])
@@ -154,6 +176,10 @@ pub enum PointKind {
     Fold,
     /// Other branches cross here, in so many independent directions.
     Branching(usize),
+    /// Oscillations begin to grow here, or no longer do.
+    Flutter,
+    /// A motion without oscillations begins to grow here, or no longer does.
+    Divergence,
 }
 
 impl PointKind {
@@ -163,6 +189,8 @@ impl PointKind {
             PointKind::Regular => "regular",
             PointKind::Fold => "fold",
             PointKind::Branching(_) => "branch-point",
+            PointKind::Flutter => MotionInstability::Flutter.word(),
+            PointKind::Divergence => MotionInstability::Divergence.word(),
         }
     }
 }
@@ -190,6 +218,7 @@ impl BranchEnd {
             BranchEnd::StepFailed(CorrectorFailure::Unresolved) => "unresolved",
             BranchEnd::StepFailed(CorrectorFailure::Unfolded) => "unfolds",
             BranchEnd::StepFailed(CorrectorFailure::Separated) => "parts",
+            BranchEnd::StepFailed(CorrectorFailure::TurnsBack) => "turns-back",
             BranchEnd::StepFailed(_) => "stuck",
             BranchEnd::PointUnverified(_) => "unverified",
         }
@@ -279,11 +308,70 @@ impl Serialize for TraceBranch {
     }
 }
 
-fn serialize_index<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut keys = serializer.serialize_struct("Index", 2)?;
-    keys.serialize_field("negative_eigenvalues", index)?;
-    keys.serialize_field("stable", &(*index == 0))?;
-    keys.end()
+/// A point as JSON.
+impl Serialize for TracePoint {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SerializedPoint {
+            point: self.point,
+            kind: self.kind,
+            value: self.value,
+            value_error: self.value_error,
+            tips: &self.tips,
+            reaction: self.reaction,
+            grip_reactions: &self.grip_reactions,
+            error: self.error,
+            energy: self.energy,
+            stability: PointStability(self),
+        }
+        .serialize(serializer)
+    }
+}
+
+#[derive(serde::Serialize)]
+struct SerializedPoint<'p> {
+    point: usize,
+    kind: PointKind,
+    value: f64,
+    value_error: Option<f64>,
+    #[serde(flatten, serialize_with = "serialize_tips")]
+    tips: &'p [DVec3],
+    #[serde(rename = "tip_reaction", skip_serializing_if = "Option::is_none")]
+    reaction: Option<DVec3>,
+    #[serde(skip_serializing_if = "<[DVec3]>::is_empty")]
+    grip_reactions: &'p [DVec3],
+    error: Option<f64>,
+    energy: f64,
+    #[serde(flatten)]
+    stability: PointStability<'p>,
+}
+
+/// The index of a point, or its motion.
+struct PointStability<'p>(&'p TracePoint);
+
+impl Serialize for PointStability<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let PointStability(point) = self;
+        let mut keys = serializer.serialize_map(None)?;
+        let index = point.motion.is_none().then_some(point.index);
+        keys.serialize_entry("negative_eigenvalues", &index)?;
+        keys.serialize_entry("stable", &point.stable())?;
+        if let Some(motion) = point.motion {
+            let dominant = motion.dominant;
+            keys.serialize_entry("unstable_roots", &motion.unstable_roots)?;
+            keys.serialize_entry("growth_rate", &dominant.map(|it| it.growth_rate))?;
+            keys.serialize_entry("frequency", &dominant.map(|it| it.frequency))?;
+            keys.serialize_entry("motion_error", &dominant.and_then(|it| it.error))?;
+        }
+        keys.end()
+    }
+}
+
+/// What is assumed, as a list of words.
+fn serialize_assumed<S: Serializer>(
+    assumed: &Option<AssumedMotion>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(assumed.iter().flat_map(|it| it.words()))
 }
 
 /// The straight line fitted to the forces on a tip as a function of its displacements

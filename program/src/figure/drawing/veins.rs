@@ -11,6 +11,7 @@ use crate::figure::drawing::{
 };
 use crate::figure::scenario::{
     FigureSetting, LoadMark, ParsedKey, SupportForm, load_marks, support_marks,
+    with_followers_as_dead,
 };
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, RodShape};
@@ -97,7 +98,7 @@ impl DrawnVeins {
     pub fn from_equilibrium(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
         let veins = DrawnVeins::from_curves(&shape.curves, &equilibrium.tips, shape.longest());
-        let loads = load_marks(scenario, None);
+        let loads = load_marks(&with_followers_as_dead(scenario, equilibrium), None);
         veins.with_supports(scenario).with_loads(
             scenario,
             &loads,

@@ -23,9 +23,10 @@ const REFUSED: &str = "
 single-shooting shooting shooting-from-rest check chart | gripped | does not take grips
 single-shooting shooting shooting-from-rest check chart | rollers | does not take grips
 single-shooting shooting | founded | led to rest by the relaxation
-explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit | windy gripped-in-wind | does not take wind
+explicit keep-unstable modes all margin map chart fit | windy gripped-in-wind | does not take wind
 check single-shooting shooting shooting-from-rest | gripped-in-wind | does not take grips
-explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit | following | does not take loads that turn with the section
+single-shooting shooting | following windy | led to rest by the relaxation
+explicit keep-unstable modes all margin map chart fit | following | does not take loads that turn with the section
 single-shooting shooting | jaws pinned | a tip that is held (tip.held)
 single-shooting shooting | leaf.base_held rooted | a leaf on hinges
 single-shooting shooting | leaf.base | veins that begin apart
