@@ -384,6 +384,9 @@ pub struct AngleClass {
 }
 
 impl AngleDistribution {
+    /// How many classes of inclination there are, and of azimuth.
+    pub const CLASSES: [usize; 2] = [INCLINATION_CLASSES, AZIMUTH_CLASSES];
+
     /// The distribution of these vector areas.
     fn new(facets: impl Iterator<Item = DVec3>) -> Self {
         let mut areas = vec![0.0; INCLINATION_CLASSES * AZIMUTH_CLASSES];

@@ -8,8 +8,9 @@ use leafdyn::relax::{
     BaseReaction, Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses,
 };
 use leafdyn::scenario::{Scenario, Stress};
+use leafdyn::surface::{AngleDistribution, TriangleMesh};
 use leafdyn_program::files::{self, FileError, FileKind, ResultDocument, WrittenResult};
-use pyo3::exceptions::{PyKeyError, PyOSError};
+use pyo3::exceptions::{PyKeyError, PyOSError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -195,6 +196,59 @@ impl Leaf {
     #[getter]
     fn error_estimate(&self, py: Python) -> Option<f64> {
         self.shown(py).accuracy.error_estimate
+    }
+
+    /// The surface, with the veins as tubes or as a body of its thickness: vertices, normals, places along and
+    /// across, veins and triangles.
+    fn mesh<'py>(
+        &self,
+        py: Python<'py>,
+        veins: bool,
+        thickness: bool,
+    ) -> PyResult<[Bound<'py, PyAny>; 5]> {
+        let (shape, input) = (&self.shown(py).shape, &self.input);
+        let found = py.detach(|| {
+            let sheet = match thickness {
+                true => TriangleMesh::body(shape, input),
+                false => TriangleMesh::sheet(shape, input),
+            };
+            match veins {
+                true => sheet.map(|sheet| sheet.and(TriangleMesh::vein_tubes(shape, input))),
+                false => sheet,
+            }
+        });
+        let mesh = found.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let count = mesh.vertices.len();
+        let rods = mesh.veins.iter().map(|vein| f64::from(*vein)).collect();
+        let corners = mesh.triangles.as_flattened().iter();
+        let corners = corners.map(|corner| f64::from(*corner)).collect();
+        Ok([
+            vectors(py, &mesh.vertices)?,
+            vectors(py, &mesh.normals)?,
+            array(py, mesh.uv.as_flattened().to_vec(), &[count, 2])?,
+            array(py, rods, &[count])?,
+            array(py, corners, &[mesh.triangles.len(), 3])?,
+        ])
+    }
+
+    /// The classes of inclination and azimuth in degrees, their areas, and area, projected area and mean inclination.
+    fn angles<'py>(&self, py: Python<'py>) -> PyResult<([Bound<'py, PyAny>; 3], [f64; 3])> {
+        let sheet = TriangleMesh::sheet(&self.shown(py).shape, &self.input);
+        let sheet = sheet.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let angles = sheet.angles();
+        let [rows, columns] = AngleDistribution::CLASSES;
+        let inclinations = angles.classes().step_by(columns);
+        let inclinations: Vec<f64> = inclinations.map(|it| it.inclination.to_degrees()).collect();
+        let azimuths = angles.classes().take(columns);
+        let azimuths: Vec<f64> = azimuths.map(|it| it.azimuth.to_degrees()).collect();
+        let areas = angles.classes().map(|it| it.area).collect();
+        let classes = [
+            array(py, inclinations, &[rows])?,
+            array(py, azimuths, &[columns])?,
+            array(py, areas, &[rows, columns])?,
+        ];
+        let mean = angles.mean_inclination.to_degrees();
+        Ok((classes, [angles.area, angles.projected_area, mean]))
     }
 
     /// What is known without any array, by the names of attributes.

@@ -51,6 +51,7 @@ mod stated_bars;
 mod steps;
 mod stiffness;
 mod stress;
+mod surface;
 mod taut_rods;
 mod threads;
 mod tissue;

@@ -2,7 +2,7 @@
 
 use crate::figure::drawing::formats;
 use crate::files::atomic;
-use crate::page::{ShapeInSeries, glb, vtk};
+use crate::page::{ShapeInSeries, glb, surface, vtk};
 use crate::report::{FileError, ResultDocument};
 use crate::{figure, page, report};
 use leafdyn::relax::Equilibrium;
@@ -26,6 +26,11 @@ impl WrittenResult for Equilibrium {
             vtk::write_leaf(it, &input.radii, out)
         }),
         FileFormat::Table("leaf.glb", glb::write_leaf),
+        FileFormat::Space("surface.obj", surface::write_obj),
+        FileFormat::Space("surface.ply", surface::write_ply),
+        FileFormat::Space("surface.glb", surface::write_glb),
+        FileFormat::Space("surface.vtp", surface::write_vtp),
+        FileFormat::Space("angles.csv", surface::write_angles),
     ];
     const BESIDES: &'static [&'static str] = &[LIVE_PAGE_FILE];
 
@@ -389,6 +394,8 @@ words! {
         Vtk = "vtk",
         /// For Blender.
         Glb = "glb",
+        /// The leaf as a surface, in several formats, and its angles.
+        Surface = "surface",
         /// A film.
         Gif = "gif",
     }
@@ -410,6 +417,9 @@ impl FileKind {
     pub fn from_file_name(file: &str) -> FileKind {
         if file == LIVE_PAGE_FILE {
             return FileKind::Live;
+        }
+        if file.starts_with("surface.") || file.starts_with("angles.") {
+            return FileKind::Surface;
         }
         let end = file.rsplit('.').next();
         let named = end.and_then(|end| end.parse().ok());

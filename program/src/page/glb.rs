@@ -8,6 +8,7 @@ use crate::figure::drawing::{Color, color_of_vein};
 use glam::{DVec3, Vec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
+use leafdyn::surface::TriangleMesh;
 use serde_json::{Value, json};
 use std::io;
 use std::io::Write;
@@ -132,7 +133,8 @@ fn write_shapes(
     let radius = RELATIVE_VEIN_RADIUS * longest;
     let first = thinned.first();
     let Some(first) = first.filter(|curves| curves.iter().any(|curve| curve.len() > 1)) else {
-        return write_container(name, &GltfBuffer::default(), json!([]), None, out);
+        let none = [json!([]), json!([])];
+        return write_container(name, &GltfBuffer::default(), none, None, out);
     };
     let (veins, points) = (first.len(), first[0].len());
     let base = TubeMesh::around_curves(first, radius);
@@ -172,7 +174,54 @@ fn write_shapes(
         animation = Some(morph_animation(&mut file, shapes));
         mesh[0]["primitives"][0]["targets"] = Value::Array(targets);
     }
-    write_container(name, &file, mesh, animation, out)
+    write_container(name, &file, [mesh, vein_material()], animation, out)
+}
+
+/// The color of a blade in linear RGB, and that of its veins.
+const BLADE_COLORS: [[f64; 4]; 2] = [[0.09, 0.30, 0.05, 1.0], [0.30, 0.42, 0.12, 1.0]];
+
+/// Writes the surface of a leaf, its blade and its veins, with normals and texture coordinates.
+pub(super) fn write_surface(
+    name: &str,
+    parts: [&TriangleMesh; 2],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut file = GltfBuffer::default();
+    let mut primitives = Vec::new();
+    let exist = |(_, mesh): &(usize, &TriangleMesh)| !mesh.triangles.is_empty();
+    for (part, mesh) in parts.into_iter().enumerate().filter(exist) {
+        let uv: Vec<[f32; 2]> = mesh.uv.iter().map(|it| it.map(|x| x as f32)).collect();
+        let bytes = uv.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+        let accessor = json!({ "componentType": GLTF_FLOAT, "count": uv.len(), "type": "VEC2" });
+        let texture = file.add_array(bytes, Some(GLTF_ARRAY_BUFFER), accessor);
+        let corners = mesh.triangles.as_flattened();
+        let accessor =
+            json!({ "componentType": GLTF_UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
+        let corners = corners.iter().flat_map(|corner| corner.to_le_bytes());
+        let indices = file.add_array(corners, Some(GLTF_ELEMENT_ARRAY_BUFFER), accessor);
+        primitives.push(json!({
+            "attributes": {
+                "POSITION": file.add_vectors(mesh.vertices.iter().map(|it| it.as_vec3())),
+                "NORMAL": file.add_vectors(mesh.normals.iter().map(|it| it.as_vec3())),
+                "TEXCOORD_0": texture,
+            },
+            "indices": indices, "material": part,
+        }));
+    }
+    let mesh = json!([{ "name": "leaf", "primitives": primitives }]);
+    let material = |name: &str, color: [f64; 4]| {
+        json!({ "name": name, "doubleSided": true, "pbrMetallicRoughness": {
+            "baseColorFactor": color, "metallicFactor": 0.0, "roughnessFactor": 0.6 } })
+    };
+    let [blade, veins] = BLADE_COLORS;
+    let materials = json!([material("blade", blade), material("veins", veins)]);
+    write_container(name, &file, [mesh, materials], None, out)
+}
+
+/// The material of veins with colors of their own.
+fn vein_material() -> Value {
+    json!([{ "name": "vein", "doubleSided": true,
+        "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.6 } }])
 }
 
 /// The animation: at the time of a shape its weight is one and all others are zero.
@@ -202,7 +251,7 @@ fn morph_animation(file: &mut GltfBuffer, shapes: &[ShapeAtTime]) -> Value {
 fn write_container(
     name: &str,
     file: &GltfBuffer,
-    meshes: Value,
+    [meshes, materials]: [Value; 2],
     animations: Option<Value>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
@@ -215,8 +264,7 @@ fn write_container(
         document["nodes"] =
             json!([{ "name": "leaf", "mesh": 0, "rotation": [-half, 0.0, 0.0, half] }]);
         document["meshes"] = meshes;
-        document["materials"] = json!([{ "name": "vein", "doubleSided": true,
-            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.6 } }]);
+        document["materials"] = materials;
         document["buffers"] = json!([{ "byteLength": file.bytes.len() }]);
         document["bufferViews"] = Value::Array(file.views.clone());
         document["accessors"] = Value::Array(file.accessors.clone());

@@ -21,6 +21,7 @@
 mod data;
 pub mod glb;
 mod results;
+pub mod surface;
 pub mod vtk;
 
 use crate::figure::FigureFunction;

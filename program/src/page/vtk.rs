@@ -10,6 +10,7 @@ use glam::DVec3;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Radii;
 use leafdyn::shape::NodeState;
+use leafdyn::surface::TriangleMesh;
 use std::io;
 use std::io::Write;
 use std::path::Path;
@@ -134,6 +135,53 @@ fn write_polydata(
     }
     writeln!(out, "</PointData>\n<CellData>")?;
     write_integer_array("rod", 1..count + 1, out)?;
+    writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")
+}
+
+/// Writes the surface of a leaf, its blade and its veins: triangles, with the vein and the place along it of every vertex, texture coordinates,
+/// normals, and for every triangle whether it is of a vein.
+pub(super) fn write_surface(meshes: [&TriangleMesh; 2], out: &mut dyn Write) -> io::Result<()> {
+    let counts = meshes.map(|mesh| (mesh.vertices.len(), mesh.triangles.len()));
+    let [vertices, triangles] = [counts[0].0 + counts[1].0, counts[0].1 + counts[1].1];
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
+         <PolyData>\n<Piece NumberOfPoints=\"{vertices}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" \
+         NumberOfStrips=\"0\" NumberOfPolys=\"{triangles}\">\n<Points>"
+    )?;
+    let vectors = |of: fn(&TriangleMesh) -> &Vec<DVec3>| {
+        flatten_vectors(meshes.into_iter().flat_map(of).copied())
+    };
+    write_float_array("Points", 3, &vectors(|mesh| &mesh.vertices), out)?;
+    writeln!(out, "</Points>\n<Polys>")?;
+    let firsts = [0, counts[0].0];
+    let corners = meshes.into_iter().zip(firsts).flat_map(|(mesh, first)| {
+        let corners = mesh.triangles.as_flattened().iter();
+        corners.map(move |corner| first + *corner as usize)
+    });
+    write_integer_array("connectivity", corners, out)?;
+    write_integer_array("offsets", (1..=triangles).map(|k| 3 * k), out)?;
+    writeln!(
+        out,
+        "</Polys>\n<PointData Normals=\"normal\" TCoords=\"uv\">"
+    )?;
+    write_float_array("normal", 3, &vectors(|mesh| &mesh.normals), out)?;
+    let uv: Vec<[f64; 2]> = meshes
+        .into_iter()
+        .flat_map(|mesh| mesh.uv.iter().copied())
+        .collect();
+    write_float_array("uv", 2, uv.as_flattened(), out)?;
+    let veins = meshes
+        .into_iter()
+        .flat_map(|mesh| mesh.veins.iter().map(|vein| *vein as usize));
+    write_integer_array("rod", veins, out)?;
+    let sigma: Vec<f64> = uv.iter().map(|[sigma, _]| *sigma).collect();
+    write_float_array("sigma", 1, &sigma, out)?;
+    writeln!(out, "</PointData>\n<CellData>")?;
+    let is_vein = [0, 1].into_iter().zip(counts);
+    let is_vein = is_vein.flat_map(|(part, (_, count))| std::iter::repeat_n(part, count));
+    write_integer_array("is_vein", is_vein, out)?;
     writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")
 }
 

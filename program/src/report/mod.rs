@@ -22,7 +22,9 @@ pub use crate::report::document::{
 pub use crate::report::fit::{write_fit_table, write_fitted_scenario};
 pub use crate::report::map::{ReportedMap, write_map_table};
 pub use crate::report::relax::doubt_with_option;
-pub use crate::report::table::{write_centerlines, write_modes_table, write_sensitivity_table};
+pub use crate::report::table::{
+    write_angle_table, write_centerlines, write_modes_table, write_sensitivity_table,
+};
 pub use crate::report::trace::{
     error_location_words, index_change_text, is_codimension_two, passes_crossings,
     point_stability_phrase, slope_unit, write_boundary_table, write_trace_table,

@@ -6,6 +6,7 @@ use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
 use leafdyn::scenario::Stress;
 use leafdyn::shape::{InterpolationWeights, interpolation_weights};
+use leafdyn::surface::AngleDistribution;
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::borrow::Cow;
@@ -220,6 +221,21 @@ const CUBIC_NODES: usize = 4;
 /// resultants are components along the directors.
 const CENTERLINES_HEADER: &str =
     "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3";
+
+/// Writes the area of a surface by classes of inclination and azimuth, in degrees: those in which there is some.
+pub fn write_angle_table(angles: &AngleDistribution, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(&table_header("inclination,azimuth,area"))?;
+    let rows = angles
+        .classes()
+        .filter(|class| class.area > 0.0)
+        .map(|class| {
+            let [inclination, azimuth] = [class.inclination, class.azimuth].map(f64::to_degrees);
+            // The middles of classes are halves of degrees.
+            let round = |degrees: f64| (2.0 * degrees).round() / 2.0;
+            (round(inclination), round(azimuth), class.area)
+        });
+    append_csv_rows::<(f64, f64, f64)>(rows, out)
+}
 
 /// `centerlines.csv`: one row per rod and station; the largest stresses there come last, if
 /// sections are given.

@@ -48,7 +48,7 @@ pub struct ScenarioArguments {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: Option<PathBuf>,
 
-    /// Which files to write: some of json, csv, svg, png, html, vtk, glb, gif, or none [default: those of the first four that the verb has]
+    /// Which files to write: some of json, csv, svg, png, html, vtk, glb, surface, gif, or none [default: those of the first four that the verb has]
     #[arg(long, value_name = "LIST", value_parser = parse_file_kinds)]
     write: Option<FileKinds>,
 

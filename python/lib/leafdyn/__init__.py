@@ -29,6 +29,7 @@ from ._scenario import Scenario, Source
 from ._sensitivity import Sensitivity
 from ._simulate import frames, simulate
 from ._study import Chart, Check, Equilibria, Map
+from ._surface import Angles, Mesh
 from ._sweep import sweep
 from ._typed import ScenarioDict
 from ._verbs import chart, check, equilibria, stability_map
@@ -41,6 +42,7 @@ map = stability_map
 all_shapes = equilibria
 
 __all__ = [
+    "Angles",
     "Boundary",
     "Branch",
     "Candidate",
@@ -55,6 +57,7 @@ __all__ = [
     "Key",
     "LeafWarning",
     "Map",
+    "Mesh",
     "MissingScenarioError",
     "Motion",
     "Page",

@@ -15,6 +15,7 @@ from ._draw import axes, curves, labelled, smooth, tangents, ticks_by_length
 from ._pickled import Drawn
 from ._result import keep
 from ._sensitivity import Sensitivity
+from ._surface import Angles, Mesh, angles, mesh
 from ._view import Viewed
 
 if TYPE_CHECKING:
@@ -378,6 +379,41 @@ class Equilibrium(Viewed):
     @property
     def _attrs(self) -> dict[str, Any]:
         return {"scenario": self.name, "method": self.method, "outcome": self.outcome}
+
+    def mesh(self, *, veins: bool = False, thickness: bool = False) -> Mesh:
+        """The surface as triangles: a sheet through the veins out to the margins, at `stations` along.
+
+        Parameters
+        ----------
+        veins
+            Whether veins are added as closed tubes, with the radii of their sections.
+        thickness
+            Whether the sheet is a closed body, as thick as the blade or the sections.
+
+        Raises
+        ------
+        ValueError
+            If no width is known, as of a single rod whose stiffnesses are given, or no thickness.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> leaf = leafdyn.relax("scenarios/measured/grass.toml", stations=64)
+        >>> leaf.mesh()
+        <Mesh: 193 vertices, 256 triangles>
+        """
+        return mesh(self._core, veins, thickness)
+
+    def angles(self) -> Angles:
+        """How the surface is inclined, as models of canopies take it: area by classes of inclination and azimuth, mean
+        inclination and projected area.
+
+        Raises
+        ------
+        ValueError
+            If no width is known, as of a single rod whose stiffnesses are given.
+        """
+        return angles(self._core)
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
