@@ -1,0 +1,95 @@
+//! `leafdyn unbend`: the least stiffness that a posture proves, and the leaf without its weight.
+
+use crate::verbs::exit::{ExitStatus, Refusal};
+use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
+use clap::{Args, ValueHint};
+use leafdyn::posture::leaf::ScenarioRod;
+use leafdyn::scenario::bytes;
+use leafdyn::study;
+use leafdyn::study::{UnbendRemark, UnbendRequest, Unbending, read_postures};
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// From the posture of a hanging leaf or stem, the least stiffness that it proves, and the leaf without its weight.
+///
+/// The scenario has the weight, the loads and the section of a single vein; its Young's modulus is not used.
+///
+/// Exit status: 0 the posture proves a bound, and is stable at the moduli of --young; 1 not
+/// (the files are still written and say why); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct UnbendArguments {
+    #[command(flatten)]
+    request: ScenarioArguments,
+
+    /// Points of the centreline from base to tip, as CSV with a header: x, y, z, or two of them in a plane, or pixel_x, pixel_y with [photo]; if measured normal_x, normal_y, normal_z of the blade, and sd
+    #[arg(long, value_name = "POINTS.csv", value_hint = ValueHint::FilePath)]
+    shape: PathBuf,
+
+    /// Young's modulus, or the range in which it lies: is the posture stable there?
+    #[arg(long, value_name = "E|A..B")]
+    young: Option<YoungRange>,
+}
+
+/// A modulus, or a range.
+#[derive(Clone, Debug)]
+struct YoungRange(RangeInclusive<f64>);
+
+impl FromStr for YoungRange {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let number = |text: &str| {
+            let number: Option<f64> = text.trim().parse().ok();
+            number.filter(|it| *it > 0.0 && it.is_finite())
+        };
+        let ends = match text.split_once("..") {
+            Some((low, high)) => [number(low), number(high)],
+            None => [number(text); 2],
+        };
+        match ends {
+            [Some(low), Some(high)] if low <= high => Ok(YoungRange(low..=high)),
+            _ => {
+                Err("must be a number greater than 0, or two as in 1e6..1e8, the smaller one first")
+            }
+        }
+    }
+}
+
+impl UnbendArguments {
+    pub fn run(self) -> Result<ExitStatus, Refusal> {
+        let reads = [self.shape.clone()];
+        let traits = VerbTraits {
+            input_files: &reads,
+            ..VerbTraits::default()
+        };
+        self.request
+            .run_each_scenario::<Unbending>(traits, |job| self.run_scenario(job))
+    }
+
+    fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let rod = ScenarioRod::new(&job.scenario)
+            .map_err(|error| format!("{}: {error}", job.scenario.name))?
+            .rod;
+        let file = self.shape.display().to_string();
+        let read = read_postures(&bytes(&self.shape)?, &file, None, &job.scenario, &rod)?;
+        let Some(posture) = read.into_iter().next() else {
+            return Err(format!("{file}: has no points").into());
+        };
+        let request = UnbendRequest {
+            young: self.young.as_ref().map(|range| range.0.clone()),
+            limit: job.limit.clone(),
+            ..UnbendRequest::new(job.scenario.clone(), posture.points)
+        };
+        let mut found = study::unbend(&request).map_err(|error| format!("{file}: {error}"))?;
+        if let Some(taken) = posture.taken {
+            found
+                .remarks
+                .insert(0, UnbendRemark::Coordinates(taken.into()));
+        }
+        job.print_remark(found.remarks.first());
+        let stable = found.indices.iter().all(|it| it.index == 0);
+        let success = found.critical_young.value > 0.0 && stable;
+        job.write_and_deliver(&found, success)
+    }
+}
