@@ -53,7 +53,8 @@ impl BaseFrame {
             ahead = -ahead;
         }
         let ahead = ahead.normalize_or_zero();
-        let angle = ahead.y.atan2(ahead.x);
+        // No -0.0: it is written to files.
+        let angle = ahead.y.atan2(ahead.x) + 0.0;
         let elevation = tangent.z.atan2(tangent.dot(ahead));
         let mut frame = BaseFrame {
             angle,

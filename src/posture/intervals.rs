@@ -94,7 +94,7 @@ fn variance_of(
 
 /// Half the width of 95 % intervals in standard deviations where these are known from so many independent residuals:
 /// the quantile of Student's distribution (Cornish and Fisher's expansion).
-fn student_quantile(freedom: f64) -> f64 {
+pub fn student_quantile(freedom: f64) -> f64 {
     let z = NORMAL_QUANTILE;
     let [z3, z5, z7] = [3, 5, 7].map(|power| z.powi(power));
     z + (z3 + z) / (4.0 * freedom)

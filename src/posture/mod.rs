@@ -15,7 +15,9 @@ pub mod rest;
 pub mod rod;
 pub mod second_variation;
 pub mod smoothing;
+pub mod two_postures;
 
+use crate::numbers::GAUSS_LEGENDRE_RULE;
 use crate::posture::frame::{BaseFrame, FrameRule, vertical_plane};
 use crate::posture::line::{Directors, Elements, Line};
 use crate::posture::points::{PostureError, PosturePoints};
@@ -276,7 +278,12 @@ impl Posture {
         if let Some(mode) = &mode {
             let density = mode.bending_density(&self.elements, &self.line, &part.directors);
             let most = (0..density.len()).max_by(|&a, &b| density[a].total_cmp(&density[b]));
-            self.critical.at = most.map_or(0.0, |k| self.elements.sigma[k]);
+            self.critical.at = match most {
+                // The first and the last Gauss point stand for the base and the tip beside them.
+                None | Some(0) => 0.0,
+                Some(k) if k + 1 == density.len() => 1.0,
+                Some(k) => self.elements.sigma[k],
+            };
             self.critical.value = largest;
             let whole: f64 = (0..density.len())
                 .map(|k| self.elements.weight(k) * density[k])
@@ -286,7 +293,10 @@ impl Posture {
                 let next = sum + self.elements.weight(k) * density[k] / whole;
                 for (end, part) in ends.iter_mut().zip([0.05, 0.95]) {
                     if sum < part && next >= part {
-                        *end = self.elements.sigma[k];
+                        *end = match k {
+                            0 => 0.0,
+                            k => self.elements.sigma[k],
+                        };
                     }
                 }
                 sum = next;
@@ -336,6 +346,28 @@ impl Posture {
             Centreline::Smoothed(smoothed) => Some(smoothed),
             Centreline::Given(_) => None,
         }
+    }
+
+    /// The fractions of the length at parameters, which ascend.
+    pub fn fractions_of(&self, at: &[f64]) -> Vec<f64> {
+        let (mut reached, mut sum) = (0.0, 0.0);
+        let mut along = |to: f64| {
+            // Intervals between knots are longer than this.
+            let steps = (64.0 * (to - reached)).ceil().max(1.0);
+            let width = (to - reached) / steps;
+            for k in 0..steps as usize {
+                let from = reached + k as f64 * width;
+                let points = GAUSS_LEGENDRE_RULE.iter();
+                let speeds = points
+                    .map(|p| p.weight * self.centreline.at(from + p.at * width).first.length());
+                sum += width * speeds.sum::<f64>();
+            }
+            reached = to;
+            sum
+        };
+        let each: Vec<f64> = at.iter().map(|&t| along(t)).collect();
+        let whole = along(1.0);
+        each.into_iter().map(|one| one / whole).collect()
     }
 
     /// Whether the posture was taken to lie in a plane.

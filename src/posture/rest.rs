@@ -204,11 +204,58 @@ impl Posture {
     }
 }
 
+/// A place and the tangent of a curve.
+#[derive(Clone, Copy, Debug)]
+pub struct LinePoint {
+    /// The place.
+    pub position: DVec3,
+    /// The unit tangent.
+    pub tangent: DVec3,
+}
+
+/// The curve of a curvature that is linear between fractions of its length, by the series of W. Magnus (Commun. Pure
+/// Appl. Math. 7 (1954), 649) to fourth order and Simpson's rule.
+pub fn integrate_curvature(
+    sigma: &[f64],
+    curvature: &[DVec3],
+    length: f64,
+    origin: DVec3,
+    base: DQuat,
+) -> Vec<LinePoint> {
+    let (mut position, mut rotation) = (origin, base);
+    let mut found = vec![LinePoint {
+        position,
+        tangent: rotation * DVec3::X,
+    }];
+    for e in 0..sigma.len() - 1 {
+        let ds = (sigma[e + 1] - sigma[e]) * length;
+        let (from, to) = (curvature[e], curvature[e + 1]);
+        let turned = |part: f64| {
+            let end = from.lerp(to, part);
+            let h = part * ds;
+            let turn = 0.5 * h * (from + end) + h * h / 12.0 * from.cross(end);
+            rotation * DQuat::from_scaled_axis(turn)
+        };
+        let tangents = [0.0, 0.5, 1.0].map(|part| turned(part) * DVec3::X);
+        position += ds / 6.0 * (tangents[0] + 4.0 * tangents[1] + tangents[2]);
+        rotation = turned(1.0).normalize();
+        found.push(LinePoint {
+            position,
+            tangent: rotation * DVec3::X,
+        });
+    }
+    found
+}
+
 impl Stations {
-    /// The curvature at rest at a modulus as a continuous function that is linear between the ends of the parts: that
-    /// with the least integral of the squared difference, so that the angles of the curve are those of the posture to
-    /// fourth order.
+    /// The curvature at rest at a modulus as a continuous function that is linear between the ends of the parts.
     pub fn linear_rest_curvature(&self, young: f64) -> Vec<DVec3> {
+        self.project(&|station| station.rest_curvature(young))
+    }
+
+    /// A quantity as a continuous function that is linear between the ends of the parts: that with the least integral of
+    /// the squared difference, so that the angles of a curve with this curvature are right to fourth order.
+    pub fn project(&self, of: &dyn Fn(&Station) -> DVec3) -> Vec<DVec3> {
         let count = self.ends.len();
         let (mut diagonal, mut beside) = (vec![0.0; count], vec![0.0; count]);
         let mut right = vec![DVec3::ZERO; count];
@@ -219,7 +266,7 @@ impl Stations {
             beside[e] = width / 6.0;
             for (point, station) in GAUSS_LEGENDRE_RULE.iter().zip(&self.between[e * POINTS..]) {
                 let part = (station.sigma - self.ends[e].sigma) / width;
-                let value = width * point.weight * station.rest_curvature(young);
+                let value = width * point.weight * of(station);
                 right[e] += (1.0 - part) * value;
                 right[e + 1] += part * value;
             }
@@ -244,27 +291,9 @@ impl Stations {
     /// The centreline without loads at a modulus, at the ends of the parts: its curvature is the one at rest.
     pub fn unloaded(&self, young: f64, base: DQuat) -> Vec<DVec3> {
         let curvature = self.linear_rest_curvature(young);
-        let mut position = self.ends[0].position;
-        let mut rotation = base;
-        let mut found = vec![position];
-        for e in 0..self.ends.len() - 1 {
-            let ds = (self.ends[e + 1].sigma - self.ends[e].sigma) * self.length;
-            let (from, to) = (curvature[e], curvature[e + 1]);
-            // Magnus' series to fourth order, for a curvature that is linear.
-            let turn = |part: f64| {
-                let end = from.lerp(to, part);
-                let h = part * ds;
-                rotation * rotation_of(0.5 * h * (from + end) - h * h / 12.0 * end.cross(from))
-            };
-            let tangents = [0.0, 0.5, 1.0].map(|part| turn(part) * DVec3::X);
-            position += ds / 6.0 * (tangents[0] + 4.0 * tangents[1] + tangents[2]);
-            rotation = turn(1.0).normalize();
-            found.push(position);
-        }
-        found
+        let sigma: Vec<f64> = self.ends.iter().map(|station| station.sigma).collect();
+        let origin = self.ends[0].position;
+        let line = integrate_curvature(&sigma, &curvature, self.length, origin, base);
+        line.into_iter().map(|point| point.position).collect()
     }
-}
-
-fn rotation_of(vector: DVec3) -> DQuat {
-    DQuat::from_scaled_axis(vector)
 }

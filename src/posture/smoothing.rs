@@ -139,6 +139,11 @@ impl SplineCurve {
         }
     }
 
+    /// Displaces a coefficient.
+    pub fn shift(&mut self, j: usize, by: DVec3) {
+        self.coefficients[j] += by;
+    }
+
     /// The curve at `t`.
     pub fn at(&self, t: f64) -> CurvePoint {
         self.point(&local_basis(self.intervals, t))
@@ -152,6 +157,8 @@ pub struct SmoothedCurve {
     pub curve: SplineCurve,
     /// The parameters of the points.
     pub at: Vec<f64>,
+    /// The points.
+    pub points: Vec<DVec3>,
     /// Covariance of the coefficients of a coordinate across the curve, for a unit of which all coordinates have the
     /// same.
     pub covariance: DMatrix<f64>,
@@ -432,6 +439,7 @@ pub fn smooth_at(
     Some(SmoothedCurve {
         curve,
         at: at.to_vec(),
+        points: points.to_vec(),
         covariance: &spread * spread.transpose() * (length * length * variance),
         deviation: length * variance.sqrt(),
         is_deviation_given: sd.is_some(),

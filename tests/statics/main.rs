@@ -34,6 +34,7 @@ mod order;
 mod path;
 mod plates;
 mod point_moments;
+mod postures;
 mod published;
 mod reaction_bars;
 mod real_leaves;

@@ -74,6 +74,20 @@ impl ReportedResult for Unbending {
         } else {
             lines.push(("bound", "none: the posture is stable at any E".into()));
         }
+        lines.extend(self.young.map(|young| {
+            let error = 0.05 * (young.high.unwrap_or(2.0 * young.value) - young.low);
+            let digits = |value: f64| format_five_digits(round_to_error(value, error));
+            let interval = match young.high {
+                Some(high) => format!("{} to {}", digits(young.low), digits(high)),
+                None => format!("at least {}", digits(young.low)),
+            };
+            let value = modulus_text(self, young.value, error, units);
+            let turn = young.turn;
+            (
+                "modulus",
+                format!("E = {value} (95 %: {interval}), by postures that differ by {turn:.2} rad"),
+            )
+        }));
         lines.extend(label_first_line(
             "index",
             self.indices.iter().map(|PostureIndex { young, index }| {

@@ -6,9 +6,11 @@ use clap::{Args, ValueHint};
 use leafdyn::posture::leaf::ScenarioRod;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
-use leafdyn::study::{UnbendRemark, UnbendRequest, Unbending, read_postures};
+use leafdyn::study::{
+    NamedPosture, SecondPosture, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
+};
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// From the posture of a hanging leaf or stem, the least stiffness that it proves, and the leaf without its weight.
@@ -29,6 +31,41 @@ pub struct UnbendArguments {
     /// Young's modulus, or the range in which it lies: is the posture stable there?
     #[arg(long, value_name = "E|A..B")]
     young: Option<YoungRange>,
+
+    /// Points of the same leaf after it was turned about the direction of its base by ROLL degrees, 180 if left out: they tell the modulus itself
+    #[arg(long, value_name = "OTHER.csv[:ROLL]")]
+    second: Option<SecondShape>,
+}
+
+/// A second table of points, and the angle by which the leaf was turned.
+#[derive(Clone, Debug)]
+struct SecondShape {
+    file: PathBuf,
+    degrees: f64,
+}
+
+impl FromStr for SecondShape {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let angle = |text: &str| {
+            text.trim()
+                .parse()
+                .ok()
+                .filter(|angle: &f64| angle.is_finite())
+        };
+        let (file, degrees) = match text.rsplit_once(':').map(|(file, end)| (file, angle(end))) {
+            Some((file, Some(degrees))) => (file, degrees),
+            _ => (text, 180.0),
+        };
+        match file.is_empty() {
+            true => Err("must name a file"),
+            false => Ok(SecondShape {
+                file: file.into(),
+                degrees,
+            }),
+        }
+    }
 }
 
 /// A modulus, or a range.
@@ -58,7 +95,8 @@ impl FromStr for YoungRange {
 
 impl UnbendArguments {
     pub fn run(self) -> Result<ExitStatus, Refusal> {
-        let reads = [self.shape.clone()];
+        let second = self.second.iter().map(|second| second.file.clone());
+        let reads: Vec<PathBuf> = second.chain([self.shape.clone()]).collect();
         let traits = VerbTraits {
             input_files: &reads,
             ..VerbTraits::default()
@@ -68,20 +106,30 @@ impl UnbendArguments {
     }
 
     fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
-        let rod = ScenarioRod::new(&job.scenario)
-            .map_err(|error| format!("{}: {error}", job.scenario.name))?
-            .rod;
-        let file = self.shape.display().to_string();
-        let read = read_postures(&bytes(&self.shape)?, &file, None, &job.scenario, &rod)?;
-        let Some(posture) = read.into_iter().next() else {
-            return Err(format!("{file}: has no points").into());
+        let posture = self.read(job, &self.shape)?;
+        let second = match &self.second {
+            Some(second) => Some(SecondPosture {
+                points: self.read(job, &second.file)?.points,
+                roll: second.degrees.to_radians(),
+            }),
+            None => None,
         };
         let request = UnbendRequest {
             young: self.young.as_ref().map(|range| range.0.clone()),
+            second,
             limit: job.limit.clone(),
             ..UnbendRequest::new(job.scenario.clone(), posture.points)
         };
-        let mut found = study::unbend(&request).map_err(|error| format!("{file}: {error}"))?;
+        let mut found = study::unbend(&request).map_err(|error| match error {
+            UnbendError::Second(error) => {
+                let second = self
+                    .second
+                    .as_ref()
+                    .map_or(&self.shape, |second| &second.file);
+                format!("{}: {error}", second.display())
+            }
+            error => format!("{}: {error}", self.shape.display()),
+        })?;
         if let Some(taken) = posture.taken {
             found
                 .remarks
@@ -91,5 +139,16 @@ impl UnbendArguments {
         let stable = found.indices.iter().all(|it| it.index == 0);
         let success = found.critical_young.value > 0.0 && stable;
         job.write_and_deliver(&found, success)
+    }
+
+    /// The points of the only leaf of a table.
+    fn read(&self, job: &ScenarioJob, path: &Path) -> Result<NamedPosture, Refusal> {
+        let rod = ScenarioRod::new(&job.scenario)
+            .map_err(|error| format!("{}: {error}", job.scenario.name))?
+            .rod;
+        let file = path.display().to_string();
+        let read = read_postures(&bytes(path)?, &file, None, &job.scenario, &rod)?;
+        let first = read.into_iter().next();
+        first.ok_or_else(|| format!("{file}: has no points").into())
     }
 }

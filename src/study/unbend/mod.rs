@@ -10,6 +10,7 @@ use crate::posture::Posture;
 use crate::posture::leaf::{ScenarioRod, rest_scenario, with_level_base};
 use crate::posture::points::{PostureError, PosturePoints};
 use crate::posture::rest::Stations;
+use crate::posture::two_postures::{TwoPostures, compare};
 use crate::relax::{self, Equilibrium, NodeState, Options, Outcome, RelaxError, RodShape};
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
@@ -23,6 +24,15 @@ use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
+/// Another posture of the same leaf.
+#[derive(Clone, Debug)]
+pub struct SecondPosture {
+    /// Its points.
+    pub points: PosturePoints,
+    /// The angle by which the leaf was turned about the direction of its base, in radians.
+    pub roll: f64,
+}
+
 /// What is asked of a posture.
 #[derive(Clone, Debug)]
 pub struct UnbendRequest {
@@ -32,6 +42,8 @@ pub struct UnbendRequest {
     pub points: PosturePoints,
     /// The modulus, or the least and the largest one that are thought of.
     pub young: Option<RangeInclusive<f64>>,
+    /// The same leaf in another posture.
+    pub second: Option<SecondPosture>,
     /// Whether the scenario that rests in the posture is relaxed from there.
     pub check: bool,
     /// Whether slow loading is tried at several moduli.
@@ -46,6 +58,9 @@ pub enum UnbendError {
     /// The scenario or its points.
     #[error(transparent)]
     Posture(#[from] PostureError),
+    /// The points of the second posture.
+    #[error("second posture: {0}")]
+    Second(PostureError),
     /// The table of points.
     #[error(transparent)]
     Table(#[from] FitError),
@@ -80,6 +95,7 @@ impl UnbendRequest {
             scenario,
             points,
             young: None,
+            second: None,
             check: true,
             slow_loading: true,
             limit: Limit::default(),
@@ -108,7 +124,16 @@ pub fn unbend(request: &UnbendRequest) -> Result<Unbending, UnbendError> {
     let of = ScenarioRod::new(&request.scenario)?;
     let base = Some(of.base);
     let posture = Posture::from_points(of.rod.clone(), &request.points, base)?;
-    Ok(describe(request, of, posture, clock))
+    let compared = match &request.second {
+        Some(second) => {
+            let other = Posture::from_points(of.rod.clone(), &second.points, base)
+                .map_err(UnbendError::Second)?;
+            let compared = compare(&posture, &other, second.roll);
+            Some(compared.ok_or(UnbendError::Second(PostureError::Coincident))?)
+        }
+        None => None,
+    };
+    Ok(describe(request, of, posture, compared, clock))
 }
 
 /// Several postures, side by side; a posture that cannot be used is an error of its own.
@@ -120,6 +145,7 @@ fn describe(
     request: &UnbendRequest,
     of: ScenarioRod,
     posture: Posture,
+    compared: Option<TwoPostures>,
     clock: Instant,
 ) -> Unbending {
     let stations = posture.stations(request.check);
@@ -127,17 +153,21 @@ fn describe(
         0.0 => of.young / SHOWN_AT,
         least => least,
     };
-    let shown = match &request.young {
-        Some(range) => (range.start() * range.end()).sqrt(),
-        None => SHOWN_AT * least,
+    let by_two = compared.and_then(|compared| ModulusInterval::new(&compared));
+    let shown = match (&request.young, by_two) {
+        (Some(range), _) => (range.start() * range.end()).sqrt(),
+        (None, Some(young)) => young.value,
+        (None, None) => SHOWN_AT * least,
     };
     let scenario = &request.scenario;
     let rest = |young: f64| rest_scenario(scenario, &of, &posture, &stations, young);
-    let check = (request.check).then(|| check_rest(&rest(shown), &posture, &stations, shown));
+    let check = (request.check).then(|| check_rest(&rest(shown), &stations, shown));
     let slow_loading =
         (request.slow_loading).then(|| slow_loading(&rest, &stations, least, &request.limit));
     let mut found = Unbending::new(scenario, &of, posture, stations, request);
     found.shown_young = shown;
+    found.young = by_two;
+    found.compared = compared;
     found.rest_check = check;
     found.slow_loading = slow_loading;
     found.rest = Some(with_level_base(&rest_scenario(
@@ -162,8 +192,7 @@ impl Unbending {
 }
 
 /// The posture as a shape from which a relaxation begins.
-fn shape(posture: &Posture, stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
-    let _ = posture;
+fn shape(stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
     let node = |station: &crate::posture::rest::Station| NodeState {
         position: station.position,
         rotation: DQuat::from_mat3(&station.directors).normalize(),
@@ -182,8 +211,8 @@ fn shape(posture: &Posture, stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
 }
 
 /// Relaxes the scenario that rests in a posture from there.
-fn check_rest(rest: &Scenario, posture: &Posture, stations: &Stations, young: f64) -> RestCheck {
-    let (at, rods) = shape(posture, stations);
+fn check_rest(rest: &Scenario, stations: &Stations, young: f64) -> RestCheck {
+    let (at, rods) = shape(stations);
     let mut options = Options::default();
     options.method = relax::SemiImplicit {
         keep_unstable: true,

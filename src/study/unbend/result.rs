@@ -3,6 +3,7 @@
 use crate::numbers::format_two_digits;
 use crate::posture::leaf::{ModulusMeaning, ScenarioRod};
 use crate::posture::rest::Stations;
+use crate::posture::two_postures::TwoPostures;
 use crate::posture::{Governing, Posture};
 use crate::run::remarks;
 use crate::scenario::Scenario;
@@ -49,6 +50,27 @@ remarks! {
             /// Its index.
             index: usize,
         } = "unstable",
+        /// Postures that differ too little.
+        #[error(
+            "the leaf moves too little from one posture to the other to tell its modulus: it turns by {} rad, as noise \
+             would; 95 %: at least {}",
+            format_two_digits(*.turn), format_two_digits(*.least)
+        )]
+        MovesTooLittle {
+            /// The largest turn.
+            turn: f64,
+            /// The least modulus.
+            least: f64,
+        } = "moves-too-little",
+        /// Postures that no elastic leaf has.
+        #[error(
+            "the leaf moves against its weight from one posture to the other: turn its points around, or give the angle \
+             by which it was turned (FILE:DEGREES)"
+        )]
+        MovesAgainstWeight = "moves-against-weight",
+        /// A modulus by two postures below the bound of one.
+        #[error("the modulus by two postures is below the bound that one of them proves: they are not those of one leaf")]
+        BelowBound = "below-bound",
         /// A relaxation that does not confirm the posture.
         #[error("the scenario that should rest in the posture, relaxed from there, comes to rest elsewhere or not at all")]
         NotConfirmed = "not-confirmed",
@@ -77,6 +99,23 @@ pub struct ModulusInterval {
     pub high: Option<f64>,
     /// The largest angle by which the leaf turns from one posture to the other, besides the turn of its base.
     pub turn: f64,
+}
+
+/// Where the standard deviation of 1/E is more than this part of it, two postures tell no modulus.
+const LARGEST_DEVIATION: f64 = 0.5;
+
+impl ModulusInterval {
+    /// The modulus that two postures tell, if they do.
+    pub fn new(compared: &TwoPostures) -> Option<ModulusInterval> {
+        let [least, most] = compared.interval();
+        let c = compared.compliance;
+        (c > 0.0 && compared.deviation < LARGEST_DEVIATION * c).then_some(ModulusInterval {
+            value: 1.0 / c,
+            low: 1.0 / most,
+            high: (least > 0.0).then(|| 1.0 / least),
+            turn: compared.turn,
+        })
+    }
 }
 
 /// The index at a modulus.
@@ -142,6 +181,8 @@ pub struct Unbending {
     pub indices: Vec<PostureIndex>,
     /// The modulus by two postures.
     pub young: Option<ModulusInterval>,
+    /// How two postures compare.
+    pub compared: Option<TwoPostures>,
     /// The modulus at which the leaf without loads is shown.
     pub shown_young: f64,
     /// The scenario that rests in the posture at that modulus.
@@ -188,6 +229,7 @@ impl Unbending {
             },
             indices: indices.collect(),
             young: None,
+            compared: None,
             shown_young: 0.0,
             rest: None,
             rest_check: None,
@@ -214,6 +256,20 @@ impl Unbending {
         let unstable = self.indices.iter().filter(|it| it.index > 0);
         if let Some(PostureIndex { young, index }) = unstable.copied().next() {
             self.remarks.push(UnbendRemark::Unstable { young, index });
+        }
+        if let (Some(compared), None) = (self.compared, self.young) {
+            let [_, most] = compared.interval();
+            self.remarks.push(match most > 0.0 {
+                true => UnbendRemark::MovesTooLittle {
+                    turn: compared.turn,
+                    least: 1.0 / most,
+                },
+                false => UnbendRemark::MovesAgainstWeight,
+            });
+        }
+        let high = self.young.and_then(|young| young.high);
+        if high.is_some_and(|high| high < self.critical_young.low) {
+            self.remarks.push(UnbendRemark::BelowBound);
         }
         let confirmed = |check: RestCheck| {
             let near = check.distance.is_some_and(|off| off < CONFIRMED_DISTANCE);
