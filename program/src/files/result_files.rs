@@ -69,6 +69,7 @@ impl WrittenResult for Unbending {
     const FORMATS: &'static [FileFormat<Self>] = &[
         FileFormat::Table("rest.toml", report::write_rest_scenario),
         FileFormat::Table("rest.csv", report::write_rest_table),
+        FileFormat::Figure(["unbend.svg", "unbend.png"], figure::unbend),
     ];
 }
 

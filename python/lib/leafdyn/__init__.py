@@ -22,6 +22,7 @@ from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._load import load
 from ._motion import Frame, Motion
+from ._posture import Bound, Posture, unbend, unbend_many
 from ._predict import Prediction
 from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
@@ -41,6 +42,7 @@ map = stability_map
 all_shapes = equilibria
 
 __all__ = [
+    "Bound",
     "Boundary",
     "Branch",
     "Candidate",
@@ -60,6 +62,7 @@ __all__ = [
     "Page",
     "Parameter",
     "Piece",
+    "Posture",
     "Prediction",
     "Result",
     "Scenario",
@@ -92,4 +95,6 @@ __all__ = [
     "sweep",
     "threads",
     "trace",
+    "unbend",
+    "unbend_many",
 ]
