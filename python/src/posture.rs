@@ -4,7 +4,6 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use leafdyn::posture::leaf::ScenarioRod;
 use leafdyn::posture::points::PosturePoints;
 use leafdyn::scenario::{self, Scenario as Checked};
 use leafdyn::study::{
@@ -43,8 +42,7 @@ impl Points {
                 (path.display().to_string(), bytes)
             }
         };
-        let rod = ScenarioRod::new(scenario).map_err(value_error)?.rod;
-        let read = read_postures(&bytes, &name, None, scenario, &rod).map_err(value_error)?;
+        let read = read_postures(&bytes, &name, None, scenario).map_err(value_error)?;
         let first = read.into_iter().next();
         let first = first.ok_or_else(|| PyValueError::new_err(format!("{name}: has no points")))?;
         Ok(ReadPoints {

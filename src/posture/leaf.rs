@@ -166,6 +166,7 @@ pub fn rest_scenario(
     young: f64,
 ) -> Scenario {
     let mut rest = scenario.clone();
+    rest.name = format!("{}-rest", scenario.name);
     let at: Vec<f64> = stations.ends.iter().map(|station| station.sigma).collect();
     let mut places: Vec<RodPlace> = Vec::new();
     let kinks = of.rod.kinks();

@@ -74,6 +74,34 @@ pub enum PostureError {
         /// The point, counted from 1.
         point: usize,
     },
+    /// A shape whose length is not that of the leaf.
+    #[error(
+        "the shape is {length:.4} long and the leaf {given:.4}: give points in the unit of the scenario, from its base to \
+         its tip"
+    )]
+    OtherLength {
+        /// Of the shape.
+        length: f64,
+        /// Of the leaf.
+        given: f64,
+    },
+    /// A shape that begins elsewhere than the leaf.
+    #[error(
+        "the shape begins {off:.2} of its length from the base of the leaf: move its points, or leaf.base, there"
+    )]
+    OffBase {
+        /// The distance, in lengths.
+        off: f64,
+    },
+    /// A shape without an equilibrium near it.
+    #[error(
+        "no equilibrium is near the shape: from there the leaf comes to rest {away:.2} of its length away; relax it \
+         without a start, or look for all equilibria"
+    )]
+    NoEquilibriumNear {
+        /// The distance, in lengths.
+        away: f64,
+    },
     /// The scenario has something that the forces of a posture do not follow from.
     #[error("{key}: {why}")]
     Scenario {

@@ -56,9 +56,12 @@ impl TwoPostures {
 /// A prediction of the second posture.
 struct Prediction<'p> {
     sigma: &'p [f64],
-    /// Curvature of the first posture, and A^-1 (m_a - m_b), per fraction of the length, at the ends of the parts.
+    /// Curvature of the first posture per fraction of the length, at the ends of the parts.
     curvature: Vec<DVec3>,
-    compliance: Vec<DVec3>,
+    /// A^-1 m of both postures, likewise.
+    compliance: [Vec<DVec3>; 2],
+    /// Whether the directors of the second posture are carried on without a twist, in place of the material's.
+    is_transported: bool,
     /// The length, the unit of displacements.
     length: f64,
     base: DQuat,
@@ -70,11 +73,34 @@ struct Prediction<'p> {
 }
 
 impl Prediction<'_> {
+    /// The curvature of the second posture at a compliance c. In the second posture the material is twisted against
+    /// directors that are carried on without a twist: the angle between them is the integral of its twist.
+    fn curvature_of_second(&self, c: f64) -> Vec<DVec3> {
+        let (mut angle, mut twist_before) = (0.0, 0.0);
+        let mut curvature = Vec::with_capacity(self.sigma.len());
+        for k in 0..self.sigma.len() {
+            let [first, second] = self.compliance.each_ref().map(|of| of[k]);
+            // A torque is about the tangent, whatever the other directors are.
+            let twist = self.curvature[k].x - c * (first.x - second.x);
+            if self.is_transported && k > 0 {
+                let width = self.sigma[k] - self.sigma[k - 1];
+                angle += 0.5 * width * (twist_before + twist);
+            }
+            twist_before = twist;
+            let (sin, cos) = angle.sin_cos();
+            let turned = DVec3::new(
+                second.x,
+                cos * second.y + sin * second.z,
+                cos * second.z - sin * second.y,
+            );
+            curvature.push(self.curvature[k] - c * (first - turned));
+        }
+        curvature
+    }
+
     /// The places of the points.
     fn places(&self, unknowns: &[f64]) -> Vec<DVec3> {
-        let c = unknowns[0] * self.unit;
-        let curvature = self.curvature.iter().zip(&self.compliance);
-        let curvature: Vec<DVec3> = curvature.map(|(u, p)| *u - c * *p).collect();
+        let curvature = self.curvature_of_second(unknowns[0] * self.unit);
         let turn = DQuat::from_scaled_axis(DVec3::from_slice(&unknowns[1..4]));
         let origin = self.origin + self.length * DVec3::from_slice(&unknowns[4..7]);
         let line = integrate_curvature(
@@ -152,12 +178,9 @@ pub fn compare(a: &Posture, b: &Posture, roll: f64) -> Option<TwoPostures> {
         curvature: (stations.project(&|station| station.curvature).iter())
             .map(|u| stations.length * *u)
             .collect(),
-        compliance: (stations
-            .project(&|station| station.compliance)
-            .iter()
-            .zip(&moments_b))
-        .map(|(pa, pb)| length * (*pa - *pb))
-        .collect(),
+        compliance: [&stations.project(&|station| station.compliance), &moments_b]
+            .map(|of| of.iter().map(|p| length * *p).collect()),
+        is_transported: !has_measured_directors(b),
         length,
         base: b.base.rotation(),
         origin: b.centreline.at(0.0).position,

@@ -72,9 +72,9 @@ pub use crate::study::trace::{
     TraceRequest, trace, trace_through,
 };
 pub use crate::study::unbend::{
-    CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, RestCheck, SecondPosture,
-    SlowLoading, SmoothingReport, UnbendError, UnbendRemark, UnbendRequest, Unbending,
-    read_postures, unbend, unbend_many,
+    CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, PostureOutcome, PostureRow,
+    Postures, RestCheck, SecondPosture, SlowLoading, SmoothingReport, UnbendError, UnbendRemark,
+    UnbendRequest, Unbending, read_postures, relax_from_points, unbend, unbend_groups, unbend_many,
 };
 pub use crate::study::vary::{
     BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,

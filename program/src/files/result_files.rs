@@ -9,7 +9,7 @@ use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Radii, Scenario};
 use leafdyn::simulate::Record;
 use leafdyn::study::{
-    Chart, Check, Equilibria, Fit, Map, ScalingStudy, StabilityBoundary, Trace, Unbending,
+    Chart, Check, Equilibria, Fit, Map, Postures, ScalingStudy, StabilityBoundary, Trace, Unbending,
 };
 use leafdyn::words;
 use rayon::prelude::*;
@@ -71,6 +71,15 @@ impl WrittenResult for Unbending {
         FileFormat::Table("rest.csv", report::write_rest_table),
         FileFormat::Figure(["unbend.svg", "unbend.png"], figure::unbend),
     ];
+}
+
+/// Postures of many leaves.
+impl WrittenResult for Postures {
+    const JSON: Option<&'static str> = Some("postures.json");
+    const FORMATS: &'static [FileFormat<Self>] = &[FileFormat::Table(
+        "postures.csv",
+        report::write_postures_table,
+    )];
 }
 
 impl WrittenResult for Map {

@@ -28,4 +28,4 @@ pub use crate::report::trace::{
     error_location_words, index_change_text, is_codimension_two, passes_crossings, slope_unit,
     write_boundary_table, write_trace_table,
 };
-pub use crate::report::unbend::{write_rest_scenario, write_rest_table};
+pub use crate::report::unbend::{write_postures_table, write_rest_scenario, write_rest_table};

@@ -4,11 +4,13 @@ use crate::report::document::ReportedResult;
 use crate::report::numbers::{
     count_in_words, duration_text, format_five_digits, number_in_key_unit, round_to_error,
 };
-use crate::report::table::{LabelledLines, csv_writer_without_header, label_first_line};
+use crate::report::table::{LabelledLines, csv_writer_without_header, label_first_line, text_cell};
 use leafdyn::posture::Governing;
 use leafdyn::posture::leaf::ModulusMeaning;
 use leafdyn::scenario::Units;
-use leafdyn::study::{CriticalYoung, PostureIndex, SlowLoading, Unbending};
+use leafdyn::study::{
+    CriticalYoung, PostureIndex, PostureOutcome, PostureRow, Postures, SlowLoading, Unbending,
+};
 use std::io;
 use std::io::Write;
 
@@ -191,4 +193,75 @@ pub fn write_rest_scenario(found: &Unbending, out: &mut dyn Write) -> io::Result
         }
         None => Ok(()),
     }
+}
+
+/// Quantiles of the bounds in the report of many postures.
+const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
+
+impl ReportedResult for Postures {
+    fn heading(&self) -> String {
+        let leaves = count_in_words(self.postures.len(), "leaf", "leaves");
+        format!("{}: postures of {leaves}", self.scenario)
+    }
+
+    fn report_lines(&self, _units: &Units) -> LabelledLines {
+        let count = |outcome: PostureOutcome| {
+            let rows = self.postures.iter();
+            rows.filter(|row| row.outcome == outcome).count()
+        };
+        let [bound, none, refused] = [
+            PostureOutcome::Bound,
+            PostureOutcome::NoBound,
+            PostureOutcome::Refused,
+        ]
+        .map(count);
+        let mut lines = vec![(
+            "found",
+            format!("{bound} with a bound, {none} stable at any E, {refused} refused"),
+        )];
+        let of = |row: &PostureRow| row.critical_young.filter(|young| *young > 0.0);
+        let mut all: Vec<f64> = self.postures.iter().filter_map(of).collect();
+        all.sort_by(f64::total_cmp);
+        if let Some(last) = all.len().checked_sub(1) {
+            let quantiles = QUANTILES.map(|part| {
+                let young = all[(part * last as f64).round() as usize];
+                format_five_digits(round_to_error(young, 5e-3 * young))
+            });
+            let [low, median, high] = quantiles;
+            lines.push((
+                "bounds",
+                format!("E is at least {low}, {median} and {high} at 5, 50 and 95 %"),
+            ));
+        }
+        let why = self
+            .postures
+            .iter()
+            .find(|row| row.outcome == PostureOutcome::Refused);
+        let why = why.map(|row| {
+            format!(
+                "{}: {}",
+                row.leaf,
+                row.remark.as_deref().unwrap_or_default()
+            )
+        });
+        lines.extend(label_first_line("refused", why));
+        lines
+    }
+
+    fn work_line(&self) -> Option<String> {
+        Some(duration_text(self.wall_seconds))
+    }
+}
+
+/// `postures.csv`: a row for each leaf.
+pub fn write_postures_table(found: &Postures, out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::Writer::from_writer(out);
+    for row in &found.postures {
+        table.serialize(PostureRow {
+            leaf: text_cell(&row.leaf).into(),
+            remark: row.remark.as_deref().map(|remark| text_cell(remark).into()),
+            ..row.clone()
+        })?;
+    }
+    table.flush()
 }

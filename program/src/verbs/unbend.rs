@@ -7,7 +7,8 @@ use leafdyn::posture::leaf::ScenarioRod;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
-    NamedPosture, SecondPosture, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
+    NamedPosture, PostureOutcome, PostureRow, Postures, SecondPosture, UnbendError, UnbendRemark,
+    UnbendRequest, Unbending, read_postures,
 };
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -35,6 +36,10 @@ pub struct UnbendArguments {
     /// Points of the same leaf after it was turned about the direction of its base by ROLL degrees, 180 if left out: they tell the modulus itself
     #[arg(long, value_name = "OTHER.csv[:ROLL]")]
     second: Option<SecondShape>,
+
+    /// The points are those of many leaves: the column by whose cells they are told apart; one row a leaf, nothing is relaxed
+    #[arg(long, value_name = "COLUMN", conflicts_with = "second")]
+    group: Option<String>,
 }
 
 /// A second table of points, and the angle by which the leaf was turned.
@@ -101,8 +106,27 @@ impl UnbendArguments {
             input_files: &reads,
             ..VerbTraits::default()
         };
-        self.request
-            .run_each_scenario::<Unbending>(traits, |job| self.run_scenario(job))
+        match &self.group {
+            Some(column) => (self.request)
+                .run_each_scenario::<Postures>(traits, |job| self.run_groups(job, column)),
+            None => {
+                (self.request).run_each_scenario::<Unbending>(traits, |job| self.run_scenario(job))
+            }
+        }
+    }
+
+    /// Many leaves, a row each.
+    fn run_groups(&self, job: &ScenarioJob, column: &str) -> Result<DeliveredResult, Refusal> {
+        // What no leaf of this scenario can tell is refused once.
+        ScenarioRod::new(&job.scenario)
+            .map_err(|error| format!("{}: {error}", job.scenario.name))?;
+        let file = self.shape.display().to_string();
+        let leaves = read_postures(&bytes(&self.shape)?, &file, Some(column), &job.scenario)?;
+        let young = self.young.as_ref().map(|range| range.0.clone());
+        let found = study::unbend_groups(&job.scenario, leaves, young);
+        let bound = |row: &PostureRow| row.outcome == PostureOutcome::Bound;
+        let success = found.postures.iter().any(bound);
+        job.write_and_deliver(&found, success)
     }
 
     fn run_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
@@ -143,11 +167,8 @@ impl UnbendArguments {
 
     /// The points of the only leaf of a table.
     fn read(&self, job: &ScenarioJob, path: &Path) -> Result<NamedPosture, Refusal> {
-        let rod = ScenarioRod::new(&job.scenario)
-            .map_err(|error| format!("{}: {error}", job.scenario.name))?
-            .rod;
         let file = path.display().to_string();
-        let read = read_postures(&bytes(path)?, &file, None, &job.scenario, &rod)?;
+        let read = read_postures(&bytes(path)?, &file, None, &job.scenario)?;
         let first = read.into_iter().next();
         first.ok_or_else(|| format!("{file}: has no points").into())
     }

@@ -3,7 +3,9 @@
 //! [`unbend`] takes the points of a leaf at rest and its scenario up to Young's modulus. The mathematics is in
 //! [`crate::posture`]; here are the tables of points, the comparison with relaxations, and the result.
 
+mod many;
 mod result;
+mod start;
 mod table;
 
 use crate::posture::Posture;
@@ -15,10 +17,12 @@ use crate::relax::{self, Equilibrium, NodeState, Options, Outcome, RelaxError, R
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
 use crate::study::fit::columns::FitError;
+pub use crate::study::unbend::many::{PostureOutcome, PostureRow, Postures, unbend_groups};
 pub use crate::study::unbend::result::{
     CriticalYoung, ModulusInterval, PostureIndex, RestCheck, SlowLoading, SmoothingReport,
     UnbendRemark, Unbending,
 };
+pub use crate::study::unbend::start::relax_from_points;
 pub use crate::study::unbend::table::{NamedPosture, read_postures};
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
@@ -155,7 +159,11 @@ fn describe(
     };
     let by_two = compared.and_then(|compared| ModulusInterval::new(&compared));
     let shown = match (&request.young, by_two) {
-        (Some(range), _) => (range.start() * range.end()).sqrt(),
+        (Some(range), _) => {
+            // Of a range the part in which the posture is stable.
+            let (low, high) = (*range.start(), *range.end());
+            (low.max(least).min(high) * high).sqrt()
+        }
         (None, Some(young)) => young.value,
         (None, None) => SHOWN_AT * least,
     };

@@ -1,7 +1,6 @@
 //! Tables of points on postures: coordinates from base to tip, or pixels of a photograph.
 
 use crate::posture::points::PosturePoints;
-use crate::posture::rod::HangingRod;
 use crate::scenario::Scenario;
 use crate::study::fit::columns::{
     DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, MeasuredColumn,
@@ -54,7 +53,6 @@ pub fn read_postures(
     file: &str,
     group: Option<&str>,
     scenario: &Scenario,
-    rod: &HangingRod,
 ) -> Result<Vec<NamedPosture>, FitError> {
     let mut reading = DataFileOptions::default();
     if let Some(group) = group {
@@ -80,7 +78,7 @@ pub fn read_postures(
         })?),
         None => None,
     };
-    let coordinates = coordinates(&table, scenario, rod)?;
+    let coordinates = coordinates(&table, scenario)?;
     let deviation = table.column_index(DEVIATION);
     let normals = NORMALS.map(|name| table.column_index(name));
     let has_normals = normals.iter().any(Option::is_some);
@@ -166,11 +164,7 @@ pub fn read_postures(
 }
 
 /// Which columns are coordinates, and of what.
-fn coordinates(
-    table: &DataTable,
-    scenario: &Scenario,
-    rod: &HangingRod,
-) -> Result<Coordinates, FitError> {
+fn coordinates(table: &DataTable, scenario: &Scenario) -> Result<Coordinates, FitError> {
     let refuse = |why: &str| Err(line_error(table.file, table.header_line, why));
     let axes = COORDINATES.map(|name| table.column_index(name));
     let pixels = PIXELS.map(|name| table.column_index(name));
@@ -184,7 +178,7 @@ fn coordinates(
         ([Some(x), None, Some(z)], _) => Ok(Coordinates::Plane([x, z], [DVec3::X, DVec3::Z], None)),
         ([None, Some(y), Some(z)], _) => Ok(Coordinates::Plane([y, z], [DVec3::Y, DVec3::Z], None)),
         ([Some(x), Some(y), None], _) => {
-            let pull = rod.total_load(scenario.rods[0].length);
+            let pull = scenario.total_load() + DVec3::from_array(scenario.tip_force);
             let upright = pull.z.abs() > pull.x.abs().max(pull.y.abs());
             Ok(match upright {
                 true => Coordinates::Plane(

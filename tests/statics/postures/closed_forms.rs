@@ -3,7 +3,7 @@
 
 use super::*;
 use leafdyn::posture::Governing;
-use leafdyn_testing::PI;
+use leafdyn_testing::{PI, Profile};
 
 const ROUND: [&str; 3] = ["0.8", "1.0", "1.0"];
 const WEIGHT: &str = "gravity = [0.0, 0.0, -1.0]";
@@ -106,14 +106,20 @@ fn first_zero(order: f64) -> f64 {
 #[test]
 fn tapered_columns() {
     for (p, r) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let taper = "{ at = [0.0, 1.0], value = [1.0, 1e-11] }";
-        let bending = if p == 1 { taper } else { "1.0" };
         let loads = match r {
             1 => "distributed = { at = [0.0, 1.0], value = [[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]] }",
             _ => WEIGHT,
         };
-        let column = scenario(["1.0", bending, bending], loads);
-        let column = posture(&column, straight(DVec3::Z), Some(DVec3::Y));
+        let mut rod = hanging(&scenario(ROUND, loads));
+        if p == 1 {
+            // A scenario's stiffness may not become as small.
+            let taper = Profile::Linear {
+                at: vec![0.0, 1.0],
+                value: vec![1.0, 1e-12],
+            };
+            rod.stiffness = [taper.clone(), taper.clone(), taper];
+        }
+        let column = Posture::from_curve(rod, straight(DVec3::Z), Some(DVec3::Y), 8).unwrap();
         let [p, r] = [p, r].map(f64::from);
         let half = 0.5 * (r + 3.0 - p);
         let k = half * first_zero((p - 1.0) / (2.0 * half));
