@@ -123,7 +123,7 @@ impl FrameRule {
         Some(Directors::Measured(each.collect()))
     }
 
-    /// The directors at parameters, given the tangents there, from those at the base; and the twist u1 per parameter.
+    /// The directors at parameters, given the points and the tangents there, from those at the base.
     pub fn along(
         &self,
         base: DQuat,

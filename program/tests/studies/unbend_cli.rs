@@ -56,7 +56,7 @@ fn the_scenario_that_rests_there_is_stable_at_larger_moduli_alone() {
     assert!(told["rest_check"]["distance"].as_f64().unwrap() < 1e-4);
     assert_eq!(told["rest_check"]["index"], 0);
     assert!(told["reached_from"].as_f64().unwrap() > young);
-    for (factor, index, status) in [(1.02, 0, 0), (0.98, 1, 1)] {
+    for (factor, index, status) in [(1.1, 0, 0), (0.9, 1, 1)] {
         let run = format!(
             "unbend leaf.toml --shape points.csv --json --young {}",
             factor * young
@@ -134,7 +134,9 @@ fn points_are_read_as_they_are_written() {
             "unbend leaf.toml --shape {name} --json --write none"
         ));
         let found = run.ends(0).json();
-        assert!((least(&found) / least(&told) - 1.0).abs() < 1e-6, "{name}");
+        // The weight of the penalty is found to some digits.
+        let off = least(&found) / least(&told) - 1.0;
+        assert!(off.abs() < 1e-4, "{name}: {off}");
         found
     };
     same(
@@ -226,7 +228,7 @@ fn what_cannot_be_used_is_refused_with_what_to_do() {
     place.write("words.csv", "a,b\n0,0\n");
     refused(
         "leaf.toml --shape words.csv",
-        &["no coordinates", "x, y, z"],
+        &["none of the columns", "a, b", "x, y, z"],
     );
     refused(
         "leaf.toml --shape points.csv --young 0",
@@ -277,9 +279,9 @@ fn a_leaf_that_is_turned_over_tells_its_modulus() {
         assert!(told["young"]["low"].as_f64().unwrap() < young);
         assert!(told["young"]["turn"].as_f64().unwrap() > 0.2);
     }
-    // The same posture twice is no leaf that moves.
-    let told =
-        place.run("unbend leaf.toml --shape as-hung.csv --second as-hung.csv --json --write none");
+    // The same posture twice, not turned, is no leaf that moves.
+    let told = place
+        .run("unbend leaf.toml --shape as-hung.csv --second as-hung.csv:0 --json --write none");
     let told = told.ends(0).json();
     assert!(told["young"].is_null(), "{told}");
 }
@@ -293,7 +295,7 @@ fn a_leaf_begins_from_a_shape() {
         .ok()
         .json();
     let young = least(&told);
-    for (factor, index) in [(1.05, 0), (0.95, 1)] {
+    for (factor, index) in [(1.1, 0), (0.9, 1)] {
         let run = format!(
             "unbend leaf.toml --shape points.csv --young {} --out out",
             factor * young

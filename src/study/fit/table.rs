@@ -342,6 +342,13 @@ impl<'t> DataTable<'t> {
                 return Err(line_error(self.file, self.header_line, why));
             }
         }
+        if columns.leaves_out_others && self.header.is_empty() {
+            let why = format!(
+                "has none of the columns that mean something here: its columns are {}; name coordinates x, y, z",
+                self.names.join(", ")
+            );
+            return Err(line_error(self.file, self.header_line, why));
+        }
         let columns = if unused.len() == 1 {
             "column"
         } else {

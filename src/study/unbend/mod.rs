@@ -13,7 +13,9 @@ use crate::posture::leaf::{ScenarioRod, rest_scenario, with_level_base};
 use crate::posture::points::{PostureError, PosturePoints};
 use crate::posture::rest::Stations;
 use crate::posture::two_postures::{TwoPostures, compare};
-use crate::relax::{self, Equilibrium, NodeState, Options, Outcome, RelaxError, RodShape};
+use crate::relax::{
+    self, Equilibrium, EquilibriumDoubt, NodeState, Options, Outcome, RelaxError, RodShape,
+};
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
 use crate::study::fit::columns::FitError;
@@ -229,7 +231,11 @@ fn check_rest(rest: &Scenario, stations: &Stations, young: f64) -> RestCheck {
     .into();
     options.every_node = true;
     let leaf = relax::relax_from(rest, (&at, &rods), &options, &mut |_| {});
-    let leaf = leaf.ok().filter(|leaf| leaf.outcome.is_at_rest());
+    // Where the matrix is nearly singular the leaf may have left the posture: that confirms nothing.
+    let stayed = |leaf: &Equilibrium| {
+        leaf.outcome.is_at_rest() && !leaf.doubts.contains(&EquilibriumDoubt::RelaxedAnew)
+    };
+    let leaf = leaf.ok().filter(stayed);
     RestCheck {
         young,
         distance: leaf.as_ref().and_then(|leaf| distance(leaf, stations)),

@@ -72,7 +72,7 @@ remarks! {
         #[error("the modulus by two postures is below the bound that one of them proves: they are not those of one leaf")]
         BelowBound = "below-bound",
         /// A relaxation that does not confirm the posture.
-        #[error("the scenario that should rest in the posture, relaxed from there, comes to rest elsewhere or not at all")]
+        #[error("the scenario that should rest in the posture, relaxed from there, does not come to rest there: near its least modulus that is not to be expected; else take the bound with care")]
         NotConfirmed = "not-confirmed",
     }
 }
