@@ -76,4 +76,4 @@ def test_what_is_refused() -> None:
     with pytest.raises(FileNotFoundError):
         leafdyn.unbend(LEAF, "none.csv")
     with pytest.warns(leafdyn.LeafWarning, match="unstable"):
-        leafdyn.unbend(LEAF, POINTS, young=1e3, slow_loading=False)
+        leafdyn.unbend(LEAF, POINTS, young=1.2e4, slow_loading=False)

@@ -18,6 +18,9 @@ const NEARLY_IN_PLANE: f64 = 0.02;
 /// A unit vector with a component below this is level, or upright.
 const LEVEL: f64 = 1e-6;
 
+/// A unit normal whose part across the curve is no longer than this is along it.
+const LEAST_ACROSS: f64 = 0.1;
+
 /// Whether a plane with this normal is upright.
 pub fn vertical_plane(normal: DVec3) -> bool {
     normal.z.abs() < LEVEL
@@ -101,7 +104,7 @@ impl FrameRule {
             let tangent = smoothed.curve.at(t).first.normalize_or_zero();
             let normal = normal.normalize_or_zero();
             let own = normal - normal.dot(tangent) * tangent;
-            if !(own.length() > 0.1) {
+            if own.length().is_nan() || own.length() <= LEAST_ACROSS {
                 return Err(PostureError::NormalAlong { point: k + 1 });
             }
             across.push(own.normalize());

@@ -49,7 +49,7 @@ fn variance_of(
     let mut changed = first.clone();
     let mut variance = 0.0;
     for axis in axes {
-        let gradient = DVector::from_fn(smoothed.curve.len(), |j, _| {
+        let gradient = DVector::from_fn(smoothed.curve.count(), |j, _| {
             let shift = |changed: &mut Vec<DVec3>, by: f64| {
                 for (k, basis) in rows.iter().enumerate() {
                     let local = j.wrapping_sub(basis.first);

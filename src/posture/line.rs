@@ -273,7 +273,7 @@ impl Elements {
     }
 
     /// Number of Gauss points.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.at.len()
     }
 

@@ -135,7 +135,7 @@ impl Posture {
         let Centreline::Smoothed(smoothed) = &self.centreline else {
             return;
         };
-        let size = smoothed.curve.len();
+        let size = smoothed.curve.count();
         let rows: Vec<_> = at
             .iter()
             .map(|&t| local_basis(smoothed.curve.intervals(), t))

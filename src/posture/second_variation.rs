@@ -64,7 +64,7 @@ impl<'a> SecondVariation<'a> {
         directors: &'a Directors,
         about: &[usize],
     ) -> SecondVariation<'a> {
-        let (count, per) = (elements.len(), about.len());
+        let (count, per) = (elements.count(), about.len());
         let size = count * per;
         let ds = |k: usize| elements.weight(k) * line.speed[k];
         // Columns: omega' at a Gauss point for a unit of an unknown.
@@ -149,7 +149,7 @@ impl<'a> SecondVariation<'a> {
             }
             vector /= norm;
         }
-        let (count, per) = (self.elements.len(), self.about.len());
+        let (count, per) = (self.elements.count(), self.about.len());
         let derivative: Vec<DVec3> = (0..count)
             .map(|k| {
                 let frame = self.directors.at(k, self.line.tangent[k]);
@@ -192,7 +192,7 @@ impl CriticalMode {
             bending: 0.0,
             loads: 0.0,
         };
-        for k in 0..elements.len() {
+        for k in 0..elements.count() {
             let (omega, rate) = (self.rotation[k], self.rate[k]);
             let (n, t, m) = (line.force[k], line.tangent[k], line.moment[k]);
             let weight = elements.weight(k);
@@ -231,6 +231,6 @@ impl CriticalMode {
             let [a1, a2, a3] = elements.stiffness[k];
             (a1 * own.x * own.x + a2 * own.y * own.y + a3 * own.z * own.z) / line.speed[k]
         };
-        (0..elements.len()).map(density).collect()
+        (0..elements.count()).map(density).collect()
     }
 }

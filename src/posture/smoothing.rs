@@ -113,7 +113,7 @@ pub fn local_basis(intervals: usize, t: f64) -> LocalBasis {
 
 impl SplineCurve {
     /// Number of splines.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.coefficients.len()
     }
 

@@ -279,7 +279,7 @@ fn variance_by_first(a: &Posture, number: &dyn Fn(&Posture) -> f64) -> f64 {
     let step = 1e-5 * a.length();
     let mut variance = 0.0;
     for axis in a.noisy_axes() {
-        let gradient = DVector::from_fn(smoothed.curve.len(), |j, _| {
+        let gradient = DVector::from_fn(smoothed.curve.count(), |j, _| {
             let mut changed = smoothed.clone();
             changed.curve.shift(j, step * axis);
             let changed = Posture {

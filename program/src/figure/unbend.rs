@@ -355,15 +355,11 @@ fn draw_ladder(page: &mut Drawing, found: &Unbending, units: &Units, cell: PageR
         steps.push((from, found.index(from) as f64));
     }
     axes.draw_curve(page, &steps, Stroke::new(BLUE, 2.0));
-    if let Some(young) = found.reached_from() {
-        if let Some(at) = axes.page_position((young, 0.0)) {
-            let top = at.with_y(cell.corner.y);
-            page.draw_line(
-                top,
-                top.with_y(cell.opposite_corner().y),
-                Stroke::new(FRAME_COLOR, 1.0).with_dashes(true),
-            );
-        }
+    let reached = found.reached_from();
+    if let Some(at) = reached.and_then(|young| axes.page_position((young, 0.0))) {
+        let (top, bottom) = (cell.corner.y, cell.opposite_corner().y);
+        let stroke = Stroke::new(FRAME_COLOR, 1.0).with_dashes(true);
+        page.draw_line(at.with_y(top), at.with_y(bottom), stroke);
     }
     let indices = found.indices.iter().map(|it| (it.young, it.index as f64));
     axes.draw_markers(page, indices, Marker::Diamond, VERMILION);

@@ -13,8 +13,8 @@ fn example(name: &str) -> String {
 /// A place with the example and its points.
 fn place() -> Workplace {
     let place = Workplace::new();
-    place.write("leaf.toml", &example("posture.toml"));
-    place.write("points.csv", &example("posture.csv"));
+    place.write("leaf.toml", example("posture.toml"));
+    place.write("points.csv", example("posture.csv"));
     place
 }
 
@@ -170,7 +170,7 @@ fn points_are_read_as_they_are_written() {
     // Standard deviations that are given are believed.
     place.write(
         "sd.csv",
-        &rewritten("x,z,sd", |_, x, z| format!("{x},{z},0.2")),
+        rewritten("x,z,sd", |_, x, z| format!("{x},{z},0.2")),
     );
     let found = place
         .run("unbend leaf.toml --shape sd.csv --json --write none")
@@ -206,12 +206,12 @@ fn what_cannot_be_used_is_refused_with_what_to_do() {
     );
     place.write(
         "pixels.csv",
-        &rewritten("pixel_x,pixel_y", |_, x, z| format!("{x},{z}")),
+        rewritten("pixel_x,pixel_y", |_, x, z| format!("{x},{z}")),
     );
     refused("leaf.toml --shape pixels.csv", &["[photo]", "give x, y, z"]);
     place.write(
         "hole.csv",
-        &rewritten("x,z", |k, x, z| {
+        rewritten("x,z", |k, x, z| {
             if k == 3 {
                 format!("{x},")
             } else {
@@ -265,10 +265,10 @@ fn a_leaf_that_is_turned_over_tells_its_modulus() {
             .map(|node| format!("{},{}", node.position.x, node.position.z));
         format!("x,z\n{}\n", rows.collect::<Vec<_>>().join("\n"))
     };
-    place.write("as-hung.csv", &points(&rest));
+    place.write("as-hung.csv", points(&rest));
     let mut over = rest.clone();
     over.rods[0].roll = std::f64::consts::PI;
-    place.write("over.csv", &points(&over));
+    place.write("over.csv", points(&over));
     for angle in ["", ":180", ":-180"] {
         let run = format!(
             "unbend leaf.toml --shape as-hung.csv --second over.csv{angle} --json --write none"
@@ -329,16 +329,16 @@ fn a_leaf_begins_from_a_shape() {
     let upright: Vec<String> = (0..20)
         .map(|k| format!("0,{}", 24.0 * f64::from(k) / 19.0))
         .collect();
-    place.write("upright.csv", &format!("x,z\n{}\n", upright.join("\n")));
+    place.write("upright.csv", format!("x,z\n{}\n", upright.join("\n")));
     refused("leaf.toml --start upright.csv", "no equilibrium is near");
     place.write(
         "short.csv",
-        &rewritten("x,z", |_, x, z| format!("{},{}", 0.1 * x, 0.1 * z)),
+        rewritten("x,z", |_, x, z| format!("{},{}", 0.1 * x, 0.1 * z)),
     );
     refused("leaf.toml --start short.csv", "unit of the scenario");
     place.write(
         "away.csv",
-        &rewritten("x,z", |_, x, z| format!("{},{z}", x + 9.0)),
+        rewritten("x,z", |_, x, z| format!("{},{z}", x + 9.0)),
     );
     refused("leaf.toml --start away.csv", "leaf.base");
     refused(

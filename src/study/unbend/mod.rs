@@ -223,13 +223,15 @@ fn shape(stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
 /// Relaxes the scenario that rests in a posture from there.
 fn check_rest(rest: &Scenario, stations: &Stations, young: f64) -> RestCheck {
     let (at, rods) = shape(stations);
-    let mut options = Options::default();
-    options.method = relax::SemiImplicit {
-        keep_unstable: true,
-        ..relax::SemiImplicit::default()
-    }
-    .into();
-    options.every_node = true;
+    let options = Options {
+        method: relax::SemiImplicit {
+            keep_unstable: true,
+            ..relax::SemiImplicit::default()
+        }
+        .into(),
+        every_node: true,
+        ..Options::default()
+    };
     let leaf = relax::relax_from(rest, (&at, &rods), &options, &mut |_| {});
     // Where the matrix is nearly singular the leaf may have left the posture: that confirms nothing.
     let stayed = |leaf: &Equilibrium| {

@@ -83,7 +83,7 @@ pub fn relax_from_points(
     stations[PARTS] = 1.0;
     let leaf = relax::relax_from(scenario, (&stations, &rods), options, progress)?;
     let away = largest_distance(&leaf, &stations, &positions) / length;
-    if leaf.doubts.contains(&EquilibriumDoubt::RelaxedAnew) || !(away <= NEAR) {
+    if leaf.doubts.contains(&EquilibriumDoubt::RelaxedAnew) || away > NEAR {
         return Err(PostureError::NoEquilibriumNear { away }.into());
     }
     Ok(leaf)

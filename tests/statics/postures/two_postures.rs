@@ -38,7 +38,7 @@ fn measure(draw: &mut Draw, noise: f64, spatial: bool) -> Option<(TwoPostures, f
     let even = stations
         .windows(2)
         .all(|pair| (pair[1] - pair[0] - 1.0 / last as f64).abs() < 1e-9);
-    if !even || last % 32 != 0 {
+    if !even || !last.is_multiple_of(32) {
         return None;
     }
     let points = |curve: &dyn Fn(f64) -> DVec3, draw: &mut Draw| PosturePoints {
