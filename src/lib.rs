@@ -105,6 +105,7 @@ mod motion;
 pub mod natural;
 mod newton;
 pub mod numbers;
+pub mod posture;
 pub mod relax;
 mod rod;
 mod rotation;

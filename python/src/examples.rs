@@ -49,7 +49,7 @@ pub fn examples() -> Texts {
             "hanging_curved" "helical_rollup" "lens_30" "lens_60" "lens_coupled" "lens_midrib"
             "princeton" "rollup" "three_point_bending" "twisted_strip"),
         &texts!("scenarios/measured":
-            "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "pull"),
+            "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "posture" "pull"),
         &texts!("scenarios/motion": "curl" "drop" "gust" "strike" "swing"),
         &texts!("scenarios/study": "plate" "saddle" "undulation"),
     ]

@@ -10,6 +10,7 @@ mod examples;
 mod fit;
 mod live;
 mod motion;
+mod posture;
 mod range;
 mod relax;
 mod result;
@@ -38,6 +39,8 @@ mod _leafdyn {
     use super::live::live_page;
     #[pymodule_export]
     use super::motion::Motion;
+    #[pymodule_export]
+    use super::posture::{Posture, unbend, unbend_many};
     #[pymodule_export]
     use super::relax::{library_seconds, relax_many, relax_one};
     #[pymodule_export]

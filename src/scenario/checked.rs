@@ -362,4 +362,16 @@ impl Scenario {
         let lever = (12.0 * vein.couple_stiffness[2].at(sigma) / stretch).sqrt();
         vec![Moduli::for_strip(width, thickness, lever)]
     }
+
+    /// Young's modulus of a rod's section, or of a blade along a vein, if one of them is given and the modulus is the
+    /// same all along.
+    pub fn young(&self, rod: usize) -> Option<f64> {
+        if let Some(blade) = &self.blade {
+            let young = blade.young(rod, 0.0);
+            let places = (0..=16).map(|k| f64::from(k) / 16.0);
+            let alike = |sigma: f64| blade.young(rod, sigma) == young;
+            return places.into_iter().all(alike).then_some(young);
+        }
+        self.radii.young(rod)
+    }
 }

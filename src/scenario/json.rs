@@ -64,6 +64,36 @@ impl Serialize for Scenario {
     }
 }
 
+impl Scenario {
+    /// The scenario as TOML, with all entries and their values, from which [`Scenario::from_toml`] makes an equal one.
+    pub fn to_toml(&self) -> String {
+        let json = serde_json::to_value(self).unwrap_or_default();
+        let value = toml_value(&json).unwrap_or(toml::Value::Table(toml::Table::new()));
+        toml::to_string(&value).unwrap_or_default()
+    }
+}
+
+/// A value of JSON as one of TOML, in which an infinite number is no text. TOML has no null.
+fn toml_value(json: &Value) -> Option<toml::Value> {
+    Some(match json {
+        Value::Null => return None,
+        Value::Bool(switch) => toml::Value::Boolean(*switch),
+        Value::Number(number) => match number.as_i64() {
+            Some(whole) => toml::Value::Integer(whole),
+            None => toml::Value::Float(number.as_f64()?),
+        },
+        Value::String(text) if text == "inf" => toml::Value::Float(f64::INFINITY),
+        Value::String(text) => toml::Value::String(text.clone()),
+        Value::Array(all) => toml::Value::Array(all.iter().filter_map(toml_value).collect()),
+        Value::Object(all) => {
+            let entries = all.iter();
+            let entries =
+                entries.filter_map(|(key, value)| Some((key.clone(), toml_value(value)?)));
+            toml::Value::Table(entries.collect())
+        }
+    })
+}
+
 /// The entries of a table, in the order of the format.
 struct SerializedTable<'e>(&'e [SerializedEntry]);
 

@@ -51,6 +51,7 @@ pub(crate) use crate::scenario::plausibility::{
     LARGEST_PLAUSIBLE_STRETCH, held_tip_out_of_reach, plausibility_warnings,
     probable_obstacle_to_rest,
 };
+pub(crate) use crate::scenario::profile::knot_places as knots;
 pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};

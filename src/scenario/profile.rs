@@ -282,7 +282,7 @@ impl Profile {
 
 /// The ends of a rod and the kinks of some profiles along it, ascending; where one of them jumps both
 /// sides. Where profiles are linear between their kinks, their values here determine them.
-pub(super) fn knot_places<'p>(profiles: impl IntoIterator<Item = &'p Profile>) -> Vec<RodPlace> {
+pub(crate) fn knot_places<'p>(profiles: impl IntoIterator<Item = &'p Profile>) -> Vec<RodPlace> {
     let (mut all, mut jumps) = (vec![0.0, 1.0], Vec::new());
     for kinks in profiles.into_iter().map(Profile::kinks) {
         all.extend(kinks);

@@ -12,6 +12,7 @@ mod margin;
 mod remark;
 mod sensitivity;
 mod trace;
+mod unbend;
 pub(crate) mod vary;
 
 pub use crate::branch::{BranchEnd, CorrectorFailure, CriticalKind, VerificationFailure};
@@ -69,6 +70,11 @@ pub use crate::study::trace::result::{ForceDisplacementLine, PointMotion, TraceS
 pub use crate::study::trace::{
     MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
     TraceRequest, trace, trace_through,
+};
+pub use crate::study::unbend::{
+    CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, PostureOutcome, PostureRow,
+    Postures, RestCheck, SecondPosture, SlowLoading, SmoothingReport, UnbendError, UnbendRemark,
+    UnbendRequest, Unbending, read_postures, relax_from_points, unbend, unbend_groups, unbend_many,
 };
 pub use crate::study::vary::{
     BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,

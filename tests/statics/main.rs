@@ -35,6 +35,7 @@ mod order;
 mod path;
 mod plates;
 mod point_moments;
+mod postures;
 mod published;
 mod reaction_bars;
 mod real_leaves;

@@ -15,6 +15,7 @@ mod rod;
 pub(crate) mod scenario;
 mod sensitivity;
 mod trace;
+mod unbend;
 
 pub use crate::figure::boundary::draw as boundary;
 pub use crate::figure::chart::{draw_chart as chart, draw_scaling as scaling};
@@ -26,6 +27,7 @@ pub use crate::figure::map::draw as map;
 pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as filmstrip, write_film};
 pub use crate::figure::sensitivity::draw as sensitivity;
 pub use crate::figure::trace::draw as trace;
+pub use crate::figure::unbend::draw as unbend;
 use leafdyn::scenario::Scenario;
 
 /// Draws a result of a scenario.

@@ -8,7 +8,9 @@ use crate::{figure, page, report};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Radii, Scenario};
 use leafdyn::simulate::Record;
-use leafdyn::study::{Chart, Check, Equilibria, Fit, Map, ScalingStudy, StabilityBoundary, Trace};
+use leafdyn::study::{
+    Chart, Check, Equilibria, Fit, Map, Postures, ScalingStudy, StabilityBoundary, Trace, Unbending,
+};
 use leafdyn::words;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -65,6 +67,24 @@ impl WrittenResult for Fit {
         FileFormat::Table("fit.csv", report::write_fit_table),
         FileFormat::Figure(["fit.svg", "fit.png"], figure::fit),
     ];
+}
+
+impl WrittenResult for Unbending {
+    const JSON: Option<&'static str> = Some("unbend.json");
+    const FORMATS: &'static [FileFormat<Self>] = &[
+        FileFormat::Table("rest.toml", report::write_rest_scenario),
+        FileFormat::Table("rest.csv", report::write_rest_table),
+        FileFormat::Figure(["unbend.svg", "unbend.png"], figure::unbend),
+    ];
+}
+
+/// Postures of many leaves.
+impl WrittenResult for Postures {
+    const JSON: Option<&'static str> = Some("postures.json");
+    const FORMATS: &'static [FileFormat<Self>] = &[FileFormat::Table(
+        "postures.csv",
+        report::write_postures_table,
+    )];
 }
 
 impl WrittenResult for Map {

@@ -12,6 +12,7 @@ pub(crate) mod sample;
 mod simulate;
 pub(crate) mod table;
 mod trace;
+mod unbend;
 
 pub use crate::report::chart::{write_chart_table, write_scaling_table};
 pub use crate::report::document::{
@@ -29,3 +30,4 @@ pub use crate::report::trace::{
     error_location_words, index_change_text, is_codimension_two, passes_crossings,
     point_stability_phrase, slope_unit, write_boundary_table, write_trace_table,
 };
+pub use crate::report::unbend::{write_postures_table, write_rest_scenario, write_rest_table};

@@ -12,6 +12,7 @@ mod relax;
 mod request;
 mod simulate;
 mod trace;
+mod unbend;
 
 use crate::verbs::exit::{
     ExitStatus, Refusal, note_json_output, print_note, print_refusal_json,
@@ -48,6 +49,7 @@ enum Verb {
     Map(map::MapArguments),
     Simulate(simulate::SimulateArguments),
     Trace(trace::TraceArguments),
+    Unbend(unbend::UnbendArguments),
     New(help::NewArguments),
     Schema(help::SchemaArguments),
     Completions(help::CompletionsArguments),
@@ -64,6 +66,7 @@ impl Cli {
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
             Verb::Trace(trace) => trace.run(),
+            Verb::Unbend(unbend) => unbend.run(),
             Verb::New(new) => new.run(),
             Verb::Schema(schema) => schema.run(),
             Verb::Completions(completions) => completions.run(Cli::command()),

@@ -3,19 +3,21 @@
 use crate::files::{FileKind, LIVE_PAGE_FILE};
 use crate::report::doubt_with_option;
 use crate::report::numbers::format_five_digits;
-use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal};
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
-use clap::Args;
-use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
+use clap::{Args, ValueHint};
+use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Progress, Route, Settings};
+use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
     DEFAULT_VEINS_TOLERANCE, Equilibria, MarginError, MarginProgress, ParameterKeys, RefinedBlade,
-    SensitivityError, VeinsError,
+    SensitivityError, UnbendError, VeinsError, read_postures, relax_from_points,
 };
+use std::path::{Path, PathBuf};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;
@@ -78,6 +80,10 @@ pub struct RelaxArguments {
     )]
     veins: Option<VeinsChoice>,
 
+    /// Find the equilibrium nearest to a shape: points of the vein's centreline from base to tip as CSV, as of unbend; of any index with --keep-unstable
+    #[arg(long, value_name = "SHAPE.csv", value_hint = ValueHint::FilePath, conflicts_with_all = ["all", "sensitivity", "margin", "veins"])]
+    start: Option<PathBuf>,
+
     /// Solve for the whole leaf, even if half of it would do
     #[arg(long, help_heading = EXPERT_OPTIONS_HEADING)]
     full_model: bool,
@@ -123,6 +129,28 @@ fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, to
     }
 }
 
+/// The equilibrium nearest to the shape in a file.
+fn relax_from_shape(
+    job: &ScenarioJob,
+    path: &Path,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, Refusal> {
+    let file = path.display().to_string();
+    let read = read_postures(&bytes(path)?, &file, None, &job.scenario)?;
+    let Some(shape) = read.into_iter().next() else {
+        return Err(format!("--start {file}: has no points").into());
+    };
+    if let Some(taken) = shape.taken {
+        print_note(&format!("{}: {taken}", job.scenario.name));
+    }
+    let found = relax_from_points(&job.scenario, &shape.points, options, progress);
+    found.map_err(|error| match error {
+        UnbendError::Relax(error) => error.into(),
+        error => format!("--start {file}: {error}").into(),
+    })
+}
+
 impl RelaxArguments {
     pub fn run(mut self) -> Result<ExitStatus, Refusal> {
         match self.veins {
@@ -137,12 +165,13 @@ impl RelaxArguments {
             }
             _ => {}
         }
+        let start: Vec<PathBuf> = self.start.iter().cloned().collect();
         let traits = VerbTraits {
             varies_numbers: !self.sensitivity.is_empty(),
             has_station_choice: true,
             runs_in_parallel: true,
             keeps_partial_result: self.all || self.margin,
-            input_files: &[],
+            input_files: &start,
             value_option: None,
         };
         match self.all {
@@ -266,6 +295,11 @@ impl RelaxArguments {
             return found.map_err(|error| match error {
                 MarginError::Relax(error) => error.into(),
                 error => format!("--margin: {error}").into(),
+            });
+        }
+        if let Some(file) = &self.start {
+            return relax_from_shape(job, file, options, &mut |progress| {
+                line.update_solver(progress, tolerance)
             });
         }
         Ok(study::relax_blade(&job.base, options, &mut |progress| {

@@ -11,3 +11,4 @@ mod simulate_choice;
 mod simulate_cli;
 mod simulate_doubts;
 mod trace_cli;
+mod unbend_cli;

@@ -22,6 +22,7 @@ from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._load import load
 from ._motion import Frame, Motion
+from ._posture import Bound, Posture, unbend, unbend_many
 from ._predict import Prediction
 from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
@@ -43,6 +44,7 @@ all_shapes = equilibria
 
 __all__ = [
     "Angles",
+    "Bound",
     "Boundary",
     "Branch",
     "Candidate",
@@ -63,6 +65,7 @@ __all__ = [
     "Page",
     "Parameter",
     "Piece",
+    "Posture",
     "Prediction",
     "Result",
     "Scenario",
@@ -95,4 +98,6 @@ __all__ = [
     "sweep",
     "threads",
     "trace",
+    "unbend",
+    "unbend_many",
 ]

@@ -14,6 +14,7 @@ __all__ = [
     "Files",
     "Leaf",
     "Motion",
+    "Posture",
     "Scenario",
     "__version__",
     "equilibria",
@@ -36,6 +37,8 @@ __all__ = [
     "templates",
     "threads",
     "trace",
+    "unbend",
+    "unbend_many",
 ]
 
 __version__: str
@@ -191,3 +194,26 @@ def fit(
     tolerance: float | None,
     progress: _Heard,
 ) -> Files: ...
+
+_Points: TypeAlias = tuple[str, str] | str | PathLike[str]
+
+@final
+class Posture:
+    def names(self) -> list[str]: ...
+    def contents(self, name: str) -> bytes: ...
+    def save(self, folder: str | PathLike[str], kinds: Sequence[str]) -> list[Path]: ...
+    def index(self, young: float) -> int: ...
+    def rest(self, young: float) -> str: ...
+
+def unbend(
+    scenario: Scenario,
+    points: _Points,
+    young: Sequence[float] | None,
+    second: _Points | None,
+    roll: float,
+    slow_loading: bool,
+    progress: _Heard,
+) -> Posture: ...
+def unbend_many(
+    leaves: Sequence[tuple[Scenario, _Points]], young: Sequence[float] | None
+) -> list[Posture | str]: ...

@@ -19,6 +19,7 @@ from ._data import QUANTITIES
 from ._fit import Fit
 from ._leaf import Equilibrium
 from ._motion import ENERGIES, Motion
+from ._posture import Posture
 from ._result import Kept, Result, columns
 from ._scenario import Scenario
 from ._sensitivity import Sensitivity
@@ -36,12 +37,13 @@ def load(path: str | os.PathLike[str]) -> Result:
     ----------
     path
         The folder, or in it the JSON file: ``summary.json``, ``equilibria.json``, ``trace.json``, ``boundary.json``,
-        ``map.json``, ``chart.json``, ``fit.json`` or ``motion.json``.
+        ``map.json``, ``chart.json``, ``fit.json``, ``unbend.json`` or ``motion.json``.
 
     Returns
     -------
     Result
-        An `Equilibrium`, `Equilibria`, `Trace`, `Boundary`, `Map`, `Chart`, `Fit` or `Motion` with what the files have.
+        An `Equilibrium`, `Equilibria`, `Trace`, `Boundary`, `Map`, `Chart`, `Fit`, `Posture` or `Motion` with what
+        the files have.
         What they do not have is no attribute: ``forces`` of a leaf without ``centerlines.csv``. A leaf draws its
         `curves` through its stations; centerlines of the points of a trace or a boundary are not there.
 
@@ -257,6 +259,11 @@ def _fit(said: Said, files: Kept) -> Fit:
     return Fit(files)
 
 
+def _posture(said: Said, files: Kept) -> Posture:
+    _table(files, "rest.csv")
+    return Posture(files)
+
+
 def _chart(said: Said, files: Kept) -> Chart:
     _table(files, "chart.csv")
     rods = {name: text for name, text in files.files.items() if name.startswith("chart_rods")}
@@ -310,6 +317,7 @@ KNOWN: dict[str, tuple[Callable[[Said, Kept], Result], tuple[str, ...]]] = {
     "map.json": (_map, ("map.csv", *_drawn("map"))),
     "chart.json": (_chart, ("chart.csv", *_drawn("chart"), "chart_rods.csv", *_drawn("chart_rods"))),
     "fit.json": (_fit, ("fit.csv", "fitted.toml", *_drawn("fit"))),
+    "unbend.json": (_posture, ("rest.csv", "rest.toml", *_drawn("unbend"))),
     "motion.json": (_motion, ("motion.csv", "motion.npy", "energy.csv", *_drawn("energy", "filmstrip"))),
 }
 """JSON files, what makes a result of each, and the files that belong to it."""

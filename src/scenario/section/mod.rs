@@ -362,6 +362,14 @@ impl Radii {
         sections.flat_map(sides).collect()
     }
 
+    /// Young's modulus of the section of a rod, if it is the same all along.
+    pub(super) fn young(&self, rod: usize) -> Option<f64> {
+        match self.0.get(rod)?.young {
+            Profile::Constant(young) => Some(young),
+            _ => None,
+        }
+    }
+
     /// The larger side of the section of a rod, where that is largest.
     pub fn largest_side(&self, rod: usize) -> Option<f64> {
         let section = self.0.get(rod)?;

@@ -95,7 +95,7 @@ pub(super) const FIRST_PHOTO_COORDINATE: usize = 3;
 pub(super) type ObservedCoordinates = [Option<f64>; COORDINATE_COLUMNS.len()];
 
 /// The column of the names of experiments.
-pub(super) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
+pub(in crate::study) const EXPERIMENT_NAME_COLUMN: &str = "experiment";
 
 pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
     "rod",

@@ -19,7 +19,7 @@ mod prediction;
 mod remark;
 pub(super) mod result;
 mod statistics;
-mod table;
+pub(super) mod table;
 
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind_or_followers};
 use crate::run::{Instant, Limit};

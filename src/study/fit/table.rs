@@ -8,7 +8,7 @@ use crate::study::fit::columns::{
     DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, RowFilter, is_known_column,
 };
 
-pub(super) struct DataTable<'t> {
+pub(in crate::study) struct DataTable<'t> {
     pub file: &'t str,
     /// Line of the header, counted from 1.
     pub header_line: usize,
@@ -24,6 +24,14 @@ pub(super) struct DataTable<'t> {
     sources: Vec<ColumnSource>,
     rows: Vec<TableLine>,
     decimals: NumberFormat,
+}
+
+/// The columns of a table that mean something.
+pub(in crate::study) struct KnownColumns<'c> {
+    /// Whether a column of this name does.
+    pub is_known: &'c dyn Fn(&str) -> bool,
+    /// Whether others are left out and told, in place of being kept for a message.
+    pub leaves_out_others: bool,
 }
 
 /// Where a column stands, and what makes its numbers those of the scenario.
@@ -71,9 +79,24 @@ fn column_names(header: &TableLine, groups: Option<&TableLine>) -> Vec<String> {
 
 impl<'t> DataTable<'t> {
     pub fn parse(bytes: &[u8], file: &'t str, reading: &DataFileOptions) -> Result<Self, FitError> {
+        let columns = KnownColumns {
+            is_known: &is_known_column,
+            leaves_out_others: false,
+        };
+        DataTable::parse_with_columns(bytes, file, reading, &columns)
+    }
+
+    /// The table of a text with other columns.
+    pub fn parse_with_columns(
+        bytes: &[u8],
+        file: &'t str,
+        reading: &DataFileOptions,
+        columns: &KnownColumns,
+    ) -> Result<Self, FitError> {
+        let is_known = columns.is_known;
         let decoded = decode(bytes, file)?;
         let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
-        let known = |name: &str| is_known_column(name) || mapped(name).is_some();
+        let known = |name: &str| is_known(name) || mapped(name).is_some();
         let named = |name: &str| match mapped(name) {
             Some(map) => map.quantity == EXPERIMENT_NAME_COLUMN,
             None => name == EXPERIMENT_NAME_COLUMN,
@@ -121,7 +144,7 @@ impl<'t> DataTable<'t> {
             .collect();
         let units = table.remove_unit_row();
         table.check_cells()?;
-        let unused = table.select_columns(reading)?;
+        let unused = table.select_columns(reading, columns)?;
         let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
         table
             .rows
@@ -248,15 +271,20 @@ impl<'t> DataTable<'t> {
     }
 
     /// Chooses the columns that are used, and returns words for others.
-    fn select_columns(&mut self, reading: &DataFileOptions) -> Result<Vec<String>, FitError> {
+    fn select_columns(
+        &mut self,
+        reading: &DataFileOptions,
+        columns: &KnownColumns,
+    ) -> Result<Vec<String>, FitError> {
         let (mut unnamed, mut unused) = (None, Vec::new());
         let maps_of = |name: &str| {
             let maps = reading.columns.iter();
             maps.filter(|map| map.name == name).collect::<Vec<_>>()
         };
         // With names given for columns of a file, others that mean nothing here are not meant.
-        let some_given = self.names.iter().any(|name| !maps_of(name).is_empty());
-        let means_nothing = |name: &&String| !name.is_empty() && !is_known_column(name);
+        let some_given =
+            columns.leaves_out_others || self.names.iter().any(|name| !maps_of(name).is_empty());
+        let means_nothing = |name: &&String| !name.is_empty() && !(columns.is_known)(name);
         if !some_given
             && !reading.columns.is_empty()
             && self.names.iter().any(|name| means_nothing(&name))
@@ -281,7 +309,7 @@ impl<'t> DataTable<'t> {
                     return Err(line_error(self.file, self.header_line, why));
                 }
                 unnamed = unnamed.or(is_used.then(|| "the first column, without a name".into()));
-            } else if maps.is_empty() && some_given && !is_known_column(name) {
+            } else if maps.is_empty() && some_given && !(columns.is_known)(name) {
                 unused.push(name.as_str());
             } else if maps.is_empty() {
                 self.header.push(name.clone());
@@ -313,6 +341,13 @@ impl<'t> DataTable<'t> {
                 };
                 return Err(line_error(self.file, self.header_line, why));
             }
+        }
+        if columns.leaves_out_others && self.header.is_empty() {
+            let why = format!(
+                "has none of the columns that mean something here: its columns are {}; name coordinates x, y, z",
+                self.names.join(", ")
+            );
+            return Err(line_error(self.file, self.header_line, why));
         }
         let columns = if unused.len() == 1 {
             "column"

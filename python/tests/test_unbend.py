@@ -1,0 +1,79 @@
+"""What a posture tells is that of the program, whatever its points come as."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from leaves import program
+
+import leafdyn
+
+MEASURED = Path(__file__).parents[2] / "scenarios" / "measured"
+LEAF, POINTS = MEASURED / "posture.toml", MEASURED / "posture.csv"
+
+
+def points() -> np.ndarray:
+    lines = [line for line in POINTS.read_text().splitlines() if not line.startswith("#")]
+    return np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+
+
+def test_by_both_roads(tmp_path: Path) -> None:
+    told = program("unbend", LEAF, "--shape", POINTS, "--young", "6e4", "--out", tmp_path / "program")
+    assert told.returncode == 0, told.stderr
+    found = leafdyn.unbend(LEAF, POINTS, young=6e4)
+    found.save(tmp_path / "python")
+    for name in ("rest.csv", "rest.toml", "unbend.svg"):
+        assert (tmp_path / "program" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    loaded = leafdyn.load(tmp_path / "program")
+    assert isinstance(loaded, leafdyn.Posture)
+    assert loaded.critical_young == found.critical_young
+
+
+def test_an_array_a_table_and_a_file_are_the_same_points() -> None:
+    x, z = points().T
+    space = np.column_stack([x, np.zeros_like(x), z])
+    found = [leafdyn.unbend(LEAF, given, slow_loading=False) for given in (POINTS, {"x": x, "z": z}, space)]
+    first = found[0].critical_young
+    for other in found[1:]:
+        assert other.critical_young.value == pytest.approx(first.value, rel=1e-6)
+    assert first.low < first.value < first.high
+    assert found[0].reached_from is None
+    with pytest.raises(ValueError, match="row x, y, z or x, y"):
+        leafdyn.unbend(LEAF, x)
+
+
+def test_index_and_rest_at_any_modulus() -> None:
+    found = leafdyn.unbend(LEAF, POINTS, slow_loading=False)
+    least = found.critical_young.value
+    assert [found.index(factor * least) for factor in (1.01, 0.99)] == [0, 1]
+    assert found.ladder[0] == least
+    leaf = leafdyn.relax(found.rest(5 * least))
+    assert leaf.stable
+    tip = [found.columns[axis][-1] for axis in "xyz"]
+    assert np.linalg.norm(leaf.tip - tip) < 1e-3 * found.length
+    with pytest.raises(ValueError, match="greater than 0"):
+        found.rest(-1.0)
+    again = pickle.loads(pickle.dumps(found))
+    assert again.critical_young == found.critical_young
+    with pytest.raises(ValueError, match="pickled"):
+        again.index(least)
+
+
+def test_many_with_those_that_are_refused() -> None:
+    all_points = points()
+    found = leafdyn.unbend_many(LEAF, [POINTS, all_points[:4], 2 * np.column_stack([all_points, all_points])[:, [0, 2, 1]]])
+    assert isinstance(found[0], leafdyn.Posture)
+    assert found[0].critical_young == leafdyn.unbend(LEAF, POINTS, slow_loading=False).critical_young
+    assert isinstance(found[1], str) and "at least 6" in found[1]
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="leaf.rods"):
+        leafdyn.unbend(LEAF, POINTS, set={"leaf.rods": 3, "leaf.fan": "symmetric"})
+    with pytest.raises(ValueError, match="greater than 0"):
+        leafdyn.unbend(LEAF, POINTS, young=(2.0, 1.0))
+    with pytest.raises(FileNotFoundError):
+        leafdyn.unbend(LEAF, "none.csv")
+    with pytest.warns(leafdyn.LeafWarning, match="unstable"):
+        leafdyn.unbend(LEAF, POINTS, young=1.2e4, slow_loading=False)

@@ -1,0 +1,130 @@
+//! The index of a posture is that of the leaf relaxed from there, on both sides of each rung of its ladder.
+
+use super::*;
+use glam::DQuat;
+use leafdyn::posture::leaf::{rest_scenario, with_level_base};
+use leafdyn::posture::rest::Stations;
+use leafdyn::relax::{NodeState, Options, RodShape, SemiImplicit, relax_from};
+
+/// The posture as a shape.
+fn shape(stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
+    let node = |station: &leafdyn::posture::rest::Station| NodeState {
+        position: station.position,
+        rotation: DQuat::from_mat3(&station.directors).normalize(),
+        v: DVec3::X,
+        u: station.curvature,
+        n: station.force,
+        m: station.moment,
+    };
+    let nodes = stations.ends.iter().map(node).collect();
+    let length = stations.length;
+    let at = stations.ends.iter().map(|station| station.sigma).collect();
+    (at, vec![RodShape { length, nodes }])
+}
+
+/// The index of the leaf that rests in the posture at a modulus, and how far it is from there.
+fn relaxed(scenario: &Scenario, found: &Posture, young: f64) -> (Option<usize>, f64) {
+    let stations = found.stations(false);
+    let of = ScenarioRod::new(scenario).unwrap();
+    let rest = rest_scenario(scenario, &of, found, &stations, young);
+    let options = Options {
+        method: SemiImplicit {
+            keep_unstable: true,
+            ..SemiImplicit::default()
+        }
+        .into(),
+        ..Options::default()
+    };
+    let (at, rods) = shape(&stations);
+    let leaf = relax_from(&rest, (&at, &rods), &options, &mut |_| {}).unwrap();
+    let tip = stations.ends.last().unwrap().position;
+    (
+        leaf.stability.negative_eigenvalues,
+        leaf.tips[0].distance(tip) / stations.length,
+    )
+}
+
+fn compare(draw: &mut Draw, spatial: bool, stiffness: [&str; 3], rungs: usize) {
+    let loads =
+        "gravity = [0.0, 0.0, -1.0], point = [{ vein = 1, at = 0.6, force = [0.0, 0.0, -0.5] }]";
+    let leaf = scenario(stiffness, loads);
+    let plane = (!spatial).then_some(DVec3::Y);
+    let found = posture(&leaf, Twin::draw(draw, spatial, 1.3).curve(), plane);
+    let ladder = found.ladder();
+    for (k, &rung) in ladder.iter().take(rungs).enumerate() {
+        for (young, index) in [(1.01 * rung, k), (0.99 * rung, k + 1)] {
+            assert_eq!(found.index(young), index);
+            let (counted, off) = relaxed(&leaf, &found, young);
+            assert!(off < 1e-3, "{off} at {young} of {ladder:?}");
+            assert_eq!(counted, Some(index), "at {young} of {ladder:?}");
+        }
+    }
+}
+
+#[test]
+fn in_the_plane_and_out_of_it() {
+    let mut draw = Draw(21);
+    for _ in 0..6 {
+        compare(&mut draw, false, ["0.7", "1.0", "1.0"], 2);
+        compare(&mut draw, false, ["0.1", "1.0", "3.0"], 2);
+    }
+}
+
+#[test]
+fn in_space() {
+    let mut draw = Draw(22);
+    for _ in 0..8 {
+        compare(&mut draw, true, ["0.7", "1.0", "1.0"], 2);
+    }
+}
+
+/// The leaf whose blade is turned where the normals say so: the same as its scenario in a lab that is turned.
+#[test]
+fn a_blade_with_measured_normals() {
+    let leaf = scenario(["0.2", "1.0", "0.3"], "gravity = [0.0, 0.0, -1.0]");
+    let twin = Twin::draw(&mut Draw(5), true, 1.0);
+    let positions: Vec<DVec3> = (0..60)
+        .map(|k| twin.position(f64::from(k) / 59.0))
+        .collect();
+    let normals = (0..60).map(|k| {
+        let s = f64::from(k) / 59.0;
+        let [tangent, _] = twin.tangent(s);
+        let side = DVec3::Z.cross(tangent).normalize();
+        let up = tangent.cross(side);
+        (0.4 + 0.8 * s).cos() * up + (0.4 + 0.8 * s).sin() * side
+    });
+    let points = leafdyn::posture::points::PosturePoints {
+        normals: Some(normals.collect()),
+        ..leafdyn::posture::points::PosturePoints::in_space(positions)
+    };
+    let found = Posture::from_points(hanging(&leaf), &points, None).unwrap();
+    assert!(
+        (found.base.roll.abs() - 0.4).abs() < 1e-2,
+        "{}",
+        found.base.roll
+    );
+    let rung = found.critical_young();
+    for (young, index) in [(1.02 * rung, 0), (0.98 * rung, 1)] {
+        let (counted, off) = relaxed(&leaf, &found, young);
+        assert!(off < 1e-3, "{off}");
+        assert_eq!(counted, Some(index));
+    }
+    let stations = found.stations(false);
+    let of = ScenarioRod::new(&leaf).unwrap();
+    let rest = rest_scenario(&leaf, &of, &found, &stations, 1.5 * rung);
+    let level = with_level_base(&rest);
+    let back = parse(&level.to_toml());
+    assert_eq!(back.rods, level.rods);
+    assert_eq!(back.gravity, level.gravity);
+    let sharp = |leaf: &Scenario| leaf.relaxation().tolerance(1e-9).run().unwrap();
+    let (one, other) = (sharp(&rest), sharp(&back));
+    // Both labs differ by a turn about the base.
+    let base = DVec3::from_array(level.rods[0].base);
+    let reach = |leaf: &leafdyn::relax::Equilibrium| leaf.tips[0].distance(base);
+    assert!(
+        (reach(&one) - reach(&other)).abs() < 1e-8,
+        "{} {}",
+        reach(&one),
+        reach(&other)
+    );
+}
