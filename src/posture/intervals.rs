@@ -5,7 +5,6 @@
 
 use crate::posture::Posture;
 use crate::posture::smoothing::{SmoothedCurve, local_basis};
-use crate::posture::spline_rows;
 use glam::DVec3;
 use nalgebra::DVector;
 
@@ -39,7 +38,9 @@ fn variance_of(
     smoothed: &SmoothedCurve,
     number: &dyn Fn(&[DVec3]) -> f64,
 ) -> f64 {
-    let rows = spline_rows(smoothed, &posture.elements.at);
+    let intervals = smoothed.curve.intervals();
+    let at = posture.elements.at.iter();
+    let rows: Vec<_> = at.map(|&t| local_basis(intervals, t)).collect();
     let first: Vec<DVec3> = rows
         .iter()
         .map(|basis| smoothed.curve.point(basis).first)

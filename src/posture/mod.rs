@@ -10,6 +10,7 @@ pub mod frame;
 pub mod intervals;
 pub mod leaf;
 pub mod line;
+mod measured;
 pub mod points;
 pub mod rest;
 pub mod rod;
@@ -22,8 +23,8 @@ use crate::posture::frame::{BaseFrame, FrameRule, vertical_plane};
 use crate::posture::line::{Directors, Elements, Line};
 use crate::posture::points::{PostureError, PosturePoints};
 use crate::posture::rod::HangingRod;
-use crate::posture::second_variation::{CriticalMode, ELEMENTS, SecondVariation};
-use crate::posture::smoothing::{CurvePoint, LEAST_POINTS, SmoothedCurve, local_basis};
+use crate::posture::second_variation::{CriticalMode, SecondVariation};
+use crate::posture::smoothing::{CurvePoint, SmoothedCurve};
 use crate::words;
 use glam::DVec3;
 use std::fmt;
@@ -95,9 +96,9 @@ pub struct CriticalModulus {
 
 /// The eigenvalues of one part of the second variation.
 #[derive(Clone, Debug)]
-struct Part {
+pub(crate) struct Part {
     governing: Governing,
-    directors: Directors,
+    pub directors: Directors,
     about: &'static [usize],
     eigenvalues: Vec<f64>,
 }
@@ -123,36 +124,10 @@ pub struct Posture {
     pub mode: Option<CriticalMode>,
     /// Points off the plane in which the posture was taken to lie: the largest distance.
     pub off_plane: Option<f64>,
-    parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
 }
 
 impl Posture {
-    /// The posture that points show; `base` is where the scenario has its base, if that tells base from tip.
-    ///
-    /// # Errors
-    /// Points that are no posture, or from which the directors of an anisotropic section do not follow.
-    pub fn from_points(
-        rod: HangingRod,
-        points: &PosturePoints,
-        base: Option<DVec3>,
-    ) -> Result<Posture, PostureError> {
-        points.check(LEAST_POINTS, base)?;
-        let chosen = frame::choose(&rod, points)?;
-        let positions = chosen.positions.as_deref().unwrap_or(&points.positions);
-        let coordinates = if chosen.plane.is_some() { 2 } else { 3 };
-        let smoothed = smoothing::smooth(positions, points.sd.as_deref(), coordinates);
-        let smoothed = smoothed.ok_or(PostureError::Coincident)?;
-        let rule = match &points.normals {
-            Some(normals) if !rod.is_round() => FrameRule::measured(&smoothed, normals)?,
-            _ => FrameRule::Transported,
-        };
-        let centreline = Centreline::Smoothed(Box::new(smoothed));
-        let mut posture = Posture::assemble(rod, centreline, chosen.plane, rule, ELEMENTS);
-        posture.off_plane = chosen.off;
-        posture.critical.relative_deviation = intervals::relative_deviation(&posture);
-        Ok(posture)
-    }
-
     /// The posture of a known curve, which lies in the plane with this unit normal, if any; `elements` is the number
     /// of elements of the second variation, whose eigenvalues converge as its tenth power.
     ///
@@ -180,7 +155,7 @@ impl Posture {
         ))
     }
 
-    fn assemble(
+    pub(crate) fn assemble(
         rod: HangingRod,
         centreline: Centreline,
         plane: Option<DVec3>,
@@ -308,7 +283,7 @@ impl Posture {
     }
 
     /// The directors in which the critical mode was found.
-    fn critical_directors(&self) -> &Directors {
+    pub(crate) fn critical_directors(&self) -> &Directors {
         &self.critical_part().directors
     }
 
@@ -374,11 +349,4 @@ impl Posture {
     pub fn is_planar(&self) -> bool {
         self.parts.len() > 1
     }
-}
-
-/// The derivatives dr/dt at parameters, by the coefficients of a smoothed curve: number of the first spline and
-/// factors.
-fn spline_rows(smoothed: &SmoothedCurve, at: &[f64]) -> Vec<smoothing::LocalBasis> {
-    let intervals = smoothed.curve.intervals();
-    at.iter().map(|&t| local_basis(intervals, t)).collect()
 }

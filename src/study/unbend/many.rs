@@ -3,8 +3,10 @@
 use crate::posture::Governing;
 use crate::run::Instant;
 use crate::scenario::Scenario;
+use crate::study::unbend::request::UnbendRequest;
+use crate::study::unbend::result::Unbending;
+use crate::study::unbend::solve::unbend_many;
 use crate::study::unbend::table::NamedPosture;
-use crate::study::unbend::{UnbendRequest, Unbending, unbend_many};
 use crate::words;
 use serde::Serialize;
 use std::ops::RangeInclusive;

@@ -7,7 +7,7 @@ use crate::posture::two_postures::TwoPostures;
 use crate::posture::{Governing, Posture};
 use crate::run::remarks;
 use crate::scenario::Scenario;
-use crate::study::unbend::UnbendRequest;
+use crate::study::unbend::request::UnbendRequest;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 

@@ -5,7 +5,7 @@ use crate::posture::points::{PostureError, PosturePoints};
 use crate::posture::smoothing::{LEAST_POINTS, smooth};
 use crate::relax::{self, Equilibrium, EquilibriumDoubt, NodeState, Options, Progress, RodShape};
 use crate::scenario::Scenario;
-use crate::study::unbend::UnbendError;
+use crate::study::unbend::request::UnbendError;
 use glam::{DQuat, DVec3};
 
 /// Equal parts of the curve's parameter at whose ends a shape is told.
