@@ -87,11 +87,13 @@ fn method_lines(check: &Check, units: &Units) -> LabelledLines {
     }
     let digits =
         |energy: f64| number_in_unit(format_as_accurate(relaxed, energy, energy), units, ENERGY);
-    let mut energy = digits(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
-    if let Some(solution) = check.solution() {
-        energy += &format!(", {} by shooting", digits(solution.energy));
+    let of_relaxed = relaxed.energy.map(|energy| digits(energy) + " relaxed");
+    let solution = check.solution().filter(|_| relaxed.energy.is_some());
+    let by_shooting = solution.map(|it| digits(it.energy) + " by shooting");
+    let energies: Vec<String> = of_relaxed.into_iter().chain(by_shooting).collect();
+    if !energies.is_empty() {
+        lines.push(("energy", energies.join(", ")));
     }
-    lines.push(("energy", energy));
     lines
 }
 
