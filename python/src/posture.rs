@@ -27,18 +27,19 @@ pub enum Points {
 }
 
 /// The points of the only leaf of a table.
-struct ReadPoints {
-    points: PosturePoints,
+pub struct ReadPoints {
+    pub points: PosturePoints,
     taken: Option<&'static str>,
     name: String,
 }
 
 impl Points {
-    fn read(self, scenario: &Checked) -> PyResult<ReadPoints> {
+    /// Reads the points of a leaf of this scenario.
+    pub fn read(&self, scenario: &Checked) -> PyResult<ReadPoints> {
         let (name, bytes) = match self {
-            Points::Text(name, text) => (name, text.into_bytes()),
+            Points::Text(name, text) => (name.clone(), text.clone().into_bytes()),
             Points::File(path) => {
-                let bytes = scenario::bytes(&path).map_err(value_error)?;
+                let bytes = scenario::bytes(path).map_err(value_error)?;
                 (path.display().to_string(), bytes)
             }
         };

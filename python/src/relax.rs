@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::errors::{value_error, vary_error};
+use crate::posture::Points;
 use crate::result::Leaf;
 use crate::run::{Monitor, elapsed, run, run_here};
 use crate::scenario::Scenario;
@@ -51,6 +52,8 @@ pub struct Asked {
     veins_error: bool,
     /// The shape from which it starts; for one leaf only.
     start: Option<Start>,
+    /// Points of the centerline from which it starts; for one leaf only.
+    points: Option<Points>,
 }
 
 /// Refuses a request with a `ValueError`.
@@ -194,7 +197,15 @@ pub fn relax_one(
     let input = scenario.checked.clone();
     let estimate = asked.veins_error && input.blade.is_some();
     let estimate = (estimate.then(|| scenario.base(py)).transpose()?).zip(Some(options.clone()));
-    let found = if let Some(start) = &asked.start {
+    let found = if let Some(points) = &asked.points {
+        let (scenario, points) = (input.clone(), points.read(&input)?.points);
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let mut report = reporter(monitor, &scenario.name);
+            study::relax_from_points(&scenario, &points, &options, &mut report)
+        })?;
+        found.map_err(value_error)?
+    } else if let Some(start) = &asked.start {
         let (scenario, stations, rods) = (input.clone(), start.stations.clone(), start.rods());
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();

@@ -216,8 +216,8 @@ def test_starts_that_are_refused(tmp_path: Path) -> None:
     ]:
         with pytest.raises(ValueError, match=re.escape(why)):
             leafdyn.relax(**{"scenario": fan(3), "start": leaf, **wrong})  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="start = dict: must be a leaf at rest"):
-        leafdyn.relax(fan(3), start=fan(3))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="start: an array of points"):
+        leafdyn.relax(fan(3), start=[1.0, 2.0])  # type: ignore[list-item]
     leaf.save(tmp_path, "json")
     with pytest.raises(AttributeError, match="was not kept when it was pickled or written"):
         leafdyn.relax(fan(3), start=leafdyn.load(tmp_path))  # type: ignore[arg-type]

@@ -77,3 +77,18 @@ def test_what_is_refused() -> None:
         leafdyn.unbend(LEAF, "none.csv")
     with pytest.warns(leafdyn.LeafWarning, match="unstable"):
         leafdyn.unbend(LEAF, POINTS, young=1.2e4, slow_loading=False)
+
+
+def test_relax_starts_from_points(tmp_path: Path) -> None:
+    leaf = leafdyn.relax("scenarios/classic/cantilever_heavy.toml", tolerance=1e-8)
+    points = leaf.positions[0][:: max(1, len(leaf.stations) // 24)]
+    again = leafdyn.relax(leaf.scenario, start=points, tolerance=1e-8)
+    assert again.stable
+    np.testing.assert_allclose(again.tip, leaf.tip, atol=1e-7)
+    file = tmp_path / "points.csv"
+    file.write_text("x,y,z\n" + "\n".join(",".join(map(repr, map(float, row))) for row in points))
+    np.testing.assert_array_equal(leafdyn.relax(leaf.scenario, start=file, tolerance=1e-8).tip, again.tip)
+    with pytest.raises(ValueError, match="shape"):
+        leafdyn.relax(leaf.scenario, start=points[:, 0])
+    with pytest.raises(ValueError, match="as long|length|near"):
+        leafdyn.relax(leaf.scenario, start=2.0 * points)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias, Union, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -13,14 +13,11 @@ from . import _leafdyn
 from ._arguments import numbers, switches
 from ._attribute import Attribute
 from ._leaf import Array
-from ._measured import Measured, measurements
+from ._points import Points, table
 from ._progress import Progress, reporter
 from ._relax import warn
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
-
-Points: TypeAlias = Union[Measured, Array, Sequence[Sequence[float]]]
-"""Points of a centreline: a table, or an array with a row ``x, y, z`` or ``x, y`` for each."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +139,6 @@ def _young(young: float | tuple[float, float] | None) -> list[float] | None:
     return [float(end) for end in ends]
 
 
-def _table(points: Points, name: str, units: Mapping[str, str]) -> tuple[str, str] | str:
-    if isinstance(points, (str, os.PathLike)) or hasattr(points, "items"):
-        return measurements(cast(Measured, points), name, units)[0]
-    array = np.asarray(points, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] not in (2, 3):
-        raise ValueError(f"{name}: an array of points has a row x, y, z or x, y for each, not the shape {array.shape}")
-    return measurements({axis: array[:, k] for k, axis in enumerate("xyz"[: array.shape[1]])}, name, units)[0]
-
-
 def unbend(
     scenario: Source,
     points: Points,
@@ -222,8 +210,8 @@ def unbend(
     numbers(roll=roll)
     switches(slow_loading=slow_loading)
     leaf = checked(scenario, set)
-    table = _table(points, "points", leaf.units)
-    other = None if second is None else _table(second, "second", leaf.units)
+    table = table(points, "points", leaf.units)
+    other = None if second is None else table(second, "second", leaf.units)
     ends = _young(young)
     with reporter(progress) as heard:
         found = Posture(_leafdyn.unbend(leaf._core, table, ends, other, float(roll), slow_loading, heard))
@@ -281,6 +269,6 @@ def unbend_many(
         leaves = [checked(scenario, set) for scenario in scenarios]
     if len(leaves) != len(tables):
         raise ValueError(f"{len(leaves)} scenarios and {len(tables)} postures: give one scenario, or one for each")
-    given = [_table(one, f"points[{k}]", leaf.units) for k, (one, leaf) in enumerate(zip(tables, leaves))]
+    given = [table(one, f"points[{k}]", leaf.units) for k, (one, leaf) in enumerate(zip(tables, leaves))]
     found = _leafdyn.unbend_many([(leaf._core, table) for leaf, table in zip(leaves, given)], _young(young))
     return [one if isinstance(one, str) else Posture(one) for one in found]

@@ -11,6 +11,7 @@ from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
 from ._errors import LeafWarning
 from ._leaf import Equilibrium
+from ._points import Points, table
 from ._progress import Heard, Progress, reporter
 from ._scenario import Scenario, Source, checked
 
@@ -28,14 +29,15 @@ def asked_for(
     sensitivity: Iterable[str] = (),
     margin: bool = False,
     path: str = "loading",
-    start: Equilibrium | None = None,
+    start: Equilibrium | Points | None = None,
     veins: str | tuple[str, float] | None = None,
     veins_error: bool = False,
 ) -> dict[str, Any]:
     asked = {
         **locals(),
         "sensitivity": list(sensitivity),
-        "start": None if start is None else _shape(start),
+        "start": _shape(start) if isinstance(start, Equilibrium) else None,
+        "points": None,
         "veins": _refined(veins),
     }
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
@@ -73,8 +75,6 @@ def _refined(veins: str | tuple[str, float] | None) -> float | None:
 
 def _shape(start: Equilibrium) -> dict[str, list[float]]:
     """A leaf as the program takes it, one number after the other."""
-    if not isinstance(start, Equilibrium):
-        raise TypeError(f"start = {type(start).__name__}: must be a leaf at rest, as relax returns it")
     names = ("stations", "lengths", "positions", "rotations", "forces")
     return {name: getattr(start, name).ravel().tolist() for name in names}
 
@@ -93,7 +93,7 @@ def relax(
     segments: SupportsIndex | None = None,
     intervals: SupportsIndex | None = None,
     path: str = "loading",
-    start: Equilibrium | None = None,
+    start: Equilibrium | Points | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: SupportsIndex = 0,
@@ -124,7 +124,9 @@ def relax(
         ``"release"``, that of one released from arcs under all of its loads.
     start
         A leaf at rest with as many rods, from which this one moves on by the method ``"semi-implicit"``: it stays in
-        the valley in which it is, where there are several equilibria. Left out: it is loaded as `path` says.
+        the valley in which it is, where there are several equilibria. Or points of the centreline of a leaf with one
+        rod, from base to tip, as of `unbend`: the equilibrium nearest to that shape, refused where none is near. Left
+        out: it is loaded as `path` says.
     keep_unstable
         Stop at a saddle instead of leaving it.
     full_model
@@ -201,6 +203,8 @@ def relax(
         veins_error,
     )
     leaf = checked(scenario, set)
+    if start is not None and not isinstance(start, Equilibrium):
+        asked["points"] = table(start, "start", leaf.units)
     with reporter(progress) as heard:
         core = _leafdyn.relax(leaf._core, asked, heard)
     if veins is not None:
