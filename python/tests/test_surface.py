@@ -43,7 +43,8 @@ def test_angles() -> None:
     # An arc of one radian.
     assert angles.mean_inclination == pytest.approx(np.degrees(0.5), rel=1e-4)
     assert angles.projected_area == pytest.approx(0.2 * np.sin(1.0), rel=1e-4)
-    assert (np.diff(angles.inclination) == 5).all() and (np.diff(angles.azimuth) == 10).all()
+    np.testing.assert_allclose(np.diff(angles.inclination), 5.0)
+    np.testing.assert_allclose(np.diff(angles.azimuth), 10.0)
 
 
 def test_files_have_the_same_surface(tmp_path: Path) -> None:

@@ -400,7 +400,7 @@ class Equilibrium(Viewed):
         >>> import leafdyn
         >>> leaf = leafdyn.relax("scenarios/measured/grass.toml", stations=64)
         >>> leaf.mesh()
-        <Mesh: 193 vertices, 256 triangles>
+        <Mesh: 573 vertices, 1012 triangles>
         """
         return mesh(self._core, veins, thickness)
 

@@ -15,7 +15,7 @@ Points: TypeAlias = Union[Measured, NDArray[np.float64], Sequence[Sequence[float
 """Points of a centreline: a table, or an array with a row ``x, y, z`` or ``x, y`` for each."""
 
 
-def table(points: Points, name: str, units: Mapping[str, str]) -> tuple[str, str] | str:
+def point_table(points: Points, name: str, units: Mapping[str, str]) -> tuple[str, str] | str:
     """The table of points as the program reads it: its name and text, or its path."""
     if isinstance(points, (str, os.PathLike)) or hasattr(points, "items"):
         return measurements(cast(Measured, points), name, units)[0]

@@ -13,7 +13,7 @@ from . import _leafdyn
 from ._arguments import numbers, switches
 from ._attribute import Attribute
 from ._leaf import Array
-from ._points import Points, table
+from ._points import Points, point_table
 from ._progress import Progress, reporter
 from ._relax import warn
 from ._result import Contents, Table, read_only
@@ -210,8 +210,8 @@ def unbend(
     numbers(roll=roll)
     switches(slow_loading=slow_loading)
     leaf = checked(scenario, set)
-    table = table(points, "points", leaf.units)
-    other = None if second is None else table(second, "second", leaf.units)
+    table = point_table(points, "points", leaf.units)
+    other = None if second is None else point_table(second, "second", leaf.units)
     ends = _young(young)
     with reporter(progress) as heard:
         found = Posture(_leafdyn.unbend(leaf._core, table, ends, other, float(roll), slow_loading, heard))
@@ -269,6 +269,6 @@ def unbend_many(
         leaves = [checked(scenario, set) for scenario in scenarios]
     if len(leaves) != len(tables):
         raise ValueError(f"{len(leaves)} scenarios and {len(tables)} postures: give one scenario, or one for each")
-    given = [table(one, f"points[{k}]", leaf.units) for k, (one, leaf) in enumerate(zip(tables, leaves))]
+    given = [point_table(one, f"points[{k}]", leaf.units) for k, (one, leaf) in enumerate(zip(tables, leaves))]
     found = _leafdyn.unbend_many([(leaf._core, table) for leaf, table in zip(leaves, given)], _young(young))
     return [one if isinstance(one, str) else Posture(one) for one in found]

@@ -11,7 +11,7 @@ from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
 from ._errors import LeafWarning
 from ._leaf import Equilibrium
-from ._points import Points, table
+from ._points import Points, point_table
 from ._progress import Heard, Progress, reporter
 from ._scenario import Scenario, Source, checked
 
@@ -204,7 +204,7 @@ def relax(
     )
     leaf = checked(scenario, set)
     if start is not None and not isinstance(start, Equilibrium):
-        asked["points"] = table(start, "start", leaf.units)
+        asked["points"] = point_table(start, "start", leaf.units)
     with reporter(progress) as heard:
         core = _leafdyn.relax(leaf._core, asked, heard)
     if veins is not None:
