@@ -72,5 +72,5 @@ def mesh(core: Any, veins: bool, thickness: bool) -> Mesh:
 
 def angles(core: Any) -> Angles:
     """The angles of a leaf of the extension."""
-    classes, (area, projected_area, mean_inclination) = core.angles()
-    return Angles(*classes, area, projected_area, mean_inclination)
+    (inclination, azimuth, areas), (area, projected_area, mean_inclination) = core.angles()
+    return Angles(inclination, azimuth, areas, area, projected_area, mean_inclination)
