@@ -157,7 +157,7 @@ pub fn unbend(
 /// The outcome of one of several postures: what it proves, or why it cannot be used.
 #[derive(IntoPyObject)]
 pub enum PostureOrRefusal {
-    Posture(Posture),
+    Posture(Py<Posture>),
     Refusal(String),
 }
 
@@ -202,7 +202,7 @@ pub fn unbend_many(
                         .remarks
                         .insert(0, UnbendRemark::Coordinates(taken.into()));
                 }
-                PostureOrRefusal::Posture(Posture { found, input })
+                PostureOrRefusal::Posture(Py::new(py, Posture { found, input })?)
             }
             Some(Err(error @ UnbendError::Young { .. })) => return Err(value_error(error)),
             Some(Err(error)) => PostureOrRefusal::Refusal(format!("{}: {error}", read.name)),

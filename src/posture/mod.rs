@@ -2,7 +2,7 @@
 //!
 //! A single rod with dead loads is clamped at its base and free at its tip; its stiffness is Young's modulus E times
 //! known moments of area, and it neither stretches nor shears. Forces and moments along a posture that was measured
-//! do not ask for E ([`line`]), so that every E has a curvature at rest, u0 = u - A^-1 m/E, with which the leaf rests
+//! do not ask for E ([`mod@line`]), so that every E has a curvature at rest, u0 = u - A^-1 m/E, with which the leaf rests
 //! in this posture. A posture that is seen is stable: E is at least [`Posture::critical_young`], the largest
 //! eigenvalue of the second variation ([`second_variation`]).
 
