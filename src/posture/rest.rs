@@ -6,6 +6,7 @@ use crate::posture::frame::FrameRule;
 use crate::posture::line::{Elements, POINTS};
 use crate::posture::smoothing::local_basis;
 use crate::posture::{Centreline, Posture};
+use crate::shape::{NodeState, RodShape};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::DVector;
 
@@ -248,6 +249,24 @@ pub fn integrate_curvature(
 }
 
 impl Stations {
+    /// The posture as a shape from which a relaxation begins: fractions of the length, and the vein there.
+    pub fn to_shape(&self) -> (Vec<f64>, Vec<RodShape>) {
+        let node = |station: &Station| NodeState {
+            position: station.position,
+            rotation: DQuat::from_mat3(&station.directors).normalize(),
+            v: DVec3::X,
+            u: station.curvature,
+            n: station.force,
+            m: station.moment,
+        };
+        let rod = RodShape {
+            length: self.length,
+            nodes: self.ends.iter().map(node).collect(),
+        };
+        let at = self.ends.iter().map(|station| station.sigma).collect();
+        (at, vec![rod])
+    }
+
     /// The curvature at rest at a modulus as a continuous function that is linear between the ends of the parts.
     pub fn linear_rest_curvature(&self, young: f64) -> Vec<DVec3> {
         self.project(&|station| station.rest_curvature(young))

@@ -5,12 +5,11 @@ use crate::posture::leaf::{ScenarioRod, rest_scenario, with_level_base};
 use crate::posture::points::PostureError;
 use crate::posture::rest::Stations;
 use crate::posture::two_postures::{TwoPostures, compare};
-use crate::relax::{self, Equilibrium, EquilibriumDoubt, NodeState, Options, Outcome, RodShape};
+use crate::relax::{self, Equilibrium, EquilibriumDoubt, Options, Outcome};
 use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
 use crate::study::unbend::request::{UnbendError, UnbendRequest};
 use crate::study::unbend::result::{ModulusInterval, RestCheck, SlowLoading, Unbending};
-use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
 /// Where no modulus is given, the files are those of this many times the least one: of measured wheat leaves half rest
@@ -116,28 +115,9 @@ impl Unbending {
     }
 }
 
-/// The posture as a shape from which a relaxation begins.
-fn shape(stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
-    let node = |station: &crate::posture::rest::Station| NodeState {
-        position: station.position,
-        rotation: DQuat::from_mat3(&station.directors).normalize(),
-        v: DVec3::X,
-        u: station.curvature,
-        n: station.force,
-        m: station.moment,
-    };
-    let nodes = stations.ends.iter().map(node).collect();
-    let at = stations.ends.iter().map(|station| station.sigma).collect();
-    let rods = vec![RodShape {
-        length: stations.length,
-        nodes,
-    }];
-    (at, rods)
-}
-
 /// Relaxes the scenario that rests in a posture from there.
 fn check_rest(rest: &Scenario, stations: &Stations, young: f64) -> RestCheck {
-    let (at, rods) = shape(stations);
+    let (at, rods) = stations.to_shape();
     let options = Options {
         method: relax::SemiImplicit {
             keep_unstable: true,

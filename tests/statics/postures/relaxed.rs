@@ -1,26 +1,8 @@
 //! The index of a posture is that of the leaf relaxed from there, on both sides of each rung of its ladder.
 
 use super::*;
-use glam::DQuat;
 use leafdyn::posture::leaf::{rest_scenario, with_level_base};
-use leafdyn::posture::rest::Stations;
-use leafdyn::relax::{NodeState, Options, RodShape, SemiImplicit, relax_from};
-
-/// The posture as a shape.
-fn shape(stations: &Stations) -> (Vec<f64>, Vec<RodShape>) {
-    let node = |station: &leafdyn::posture::rest::Station| NodeState {
-        position: station.position,
-        rotation: DQuat::from_mat3(&station.directors).normalize(),
-        v: DVec3::X,
-        u: station.curvature,
-        n: station.force,
-        m: station.moment,
-    };
-    let nodes = stations.ends.iter().map(node).collect();
-    let length = stations.length;
-    let at = stations.ends.iter().map(|station| station.sigma).collect();
-    (at, vec![RodShape { length, nodes }])
-}
+use leafdyn::relax::{Options, SemiImplicit, relax_from};
 
 /// The index of the leaf that rests in the posture at a modulus, and how far it is from there.
 fn relaxed(scenario: &Scenario, found: &Posture, young: f64) -> (Option<usize>, f64) {
@@ -35,7 +17,7 @@ fn relaxed(scenario: &Scenario, found: &Posture, young: f64) -> (Option<usize>, 
         .into(),
         ..Options::default()
     };
-    let (at, rods) = shape(&stations);
+    let (at, rods) = stations.to_shape();
     let leaf = relax_from(&rest, (&at, &rods), &options, &mut |_| {}).unwrap();
     let tip = stations.ends.last().unwrap().position;
     (
