@@ -15,7 +15,7 @@ use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::same_equilibrium::{is_near_guess, is_own_mirror_image, is_same_on_two_grids};
 use crate::relax::solve_on_grid::{
     COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
-    find_grid_equilibrium,
+    find_grid_equilibrium, has_coarse_span,
 };
 
 /// Newton iterations to the same equilibrium, of any index, on the next grid.
@@ -131,7 +131,7 @@ pub fn refine_to_tolerance(
         if known {
             let another = needs_another_grid(problem, &found);
             found.added_for_nodes |= another;
-            if !another {
+            if !another && !needs_third_grid(problem, &found) {
                 return Ok(found.with_tolerance_kept(true));
             }
         }
@@ -144,6 +144,17 @@ pub fn refine_to_tolerance(
         };
         found = predict_and_solve(problem, found, finer, effort)?;
     }
+}
+
+/// Whether the leaf has two grids, on which the spans between some holders have so few segments that their forces on
+/// two grids tell only the first digits.
+fn needs_third_grid(problem: &RelaxationProblem, found: &NestedEquilibrium) -> bool {
+    let [coarsest, _] = found.levels.as_slice() else {
+        return false;
+    };
+    found.corrected_estimate().is_none()
+        && has_coarse_span(problem.leaf, coarsest.leaf.segments() / 2)
+        && found.next_finer_grid().is_some()
 }
 
 /// Whether all nodes of the finest grid are requested and the leaf is not accurate enough

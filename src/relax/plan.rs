@@ -8,6 +8,7 @@
 //! that is stable.
 
 use crate::leaf::{Leaf, Loads};
+use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::log::{Extent, Strategy};
 use crate::relax::path::{Path, Route};
 use crate::relax::request::{Method, Options, SemiImplicit};
@@ -136,6 +137,9 @@ pub struct RelaxationProblem<'a> {
     pub planar: bool,
     /// Where the leaf may go from its initial guess.
     pub valley: ValleyPolicy,
+    /// The whole leaf at rest under the loads that have a potential, from which the others grow; `None`: they
+    /// grow from where a release from arcs leads.
+    pub loaded_start: Option<&'a GridLevel>,
 }
 
 impl<'a> RelaxationProblem<'a> {
@@ -149,6 +153,7 @@ impl<'a> RelaxationProblem<'a> {
             shape_alone: false,
             planar: false,
             valley: ValleyPolicy::MayLeave,
+            loaded_start: None,
         }
     }
 
@@ -187,6 +192,17 @@ impl<'a> RelaxationProblem<'a> {
 
     /// Whether the leaf is loaded slowly, rather than released.
     pub fn loads_slowly(&self) -> bool {
+        self.may_load_slowly() && self.leaf.loads != Loads::default() && self.leaf.has_potential()
+    }
+
+    /// Whether loads without a potential grow on a leaf that was first loaded slowly with the others.
+    pub fn grows_from_slow_loading(&self) -> bool {
+        let grows = self.leaf.loads.has_followers() || self.leaf.in_wind();
+        self.may_load_slowly() && grows
+    }
+
+    /// Whether slow loading is asked for, and possible for this leaf.
+    fn may_load_slowly(&self) -> bool {
         let disturbed = |how: SemiImplicit| how.keep_unstable || how.disturbance.is_some();
         let released = match self.options.method {
             Method::SemiImplicit(how) => disturbed(how),
@@ -197,8 +213,6 @@ impl<'a> RelaxationProblem<'a> {
             && !released
             && !self.leaf.has_placed_supports()
             && !self.leaf.turns_freely()
-            && self.leaf.loads != Loads::default()
-            && self.leaf.has_potential()
     }
 
     /// Whether a leaf that was released may be loaded slowly.

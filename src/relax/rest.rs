@@ -31,6 +31,9 @@ use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
+/// Tolerance of a leaf on which loads without a potential are to grow, which is brought to rest again on each grid.
+const LOADED_START_TOLERANCE: f64 = 1e-3;
+
 /// What a relaxation on nested grids found.
 pub(crate) struct RelaxedLeaf {
     /// The leaf in the units of the scenario.
@@ -72,13 +75,42 @@ pub(crate) fn relax_on_grids(
         ..RelaxationProblem::new(&leaf, options, tolerance)
     };
     let mut effort = WorkLog::new(progress);
+    let loaded = match problem.grows_from_slow_loading() {
+        true => load_with_potential(&problem, &mut effort),
+        false => None,
+    };
+    let problem = RelaxationProblem {
+        loaded_start: loaded.as_ref().and_then(|it| it.levels.last()),
+        ..problem
+    };
+    let path = loaded.as_ref().and_then(|it| it.path.clone());
     let found = find_rest(&problem, half.as_ref(), first, &mut effort);
+    let found = result_with_path(found, path);
     Ok(equilibrium_with_stability(
         &problem,
         found,
         clock,
         &mut effort,
     ))
+}
+
+/// Loads a leaf slowly with those of its loads that have a potential, as well as their growth needs; `None`
+/// if that does not lead to rest.
+fn load_with_potential(
+    problem: &RelaxationProblem,
+    effort: &mut WorkLog,
+) -> Option<NestedEquilibrium> {
+    let leaf = Leaf::new(&problem.leaf.scenario().with_potential());
+    let method = problem.options.method;
+    let half = may_solve_half(method).then(|| leaf.mirror_half()).flatten();
+    let calm = RelaxationProblem {
+        leaf: &leaf,
+        tolerance: problem.tolerance.max(LOADED_START_TOLERANCE),
+        shape_alone: true,
+        ..*problem
+    };
+    let segments = check_segments(&leaf, method.segments(), GRIDS.coarsest).ok()?;
+    find_rest(&calm, half.as_ref(), segments, effort).ok()
 }
 
 /// Brings the leaf to rest, its `half` where that is enough, by the first attempt of its plan that is

@@ -294,6 +294,23 @@ impl Scenario {
         self.tip_moment != [0.0; 3] || on_points()
     }
 
+    /// The scenario without loads that have no potential: those that turn with the sections, moments and wind.
+    pub(crate) fn with_potential(&self) -> Scenario {
+        let without = |point: &PointLoad| PointLoad {
+            force: if point.follows { [0.0; 3] } else { point.force },
+            moment: [0.0; 3],
+            ..point.clone()
+        };
+        Scenario {
+            follower: None,
+            couple: None,
+            wind: None,
+            tip_moment: [0.0; 3],
+            points: self.points.iter().map(without).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Whether all rods begin in the origin, in the plane z = 0.
     pub(crate) fn is_fan(&self) -> bool {
         let in_plane = |rod: &Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;

@@ -6,7 +6,8 @@
 //! classical Runge-Kutta method, independent of the elements.
 
 use glam::DQuat;
-use leafdyn::relax::EquilibriumRemark;
+use leafdyn::relax::{EquilibriumRemark, Options, Route};
+use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
 
 const ROD: &str = r#"
@@ -319,4 +320,55 @@ fn what_needs_a_potential_refuses_them() {
     let refused = leafdyn::study::relax_with_margin(&leaf, &to(1e-6), &mut |_| {});
     let why = refused.unwrap_err().to_string();
     assert!(why.contains("load.follower"), "{why}");
+}
+
+/// A joined leaf that is softer to one side than to the other, stiff veins between soft ones: several equilibria.
+fn soft_leaf(random: &mut Draw) -> Scenario {
+    let rods = 2 + random.uniform(0.0, 4.0) as usize;
+    let [torsion, bending] = [random.log(0.3, 3.0), random.log(1.0, 30.0)];
+    let weight = random.log(0.5, 12.0);
+    parse(&format!(
+        r#"
+        name = "soft"
+        leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
+        stiffness = {{ torsion = {torsion:?}, bending_2 = 1.0, bending_3 = {bending:?}, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }}
+        load.gravity = [0.0, 0.0, {:?}]
+        "#,
+        -weight
+    ))
+}
+
+/// A load that is hardly there changes nothing: loads without a potential grow on the leaf that slow loading gives.
+#[test]
+fn vanishing_loads_leave_the_slowly_loaded_leaf() {
+    let mut random = Draw(0x51_0e5);
+    let mut far = 0;
+    for k in 0..60 {
+        let alone = soft_leaf(&mut random);
+        let mut loaded = alone.clone();
+        loaded.follower = Some(vec![
+            [
+                Profile::Constant(0.0),
+                Profile::Constant(0.0),
+                Profile::Constant(1e-12)
+            ];
+            alone.rods.len()
+        ]);
+        let [one, other] = [&alone, &loaded].map(|it| settle(it, 1e-6));
+        assert_eq!(
+            one.path.as_ref().map(|it| it.word()),
+            other.path.as_ref().map(|it| it.word()),
+            "{k}"
+        );
+        let bar = estimate(&one) + estimate(&other);
+        let off = tip(&one).distance(tip(&other));
+        assert!(off <= bar.max(1e-9), "{k}: {off:.1e} > {bar:.1e}");
+        let released = Options {
+            route: Route::Release,
+            ..to(1e-6)
+        };
+        far += usize::from(tip(&settled(&loaded, &released)).distance(tip(&one)) > 0.1);
+    }
+    // Where slow loading ends is not where arcs lead.
+    assert!(far > 0);
 }

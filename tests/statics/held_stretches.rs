@@ -155,3 +155,37 @@ fn unshearable_veins_come_to_clamps() {
     }
     assert_eq!(compared, 9);
 }
+
+/// A vein that is clamped at both ends of a span and moved across bends antisymmetrically: in its middle all grids agree.
+/// The shape beyond the clamp is that of the natural leaf, and that of the span a cubic that tension flattens.
+#[test]
+fn antisymmetric_spans_are_seen() {
+    for (at, tolerance) in [
+        ("[0.25, 0.5]", 1e-6),
+        ("0.25", 1e-8),
+        ("[0.125, 0.5]", 1e-6),
+    ] {
+        let leaf = |axial: &str| {
+            parse(&format!(
+                r#"
+                name = "span"
+                leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+                stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = {axial}, shear_2 = inf, shear_3 = inf }}
+                [[grip]]
+                vein = 1
+                at = {at}
+                held = "clamped"
+                move = [0.0, 0.02, 0.0]
+                "#
+            ))
+        };
+        for axial in ["1e3", "5e5"] {
+            let leaf = leaf(axial);
+            let found = settle(&leaf, tolerance).at_stations(&leaf, Some(32));
+            let exact = settle_on(&leaf, 2048, false).at_stations(&leaf, Some(32));
+            let bar = found.accuracy.error_estimate.unwrap();
+            let off = distance(&found, &exact);
+            assert!(off <= bar + 1e-6, "{at} {axial}: {off:.1e} > {bar:.1e}");
+        }
+    }
+}

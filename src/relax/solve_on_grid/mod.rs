@@ -11,7 +11,7 @@ pub(crate) mod start;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, LinearSolveOutcome, State, System, half_state};
 use crate::memory;
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonIteration, SolverCounts};
-use crate::relax::accuracy::transfer::{GridLevel, mirror_level};
+use crate::relax::accuracy::transfer::{GridLevel, mirror_level, transfer};
 use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, StrainEffects, is_large,
 };
@@ -24,6 +24,7 @@ use crate::relax::saddle::saddle_summary;
 use crate::relax::solve_on_grid::grips::move_grips;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation, disturb, initial_state};
 use crate::run::{Limit, RefusedOption};
+use crate::scenario::Grip;
 use glam::DVec3;
 
 /// Errors of positions and rotations that the iteration on a grid may leave. Half of any of them costs
@@ -166,6 +167,17 @@ fn find_unleaned_equilibrium(
     };
     if grows && !near_rest && !grip {
         let calm = leaf.with_load_potential();
+        let loaded = problem.loaded_start.filter(|_| from_start);
+        let quality = GuessQuality {
+            near_rest: loaded.is_some(),
+            ..quality
+        };
+        if let Some(loaded) = loaded {
+            state = transfer(&loaded.leaf, &loaded.state, &calm.grid);
+            if problem.whole_leaf.is_some() {
+                state = half_state(problem.leaf, &state);
+            }
+        }
         let mut system = effort.workspace.equations(&calm);
         let level = GridLevel { leaf: calm, state };
         let settled = solve_semi_implicit(problem, history, level, &mut system, quality, effort);
@@ -599,7 +611,34 @@ pub fn check_segments(
     Ok(segments)
 }
 
-/// Segments of the coarsest grid: `least`, or as many as resolve rest curvature and dead moments.
+/// Least segments of a span between holders on the coarsest grid, where positions on all grids are compared. In the
+/// middle of a span the deflection may vanish on every grid: an antisymmetric one does.
+const LEAST_SPAN_SEGMENTS: usize = 4;
+
+/// The largest factor by which that refines the coarsest grid.
+const LARGEST_SPAN_REFINEMENT: usize = 4;
+
+/// Whether rigid grips divide a vein into spans of which some have too few segments to be compared.
+pub fn has_coarse_span(leaf: &Leaf, segments: usize) -> bool {
+    let grips = &leaf.scenario().grips;
+    let grid = Grid::new(segments, leaf.kinks());
+    let is_coarse = |vein: usize, to: f64| {
+        let beside = grips.iter().filter(|it| it.vein == vein);
+        let before = beside.map(|it| it.at[1]).filter(|end| *end < to);
+        let from = before.fold(0.0, f64::max);
+        let count = grid
+            .nearest_node(to)
+            .saturating_sub(grid.nearest_node(from));
+        (1..LEAST_SPAN_SEGMENTS).contains(&count)
+    };
+    let held_tip = leaf.tip_support.is_some();
+    let is_coarse_beside =
+        |grip: &Grip| is_coarse(grip.vein, grip.at[0]) || held_tip && is_coarse(grip.vein, 1.0);
+    grips.iter().any(is_coarse_beside)
+}
+
+/// Segments of the coarsest grid: `least`, or as many as resolve rest curvature, dead moments and spans between
+/// holders.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
     let moment = leaf.moment_integral_bound();
     let turn = |j: usize| {
@@ -616,6 +655,10 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         None => least,
     };
     while (segments as f64) * COARSEST_TURN < turn && segments < GRIDS.finest {
+        segments *= 2;
+    }
+    let most = (LARGEST_SPAN_REFINEMENT * segments).min(GRIDS.finest);
+    while segments < most && has_coarse_span(leaf, segments) {
         segments *= 2;
     }
     segments
