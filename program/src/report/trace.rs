@@ -107,8 +107,8 @@ fn option_advice(trace: &Trace) -> Vec<String> {
         advice.extend(first.map(|(branch, losses)| {
             let branch = branch + 1;
             format!(
-                "branch {branch} loses its stability {losses} times: --until unstable ends branches \
-                 where they do"
+                "branch {branch} passes {losses} points beyond which more modes are unstable: --until unstable ends \
+                 branches at the first"
             )
         }));
     }
@@ -245,7 +245,10 @@ fn motion_event_line(trace: &Trace, point: &TracePoint, kind: PointKind, before:
             Some(error) => format_within_error(it.frequency, error),
             None => format_five_digits(it.frequency),
         };
-        let cycles = format_five_digits(it.frequency / TAU);
+        let cycles = match it.error {
+            Some(error) => format_within_error(it.frequency / TAU, error / TAU),
+            None => format_five_digits(it.frequency / TAU),
+        };
         format!(", angular frequency {angular} {per_time} ({cycles} cycles)")
     });
     let value = varied_value_text(trace, point);
