@@ -90,7 +90,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "the ratio of the largest to this smallest torsion or bending stiffness; \
          double precision does not resolve more: raise this one or lower the largest",
     ),
-    rest_angle: upper_limit("|u0| L", 1e3, REST_ANGLE_REASON),
+    rest_angle: upper_limit("|u0| L", 1e4, REST_ANGLE_REASON),
     stretch: ratio_limit(
         "v0",
         1e3,
@@ -151,7 +151,7 @@ const LIMITS: LeafLimits = LeafLimits {
         1e6,
         "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor",
     ),
-    rest_factor_angle: upper_limit("|factor u0| L", 1e3, REST_ANGLE_REASON),
+    rest_factor_angle: upper_limit("|factor u0| L", 1e4, REST_ANGLE_REASON),
     gravity: upper_limit("|g| L^3/A", 1e8, TENSION_REASON),
     tip_force: upper_limit("|F| L^2/A", 1e8, TENSION_REASON),
     tip_moment: upper_limit(
@@ -169,7 +169,11 @@ const LIMITS: LeafLimits = LeafLimits {
         "L is the longest rod; \
          beyond the limit positions lose digits: choose an origin closer to the leaf",
     ),
-    base_turn: upper_limit("|turn|", 1e3, REST_ANGLE_REASON),
+    base_turn: upper_limit(
+        "|turn|",
+        1e3,
+        "an angle in radians: the bases would turn more than 150 times",
+    ),
     tissue: upper_limit("k L^4/A", 1e16, TISSUE_STIFFNESS_REASON),
     fold: upper_limit("c L^2/A", 1e12, TISSUE_STIFFNESS_REASON),
     drag: upper_limit(
@@ -194,7 +198,7 @@ const SPRING_REASON: &str = "A is the smallest bending stiffness of a rod and L 
      is rigid for all that double precision resolves: lower it, or hold the rod rigidly";
 
 const REST_ANGLE_REASON: &str =
-    "an angle in radians: the rod at rest would be wound up more than 150 times";
+    "an angle in radians: the rod at rest would be wound up more than 1,500 times";
 
 const TISSUE_STIFFNESS_REASON: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
      beyond the limit double precision does not resolve both: lower this one or stiffen the rods";

@@ -54,6 +54,20 @@ fn hundreds_of_turns_are_found() {
     }
 }
 
+/// A rod that is curled, or twisted, by thousands of radians at rest: an arc, or a straight line.
+#[test]
+fn thousands_of_radians_at_rest_are_resolved() {
+    for curl in [900.0_f64, 9_000.0] {
+        let leaf = settle(&rod(&format!("rest.bend_3={curl:?}")), 1e-6);
+        let arc = DVec3::new(curl.sin(), 1.0 - curl.cos(), 0.0) / curl;
+        let off = (tip(&leaf) - arc).length();
+        assert!(off <= estimate(&leaf), "{curl}: {off:.1e}");
+        let leaf = settle(&rod(&format!("rest.twist={curl:?}")), 1e-6);
+        let off = (tip(&leaf) - DVec3::X).length();
+        assert!(off <= estimate(&leaf), "{curl}: {off:.1e}");
+    }
+}
+
 /// A section that is hardly stiff against twist, and no twist; more turns than any
 /// grid resolves.
 #[test]

@@ -258,7 +258,7 @@ fn limits_that_values_set_together() {
         tip_force = { at = [-1.7e308, 1.7e308], value = [[0, 0, 0], [0, 0, 0]] } => dynamics.tip_force, at, entry 1 = -1.7e308: gives |t|/T
         gravity = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1e8]] } => dynamics.gravity, value, entry 2 = [0, 0, 1e8]: gives |g| L^3/A = 8.000e8, the limit is 1e8
         tip_force = { at = [0], value = [[1.7e308, 1.7e308, 0]] } => dynamics.tip_force, value, entry 1 = [1.7e308, 1.7e308, 0]: gives |F| L^2/A
-        rest = { at = [0, 1], factor = [1, -1001] } => dynamics.rest, factor, entry 2 = -1001: gives |factor u0| L = 1.001e3, the limit is 1e3
+        rest = { at = [0, 1], factor = [1, -10010] } => dynamics.rest, factor, entry 2 = -10010: gives |factor u0| L = 1.001e4, the limit is 1e4
         rest = { at = [0], factor = [1e307] } => dynamics.rest, factor, entry 1 = 1e307: gives |factor| = 1.000e307, the limit is 1e6
     "#;
     all_refused(table, with_lines);
