@@ -54,13 +54,12 @@ pub use crate::leaf::system::{
 pub use crate::leaf::tissue::cells::{CellStiffness, ContractionResultants};
 pub use crate::leaf::tissue::rigid::ForceCarriers;
 pub use crate::leaf::tissue::strips::HalfTurn;
-use crate::numbers::sorted_distinct;
 use crate::rod::Section;
 use crate::rotation::{self, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{
     BaseSupport, Clamp, Dynamics, Profile, Rod, RodPlace, Scenario, Tissue, ZeroEnergyRotation,
-    longest,
+    distinct_places, longest,
 };
 use glam::{BVec3, DQuat, DVec3};
 use std::sync::Arc;
@@ -265,7 +264,7 @@ impl Leaf {
         let masses = density.iter().chain(rotary_inertia);
         let masses = masses.flat_map(Profile::kinks).copied();
         let layers = clamp_layer_edges(&scenario);
-        let kinks = sorted_distinct(scenario.kinks().into_iter().chain(masses).chain(layers));
+        let kinks = distinct_places(scenario.kinks().into_iter().chain(masses).chain(layers));
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;

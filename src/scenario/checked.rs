@@ -117,6 +117,14 @@ impl Scenario {
 /// short.
 const PLACE_TOLERANCE: f64 = 1e-12;
 
+/// The fractions inside (0, 1), in their order; of those that differ by rounding alone the first.
+pub(crate) fn distinct_places(all: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut places =
+        sorted_distinct(all.filter(|&at| at > PLACE_TOLERANCE && at < 1.0 - PLACE_TOLERANCE));
+    places.dedup_by(|next, kept| *next - *kept <= PLACE_TOLERANCE);
+    places
+}
+
 /// A grip that ends within this fraction of the length from the tip holds the tip.
 const TIP_GRIP_TOLERANCE: f64 = 1e-11;
 
@@ -145,11 +153,7 @@ impl Scenario {
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
         let inside = points.chain(ends);
-        let all = profiles.flat_map(Profile::kinks).copied().chain(inside);
-        let mut kinks =
-            sorted_distinct(all.filter(|&at| at > PLACE_TOLERANCE && at < 1.0 - PLACE_TOLERANCE));
-        kinks.dedup_by(|next, kept| *next - *kept <= PLACE_TOLERANCE);
-        kinks
+        distinct_places(profiles.flat_map(Profile::kinks).copied().chain(inside))
     }
 
     /// Fractions inside (0, 1) where a stiffness or a rest shape jumps, and with it the strains of a rod.

@@ -33,6 +33,7 @@ crate::renamed! {
 
 pub use crate::scenario::blade::Blade;
 pub use crate::scenario::checked::Scenario;
+pub(crate) use crate::scenario::checked::distinct_places;
 pub use crate::scenario::format::Key;
 pub use crate::scenario::format::entries::Entries;
 pub use crate::scenario::format::error::{ScenarioError, SourceLocation, printable};

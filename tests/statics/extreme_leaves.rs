@@ -340,3 +340,27 @@ fn stations_keep_the_tolerance() {
     assert_eq!(kept.accuracy.tolerance, 1e-3);
     assert!(kept.accuracy.error_estimate.unwrap() <= 1e-3);
 }
+
+/// Knots that tables of different origin have at one place, up to rounding, are one: no segment lies between them.
+#[test]
+fn knots_that_differ_by_rounding_are_one() {
+    let leaf = |knot: f64| {
+        parse(&format!(
+            r#"
+            name = "slender"
+            units = {{ length = "cm", force = "N", time = "s" }}
+            leaf = {{ rods = 1, length = 17.0, fan = [0.0], elevation = 1.4 }}
+            section = {{ shape = "rectangle", width = {{ at = [0.0, 0.33, 1.0], value = [1.2, 1.7, 0.1] }}, thickness = 0.025, young = 1.5e5, mass_density = 1e-5 }}
+            load = {{ g = [0.0, 0.0, -981.0] }}
+            rest = {{ bend_2 = {{ at = [0.0, {knot:?}, 1.0], value = [0.04, -0.04, 0.07] }} }}
+            "#
+        ))
+    };
+    let one = settle(&leaf(0.33), 1e-6);
+    for by in [8e-15, -8e-15, 3e-13] {
+        let other = settle(&leaf(0.33 + by), 1e-6);
+        assert_eq!(other.accuracy.segments, one.accuracy.segments, "{by:e}");
+        let (off, bar) = (distance(&one, &other), estimate(&one));
+        assert!(off <= 1e-9, "{by:e}: {off:.1e}, {bar:.1e}");
+    }
+}
