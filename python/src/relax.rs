@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use leafdyn::relax::{
-    self, CorrectionProgress, Equilibrium, Method, Options, Progress, RelaxError, RodShape, Route,
-    Settings,
+    self, CorrectionProgress, Equilibrium, Limit, Method, Options, Progress, RelaxError, RodShape,
+    Route, Settings,
 };
 use leafdyn::scenario;
 use leafdyn::study::{
@@ -54,6 +54,15 @@ pub struct Asked {
     start: Option<Start>,
     /// Points of the centerline from which it starts; for one leaf only.
     points: Option<Points>,
+    /// Seconds after which all leaves are given up.
+    time_limit: Option<f64>,
+}
+
+/// The outcome of one of several scenarios: a leaf, or why it is refused.
+#[derive(IntoPyObject)]
+pub enum LeafOrRefusal {
+    Leaf(Leaf),
+    Refusal(String),
 }
 
 /// Refuses a request with a `ValueError`.
@@ -113,8 +122,21 @@ impl Asked {
             mode_shapes: self.mode_shapes || (self.modes > 0 && method.is_shooting()),
             every_node: true,
             stations: self.stations,
+            limit: self.limit(),
             ..Options::default()
         })
+    }
+
+    /// The limit of the time that begins now; none beyond what a clock counts.
+    fn limit(&self) -> Limit {
+        let limit = self
+            .time_limit
+            .and_then(|it| Duration::try_from_secs_f64(it).ok());
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        Limit {
+            deadline,
+            ..Limit::default()
+        }
     }
 }
 
@@ -150,7 +172,7 @@ fn solve_here(
     }
     let mut options = options.clone();
     let found = run_here(py, progress, |monitor, step| {
-        options.limit = monitor.limit();
+        monitor.watch(&mut options.limit);
         let mut large = false;
         let mut report = reporter(monitor, &scenario.name);
         let found = relax::relax(scenario, &options, &mut |progress| {
@@ -180,7 +202,7 @@ pub fn relax_one(
     if let Some(tolerance) = asked.veins {
         let base = scenario.base(py)?;
         let refined = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::refine_veins(&base, tolerance, &options, &mut reporter(monitor, &name))
         })?;
@@ -200,7 +222,7 @@ pub fn relax_one(
     let found = if let Some(points) = &asked.points {
         let (scenario, points) = (input.clone(), points.read(&input)?.points);
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let mut report = reporter(monitor, &scenario.name);
             study::relax_from_points(&scenario, &points, &options, &mut report)
         })?;
@@ -208,7 +230,7 @@ pub fn relax_one(
     } else if let Some(start) = &asked.start {
         let (scenario, stations, rods) = (input.clone(), start.stations.clone(), start.rods());
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let from: (&[f64], &[RodShape]) = (&stations, &rods);
             relax::relax_from(
                 &scenario,
@@ -221,7 +243,7 @@ pub fn relax_one(
     } else if asked.margin {
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let mut report = reporter(monitor, &scenario.name);
             let mut report_margin = |progress: &MarginProgress| match progress {
                 MarginProgress::Relaxing(progress) => report(progress),
@@ -237,7 +259,7 @@ pub fn relax_one(
     } else if asked.sensitivity.is_empty() && input.blade.is_some() {
         let base = scenario.base(py)?;
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::relax_blade(&base, &options, &mut reporter(monitor, &name))
         })?;
@@ -252,7 +274,7 @@ pub fn relax_one(
         }
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             relax::relax(&scenario, &options, &mut reporter(monitor, &scenario.name))
         })?;
         found.map_err(value_error)?
@@ -262,7 +284,7 @@ pub fn relax_one(
         let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
         let found = run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::relax_with_sensitivities(&base, &keys, &options, &mut reporter(monitor, &name))
         })?;
@@ -274,7 +296,7 @@ pub fn relax_one(
     let found = match estimate {
         None => found,
         Some((base, mut options)) => run(py, progress, move |monitor| {
-            options.limit = monitor.limit();
+            monitor.watch(&mut options.limit);
             let mut found = found;
             study::estimate_error_in_veins(&base, &mut found, &options);
             found
@@ -283,14 +305,16 @@ pub fn relax_one(
     Ok(Leaf::new(found, input, asked.stations))
 }
 
-/// Lets many leaves come to rest, side by side.
+/// Lets many leaves come to rest, side by side. The first that is refused ends the run, unless refusals are
+/// to be told in place of leaves.
 #[pyfunction]
 pub fn relax_many(
     py: Python,
     scenarios: Vec<PyRef<Scenario>>,
     asked: Asked,
+    tell_refusals: bool,
     progress: Option<&Bound<PyAny>>,
-) -> PyResult<Vec<Leaf>> {
+) -> PyResult<Vec<LeafOrRefusal>> {
     let mut options = asked.options()?;
     let checked: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
         .map(|scenario| scenario.checked.clone())
@@ -302,7 +326,7 @@ pub fn relax_many(
     };
     let bases = scenarios.iter().map(base).collect::<PyResult<Vec<_>>>()?;
     let found = run(py, progress, move |monitor| {
-        options.limit = monitor.limit();
+        monitor.watch(&mut options.limit);
         let (done, all, clock) = (AtomicUsize::new(0), checked.len(), Instant::now());
         let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
             let mut found = relax::relax(scenario, &options, &mut |_| {});
@@ -313,14 +337,22 @@ pub fn relax_many(
             monitor.report(done as f64, Some(all as f64), || {
                 format!("{done} of {all} leaves, {}", elapsed(clock))
             });
-            found.map_err(|error| format!("scenarios[{number}], {}: {error}", scenario.name))
+            match found {
+                Err(error) if !tell_refusals => {
+                    Err(format!("scenarios[{number}], {}: {error}", scenario.name))
+                }
+                found => Ok(found.map_err(|error| error.to_string())),
+            }
         };
         // One by one: a leaf may take a thousand times as long as the next.
         let leaves = checked.par_iter().enumerate().with_max_len(1).map(one);
-        leaves.collect::<Result<Vec<Equilibrium>, String>>()
+        leaves.collect::<Result<Vec<Result<Equilibrium, String>>, String>>()
     })?;
     let leaves = found.or_else(refuse)?.into_iter().zip(inputs);
-    let leaf = |(found, input)| Leaf::new(found, input, asked.stations);
+    let leaf = |(found, input)| match found {
+        Ok(found) => LeafOrRefusal::Leaf(Leaf::new(found, input, asked.stations)),
+        Err(why) => LeafOrRefusal::Refusal(why),
+    };
     Ok(leaves.map(leaf).collect())
 }
 

@@ -106,6 +106,11 @@ impl Monitor {
         }
     }
 
+    /// Lets a limit be reached, too, when the run is cancelled.
+    pub fn watch(&self, limit: &mut Limit) {
+        limit.cancel = Some(self.cancel.clone());
+    }
+
     /// Ends the run.
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);

@@ -1,5 +1,6 @@
 """A sweep finds what single leaves find, in the order of its grid."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -112,3 +113,49 @@ def test_the_workers_of_a_client(tmp_path: Path) -> None:
     with distributed.Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
         found = leafdyn.sweep(fan(2), GRID, client=client)
     assert found.equals(wanted)
+
+
+def test_refused_leaves_are_rows() -> None:
+    with pytest.raises(leafdyn.ScenarioError, match="stiffness.torsion"):
+        leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0, -1.0]})
+    names = ["tip_z", "stable", "negative_eigenvalues", "frequency_1", "neutral_directions", "outcome", "success", "remark"]
+    with pytest.warns(leafdyn.LeafWarning, match="1 of 3 leaves"):
+        table = leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0, -1.0, 2.0]}, names, on_error="row")
+    assert table["outcome"].tolist() == ["converged", "refused", "converged"]
+    assert "greater than 0" in table["remark"][1]
+    assert not table["success"][1]
+    assert table.loc[1, ["tip_z", "frequency_1", "stable", "negative_eigenvalues"]].isna().all()
+    alone = leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0, 2.0]}, names)
+    assert table["tip_z"].dropna().tolist() == alone["tip_z"].tolist()
+    # What relaxation refuses, and not the scenario.
+    with pytest.warns(leafdyn.LeafWarning, match="1 of 2 leaves"):
+        table = leafdyn.sweep(fan(2), {"load.gravity[2]": [-1.0, -1e3]}, segments=4, on_error="row")
+    assert table["outcome"][0] == "converged"
+    with pytest.raises(ValueError, match='on_error = "rows"|on_error'):
+        leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0]}, on_error="rows")  # type: ignore[arg-type]
+
+
+def test_batches_keep_their_leaves() -> None:
+    rigid = {**fan(2), "stiffness": {**fan(2)["stiffness"], "axial": np.inf}}
+    one, other, third = leafdyn.relax_many([fan(3), {**fan(3), "leaf": {}}, rigid], on_error="row", method="explicit")
+    assert isinstance(one, leafdyn.Equilibrium)
+    assert one.tips.tolist() == leafdyn.relax(fan(3), method="explicit").tips.tolist()
+    assert isinstance(other, leafdyn.RefusedLeaf)
+    assert isinstance(third, leafdyn.RefusedLeaf)
+    assert other.remark.startswith("scenarios[1]: ")
+    assert third.remark.startswith("scenarios[2], fan: ")
+    assert (third.outcome, third.success) == ("refused", False)
+    with pytest.raises(type(other.error), match="leaf"):
+        raise other.error
+
+
+def test_a_limit_of_time() -> None:
+    for asked in (1e-9, 1e9):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", leafdyn.LeafWarning)
+            leaf = leafdyn.relax(fan(9), time_limit=asked)
+            many = leafdyn.relax_many([fan(9), fan(8)], time_limit=asked)
+        wanted = "out-of-time" if asked < 1.0 else "converged"
+        assert [leaf.outcome, *(it.outcome for it in many)] == [wanted] * 3
+    with pytest.raises(ValueError, match="time_limit = 0"):
+        leafdyn.relax(fan(2), time_limit=0)

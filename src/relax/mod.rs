@@ -293,7 +293,7 @@ mod tests {
                 .progress(|_| steps.set(steps.get() + 1))
                 .run()
                 .unwrap();
-            assert_eq!(leaf.outcome, Outcome::NotAtRest, "{method:?}");
+            assert_eq!(leaf.outcome, Outcome::OutOfTime, "{method:?}");
         }
         assert!(steps.get() < 10);
     }

@@ -135,7 +135,7 @@ fn relax_from_rest(
         ..options.clone()
     };
     let rest = relax_on_grids(scenario, &relaxation, true, progress)?.result;
-    if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
+    if !rest.outcome.is_at_rest() {
         return Ok(Equilibrium {
             method: options.method,
             ..rest
@@ -332,6 +332,7 @@ fn outcome_of_solution(
 fn outcome_of_failure(failure: &shooting::ShootingFailure) -> RunEnd {
     let outcome = match failure.reason {
         ShootingFailureReason::Singular(_) => Outcome::Singular,
+        ShootingFailureReason::OutOfTime => Outcome::OutOfTime,
         _ => Outcome::NotAtRest,
     };
     let remark = EquilibriumRemark::ShootingFailed {

@@ -3,8 +3,8 @@
 
 use crate::numbers::{larger, largest};
 use crate::relax::{
-    Equilibrium, EquilibriumRemark, Options, Outcome, Progress, RelaxError, SemiImplicit,
-    serialize_index, serialize_remark,
+    Equilibrium, EquilibriumRemark, Options, Progress, RelaxError, SemiImplicit, serialize_index,
+    serialize_remark,
 };
 use crate::run::Limit;
 use crate::scenario::{Scenario, Tissue};
@@ -300,8 +300,8 @@ pub fn check(
     };
     // Forces are compared as well: not the shape alone.
     let relaxed = relax::relax_on_grids(scenario, &asked, false, progress)?.result;
-    let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
-    let shot = (!lost).then(|| solve_by_shooting(scenario, &relaxed, options, progress));
+    let shot = (relaxed.outcome.is_at_rest())
+        .then(|| solve_by_shooting(scenario, &relaxed, options, progress));
     let check = Check::new(relaxed, shot);
     let rigid = scenario.tissue.iter().flatten().any(Tissue::is_rigid);
     Ok(if rigid {

@@ -195,6 +195,7 @@ pub fn relaxation_verdict(equilibrium: &Equilibrium) -> String {
         }
         Outcome::NotAtRest if equilibrium.method.is_shooting() => "no equilibrium".into(),
         Outcome::NotAtRest => "not at rest".into(),
+        Outcome::OutOfTime => "not at rest in time".into(),
         Outcome::Singular => "singular equations".into(),
         Outcome::Diverged => "diverged".into(),
     }

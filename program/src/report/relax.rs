@@ -132,7 +132,10 @@ pub fn equilibrium_phrase(equilibrium: &Equilibrium) -> String {
     let verdict = relaxation_verdict(equilibrium);
     let residual = equilibrium.accuracy.residual.filter(|it| it.is_finite());
     match (equilibrium.outcome, residual) {
-        (Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular, Some(residual)) => {
+        (
+            Outcome::NotAtRest | Outcome::OutOfTime | Outcome::Diverged | Outcome::Singular,
+            Some(residual),
+        ) => {
             format!("{verdict} (residual {residual:.1e})")
         }
         _ => {

@@ -238,7 +238,7 @@ fn limits_that_values_set_together() {
         y = 1e12 => leaf.toml:21: coupling.y = 1e12: gives kappa L^4/A = 1.600e14, the limit is 1e12
         z = [1, 1e300] => leaf.toml:22: coupling.z, entry 2 = 1e300 & kappa L^4/A
         torsion = [1, 1e-13, 1] => leaf.toml:9: stiffness.torsion, entry 2 = 1e-13: gives A_max/A = 1.000e13, the limit is 1e12
-        twist = -5001 => leaf.toml:16: rest.twist = -5001: gives |u0| L = 1.0002e4, the limit is 1e4
+        twist = -5010 => leaf.toml:16: rest.twist = -5010: gives |u0| L = 1.002e4, the limit is 1e4
         shear_3 = 1e-9 => leaf.toml:14: stiffness.shear_3 = 1e-9: gives H L^2/A = 4.000e-8, the limit is 1e-6 & softer in stretch or shear
         length = [2.0, 1.9e-3, 2.0] => leaf.toml:5: leaf.length, entry 2 = 1.9e-3: gives L_max/L = 1.053e3, the limit is 1e3
     "#;

@@ -12,7 +12,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._branches import Boundary, Branch, Curve, Piece, Trace
-from ._errors import LeafWarning, MissingScenarioError, ScenarioError
+from ._errors import LeafWarning, MissingScenarioError, RefusedLeaf, ScenarioError
 from ._explore import Exploration, explore
 from ._fit import Candidate, Fit, Parameter
 from ._fitting import fit
@@ -67,6 +67,7 @@ __all__ = [
     "Piece",
     "Posture",
     "Prediction",
+    "RefusedLeaf",
     "Result",
     "Scenario",
     "ScenarioDict",

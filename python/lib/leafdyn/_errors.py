@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import dataclass
 from typing import Any
 
 
@@ -62,3 +63,15 @@ class MissingScenarioError(ScenarioError, FileNotFoundError):
 
 class LeafWarning(UserWarning):
     """What the program says beside a result: why it is not at rest, say, and what would help."""
+
+
+@dataclass(frozen=True)
+class RefusedLeaf:
+    """What stands in the list of a batch in place of a leaf that is refused."""
+
+    remark: str
+    """Why, and what to change."""
+    error: ValueError | TypeError
+    """What `relax` of it alone raises."""
+    outcome: str = "refused"
+    success: bool = False

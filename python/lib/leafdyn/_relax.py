@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping
-from typing import Any, SupportsIndex
+from typing import Any, Literal, SupportsIndex, overload
 
 from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
-from ._errors import LeafWarning
+from ._errors import LeafWarning, RefusedLeaf
 from ._leaf import Equilibrium
 from ._points import Points, point_table
 from ._progress import Heard, Progress, reporter
@@ -32,6 +32,7 @@ def asked_for(
     start: Equilibrium | Points | None = None,
     veins: str | tuple[str, float] | None = None,
     veins_error: bool = False,
+    time_limit: float | None = None,
 ) -> dict[str, Any]:
     asked = {
         **locals(),
@@ -41,7 +42,9 @@ def asked_for(
         "veins": _refined(veins),
     }
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
-    numbers(tolerance=tolerance)
+    numbers(tolerance=tolerance, time_limit=time_limit)
+    if time_limit is not None and not time_limit > 0:
+        raise ValueError(f"time_limit = {time_limit}: must be a positive number of seconds")
     switches(
         keep_unstable=keep_unstable,
         full_model=full_model,
@@ -101,6 +104,7 @@ def relax(
     veins: str | tuple[str, float] | None = None,
     veins_error: bool = False,
     stations: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest.
@@ -142,6 +146,8 @@ def relax(
         Also estimate the ``error_in_veins`` of a blade, from the same blade with half as many veins.
     stations
         At ``stations + 1`` equally spaced stations of every vein; left out: those of the finest grid, at least 17.
+    time_limit
+        Seconds after which the leaf is given up: as far as it came, with the outcome ``"out-of-time"``.
     progress
         A function of how much is done, of how much (none if unknown), and a text; or true for a bar of tqdm.
 
@@ -201,6 +207,7 @@ def relax(
         start,
         veins,
         veins_error,
+        time_limit,
     )
     leaf = checked(scenario, set)
     if start is not None and not isinstance(start, Equilibrium):
@@ -212,6 +219,48 @@ def relax(
     found = Equilibrium(core, (leaf, asked))
     warn(found.name, found.remark, found.error_in_veins_remark, *found.doubts)
     return found
+
+
+@overload
+def relax_many(
+    scenarios: Iterable[Source],
+    *,
+    set: Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    method: str = "semi-implicit",
+    segments: SupportsIndex | None = None,
+    intervals: SupportsIndex | None = None,
+    path: str = "loading",
+    keep_unstable: bool = False,
+    full_model: bool = False,
+    modes: SupportsIndex = 0,
+    veins_error: bool = False,
+    stations: SupportsIndex | None = None,
+    on_error: Literal["raise"] = "raise",
+    time_limit: float | None = None,
+    progress: Progress = None,
+) -> list[Equilibrium]: ...
+
+
+@overload
+def relax_many(
+    scenarios: Iterable[Source],
+    *,
+    set: Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    method: str = "semi-implicit",
+    segments: SupportsIndex | None = None,
+    intervals: SupportsIndex | None = None,
+    path: str = "loading",
+    keep_unstable: bool = False,
+    full_model: bool = False,
+    modes: SupportsIndex = 0,
+    veins_error: bool = False,
+    stations: SupportsIndex | None = None,
+    on_error: Literal["row"],
+    time_limit: float | None = None,
+    progress: Progress = None,
+) -> list[Equilibrium | RefusedLeaf]: ...
 
 
 def relax_many(
@@ -228,12 +277,22 @@ def relax_many(
     modes: SupportsIndex = 0,
     veins_error: bool = False,
     stations: SupportsIndex | None = None,
+    on_error: Literal["raise", "row"] = "raise",
+    time_limit: float | None = None,
     progress: Progress = None,
-) -> list[Equilibrium]:
+) -> list[Equilibrium] | list[Equilibrium | RefusedLeaf]:
     """Find how many leaves come to rest, side by side on all threads.
 
-    Parameters are those of `relax`, and hold for all. All scenarios are checked before the first is solved. Messages
-    and warnings begin with the index of the scenario: ``scenarios[2]``.
+    Parameters that are not listed are those of `relax`, and hold for all. Messages and warnings begin with the index of
+    the scenario: ``scenarios[2]``.
+
+    Parameters
+    ----------
+    on_error
+        ``"raise"``: all scenarios are checked before the first is solved, and the first that is refused ends the run.
+        ``"row"``: a `RefusedLeaf` takes the place of each that is refused, with the message as its ``remark``.
+    time_limit
+        Seconds for all leaves together; those that are not at rest then have the outcome ``"out-of-time"``.
 
     Returns
     -------
@@ -248,6 +307,9 @@ def relax_many(
     >>> leaves = leafdyn.relax_many(leafdyn.Scenario(fan, {"load.gravity": [0, 0, -q]}) for q in weights)
     >>> [round(float(leaf.tip[2]), 4) for leaf in leaves]
     [-0.0739, -0.146, -0.2791]
+    >>> good, refused = leafdyn.relax_many([fan, {"name": "empty"}], on_error="row")
+    >>> good.outcome, refused.outcome
+    ('converged', 'refused')
     """
     if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
         raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
@@ -263,25 +325,49 @@ def relax_many(
         stations,
         path=path,
         veins_error=veins_error,
+        time_limit=time_limit,
     )
-    leaves = []
+    told = tells_refusals(on_error)
+    leaves: list[Scenario | RefusedLeaf] = []
     for number, scenario in enumerate(scenarios):
         try:
             leaves.append(checked(scenario, set))
         except (ValueError, TypeError) as refused:
             refused.args = (f"scenarios[{number}]: {refused}",)
-            raise
+            if not told:
+                raise
+            leaves.append(RefusedLeaf(str(refused), refused))
     with reporter(progress) as heard:
-        found = relaxed(leaves, asked, heard)
+        found = relaxed(leaves, asked, heard, told)
     for number, leaf in enumerate(found):
+        if isinstance(leaf, RefusedLeaf):
+            continue
         warn(f"scenarios[{number}], {leaf.name}", leaf.remark, leaf.error_in_veins_remark, *leaf.doubts)
     return found
 
 
-def relaxed(leaves: list[Scenario], asked: dict[str, Any], heard: Heard | None) -> list[Equilibrium]:
-    """Many leaves at rest, without a word about those that are not."""
-    cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
-    return [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
+def tells_refusals(on_error: str) -> bool:
+    """Whether what is refused stands in a list or a table, rather than ending the run."""
+    if on_error not in ("raise", "row"):
+        raise ValueError(f'on_error = {on_error!r}: must be "raise" or "row"')
+    return on_error == "row"
+
+
+def relaxed(
+    leaves: list[Scenario | RefusedLeaf], asked: dict[str, Any], heard: Heard | None, told: bool
+) -> list[Equilibrium | RefusedLeaf]:
+    """Many leaves at rest, without a word about those that are not; refusals are told or raised."""
+    numbers = [number for number, leaf in enumerate(leaves) if isinstance(leaf, Scenario)]
+    scenarios = [leaf for leaf in leaves if isinstance(leaf, Scenario)]
+    cores = _leafdyn.relax_many([leaf._core for leaf in scenarios], asked, told, heard)
+    rest: dict[int, Equilibrium | RefusedLeaf] = {}
+    for number, leaf, core in zip(numbers, scenarios, cores):
+        if isinstance(core, str):
+            why = f"scenarios[{number}], {leaf.name}: {core}"
+            rest[number] = RefusedLeaf(why, ValueError(why))
+        else:
+            rest[number] = Equilibrium(core, (leaf, asked))
+    return [rest[number] if isinstance(leaf, Scenario) else leaf for number, leaf in enumerate(leaves)]
 
 
 def modes(

@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import product
 from math import nan
-from typing import Any, SupportsIndex
+from typing import Any, Literal, SupportsIndex
 
 import numpy as np
 
-from . import _leafdyn
 from ._data import column_unit, pandas
+from ._errors import RefusedLeaf
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
 from ._quantities import plain
 from ._range import Range, spans, values
-from ._relax import asked_for, relaxed, warn
+from ._relax import asked_for, relaxed, tells_refusals, warn
 from ._scenario import Scenario, Source, checked
 
 Of = Callable[[Equilibrium], Any]
@@ -57,6 +57,8 @@ def sweep(
     path: str = "loading",
     keep_unstable: bool = False,
     full_model: bool = False,
+    on_error: Literal["raise", "row"] = "raise",
+    time_limit: float | None = None,
     client: Any = None,
     progress: Progress = None,
 ) -> Any:
@@ -78,6 +80,12 @@ def sweep(
         ``"error_estimate"``, ``"error_in_veins"`` (of blades), ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
         ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time); or a dict of functions
         of an `Equilibrium`.
+    on_error
+        ``"raise"``, or ``"row"``: a leaf that is refused has a row with the outcome ``"refused"``, and the message as
+        its ``remark``.
+    time_limit
+        Seconds for all leaves together, or with a client for each; those that are not at rest then have the outcome
+        ``"out-of-time"``.
     client
         A ``dask.distributed.Client``, whose workers then solve the leaves.
 
@@ -92,7 +100,7 @@ def sweep(
     ImportError
         Without pandas.
     ScenarioError
-        If the scenario is refused with some of the values; nothing is solved then.
+        If the scenario is refused with some of the values, unless `on_error` is ``"row"``; nothing is solved then.
     ValueError
         If the request cannot be met.
 
@@ -124,17 +132,19 @@ def sweep(
         modes,
         path=path,
         veins_error="error_in_veins" in wanted,
+        time_limit=time_limit,
     )
+    told = tells_refusals(on_error)
     base = checked(scenario, set)
     vary = vary if isinstance(vary, Mapping) else spans(vary)
     axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
     grid = list(product(*axes.values()))
-    leaves = [_at(base, dict(zip(axes, point))) for point in grid]
+    leaves = [_at(base, dict(zip(axes, point)), told) for point in grid]
     if client is None:
         with reporter(progress) as heard:
-            rows = _solved(leaves, wanted, asked, heard)
+            rows = _solved(leaves, wanted, asked, heard, told)
     else:
-        one = partial(_row, wanted=wanted, asked=asked)
+        one = partial(_row, wanted=wanted, asked=asked, told=told)
         rows = client.gather(client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
     failed = sum(not success for success, _ in rows)
     if failed:
@@ -150,18 +160,20 @@ def sweep(
     return found
 
 
-def _at(base: Scenario, point: Mapping[str, Any]) -> Scenario:
-    """The scenario with these values."""
+def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | RefusedLeaf:
+    """The scenario with these values, or why it is refused."""
     entries = {key: value for keys, value in point.items() for key in keys.split("+")}
     try:
         return Scenario(base, entries)
     except ValueError as refused:
         refused.args = (f"at {', '.join(f'{key} = {value}' for key, value in point.items())}: {refused}",)
-        raise
+        if not told:
+            raise
+        return RefusedLeaf(str(refused), refused)
 
 
 def _solved(
-    leaves: list[Scenario], wanted: Mapping[str, Of], asked: dict[str, Any], heard: Heard | None
+    leaves: list[Scenario | RefusedLeaf], wanted: Mapping[str, Of], asked: dict[str, Any], heard: Heard | None, told: bool
 ) -> list[tuple[bool, list[Any]]]:
     """What is wanted of every leaf, and whether it is at rest."""
     rows = []
@@ -171,17 +183,27 @@ def _solved(
             if heard is not None:
                 heard(begin + done, len(leaves), text)
 
-        found = relaxed(leaves[begin : begin + AT_ONCE], asked, None if heard is None else passed_on)
+        found = relaxed(leaves[begin : begin + AT_ONCE], asked, None if heard is None else passed_on, told)
         rows += [_of(leaf, wanted) for leaf in found]
     return rows
 
 
-def _row(leaf: Scenario, wanted: Mapping[str, Of], asked: dict[str, Any]) -> tuple[bool, list[Any]]:
-    return _of(Equilibrium(_leafdyn.relax(leaf._core, asked, None)), wanted)
+def _row(
+    leaf: Scenario | RefusedLeaf, wanted: Mapping[str, Of], asked: dict[str, Any], told: bool
+) -> tuple[bool, list[Any]]:
+    return _of(relaxed([leaf], asked, None, told)[0], wanted)
 
 
-def _of(leaf: Equilibrium, wanted: Mapping[str, Of]) -> tuple[bool, list[Any]]:
+def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of]) -> tuple[bool, list[Any]]:
+    if isinstance(leaf, RefusedLeaf):
+        said = {"outcome": leaf.outcome, "remark": leaf.remark, "success": False}
+        return False, [said.get(name, nan if _is_number(name) else None) for name in wanted]
     return leaf.success, [of(leaf) for of in wanted.values()]
+
+
+def _is_number(name: str) -> bool:
+    """Whether a column with this name, of those that have one, has numbers."""
+    return name not in ("stable", "negative_eigenvalues", "neutral_directions", "path")
 
 
 def _wanted(columns: str | Iterable[str] | Mapping[str, Of]) -> tuple[dict[str, Of], int]:

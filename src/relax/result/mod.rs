@@ -38,6 +38,8 @@ words! {
         ToleranceNotReached = "tolerance-not-reached",
         /// The step limit was reached before rest.
         NotAtRest = "not-at-rest",
+        /// The time limit was reached before rest, or the run was cancelled.
+        OutOfTime = "out-of-time",
         /// The equations are singular: at a bifurcation, or where the leaf can move
         /// without resistance.
         Singular = "singular",

@@ -349,12 +349,13 @@ pub fn outcome(
                 obstacle: obstacle(),
             },
         ),
+        Some(EquilibriumFailure::StepLimit) if problem.out_of_time() => RunEnd::new(
+            Outcome::OutOfTime,
+            EquilibriumRemark::OutOfTime { segments },
+        ),
         Some(stop) => RunEnd::new(
             Outcome::NotAtRest,
             match stop {
-                EquilibriumFailure::StepLimit if problem.out_of_time() => {
-                    EquilibriumRemark::OutOfTime { segments }
-                }
                 EquilibriumFailure::StepLimit if explicit => {
                     EquilibriumRemark::ExplicitStepLimit { segments }
                 }

@@ -203,6 +203,7 @@ pub(super) fn shoot_from_relaxed_leaf(
         Some(Err(failure)) => MethodSolution {
             outcome: match failure.reason {
                 ShootingFailureReason::Singular(_) => Outcome::Singular,
+                ShootingFailureReason::OutOfTime => Outcome::OutOfTime,
                 _ => Outcome::NotAtRest,
             },
             remark: Some(SolutionRemark::ShootingFailed(failure.reason)),
