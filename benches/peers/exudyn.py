@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A leaf at rest by exudyn's static solver, with its geometrically exact beam.
+"""A leaf at rest by exudyn's static solver, or in motion by its implicit one, with its geometrically exact beam.
 
 Every rod is a chain of n elements ObjectBeamGeometricallyExact between nodes with Euler parameters, of
 second order in the element's length. Its undeformed shape (straight, or of the scenario's rest curvature)
@@ -22,6 +22,13 @@ With --close-tips joined rods start from the reference, too, with their tips apa
 tips, whose natural length goes to zero with the load steps, bring them together. This is how a slender leaf
 that does not come to rest from arcs can be solved; what is left of the gap is printed.
 
+With --motion the leaf moves by exudyn's generalized-alpha method, in steps of T/(STEPS n) unless --steps says how many
+there are from output to output. Masses and moments of inertia are those of the beams' sections, of which half an
+element's is at each node. External damping is spring-dampers between the nodes and the ground. Internal damping is
+refused: the beam takes a dampingMatrix and moves as without one, and a spring-damper between two nodes resists their
+rigid rotation, too. A leaf that starts at rest starts as leafdyn found it, in the folder of --compare. Loads in time
+are set before every step. The time is that of SolveDynamic alone.
+
 Needs python 3.11 and exudyn (here 1.13.6). One thread, exudyn's default.
 """
 import sys
@@ -31,7 +38,7 @@ from functools import partial
 import numpy as np
 
 from leaf import Leaf, Refused, arguments, at_stations, conclude, load, read_summary, sample, status
-from moving import Dynamics, conclude_motion, read_motion
+from moving import Dynamics, conclude_motion, motion_arguments, read_motion
 
 # This file has the name of the package: look for that elsewhere.
 sys.path.pop(0)
@@ -285,7 +292,7 @@ def main():
     parser.add_argument("--segments", type=int, default=50, metavar="N", help="elements a rod (default: 50)")
     parser.add_argument("--load-steps", type=int, default=1, metavar="N", help="load steps (default: 1)")
     parser.add_argument("--close-tips", action="store_true", help="start with the tips apart, and bring them together")
-    parser.add_argument("--motion", action="store_true", help="move the leaf, by the generalized-alpha method")
+    motion_arguments(parser)
     parser.add_argument("--steps", type=int, metavar="N", help="with --motion: time steps from output to output")
     help_radius = "with --motion: spectral radius at infinite frequency; 1 is the trapezoidal rule (default: 0.9)"
     parser.add_argument("--spectral-radius", type=float, default=SPECTRAL_RADIUS, metavar="R", help=help_radius)
@@ -294,8 +301,9 @@ def main():
         parser.error("--segments: at least 3; --load-steps: at least 1")
     if options.motion and (options.load_steps > 1 or options.close_tips):
         parser.error("--load-steps and --close-tips are not for --motion")
-    if not options.motion and (options.steps is not None or options.spectral_radius != SPECTRAL_RADIUS):
-        parser.error("--steps and --spectral-radius need --motion")
+    only = options.steps is not None, options.spectral_radius != SPECTRAL_RADIUS, options.points
+    if not options.motion and any(only):
+        parser.error("--steps, --spectral-radius and --points need --motion")
     if options.motion and (options.segments % 2 or options.steps is not None and options.steps < 1):
         parser.error("--motion: an even number of --segments, at least 4, and at least one of --steps")
     return status(move if options.motion else solve, options)

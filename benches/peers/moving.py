@@ -189,6 +189,13 @@ class RecordedMotion:
         return np.linalg.norm(np.array(points) - own, axis=2).max()
 
 
+def motion_arguments(parser):
+    """The options of scripts that move leaves."""
+    parser.add_argument("--motion", action="store_true", help="follow the motion of the scenario's dynamics")
+    help_points = "with --motion: writes the middles and tips, [output][rod][axis][2], as .npy"
+    parser.add_argument("--points", metavar="FILE", help=help_points)
+
+
 def read_motion(folder, leaf, dynamics):
     """leafdyn's motion, if there is a folder."""
     return None if folder is None else RecordedMotion(folder, leaf, dynamics)
@@ -212,6 +219,8 @@ def conclude_motion(options, leaf, recorded, run, notes, points):
             bar = recorded.report["error_estimate"]
             print(f"  leafdyn    {away:.3e} away at most; its own error estimate is {bar}")
             error = f"{away:.4e}"
+    if completed and options.points:
+        np.save(options.points, points)
     if options.csv:
         append(options.csv, [program, leaf.name, leaf.rods, knob, f"{seconds:.4g}", error, outcome])
     return completed

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""PyElastica on a leaf: how fast its explicit time steps are, and where its damped motion comes to rest.
+"""PyElastica on a leaf: how fast its explicit time steps are, where its damped motion comes to rest, and how accurate a
+motion is.
 
 N rods in a fan, clamped at the base, under their weight and damped, written as somebody at home in
 PyElastica would. All rods lie in its one memory block, and everything acts on that block in one call:
@@ -28,6 +29,14 @@ With --relax: the damped motion from circular arcs until the kinetic energy is R
 matrices are renewed in every step so that force and moment are linear in the strains, as the scenario
 wants; with --own-law PyElastica's own law stays, by which a stretched rod gets thinner.
 
+With --motion: the motion of the scenario's `[dynamics]`, with the same laws, in steps of MOTION_STEP of what should be
+stable. AnalyticalLinearDamper damps velocities and angular velocities at one rate, as leafdyn's external damping does.
+For internal damping PyElastica has no class of this kind: the strains at rest are moved by minus the retardation time
+times the rates of strain before every evaluation, which gives stresses of Kelvin and Voigt. A leaf that starts at rest
+starts as leafdyn found it, in the folder of --compare. PyElastica clamps the directors of a first element, half an
+element from the base, by which errors are of first order in its length; with --base-springs that element turns, and
+half an element bends between it and the base, by which they are of second order. numba compiles before.
+
 Needs python 3.11 and pyelastica (here 1.0.0). Set OMP_NUM_THREADS=1 and NUMBA_NUM_THREADS=1.
 """
 import json
@@ -44,7 +53,7 @@ import numpy as np
 from numba import njit
 
 from leaf import Leaf, Refused, append, arguments, at_stations, conclude, load, read_summary, sample, status
-from moving import COMPARED, Dynamics, conclude_motion, read_motion
+from moving import COMPARED, Dynamics, conclude_motion, motion_arguments, read_motion
 
 # Rods, elements a rod.
 CASES = [(1, 50), (1, 100), (1, 1000), (5, 50), (35, 50)]
@@ -52,6 +61,8 @@ REPEATS = 5
 # What a repeat takes, about.
 SECONDS = 1.0
 STEP = 0.4
+# Time step of a motion, as a part of the longest that should be stable.
+MOTION_STEP = 0.8
 LAP = 0.1
 # Between two looks at the kinetic energy.
 LOOK = 0.05
@@ -327,9 +338,10 @@ class Motion:
         speed = np.sqrt(max(force.max() / density, couple.max() / inertia))
         self.step = STEP * leaf.length.min() / n / speed
         if dynamics is not None:
-            # Internal friction shortens the longest stable step.
-            friction = dynamics.retardation * speed * n / leaf.length.min()
-            self.step *= np.sqrt(1.0 + friction**2) - friction
+            # The fastest motion of an element, by waves and by shear that turns it; internal friction acts in addition.
+            fastest = np.sqrt((2.0 * speed * n / leaf.length.min()) ** 2 + force[:, :2].max() / inertia)
+            friction = 0.5 * dynamics.retardation * fastest
+            self.step = MOTION_STEP * 2.0 / fastest * (np.sqrt(1.0 + friction**2) - friction)
             self.step = dynamics.interval / np.ceil(dynamics.interval / self.step)
         self.time = 0.0
 
@@ -361,12 +373,14 @@ class Motion:
             loads[:, :, -1] += tip_force[:, None] / (leaf.rods if leaf.joined else 1)
             return loads
 
-        at_rest = dead_loads(leaf.gravity, leaf.tip_force)
-        dead = lambda time: at_rest
-        if dynamics is not None and (dynamics.gravity.varies() or dynamics.tip_force.varies()):
-            dead = lambda time: dead_loads(dynamics.gravity(time), dynamics.tip_force(time))
-        elif dynamics is not None:
-            at_rest = dead_loads(dynamics.gravity(0.0), dynamics.tip_force(0.0))
+        loads = (leaf.gravity, leaf.tip_force) if dynamics is None else (dynamics.gravity(0.0), dynamics.tip_force(0.0))
+        first_loads = dead_loads(*loads)
+
+        def dead(time):
+            if dynamics is not None and (dynamics.gravity.varies() or dynamics.tip_force.varies()):
+                return dead_loads(dynamics.gravity(time), dynamics.tip_force(time))
+            return first_loads
+
         spring = (leaf.coupling * leaf.gap)[:, :, None] / n * weights
         critical = 2 * 3.516  # for a clamped rod, as T = 1
         rate = critical if dynamics is None else dynamics.damping_rate
@@ -565,7 +579,7 @@ def main():
     parser = arguments("Measure PyElastica's time steps, bring a leaf to rest with it, or move it.")
     parser.add_argument("--leafdyn", metavar="PATH", help="the program leafdyn, to run in turns")
     parser.add_argument("--relax", action="store_true", help="follow the motion until the leaf rests")
-    parser.add_argument("--motion", action="store_true", help="follow the motion of the scenario's dynamics")
+    motion_arguments(parser)
     help_springs = "with --motion: first elements turn, and half an element bends between them and the base"
     parser.add_argument("--base-springs", action="store_true", help=help_springs)
     parser.add_argument("--segments", type=int, metavar="N", help="elements a rod (default: 50)")
@@ -585,8 +599,8 @@ def main():
     options.segments = 50 if options.segments is None else options.segments
     if options.segments < 3:
         parser.error("--segments: at least 3")
-    if options.base_springs and not options.motion:
-        parser.error("--base-springs needs --motion")
+    if (options.base_springs or options.points) and not options.motion:
+        parser.error("--base-springs and --points need --motion")
     if options.motion and options.segments % 2:
         parser.error("--motion: an even number of --segments")
     return status(move if options.motion else relax if options.relax else rates, options)
