@@ -48,7 +48,8 @@ from exudyn.lieGroupBasics import ExpSE3
 from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
 
-# Of a motion: time steps in T over the number of elements, and exudyn's own spectral radius of its generalized-alpha method.
+# Of a motion: time steps in T over the number of elements, by which errors in time and space nearly balance; and
+# exudyn's own spectral radius of its generalized-alpha method.
 STEPS = 4.0
 SPECTRAL_RADIUS = 0.9
 # Springs between tips that are closed: times the axial stiffness of a rod.
@@ -133,8 +134,8 @@ class Model:
         dynamics = self.dynamics
         per_length = dynamics.damping_rate * np.diag([*[dynamics.density] * 3, *dynamics.inertia])
         for marker, weight in zip(markers[1:], self.weights[1:]):
-            pair, damping = [marker, ground], weight * element * per_length
-            self.system.AddObject(items.RigidBodySpringDamper(markerNumbers=pair, stiffness=0.0 * damping, damping=damping))
+            forces = {"stiffness": np.zeros((6, 6)), "damping": weight * element * per_length}
+            self.system.AddObject(items.RigidBodySpringDamper(markerNumbers=[marker, ground], **forces))
 
     def lay_across(self, pairs, stiffness):
         """Beams of tissue between pairs of nodes, from the first above the base to the tips."""
@@ -221,8 +222,8 @@ class Model:
         """Adds sensors of the middles and the tips; the model is assembled again."""
 
         def sensor(node):
-            position = exudyn.OutputVariableType.Position
-            return self.system.AddSensor(items.SensorNode(nodeNumber=int(node), outputVariableType=position, storeInternal=True))
+            shown = {"outputVariableType": exudyn.OutputVariableType.Position, "storeInternal": True}
+            return self.system.AddSensor(items.SensorNode(nodeNumber=int(node), **shown))
 
         self.sensors = [[sensor(rod[self.n // 2]), sensor(rod[-1])] for rod in self.nodes]
         self.system.Assemble()
@@ -231,8 +232,8 @@ class Model:
         """Sets the loads of a time."""
         gravity, pull = self.dynamics.gravity(time), self.dynamics.tip_force(time)
         for loads, vector in (self.weighed, gravity), (self.pulled, pull):
-            for load, factor in loads:
-                system.SetLoadParameter(load, "loadVector", factor * vector)
+            for number, factor in loads:
+                system.SetLoadParameter(number, "loadVector", factor * vector)
         return True
 
     def positions(self):

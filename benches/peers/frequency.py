@@ -3,10 +3,10 @@
     python benches/peers/frequency.py benches/peers/cantilever.toml --leafdyn target/release/leafdyn
 
 The rod of the scenario is released horizontally under a weight that bends it by little, and swings for PERIODS.
-Its frequency is that of the slowest of as many cosines as there are ROOTS, which fit the tip. The exact one is that of a rod with the
-scenario's shear stiffness and rotary inertia (Timoshenko, Phil. Mag. 41, 1921), the lowest root of the determinant of
-its boundary-value problem; for a slender rod that is 1.875104^2 sqrt(EI/(rho L^4)). Prints a table in Markdown:
-errors relative to the exact frequency. Needs scipy besides what the programs need.
+Its frequency is that of the slowest of as many cosines as there are ROOTS, which fit the motion of the tip. The exact
+one is that of a rod with the scenario's shear stiffness and rotary inertia (Timoshenko, Phil. Mag. 41, 1921), the
+lowest root of the determinant of its boundary-value problem; for a slender rod that is 1.875104^2 sqrt(EI/(rho L^4)).
+Prints a table in Markdown: errors relative to the exact frequency. Needs scipy besides what the programs need.
 """
 import argparse
 import subprocess
@@ -41,8 +41,10 @@ def exact(leaf, dynamics):
 
     def determinant(omega):
         # Deflection, rotation, moment and force along the rod.
-        slope = [[0, 1, 0, 1 / shear], [0, 0, 1 / bending, 0], [0, -inertia * omega**2, 0, -1], [-density * omega**2, 0, 0, 0]]
-        return np.linalg.det(expm(leaf.length[0] * np.array(slope))[2:, 2:])
+        slope = np.zeros((4, 4))
+        slope[0, 1], slope[0, 3], slope[1, 2] = 1.0, 1.0 / shear, 1.0 / bending
+        slope[2, 1], slope[2, 3], slope[3, 0] = -inertia * omega**2, -1.0, -density * omega**2
+        return np.linalg.det(expm(leaf.length[0] * slope)[2:, 2:])
 
     slender = ROOTS[0] ** 2 / dynamics.unit
     return brentq(determinant, 0.5 * slender, 1.1 * slender, xtol=1e-14), slender
@@ -89,14 +91,15 @@ def main():
         folder = Path(name)
         for n in SEGMENTS:
             tips = {}
-            command = [options.leafdyn, "simulate", options.scenario, *sets, "--method", "explicit", "--segments", str(n)]
-            subprocess.run([*command, "--write", "csv", "--out", folder], check=True, capture_output=True)
+            leaf_of = [options.scenario, *sets, "--segments", str(n)]
+            command = [options.leafdyn, "simulate", *leaf_of, "--method", "explicit", "--write", "csv", "--out", folder]
+            subprocess.run(command, check=True, capture_output=True)
             table = np.genfromtxt(folder / "energy.csv", delimiter=",", names=True)
             tips["leafdyn"] = table["tip_z"]
             for program, words in PEERS:
                 points = folder / "points.npy"
-                command = [sys.executable, HERE / f"{program}.py", options.scenario, *sets, "--motion", "--segments", str(n)]
-                done = subprocess.run([*command, *words, "--points", points], capture_output=True, text=True)
+                command = [sys.executable, HERE / f"{program}.py", *leaf_of, "--motion", *words, "--points", points]
+                done = subprocess.run(command, capture_output=True, text=True)
                 if done.returncode > 1:
                     sys.exit(done.stderr)
                 moved = done.returncode == 0

@@ -316,7 +316,7 @@ class Simulator(
 
 
 class Motion:
-    """A leaf in PyElastica, with n elements a rod. Unless it has dynamics, with a start, it moves as in a relaxation."""
+    """A leaf in PyElastica, with n elements a rod. Without dynamics it moves as in a relaxation."""
 
     def __init__(self, leaf, n, linear, own_classes=False, dynamics=None, start=None, turns=False):
         if leaf.tip_moment.any():
