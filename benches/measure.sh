@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measures the tables of docs/speed.md, the error estimates of
-# docs/how-to-read.md and the intervals of docs/fit.md, and draws the two charts. Hours on two cores, and worth
+# docs/how-to-read.md and the intervals of docs/fit.md, and draws the charts. Hours on two cores, and worth
 # little on a busy machine. Needs Python 3.11 and what pip installs below.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -72,6 +72,33 @@ cp out/fig04/chart.svg docs/chart_fig04_35.svg
 python benches/peers/turns.py scenarios/paper/fig04.toml --rods 5,21,35
 python benches/peers/turns.py benches/peers/lattice.toml --rods 5 --tolerances 1e-1,1e-2,1e-3,1e-4,1e-5 \
   --peer 'exudyn --segments 20 --load-steps 5' --peer 'exudyn --segments 40 --load-steps 5' --peer 'exudyn --segments 80 --load-steps 5'
+
+# Leaves that move, in PyElastica and exudyn.
+python benches/peers/frequency.py benches/peers/cantilever.toml --leafdyn target/release/leafdyn
+leafdyn simulate benches/peers/cantilever.toml --segments 512 --method explicit --stations 128 --write csv,json
+leafdyn simulate benches/peers/heave.toml --segments 512 --method explicit --stations 128 --write csv,json
+leafdyn simulate scenarios/motion/swing.toml --set dynamics.duration=2.0 --segments 256 --method explicit --stations 128 --write csv,json
+rm -f out/moved.csv
+python benches/peers/exudyn.py benches/peers/heave.toml --motion --segments 20 --compare out/heave --csv out/moved.csv
+python benches/peers/pyelastica.py benches/peers/heave.toml --motion --segments 20 --base-springs --compare out/heave --csv out/moved.csv
+move() { python "benches/peers/$1.py" "$2" --motion --segments "$3" "${@:5}" --compare "out/$4" --csv out/moved.csv; }
+for run in 1 2 3; do
+  for leaf in cantilever heave; do
+    for segments in 10 20 40; do
+      move exudyn "benches/peers/$leaf.toml" "$segments" "$leaf"
+      move pyelastica "benches/peers/$leaf.toml" "$segments" "$leaf"
+      move pyelastica "benches/peers/$leaf.toml" "$segments" "$leaf" --base-springs
+    done
+    move pyelastica "benches/peers/$leaf.toml" 80 "$leaf" --base-springs
+  done
+  for segments in 10 20 40; do
+    move pyelastica scenarios/motion/swing.toml "$segments" swing --base-springs --set dynamics.duration=2.0
+  done
+done
+leafdyn chart benches/peers/cantilever.toml --motion --seconds 5 --peers out/moved.csv
+leafdyn chart benches/peers/heave.toml --motion --seconds 5 --peers out/moved.csv
+cp out/heave/chart.svg docs/chart_heave.svg
+leafdyn chart scenarios/motion/swing.toml --set dynamics.duration=2.0 --motion --seconds 5 --peers out/moved.csv
 
 # A leaf as one measures it. That others do not come to rest is a result; those that take minutes run once.
 leafdyn relax scenarios/measured/lily.toml --tolerance 1e-10 --out out/lily
