@@ -69,6 +69,37 @@ enum CrossSection {
 }
 
 impl CrossSection {
+    /// `None` of a channel without a wall.
+    fn new(
+        outline: SectionOutline,
+        width: f64,
+        thickness: f64,
+        wall: Option<f64>,
+    ) -> Option<CrossSection> {
+        let height = thickness;
+        let closed = |outline| {
+            CrossSection::Closed(SectionDimensions {
+                outline,
+                width,
+                thickness,
+                wall,
+            })
+        };
+        Some(match outline {
+            SectionOutline::Circle | SectionOutline::Ellipse => closed(ClosedOutline::Ellipse),
+            SectionOutline::Rectangle => closed(ClosedOutline::Rectangle),
+            SectionOutline::Triangle => {
+                CrossSection::Polygon(PolygonSection::Triangle { width, height })
+            }
+            SectionOutline::Hexagon => CrossSection::Polygon(PolygonSection::Hexagon { width }),
+            SectionOutline::U => CrossSection::Polygon(PolygonSection::Channel {
+                width,
+                height,
+                wall: wall?,
+            }),
+        })
+    }
+
     /// The area of the material.
     fn area(self) -> f64 {
         match self {
@@ -123,6 +154,35 @@ impl CrossSection {
             CrossSection::Closed(section) => section.moduli(),
             CrossSection::Polygon(section) => Moduli::for_polygon(section),
         }
+    }
+}
+
+/// Moments of area of a full section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectionConstants {
+    /// I2 and I3, about d2 and d3; length^4.
+    pub second_moments: [f64; 2],
+    /// The torsion constant J; length^4.
+    pub torsion: f64,
+}
+
+impl SectionConstants {
+    /// Those of an outline with this width, along d2, and thickness, along d3; of a circle the thickness alone counts,
+    /// of a hexagon the width. `None` of a channel, which is not full.
+    pub fn of_full_section(
+        outline: SectionOutline,
+        width: f64,
+        thickness: f64,
+    ) -> Option<SectionConstants> {
+        let width = match outline {
+            SectionOutline::Circle => thickness,
+            _ => width,
+        };
+        let section = CrossSection::new(outline, width, thickness, None)?;
+        Some(SectionConstants {
+            second_moments: section.second_moments(),
+            torsion: section.torsion_constant(),
+        })
     }
 }
 
@@ -312,28 +372,9 @@ impl Section {
             HollowSection::Wall(wall) => wall.at(place),
             HollowSection::Bore(inner) => 0.5 * (width - inner.at(place)),
         });
-        let closed = |outline| {
-            CrossSection::Closed(SectionDimensions {
-                outline,
-                width,
-                thickness,
-                wall,
-            })
-        };
-        match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => closed(ClosedOutline::Ellipse),
-            SectionOutline::Rectangle => closed(ClosedOutline::Rectangle),
-            SectionOutline::Triangle => CrossSection::Polygon(PolygonSection::Triangle {
-                width,
-                height: thickness,
-            }),
-            SectionOutline::Hexagon => CrossSection::Polygon(PolygonSection::Hexagon { width }),
-            SectionOutline::U => CrossSection::Polygon(PolygonSection::Channel {
-                width,
-                height: thickness,
-                wall: wall.unwrap_or(0.5 * thickness),
-            }),
-        }
+        let section = CrossSection::new(self.outline, width, thickness, wall);
+        // Scenarios of channels without a wall are refused.
+        section.unwrap_or(CrossSection::Polygon(PolygonSection::Hexagon { width }))
     }
 
     /// A property at a place.

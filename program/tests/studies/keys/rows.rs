@@ -19,6 +19,7 @@ pub enum Acts {
 }
 
 /// A key and another value of it in a leaf.
+#[derive(Clone)]
 pub struct Row {
     pub key: Key,
     pub leaf: &'static str,
