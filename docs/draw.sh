@@ -25,6 +25,9 @@ cp out/fig10/trace.svg "$top/docs/trace_fig10.svg"
 leafdyn relax scenarios/study/undulation.toml
 cp out/undulation/figure.svg "$top/docs/undulation.svg"
 
+leafdyn unbend scenarios/field/palm.toml --shape scenarios/field/palm.csv --format biomech --out out/palm-posture
+cp out/palm-posture/unbend.svg "$top/docs/palm.svg"
+
 # docs/command-line.md
 leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=5
 

@@ -9,7 +9,9 @@ use std::time::Duration;
 
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
-use leafdyn::study::{BaseScenario, Data, FitRequest, ParameterSweep};
+use leafdyn::study::{
+    BaseScenario, Data, FitRequest, ParameterSweep, ShapeFormat, ShapeTableOptions, read_postures,
+};
 use leafdyn_program::files::read_peer_measurements;
 
 /// A leaf with something of everything.
@@ -106,6 +108,42 @@ pub fn measurements(data: &[u8]) {
     let candidates = FitRequest::read_candidates(data, "candidates.csv", &[]).map(drop);
     for refused in [read, candidates].into_iter().filter_map(Result::err) {
         assert!(refused.to_string().len() < 2_000 + 4 * data.len());
+    }
+}
+
+/// A hanging leaf, seen in a photograph, of which points are read.
+const POSTURE: &str = r#"
+name = "posture"
+units = { length = "m", force = "N" }
+leaf = { rods = 1, length = 1.0, fan = [0.0] }
+stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+photo = { scale = 0.01, x = 300.0, y = 1200.0 }
+"#;
+
+/// A table of points on leaves, by every program that may have written it, with and without names of its columns.
+pub fn points(data: &[u8]) {
+    static LEAF: LazyLock<Scenario> = LazyLock::new(|| Scenario::from_toml(POSTURE).unwrap());
+    let numbered = ["1=x", "2=z:0.01"].map(|column| column.parse().unwrap());
+    let formats = ShapeFormat::ALL.map(Some).into_iter().chain([None]);
+    for (format, columns) in
+        formats.flat_map(|format| [(format, &numbered[..0]), (format, &numbered[..])])
+    {
+        for group in [None, Some(String::from("frame"))] {
+            let options = ShapeTableOptions {
+                group,
+                format,
+                columns: columns.to_vec(),
+            };
+            match read_postures(data, "points.csv", &options, &LEAF) {
+                Ok(leaves) => {
+                    for leaf in leaves {
+                        assert!(leaf.points.positions.iter().all(|point| point.is_finite()));
+                        let _ = leaf.points.check(6, None);
+                    }
+                }
+                Err(refused) => assert!(refused.to_string().len() < 4_000 + 8 * data.len()),
+            }
+        }
     }
 }
 

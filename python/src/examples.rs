@@ -50,6 +50,7 @@ pub fn examples() -> Texts {
             "princeton" "rollup" "three_point_bending" "twisted_strip"),
         &texts!("scenarios/measured":
             "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "posture" "pull"),
+        &texts!("scenarios/field": "bamboo" "palm" "pazy" "wheat"),
         &texts!("scenarios/motion": "curl" "drop" "gust" "strike" "swing"),
         &texts!("scenarios/study": "plate" "saddle" "undulation"),
     ]

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use leafdyn::posture::points::PosturePoints;
 use leafdyn::scenario::{self, Scenario as Checked};
 use leafdyn::study::{
-    self, SecondPosture, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
+    self, MeasuredColumn, SecondPosture, ShapeTableOptions, UnbendError, UnbendRemark,
+    UnbendRequest, Unbending, read_postures,
 };
 use leafdyn_program::files::{self, FileKind, ResultDocument};
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -29,13 +30,24 @@ pub enum Points {
 /// The points of the only leaf of a table.
 pub struct ReadPoints {
     pub points: PosturePoints,
-    taken: Option<&'static str>,
+    taken: Option<String>,
+    /// The scenario with what the table has besides points, if it has.
+    scenario: Option<Box<Checked>>,
     name: String,
 }
 
 impl Points {
     /// Reads the points of a leaf of this scenario.
     pub fn read(&self, scenario: &Checked) -> PyResult<ReadPoints> {
+        self.read_with(scenario, &ShapeTableOptions::default())
+    }
+
+    /// Reads the points of a leaf of this scenario from a table of another program.
+    pub fn read_with(
+        &self,
+        scenario: &Checked,
+        options: &ShapeTableOptions,
+    ) -> PyResult<ReadPoints> {
         let (name, bytes) = match self {
             Points::Text(name, text) => (name.clone(), text.clone().into_bytes()),
             Points::File(path) => {
@@ -43,12 +55,13 @@ impl Points {
                 (path.display().to_string(), bytes)
             }
         };
-        let read = read_postures(&bytes, &name, None, scenario).map_err(value_error)?;
+        let read = read_postures(&bytes, &name, options, scenario).map_err(value_error)?;
         let first = read.into_iter().next();
         let first = first.ok_or_else(|| PyValueError::new_err(format!("{name}: has no points")))?;
         Ok(ReadPoints {
             points: first.points,
             taken: first.taken,
+            scenario: first.scenario,
             name,
         })
     }
@@ -125,11 +138,27 @@ pub fn unbend(
     second: Option<Points>,
     roll: f64,
     slow_loading: bool,
+    format: Option<&str>,
+    columns: Vec<String>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Posture> {
-    let input = scenario.checked.clone();
-    let read = points.read(&input)?;
-    let other = second.map(|second| second.read(&input)).transpose()?;
+    let mut input = scenario.checked.clone();
+    let format = format.map(str::parse).transpose();
+    let columns = columns
+        .iter()
+        .map(|column| column.parse::<MeasuredColumn>());
+    let options = ShapeTableOptions {
+        format: format.map_err(value_error)?,
+        columns: columns.collect::<Result<_, _>>().map_err(value_error)?,
+        ..ShapeTableOptions::default()
+    };
+    let mut read = points.read_with(&input, &options)?;
+    let other = second
+        .map(|second| second.read_with(&input, &options))
+        .transpose()?;
+    if let Some(with_sheet) = read.scenario.take() {
+        input = Arc::new(*with_sheet);
+    }
     let second_name = other.as_ref().map(|other| other.name.clone());
     let mut request = UnbendRequest {
         young: range(young),
@@ -147,9 +176,7 @@ pub fn unbend(
     let mut found =
         found.map_err(|error| posture_error(&read.name, second_name.as_deref(), error))?;
     if let Some(taken) = read.taken {
-        found
-            .remarks
-            .insert(0, UnbendRemark::Coordinates(taken.into()));
+        found.remarks.insert(0, UnbendRemark::Coordinates(taken));
     }
     Ok(Posture { found, input })
 }
@@ -198,9 +225,7 @@ pub fn unbend_many(
         Ok(match found.next() {
             Some(Ok(mut found)) => {
                 if let Some(taken) = read.taken {
-                    found
-                        .remarks
-                        .insert(0, UnbendRemark::Coordinates(taken.into()));
+                    found.remarks.insert(0, UnbendRemark::Coordinates(taken));
                 }
                 PostureOrRefusal::Posture(Py::new(py, Posture { found, input })?)
             }

@@ -92,3 +92,36 @@ def test_relax_starts_from_points(tmp_path: Path) -> None:
         leafdyn.relax(leaf.scenario, start=points[:, 0])
     with pytest.raises(ValueError, match="the shape is 2.0000 long"):
         leafdyn.relax(leaf.scenario, start=2.0 * points)
+
+
+def test_tables_of_other_programs(tmp_path: Path) -> None:
+    wanted = leafdyn.unbend(LEAF, POINTS, slow_loading=False).critical_young.value
+    bare = tmp_path / "bare.txt"
+    bare.write_text("\n".join(f"{10 * x:.6f}  {10 * z:.6f}" for x, z in points()))
+    columns = ["1=x:0.1", "2=z:0.1"]
+    found = leafdyn.unbend(LEAF, bare, columns=columns, slow_loading=False)
+    assert found.critical_young.value == pytest.approx(wanted, rel=1e-4)
+    midrib = tmp_path / "midrib.csv"
+    midrib.write_text("inerv,x,y,hins\n" + "\n".join(f"1,{x},{z},4.5" for x, z in points()))
+    found = leafdyn.unbend(LEAF, midrib, format="adel", slow_loading=False)
+    assert found.critical_young.value == pytest.approx(wanted, rel=1e-4)
+    with pytest.raises(ValueError, match="adel, biomech"):
+        leafdyn.unbend(LEAF, midrib, format="plant")
+    with pytest.raises(ValueError, match="no quantity"):
+        leafdyn.unbend(LEAF, bare, columns=["1=w"])
+    field = MEASURED.parent / "field"
+    palm = leafdyn.unbend(field / "palm.toml", field / "palm.csv", format="biomech", slow_loading=False)
+    # The scenario that rests there has the sections of the sheet: a triangle at the base.
+    second = 0.0755 * 0.0411**3 / 36
+    rest = leafdyn.Scenario(palm.rest(1.0)).to_dict()
+    assert rest["stiffness"]["bending_2"]["value"][0] == pytest.approx(1e9 * second, rel=1e-6)
+
+
+def test_spreadsheets_are_read_by_pandas(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    book = tmp_path / "points.xlsx"
+    pandas.DataFrame(points(), columns=["x", "z"]).to_excel(book, index=False)
+    wanted = leafdyn.unbend(LEAF, POINTS, slow_loading=False).critical_young.value
+    found = leafdyn.unbend(LEAF, book, slow_loading=False).critical_young.value
+    assert found == pytest.approx(wanted, rel=1e-6)

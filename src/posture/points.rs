@@ -120,6 +120,9 @@ const MOST_DETOUR: f64 = 1.8;
 /// it is farther than four times that.
 const AT_BASE: f64 = 0.03;
 
+/// A step follows a direction if the cosine of the angle between them is larger.
+const FOLLOWS_DIRECTION: f64 = 0.7;
+
 impl PosturePoints {
     /// Points in space.
     pub fn in_space(positions: Vec<DVec3>) -> PosturePoints {
@@ -136,6 +139,23 @@ impl PosturePoints {
             plane: Some(normal),
             ..PosturePoints::default()
         }
+    }
+
+    /// Whether the points may run from tip to base: they begin away from it and against its direction, but their end
+    /// read backwards follows that direction.
+    pub fn lead_backwards(&self, base: DVec3, direction: DVec3) -> bool {
+        let points = &self.positions;
+        let ([first, second, ..], [.., before, last]) = (&points[..], &points[..]) else {
+            return false;
+        };
+        let length: f64 = points
+            .windows(2)
+            .map(|pair| pair[0].distance(pair[1]))
+            .sum();
+        let along = |from: &DVec3, to: &DVec3| (*to - *from).normalize_or_zero().dot(direction);
+        first.distance(base) > 4.0 * AT_BASE * length
+            && along(first, second) < 0.0
+            && along(last, before) > FOLLOWS_DIRECTION
     }
 
     /// Checks the points themselves.

@@ -409,6 +409,7 @@ impl SerializedSections<'_> {
             Key::Diameter if outline == SectionOutline::Circle => of(|section| &section.width),
             Key::Width | Key::Thickness if outline == SectionOutline::Circle => return None,
             Key::Width => of(|section| &section.width),
+            Key::Thickness if outline == SectionOutline::Hexagon => return None,
             Key::Thickness => of(|section| &section.thickness),
             Key::InnerDiameter | Key::Wall => {
                 let hollow = |section: &'_ Arc<Section>| section.hollow.clone();

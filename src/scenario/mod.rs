@@ -56,7 +56,7 @@ pub(crate) use crate::scenario::profile::knot_places as knots;
 pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};
 pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
-pub use crate::scenario::section::{Moduli, Radii, Stress};
+pub use crate::scenario::section::{Moduli, Radii, SectionConstants, SectionOutline, Stress};
 pub use crate::scenario::support_motion::{BaseMotion, SupportMotion};
 pub use crate::scenario::supports::{BaseSupport, Clamp, Grip, HeldTip, SupportKind};
 pub use crate::scenario::veins::{Rod, Scale, Tissue, longest};

@@ -73,8 +73,9 @@ pub use crate::study::trace::{
 };
 pub use crate::study::unbend::{
     CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, PostureOutcome, PostureRow,
-    Postures, RestCheck, SecondPosture, SlowLoading, SmoothingReport, UnbendError, UnbendRemark,
-    UnbendRequest, Unbending, read_postures, relax_from_points, unbend, unbend_groups, unbend_many,
+    Postures, RestCheck, SecondPosture, ShapeFormat, ShapeTableOptions, SlowLoading,
+    SmoothingReport, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
+    relax_from_points, unbend, unbend_groups, unbend_many,
 };
 pub use crate::study::vary::{
     BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SolverSetting, SolverSettings,

@@ -210,7 +210,7 @@ const REFUSED: &str = "
     made up|load.tip_force[2];tip_w|1;2 => data.csv:2: unknown column tip_w
     tip_z|1|load.tip_force[2],tip_z|1,2 => data.csv:1: names columns, and so does line 3
     -0.1,-0.2|slipped,again => data.csv:1: has no header
-    tip_x tip_z|1 2 => data.csv:1: columns are divided by blanks
+    tip_x tip_z|1 2|1 2 3 => data.csv:1: columns are divided by blanks
     tip_z,|0,25 => data.csv:1: column 2 has no name, and cells below
     experiment,tip_z|'a,1|b,2 => data.csv:2: a quotation mark is not closed
     x,y|1,1 => data.csv:1: points on veins need a column rod, from 1 to 5
@@ -335,4 +335,38 @@ fn candidates_may_have_other_names() {
     let table = "Force;tip_z\n0,5;\n";
     let found = FitRequest::read_candidates(table, "next.csv", &[column]).unwrap();
     assert_eq!(found[0].settings[0].1, 0.5);
+}
+
+/// Cells divided by blanks, and columns without names, which are given by their numbers.
+#[test]
+fn columns_of_bare_numbers_are_given_by_number() {
+    let wanted: Vec<Vec<f64>> = PULLS.iter().map(|row| row.to_vec()).collect();
+    let columns = ["1=load.tip_force[2]", "2=tip_z"];
+    for table in [
+        "-0.25 -0.0632\n-0.5 -0.1254\n-1.0 -0.2414\n",
+        "# slipped at the end\n\n  -0.25\t  -0.0632\n  -0.5\t  -0.1254\n  -1\t  -0.2414\n",
+        "-0.25,-0.0632\n-0.5,-0.1254\n-1.0,-0.2414\n",
+        "-0,25;-0,0632\n-0,5;-0,1254\n-1,0;-0,2414\n",
+    ] {
+        let data = read_with(table, 5, &columns, 1).unwrap();
+        assert_eq!(numbers(&data), wanted, "{table}");
+    }
+    let named = "load.tip_force[2]   tip_z\n-0.25 -0.0632\n-0.5   -0.1254\n-1.0  -0.2414\n";
+    let data = read(named).unwrap();
+    assert_eq!(numbers(&data), wanted);
+    assert!(
+        data.files[0]
+            .taken
+            .contains(&"cells divided by blanks".to_string())
+    );
+    let refused = read_with("-0.25,-0.0632\nslipped,1\n", 5, &columns, 1).unwrap_err();
+    assert!(
+        refused.contains("data.csv:2: load.tip_force[2] = slipped"),
+        "{refused}"
+    );
+    let refused = read_with("-0.25,-0.0632\n", 5, &["3=tip_z"], 1).unwrap_err();
+    assert!(
+        refused.contains("none of the columns") && refused.contains("1, 2"),
+        "{refused}"
+    );
 }

@@ -78,9 +78,16 @@ fn what_cannot_be_a_section_is_refused() {
     let table = r#"
         shape = "circle", young = 1 => section.diameter is missing
         diameter = 0.1, young = 1 => section.shape is missing
-        shape = "oval", diameter = 0.1, young = 1 => must be "circle", "ellipse" or "rectangle"
+        shape = "oval", diameter = 0.1, young = 1 => must be "circle", "ellipse", "rectangle", "triangle", "hexagon" or "u"
         shape = "circle", diameter = 0.1, width = 1, young = 1 => a circle has a diameter
         shape = "ellipse", diameter = 0.1, young = 1 => width (along d2)
+        shape = "triangle", width = 0.1, young = 1 => section.thickness is missing
+        shape = "triangle", width = 0.1, thickness = 0.1, wall = 0.01, young = 1 => triangles and hexagons are full
+        shape = "hexagon", width = 0.1, thickness = 0.1, young = 1 => a hexagon has a width (across flats)
+        shape = "hexagon", width = 0.1, inner_diameter = 0.05, young = 1 => belongs to a circle
+        shape = "u", width = 0.1, thickness = 0.1, young = 1 => section.shape = "u": has a wall
+        shape = "u", width = 0.1, thickness = 0.1, wall = 0.04, young = 1 => at most a third of section.width
+        shape = "u", width = 0.4, thickness = [0.1, 0.05], wall = 0.04, young = 1 => half of section.thickness
         shape = "circle", diameter = -0.1, young = 1 => must be greater than 0
         shape = "circle", diameter = 0.1, young = 1, poisson = 0.6 => at most 0.5
         shape = "circle", diameter = 0.1, young = 1, poisson = -1 => greater than -1
@@ -104,4 +111,68 @@ fn what_cannot_be_a_section_is_refused() {
     assert!(with(both).unwrap_err().contains("leave out either"));
     let masses = both.replace("stiffness = { torsion", "dynamics = { density");
     assert!(with(&masses).unwrap_err().contains("section.mass_density"));
+}
+
+/// Sections of straight sides are written and read back, with their stiffnesses: I2 and I3 by hand, J of an equilateral
+/// triangle, of a hexagon (0.1151 d^4) and of thin walls.
+#[test]
+fn triangles_hexagons_and_channels() {
+    let height = 0.1 * 3_f64.sqrt() / 2.0;
+    let shear = 1.0 / 2.6;
+    for (section, constants) in [
+        (
+            format!(r#"shape = "triangle", width = 0.1, thickness = {height}"#),
+            [
+                3_f64.sqrt() / 80.0 * 1e-4,
+                0.1 * height.powi(3) / 36.0,
+                height * 1e-3 / 48.0,
+            ],
+        ),
+        (
+            r#"shape = "hexagon", width = 0.1"#.into(),
+            [0.115_050_994_4e-4, 0.060_140_653_04e-4, 0.060_140_653_04e-4],
+        ),
+        (
+            // Thin walls: web and flanges by themselves, and moved to the centroid at 1/3 of the height.
+            r#"shape = "u", width = 0.10001, thickness = 0.100005, wall = 0.00001"#.into(),
+            [
+                0.3 * 1e-15 / 3.0,
+                1e-5 * 1e-3 / 3.0,
+                1e-5 * 1e-3 * 7.0 / 12.0,
+            ],
+        ),
+    ] {
+        let text = format!("section = {{ {section}, young = 1.0, mass_density = 2.0 }}");
+        let leaf = with(&text).unwrap();
+        let again = Scenario::from_toml(&serde_json::to_string(&leaf).unwrap()).unwrap();
+        assert_eq!(again, leaf, "{section}");
+        let rod = &leaf.rods[0];
+        let factors = [shear, 1.0, 1.0];
+        for ((stiffness, constant), factor) in
+            rod.couple_stiffness.iter().zip(constants).zip(factors)
+        {
+            let ratio = stiffness.at(0.5) / (factor * constant);
+            assert!((ratio - 1.0).abs() < 2e-4, "{section}: {ratio}");
+        }
+    }
+}
+
+/// A triangular cantilever bent a little up or down by P at its tip has its largest stress at the apex, P L (2 t/3)/I2,
+/// at the clamp.
+#[test]
+fn the_apex_of_a_triangle_is_stressed_most() {
+    for force in [1e-7, -1e-7] {
+        let text = format!(
+            r#"
+            name = "ridge"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            section = {{ shape = "triangle", width = 0.04, thickness = 0.03, young = 1.0 }}
+            load = {{ tip_force = [0.0, 0.0, {force:e}] }}
+            "#
+        );
+        let leaf = settle(&Scenario::from_toml(&text).unwrap(), 1e-9);
+        let stress = leaf.stress.as_ref().expect("a section has stresses");
+        let wanted = 1e-7 * 0.02 / (0.04 * 0.03_f64.powi(3) / 36.0);
+        leafdyn_testing::close("normal", stress.largest.normal / wanted, 1.0, 1e-4);
+    }
 }

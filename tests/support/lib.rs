@@ -55,7 +55,7 @@ pub fn files(folder: &str) -> Vec<PathBuf> {
 
 /// All scenario files; measured data stand beside theirs.
 pub fn scenario_files() -> Vec<PathBuf> {
-    let folders = ["paper", "classic", "motion", "study", "measured"];
+    let folders = ["paper", "classic", "motion", "study", "measured", "field"];
     let mut all = folders.map(files).concat();
     all.retain(|file| file.extension().is_none_or(|kind| kind != "csv"));
     all

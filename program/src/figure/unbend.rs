@@ -360,6 +360,11 @@ fn draw_ladder(page: &mut Drawing, found: &Unbending, units: &Units, cell: PageR
         let (top, bottom) = (cell.corner.y, cell.opposite_corner().y);
         let stroke = Stroke::new(FRAME_COLOR, 1.0).with_dashes(true);
         page.draw_line(at.with_y(top), at.with_y(bottom), stroke);
+        let mut key =
+            LegendRows::starting_at(cell.corner.x, cell.corner.y - PAGE.panel_title - 4.0, 22.0);
+        key.add_entry(page, "slow loading leads here", |page, cell| {
+            cell.draw_midline(page, stroke);
+        });
     }
     let indices = found.indices.iter().map(|it| (it.young, it.index as f64));
     axes.draw_markers(page, indices, Marker::Diamond, VERMILION);

@@ -9,6 +9,7 @@ use crate::verbs::progress::{ProgressLine, completed_fraction};
 use crate::verbs::request::{
     DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
 };
+use crate::verbs::unbend::ShapeTableArguments;
 use clap::{Args, ValueHint};
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Progress, Route, Settings};
 use leafdyn::scenario::bytes;
@@ -84,6 +85,9 @@ pub struct RelaxArguments {
     #[arg(long, value_name = "SHAPE.csv", value_hint = ValueHint::FilePath, conflicts_with_all = ["all", "sensitivity", "margin", "veins"])]
     start: Option<PathBuf>,
 
+    #[command(flatten)]
+    start_table: ShapeTableArguments,
+
     /// Solve for the whole leaf, even if half of it would do
     #[arg(long, help_heading = EXPERT_OPTIONS_HEADING)]
     full_model: bool,
@@ -132,12 +136,12 @@ fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, to
 /// The equilibrium nearest to the shape in a file.
 fn relax_from_shape(
     job: &ScenarioJob,
-    path: &Path,
+    (path, table): (&Path, &ShapeTableArguments),
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, Refusal> {
     let file = path.display().to_string();
-    let read = read_postures(&bytes(path)?, &file, None, &job.scenario)?;
+    let read = read_postures(&bytes(path)?, &file, &table.options(None), &job.scenario)?;
     let Some(shape) = read.into_iter().next() else {
         return Err(format!("--start {file}: has no points").into());
     };
@@ -153,6 +157,9 @@ fn relax_from_shape(
 
 impl RelaxArguments {
     pub fn run(mut self) -> Result<ExitStatus, Refusal> {
+        if self.start.is_none() && self.start_table.any_given() {
+            return Err("--format, --column: say how the points of --start are read: give --start SHAPE.csv".into());
+        }
         match self.veins {
             Some(VeinsChoice::Number(veins)) => {
                 self.request.overrides.push(format!("leaf.rods={veins}"));
@@ -298,7 +305,7 @@ impl RelaxArguments {
             });
         }
         if let Some(file) = &self.start {
-            return relax_from_shape(job, file, options, &mut |progress| {
+            return relax_from_shape(job, (file, &self.start_table), options, &mut |progress| {
                 line.update_solver(progress, tolerance)
             });
         }

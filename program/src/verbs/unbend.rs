@@ -1,14 +1,16 @@
 //! `leafdyn unbend`: the least stiffness that a posture proves, and the leaf without its weight.
 
 use crate::verbs::exit::{ExitStatus, Refusal};
-use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
+use crate::verbs::request::{
+    DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits, word_parser,
+};
 use clap::{Args, ValueHint};
 use leafdyn::posture::leaf::ScenarioRod;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
-    NamedPosture, PostureOutcome, PostureRow, Postures, SecondPosture, UnbendError, UnbendRemark,
-    UnbendRequest, Unbending, read_postures,
+    MeasuredColumn, NamedPosture, PostureOutcome, PostureRow, Postures, SecondPosture, ShapeFormat,
+    ShapeTableOptions, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
 };
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -29,6 +31,9 @@ pub struct UnbendArguments {
     #[arg(long, value_name = "POINTS.csv", value_hint = ValueHint::FilePath)]
     shape: PathBuf,
 
+    #[command(flatten)]
+    table: ShapeTableArguments,
+
     /// Young's modulus, or the range in which it lies: is the posture stable there?
     #[arg(long, value_name = "E|A..B")]
     young: Option<YoungRange>,
@@ -40,6 +45,34 @@ pub struct UnbendArguments {
     /// The points are those of many leaves: the column by whose cells they are told apart; one row a leaf, nothing is relaxed
     #[arg(long, value_name = "COLUMN", conflicts_with = "second")]
     group: Option<String>,
+}
+
+/// How tables of points are read.
+#[derive(Debug, Args)]
+pub struct ShapeTableArguments {
+    /// The program that wrote the points: adel, midribs in cm, told apart by --group inerv; biomech, a field sheet of twelve rows, whose sections and weights stand for those of the scenario. Tables of DeepLabCut are known by their first lines
+    #[arg(long, value_name = "PROGRAM", value_parser = word_parser::<ShapeFormat>(ShapeFormat::ALL.map(ShapeFormat::word)))]
+    format: Option<ShapeFormat>,
+
+    /// What a column of the points is: its name in the file, or its number, from 1, in a file without a header, and x, y, z, pixel_x, pixel_y, normal_x, normal_y, normal_z or sd, with a factor and an offset, as in '1=x:1e-3'; may repeat
+    #[arg(long, value_name = "NAME=QUANTITY[:FACTOR[+OFFSET]]")]
+    column: Vec<MeasuredColumn>,
+}
+
+impl ShapeTableArguments {
+    /// How a table is read whose leaves are told apart by this column, if there are several.
+    pub fn options(&self, group: Option<&str>) -> ShapeTableOptions {
+        ShapeTableOptions {
+            group: group.map(String::from),
+            format: self.format,
+            columns: self.column.clone(),
+        }
+    }
+
+    /// Whether any of the options is given.
+    pub fn any_given(&self) -> bool {
+        self.format.is_some() || !self.column.is_empty()
+    }
 }
 
 /// A second table of points, and the angle by which the leaf was turned.
@@ -121,7 +154,8 @@ impl UnbendArguments {
         ScenarioRod::new(&job.scenario)
             .map_err(|error| format!("{}: {error}", job.scenario.name))?;
         let file = self.shape.display().to_string();
-        let leaves = read_postures(&bytes(&self.shape)?, &file, Some(column), &job.scenario)?;
+        let options = self.table.options(Some(column));
+        let leaves = read_postures(&bytes(&self.shape)?, &file, &options, &job.scenario)?;
         let young = self.young.as_ref().map(|range| range.0.clone());
         let found = study::unbend_groups(&job.scenario, leaves, young);
         let bound = |row: &PostureRow| row.outcome == PostureOutcome::Bound;
@@ -142,7 +176,12 @@ impl UnbendArguments {
             young: self.young.as_ref().map(|range| range.0.clone()),
             second,
             limit: job.limit.clone(),
-            ..UnbendRequest::new(job.scenario.clone(), posture.points)
+            ..UnbendRequest::new(
+                posture
+                    .scenario
+                    .map_or_else(|| job.scenario.clone(), |it| *it),
+                posture.points,
+            )
         };
         let mut found = study::unbend(&request).map_err(|error| match error {
             UnbendError::Second(error) => {
@@ -155,9 +194,7 @@ impl UnbendArguments {
             error => format!("{}: {error}", self.shape.display()),
         })?;
         if let Some(taken) = posture.taken {
-            found
-                .remarks
-                .insert(0, UnbendRemark::Coordinates(taken.into()));
+            found.remarks.insert(0, UnbendRemark::Coordinates(taken));
         }
         job.print_remark(found.remarks.first());
         let stable = found.indices.iter().all(|it| it.index == 0);
@@ -168,7 +205,8 @@ impl UnbendArguments {
     /// The points of the only leaf of a table.
     fn read(&self, job: &ScenarioJob, path: &Path) -> Result<NamedPosture, Refusal> {
         let file = path.display().to_string();
-        let read = read_postures(&bytes(path)?, &file, None, &job.scenario)?;
+        let options = self.table.options(None);
+        let read = read_postures(&bytes(path)?, &file, &options, &job.scenario)?;
         let first = read.into_iter().next();
         first.ok_or_else(|| format!("{file}: has no points").into())
     }

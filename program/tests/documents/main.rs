@@ -4,6 +4,7 @@ mod documented_commands;
 mod figure_trace;
 mod first_minute;
 mod fit_cli;
+mod measured_by_others;
 mod numbers_on_two_pages;
 mod refusals;
 mod relax_cli;

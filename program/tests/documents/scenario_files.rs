@@ -10,7 +10,7 @@ use leafdyn_testing::*;
 fn every_file_is_accepted_named_after_itself_and_explained() {
     let folders = fs::read_dir(path("").parent().unwrap()).unwrap();
     let folders = folders.filter(|entry| entry.as_ref().unwrap().path().is_dir());
-    assert_eq!(folders.count(), 5, "all folders are known");
+    assert_eq!(folders.count(), 6, "all folders are known");
     for path in scenario_files() {
         assert_eq!(path.extension().unwrap(), "toml", "{}", path.display());
         let name = path.file_stem().unwrap().to_str().unwrap();

@@ -126,14 +126,23 @@ fn measured_data() {
 
 /// Seeds and finds of the fuzz targets.
 #[test]
+fn points_that_are_changed_at_random() {
+    for (_, seed) in bodies::contents(&root().join("fuzz/corpus/points")) {
+        let text = String::from_utf8(seed).unwrap();
+        each("points.csv", &text, 100, bodies::points);
+    }
+}
+
+#[test]
 fn the_corpus_of_the_fuzz_targets() {
     let corpus = root().join("fuzz/corpus");
     type Body = fn(&[u8]);
-    let bodies: [(&str, Body); 4] = [
+    let bodies: [(&str, Body); 5] = [
         ("scenario", bodies::scenario),
         ("typed", bodies::typed),
         ("peers", bodies::peers),
         ("measurements", bodies::measurements),
+        ("points", bodies::points),
     ];
     for (target, body) in bodies {
         let inputs = bodies::contents(&corpus.join(target));

@@ -7,6 +7,7 @@ mod equilibria;
 mod keys;
 mod map_outcomes;
 mod margin;
+mod shape_tables;
 mod simulate_choice;
 mod simulate_cli;
 mod simulate_doubts;

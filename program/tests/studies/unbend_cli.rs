@@ -115,6 +115,7 @@ fn its_files_are_those_of_one_modulus() {
         "with 95 % bands",
         "the critical mode",
         "the index at every E",
+        "slow loading leads here",
         "bend about d2 / (1/cm)",
     ] {
         assert!(svg.contains(text), "{text}");

@@ -214,6 +214,8 @@ def unbend(
     second: _Points | None,
     roll: float,
     slow_loading: bool,
+    format: str | None,
+    columns: Sequence[str],
     progress: _Heard,
 ) -> Posture: ...
 def unbend_many(

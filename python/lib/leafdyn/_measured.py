@@ -45,11 +45,24 @@ def _table(table: Any, name: str, units: Mapping[str, str]) -> tuple[str, str] |
         path = os.fspath(table)
         if not os.path.lexists(path):
             raise MissingDataError(f"{path}: cannot be read: there is no such file")
-        return path
+        return (path, _spreadsheet(path)) if path.lower().endswith(_SPREADSHEETS) else path
     if not hasattr(table, "items"):
         found = type(table).__name__
         raise TypeError(f"{name}: allowed are a path, a dict of columns and a pandas.DataFrame, not {found}")
     return name, _text(table, name, units)
+
+
+_SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
+
+
+def _spreadsheet(path: str) -> str:
+    """The first sheet of a spreadsheet as CSV, by pandas."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError(f"{path}: spreadsheets are read by pandas: install it with openpyxl, or export CSV") from None
+    text: str = pandas.read_excel(path, header=None).to_csv(header=False, index=False)
+    return text
 
 
 def _text(table: Columns, name: str, units: Mapping[str, str]) -> str:

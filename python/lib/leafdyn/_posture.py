@@ -148,6 +148,8 @@ def unbend(
     second: Points | None = None,
     roll: float = 180.0,
     slow_loading: bool = True,
+    format: str | None = None,
+    columns: Iterable[str] = (),
     progress: Progress = None,
 ) -> Posture:
     """Tell the least stiffness that a posture proves: a leaf that is seen at rest is stable.
@@ -160,7 +162,7 @@ def unbend(
         A single vein with the weight, the loads and the section of the leaf. Its Young's modulus and its rest shape are
         not used.
     points
-        Points of the centreline from base to tip: the path of a CSV file, a dict of columns, a ``pandas.DataFrame`` or
+        Points of the centreline from base to tip: the path of a CSV file or a spreadsheet (``.xlsx``, by pandas), a dict of columns, a ``pandas.DataFrame`` or
         an array. Columns are ``"x"``, ``"y"``, ``"z"``, or two of them in a plane, or ``"pixel_x"``, ``"pixel_y"`` with
         ``[photo]``; if they were measured ``"normal_x"``, ``"normal_y"``, ``"normal_z"`` of the blade, and ``"sd"``.
     young
@@ -171,6 +173,12 @@ def unbend(
         By how many degrees it was turned.
     slow_loading
         Whether to find out from which modulus on slow loading leads to the posture.
+    format
+        The program that wrote the points: ``"adel"``, midribs in cm; ``"biomech"``, a field sheet whose sections and
+        weights stand for those of the scenario. Tables of DeepLabCut are known by their first lines.
+    columns
+        What columns are, as ``"NAME=QUANTITY[:FACTOR[+OFFSET]]"``: of a file without a header by number, from 1, as in
+        ``["1=x", "2=z:1e-3"]``.
 
     Returns
     -------
@@ -214,7 +222,7 @@ def unbend(
     other = None if second is None else point_table(second, "second", leaf.units)
     ends = _young(young)
     with reporter(progress) as heard:
-        found = Posture(_leafdyn.unbend(leaf._core, table, ends, other, float(roll), slow_loading, heard))
+        found = Posture(_leafdyn.unbend(leaf._core, table, ends, other, float(roll), slow_loading, format, list(columns), heard))
     for remark in found.remarks:
         warn(leaf.name, remark)
     return found

@@ -528,10 +528,14 @@ impl Stresses {
             return self;
         };
         let moduli = scenario.moduli(self.vein - 1, self.sigma);
-        let along_all = |size: f64| DVec3::splat(size);
-        let error = largest_stress(&moduli, along_all(force), along_all(moment));
+        // A section that is not symmetric about d2 is stressed most by moments of one sign.
+        let errors = [1.0, -1.0].map(|sign| {
+            let moment = moment * DVec3::new(1.0, sign, 1.0);
+            largest_stress(&moduli, DVec3::splat(force), moment).map(|it| it.equivalent)
+        });
+        let [one, other] = errors;
         Stresses {
-            error: error.map(|it| it.equivalent),
+            error: one.zip(other).map(|(one, other)| larger(one, other)),
             ..self
         }
     }

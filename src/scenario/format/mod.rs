@@ -88,13 +88,13 @@ keys! {
     SectionShape "section.shape": Text, [0, 0, 0], Required("\"circle\"");
     /// diameter of a circle.
     Diameter "section.diameter": Quantity(Positive), [1, 0, 0], Required("0.1");
-    /// width of an ellipse or a rectangle, along d2.
+    /// width of the section, along d2; of a hexagon across flats.
     Width "section.width": Quantity(Positive), [1, 0, 0], Required("0.4");
-    /// thickness of an ellipse or a rectangle, along d3.
+    /// thickness of the section, along d3.
     Thickness "section.thickness": Quantity(Positive), [1, 0, 0], Required("0.1");
     /// diameter of the bore of a tube.
     InnerDiameter "section.inner_diameter": Quantity(NotNegative), [1, 0, 0], Derived;
-    /// thickness of the wall of a hollow section.
+    /// thickness of the wall of a hollow section or of a channel.
     Wall "section.wall": Quantity(Positive), [1, 0, 0], Derived;
     /// E, Young's modulus.
     Young "section.young": Quantity(Positive), [-2, 1, 0], Required("0.3");

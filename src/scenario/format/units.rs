@@ -110,6 +110,30 @@ impl Units {
         (newtons && self.is_in_seconds()).then_some(1e3 * metre)
     }
 
+    /// How many meters the unit of length is, if it has a known name.
+    pub fn meters(&self) -> Option<f64> {
+        match self.length.as_deref()? {
+            "m" => Some(1.0),
+            "dm" => Some(0.1),
+            "cm" => Some(0.01),
+            "mm" => Some(1e-3),
+            "in" => Some(0.0254),
+            "ft" => Some(0.3048),
+            _ => None,
+        }
+    }
+
+    /// How many newtons the unit of force is, if it has a known name.
+    pub fn newtons(&self) -> Option<f64> {
+        match self.force.as_deref()? {
+            "N" => Some(1.0),
+            "mN" => Some(1e-3),
+            "kN" => Some(1e3),
+            "lbf" => Some(4.448_221_615_260_5),
+            _ => None,
+        }
+    }
+
     /// Whether the unit of time is called that of a second.
     pub fn is_in_seconds(&self) -> bool {
         self.time.as_deref() == Some("s")

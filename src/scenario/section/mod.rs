@@ -13,10 +13,12 @@
 //!
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
-//! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`.
+//! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`, of triangles,
+//! hexagons and channels `polygon`.
 //! They depend on Poisson's ratio, for which a given G stands as well: see [`ShearLaw::equivalent_poisson`].
 
 mod outline;
+mod polygon;
 
 use crate::numbers::sorted_distinct;
 use crate::scenario::format::Key;
@@ -26,9 +28,10 @@ use crate::scenario::format::item::EntryValue;
 use crate::scenario::profile::{
     DerivedProfile, Profile, RodPlace, RodProperties, Side, knot_places,
 };
-use crate::scenario::section::outline::SectionDimensions;
-pub(super) use crate::scenario::section::outline::SectionOutline;
+use crate::scenario::section::outline::{ClosedOutline, SectionDimensions};
 pub use crate::scenario::section::outline::{Moduli, Stress};
+use crate::scenario::section::polygon::{LEAST_CHANNEL_GAP, PolygonSection};
+use crate::words;
 use std::any::Any;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -39,6 +42,149 @@ const SAME_KINK_DISTANCE: f64 = 1e-12;
 /// Steps between two knots at which the extremes of a property are looked for: properties are smooth
 /// between knots.
 const STEPS_BETWEEN_KNOTS: usize = 16;
+
+words! {
+    /// The outline of a section.
+    pub enum SectionOutline {
+        /// A circle, whose width and thickness are the same.
+        Circle = "circle",
+        /// An ellipse with its width along d2 and its thickness along d3.
+        Ellipse = "ellipse",
+        /// A rectangle with its width along d2 and its thickness along d3.
+        Rectangle = "rectangle",
+        /// An isosceles triangle: its base along d2 below, its apex on the side of d3.
+        Triangle = "triangle",
+        /// A regular hexagon, its width across flats, along d2.
+        Hexagon = "hexagon",
+        /// A channel, open towards d3.
+        U = "u",
+    }
+}
+
+/// A section at one place along a rod.
+#[derive(Clone, Copy, Debug)]
+enum CrossSection {
+    Closed(SectionDimensions),
+    Polygon(PolygonSection),
+}
+
+impl CrossSection {
+    /// `None` of a channel without a wall.
+    fn new(
+        outline: SectionOutline,
+        width: f64,
+        thickness: f64,
+        wall: Option<f64>,
+    ) -> Option<CrossSection> {
+        let height = thickness;
+        let closed = |outline| {
+            CrossSection::Closed(SectionDimensions {
+                outline,
+                width,
+                thickness,
+                wall,
+            })
+        };
+        Some(match outline {
+            SectionOutline::Circle | SectionOutline::Ellipse => closed(ClosedOutline::Ellipse),
+            SectionOutline::Rectangle => closed(ClosedOutline::Rectangle),
+            SectionOutline::Triangle => {
+                CrossSection::Polygon(PolygonSection::Triangle { width, height })
+            }
+            SectionOutline::Hexagon => CrossSection::Polygon(PolygonSection::Hexagon { width }),
+            SectionOutline::U => CrossSection::Polygon(PolygonSection::Channel {
+                width,
+                height,
+                wall: wall?,
+            }),
+        })
+    }
+
+    /// The area of the material.
+    fn area(self) -> f64 {
+        match self {
+            CrossSection::Closed(section) => section.area(),
+            CrossSection::Polygon(section) => section.area(),
+        }
+    }
+
+    /// The area within the outline.
+    fn enclosed_area(self) -> f64 {
+        match self {
+            CrossSection::Closed(section) => section.enclosed_area(),
+            CrossSection::Polygon(section) => section.area(),
+        }
+    }
+
+    /// The extent along d3.
+    fn height(self) -> f64 {
+        match self {
+            CrossSection::Closed(section) => section.thickness,
+            CrossSection::Polygon(section) => section.height(),
+        }
+    }
+
+    /// The second moments I2 and I3 of the area, about d2 and d3.
+    fn second_moments(self) -> [f64; 2] {
+        match self {
+            CrossSection::Closed(section) => section.second_moments(),
+            CrossSection::Polygon(section) => section.second_moments(),
+        }
+    }
+
+    /// The torsion constant J.
+    fn torsion_constant(self) -> f64 {
+        match self {
+            CrossSection::Closed(section) => section.torsion_constant(),
+            CrossSection::Polygon(section) => section.torsion_constant(),
+        }
+    }
+
+    /// Factors for shear forces along d2 and along d3: Cowper's, which depend on Poisson's ratio, or Zhuravskii's.
+    fn shear_factors(self, poisson: f64) -> [f64; 2] {
+        match self {
+            CrossSection::Closed(section) => section.shear_factors(poisson),
+            CrossSection::Polygon(section) => section.shear_factors(),
+        }
+    }
+
+    /// What the largest stresses in the section follow from.
+    fn moduli(self) -> Moduli {
+        match self {
+            CrossSection::Closed(section) => section.moduli(),
+            CrossSection::Polygon(section) => Moduli::for_polygon(section),
+        }
+    }
+}
+
+/// Moments of area of a full section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectionConstants {
+    /// I2 and I3, about d2 and d3; length^4.
+    pub second_moments: [f64; 2],
+    /// The torsion constant J; length^4.
+    pub torsion: f64,
+}
+
+impl SectionConstants {
+    /// Those of an outline with this width, along d2, and thickness, along d3; of a circle the thickness alone counts,
+    /// of a hexagon the width. `None` of a channel, which is not full.
+    pub fn of_full_section(
+        outline: SectionOutline,
+        width: f64,
+        thickness: f64,
+    ) -> Option<SectionConstants> {
+        let width = match outline {
+            SectionOutline::Circle => thickness,
+            _ => width,
+        };
+        let section = CrossSection::new(outline, width, thickness, None)?;
+        Some(SectionConstants {
+            second_moments: section.second_moments(),
+            torsion: section.torsion_constant(),
+        })
+    }
+}
 
 /// A property that a section determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,25 +364,23 @@ impl Section {
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
-    /// The sides of the section at a place.
-    fn dimensions_at(&self, place: impl Into<RodPlace>) -> SectionDimensions {
+    /// The section at a place.
+    fn cross_section_at(&self, place: impl Into<RodPlace>) -> CrossSection {
         let place = place.into();
         let (width, thickness) = (self.width.at(place), self.thickness.at(place));
-        SectionDimensions {
-            outline: self.outline,
-            width,
-            thickness,
-            wall: self.hollow.as_ref().map(|hollow| match hollow {
-                HollowSection::Wall(wall) => wall.at(place),
-                HollowSection::Bore(inner) => 0.5 * (width - inner.at(place)),
-            }),
-        }
+        let wall = self.hollow.as_ref().map(|hollow| match hollow {
+            HollowSection::Wall(wall) => wall.at(place),
+            HollowSection::Bore(inner) => 0.5 * (width - inner.at(place)),
+        });
+        let section = CrossSection::new(self.outline, width, thickness, wall);
+        // Scenarios of channels without a wall are refused.
+        section.unwrap_or(CrossSection::Polygon(PolygonSection::Hexagon { width }))
     }
 
     /// A property at a place.
     fn property_value(&self, property: Property, place: impl Into<RodPlace>) -> f64 {
         let place = place.into();
-        let sides = self.dimensions_at(place);
+        let sides = self.cross_section_at(place);
         let young = self.young.at(place);
         let shear = self.shear.modulus(young, place);
         let area = sides.area();
@@ -268,7 +412,7 @@ impl Section {
     fn shear_factors_at(&self, place: RodPlace) -> [f64; 2] {
         let young = self.young.at(place);
         let poisson = self.shear.equivalent_poisson(young, place);
-        self.dimensions_at(place).shear_factors(poisson)
+        self.cross_section_at(place).shear_factors(poisson)
     }
 
     /// The knots, and places between them.
@@ -335,7 +479,7 @@ impl Radii {
     /// the outline of its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some((section.dimensions_at(sigma).enclosed_area() / PI).sqrt())
+        Some((section.cross_section_at(sigma).enclosed_area() / PI).sqrt())
     }
 
     /// Half of the width of a rod's section, along d2, at a fraction of its length; `None` as of
@@ -349,14 +493,18 @@ impl Radii {
     /// [`Radii::at`].
     pub fn thickness(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some(section.thickness.at(sigma))
+        Some(section.cross_section_at(sigma).height())
     }
 
     /// The moduli of the section of a rod at a fraction of its length: of both sections where it jumps.
     pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Vec<Moduli> {
         let sections = self.0.get(rod).into_iter();
         let sides = |section: &'_ Arc<Section>| {
-            let of = |side: &Side| section.dimensions_at(RodPlace::new(sigma, *side)).moduli();
+            let of = |side: &Side| {
+                section
+                    .cross_section_at(RodPlace::new(sigma, *side))
+                    .moduli()
+            };
             section.sides_at(sigma).iter().map(of).collect::<Vec<_>>()
         };
         sections.flat_map(sides).collect()
@@ -394,7 +542,12 @@ impl PartialEq for Radii {
 
 /// The entry that gives the size of the sections or of the blade.
 pub(super) fn size_entry(entries: &Entries) -> Option<EntryValue<'_>> {
-    let sizes = [Key::Diameter, Key::Thickness, Key::BladeThickness];
+    let sizes = [
+        Key::Diameter,
+        Key::Thickness,
+        Key::Width,
+        Key::BladeThickness,
+    ];
     sizes.into_iter().find_map(|key| entries.given_value(key))
 }
 
@@ -494,19 +647,30 @@ struct SectionForm {
 
 fn read_form(entries: &Entries) -> ScenarioResult<SectionForm> {
     let item = entries.value_or_default(Key::SectionShape)?;
-    let outline = item.word("must be \"circle\", \"ellipse\" or \"rectangle\"")?;
-    let (sides, diameter) = ([Key::Width, Key::Thickness], [Key::Diameter; 2]);
+    let outline = item.word(
+        "must be \"circle\", \"ellipse\", \"rectangle\", \"triangle\", \"hexagon\" or \"u\"",
+    )?;
+    let (width, thickness, diameter) = (Key::Width, Key::Thickness, Key::Diameter);
     let (sides, others) = match outline {
-        SectionOutline::Circle => (diameter, sides),
-        SectionOutline::Ellipse | SectionOutline::Rectangle => (sides, diameter),
+        SectionOutline::Circle => ([diameter; 2], &[width, thickness][..]),
+        SectionOutline::Hexagon => ([width; 2], &[thickness, diameter][..]),
+        SectionOutline::Ellipse
+        | SectionOutline::Rectangle
+        | SectionOutline::Triangle
+        | SectionOutline::U => ([width, thickness], &[diameter][..]),
     };
-    match others.into_iter().find_map(|key| entries.given_value(key)) {
-        None => Ok(SectionForm { outline, sides }),
-        Some(other) => Err(other.value_error(
-            "a circle has a diameter; an ellipse and a rectangle have a width (along d2) and a \
+    if let Some(other) = others.iter().find_map(|key| entries.given_value(*key)) {
+        return Err(other.value_error(
+            "a circle has a diameter; a hexagon has a width (across flats); all others have a width (along d2) and a \
              thickness (along d3): leave this out, or change section.shape",
-        )),
+        ));
     }
+    let has_wall = entries.given_value(Key::Wall).is_some();
+    item.refuse_unless(
+        outline != SectionOutline::U || has_wall,
+        "has a wall: give section.wall, the thickness of its web and of its flanges",
+    )?;
+    Ok(SectionForm { outline, sides })
 }
 
 /// The walls or bores of the rods; `None` if their sections are full.
@@ -528,6 +692,10 @@ fn read_hollow(
         let twice = "section.wall is given, too: leave one of them out";
         bore.refuse_unless(wall.is_none(), twice)?;
     }
+    item.refuse_unless(
+        !matches!(outline, SectionOutline::Triangle | SectionOutline::Hexagon),
+        "triangles and hexagons are full: leave it out, or change section.shape",
+    )?;
     let profiles = item.profile_per_rod(width.len())?;
     for (rod, profile) in profiles.iter().enumerate() {
         let sides = [&width[rod], &thickness[rod]];
@@ -535,7 +703,17 @@ fn read_hollow(
         for place in knot_places(sides.into_iter().chain([profile])) {
             let side = sides.map(|side| side.at(place));
             let (value, least) = (profile.at(place), side[0].min(side[1]));
+            let channel = outline == SectionOutline::U;
             match bore {
+                _ if channel => {
+                    let gap = side[0] - 2.0 * value;
+                    let flange = side[1] - value;
+                    item.entry(rod).refuse_unless(
+                        gap.min(flange) >= LEAST_CHANNEL_GAP * value,
+                        "must be at most a third of section.width and half of section.thickness, all along the \
+                         rod: stouter channels twist as no thin walls do; give their stiffnesses",
+                    )?;
+                }
                 Some(_) => item.entry(rod).refuse_unless(
                     value < least,
                     "must be less than section.diameter, all along the rod",

@@ -1,5 +1,5 @@
-//! A section at one place along a rod: area, moments, torsion constant and shear factors, full or
-//! hollow, and the largest stresses in it.
+//! An elliptic or rectangular section at one place along a rod: area, moments, torsion constant and shear
+//! factors, full or hollow; and the largest stresses in sections, also those of `polygon`.
 //!
 //! Second moments and areas of hollow sections are those of the outline less those of the hole.
 //!
@@ -24,7 +24,7 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | normal stress | \|n1\|/S + \|m2\| t/(2 I2) + \|m3\| w/(2 I3) in the corner of a rectangle; on an ellipse the root of the sum of the squares of both bending stresses in place of their sum |
+//! | normal stress | \|n1\|/S + \|m2\| t/(2 I2) + \|m3\| w/(2 I3) in the corner of a rectangle; on an ellipse the root of the sum of the squares of both bending stresses in place of their sum; else \|n1/S + m2 z/I2 - m3 y/I3\| in the corner (y, z) where it is largest |
 //! | shear stress | of torsion \|m1\| D/J, plus the root of the sum of the squares of those of n2 and n3, n Q/(I b) each |
 //! | equivalent stress | the root of normal^2 + 3 shear^2 (R. von Mises, 1913) |
 //!
@@ -43,27 +43,24 @@
 //! rectangle concentrate stress, which is left out.
 
 use crate::numbers::GAUSS_LEGENDRE_RULE;
-use crate::words;
+use crate::scenario::section::polygon::PolygonSection;
 use glam::DVec3;
 use serde::Serialize;
 use std::f64::consts::PI;
 
-words! {
-    /// The outline of a section.
-    pub enum SectionOutline {
-        /// A circle, whose width and thickness are the same.
-        Circle = "circle",
-        /// An ellipse with its width along d2 and its thickness along d3.
-        Ellipse = "ellipse",
-        /// A rectangle with its width along d2 and its thickness along d3.
-        Rectangle = "rectangle",
-    }
+/// Outlines whose constants have closed forms, and which may be hollow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ClosedOutline {
+    /// An ellipse with its width along d2 and its thickness along d3, or a circle.
+    Ellipse,
+    /// A rectangle with its width along d2 and its thickness along d3.
+    Rectangle,
 }
 
 /// A section at one place, with its wall if it is hollow.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SectionDimensions {
-    pub outline: SectionOutline,
+    pub outline: ClosedOutline,
     pub width: f64,
     pub thickness: f64,
     pub wall: Option<f64>,
@@ -84,10 +81,8 @@ impl SectionDimensions {
     /// The area within the outline, with the hole.
     pub fn enclosed_area(self) -> f64 {
         match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => {
-                PI / 4.0 * self.width * self.thickness
-            }
-            SectionOutline::Rectangle => self.width * self.thickness,
+            ClosedOutline::Ellipse => PI / 4.0 * self.width * self.thickness,
+            ClosedOutline::Rectangle => self.width * self.thickness,
         }
     }
 
@@ -99,8 +94,8 @@ impl SectionDimensions {
     /// The second moments I2 and I3 of the area, about d2 and d3.
     pub fn second_moments(self) -> [f64; 2] {
         let factor = match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => PI / 64.0,
-            SectionOutline::Rectangle => 1.0 / 12.0,
+            ClosedOutline::Ellipse => PI / 64.0,
+            ClosedOutline::Rectangle => 1.0 / 12.0,
         };
         let (w, t) = (self.width, self.thickness);
         let full = [factor * w * t * t * t, factor * t * w * w * w];
@@ -129,8 +124,8 @@ impl SectionDimensions {
         let panels = (0..WALL_PANELS as usize).map(|k| panel(k as f64 / WALL_PANELS));
         let below = 4.0 * wall / WALL_PANELS * panels.sum::<f64>();
         match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => below,
-            SectionOutline::Rectangle => {
+            ClosedOutline::Ellipse => below,
+            ClosedOutline::Rectangle => {
                 below + self.torsion_interpolation(wall) * (self.torsion_upper_bound() - below)
             }
         }
@@ -160,12 +155,12 @@ impl SectionDimensions {
     fn layer_torsion(self, depth: f64) -> f64 {
         let (w, t) = (self.width - 2.0 * depth, self.thickness - 2.0 * depth);
         let (area, gradient) = match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => {
+            ClosedOutline::Ellipse => {
                 // Of ellipses with the semi-axes a - x and b - x.
                 let (a, b) = (w / 2.0, t / 2.0);
                 (PI * a * b, 2.0 * PI * (a + b - (a * b).sqrt()))
             }
-            SectionOutline::Rectangle => (w * t, 2.0 * (w + t)),
+            ClosedOutline::Rectangle => (w * t, 2.0 * (w + t)),
         };
         area * area / gradient
     }
@@ -178,8 +173,8 @@ impl SectionDimensions {
                 return self.outline.shear_factor(along, across, nu);
             };
             match self.outline {
-                SectionOutline::Rectangle => box_shear_factor(along - wall, across - wall, nu),
-                SectionOutline::Circle | SectionOutline::Ellipse => {
+                ClosedOutline::Rectangle => box_shear_factor(along - wall, across - wall, nu),
+                ClosedOutline::Ellipse => {
                     let full = self.outline.shear_factor(along, across, nu);
                     let hole = ((along - 2.0 * wall) / along).powi(2);
                     full * hollow_circle_shear_factor(hole, nu)
@@ -211,17 +206,17 @@ fn box_shear_factor(along: f64, across: f64, nu: f64) -> f64 {
     10.0 * (1.0 + nu) * (1.0 + 3.0 * m).powi(2) / (walls + nu * of_nu + flanges)
 }
 
-impl SectionOutline {
+impl ClosedOutline {
     /// The torsion constant J. Of a rectangle with the long side a and the short
     /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
     fn torsion_constant(self, width: f64, thickness: f64) -> f64 {
         match self {
-            SectionOutline::Circle | SectionOutline::Ellipse => {
+            ClosedOutline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
                 // In this order equal sides give the circle's value to the last bit but one.
                 PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
             }
-            SectionOutline::Rectangle => {
+            ClosedOutline::Rectangle => {
                 let (long, short) = (width.max(thickness), width.min(thickness));
                 let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
                 // From n = 17 on every tanh is 1, so the rest of the sum is known (zeta(5)
@@ -238,8 +233,8 @@ impl SectionOutline {
     /// Cowper's factor for a shear force along the side `along`.
     fn shear_factor(self, along: f64, across: f64, nu: f64) -> f64 {
         match self {
-            SectionOutline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
-            SectionOutline::Circle | SectionOutline::Ellipse => {
+            ClosedOutline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
+            ClosedOutline::Ellipse => {
                 let (a, b) = (along * along, across * across);
                 12.0 * (1.0 + nu) * a * (3.0 * a + b)
                     / ((40.0 + 37.0 * nu) * a * a + (16.0 + 10.0 * nu) * a * b + nu * b * b)
@@ -253,14 +248,23 @@ impl SectionOutline {
 pub struct Moduli {
     /// S, the area of the material.
     area: f64,
-    /// t/(2 I2) and w/(2 I3).
-    bending: [f64; 2],
+    /// Where bending stresses are largest.
+    fibers: OuterFibers,
     /// Largest shear stress per twisting moment.
     torsion: f64,
     /// Largest shear stress per force along d2 and along d3.
     shear: [f64; 2],
-    /// Whether both bending stresses are largest in the same point.
-    corners: bool,
+}
+
+/// The fibers of a section that bending stresses most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum OuterFibers {
+    /// Of an ellipse, t/(2 I2) and w/(2 I3): each is largest where the other is zero.
+    Ellipse([f64; 2]),
+    /// Of a rectangle, t/(2 I2) and w/(2 I3): both are largest in the same corner.
+    Rectangle([f64; 2]),
+    /// Of any other section of straight sides, whose corners lie at different distances from its axes.
+    Corners(PolygonSection),
 }
 
 /// The largest stresses in a section, force per area.
@@ -285,15 +289,30 @@ impl Stress {
 }
 
 impl Moduli {
+    /// The moduli of a section of straight sides.
+    pub(super) fn for_polygon(section: PolygonSection) -> Moduli {
+        let area = section.area();
+        Moduli {
+            area,
+            fibers: OuterFibers::Corners(section),
+            torsion: section.stress_function_slope() / section.torsion_constant(),
+            shear: section.peak_shear().map(|peak| peak / area),
+        }
+    }
+
     /// Stresses by a force n and a moment m along the directors.
     pub fn stress(&self, n: DVec3, m: DVec3) -> Stress {
-        let (n, m) = (n.abs(), m.abs());
-        let [about_2, about_3] = [m.y * self.bending[0], m.z * self.bending[1]];
-        let bending = match self.corners {
-            true => about_2 + about_3,
-            false => about_2.hypot(about_3),
+        let tension = n.x / self.area;
+        let normal = match self.fibers {
+            OuterFibers::Ellipse([second, third]) => {
+                tension.abs() + (m.y * second).hypot(m.z * third)
+            }
+            OuterFibers::Rectangle([second, third]) => {
+                tension.abs() + (m.y * second).abs() + (m.z * third).abs()
+            }
+            OuterFibers::Corners(section) => section.normal_stress(tension, [m.y, m.z]),
         };
-        let normal = n.x / self.area + bending;
+        let (n, m) = (n.abs(), m.abs());
         let shear = m.x * self.torsion + (n.y * self.shear[0]).hypot(n.z * self.shear[1]);
         Stress {
             normal,
@@ -306,16 +325,17 @@ impl Moduli {
     /// lever, I3 = w t lever^2/12.
     pub(in crate::scenario) fn for_strip(width: f64, thickness: f64, lever: f64) -> Moduli {
         let sides = SectionDimensions {
-            outline: SectionOutline::Rectangle,
+            outline: ClosedOutline::Rectangle,
             width,
             thickness,
             wall: None,
         };
-        let whole = sides.moduli();
+        let [second, third] = sides.second_moments();
+        let in_plane = third * (lever / width).powi(2);
         Moduli {
             torsion: 3.0 / (width * thickness * thickness),
-            bending: [whole.bending[0], whole.bending[1] * (width / lever).powi(2)],
-            ..whole
+            fibers: OuterFibers::Rectangle([0.5 * thickness / second, 0.5 * width / in_plane]),
+            ..sides.moduli()
         }
     }
 }
@@ -332,13 +352,18 @@ impl SectionDimensions {
         };
         Moduli {
             area: self.area(),
-            bending: [0.5 * t / second, 0.5 * w / third],
+            fibers: {
+                let fibers = [0.5 * t / second, 0.5 * w / third];
+                match self.outline {
+                    ClosedOutline::Ellipse => OuterFibers::Ellipse(fibers),
+                    ClosedOutline::Rectangle => OuterFibers::Rectangle(fibers),
+                }
+            },
             torsion: self.stress_function_slope() / self.torsion_constant(),
             shear: [
                 turned.first_moment() / (third * turned.central_material_width()),
                 self.first_moment() / (second * self.central_material_width()),
             ],
-            corners: self.outline == SectionOutline::Rectangle,
         }
     }
 
@@ -350,8 +375,8 @@ impl SectionDimensions {
     /// The first moment of the upper half of the section about d2.
     fn first_moment(self) -> f64 {
         let factor = match self.outline {
-            SectionOutline::Circle | SectionOutline::Ellipse => 1.0 / 12.0,
-            SectionOutline::Rectangle => 1.0 / 8.0,
+            ClosedOutline::Ellipse => 1.0 / 12.0,
+            ClosedOutline::Rectangle => 1.0 / 8.0,
         };
         let full = factor * self.width * self.thickness * self.thickness;
         full - self
@@ -373,10 +398,8 @@ impl SectionDimensions {
         };
         let thin = match self.outline {
             // The length of an ellipse as for the torsion constant.
-            SectionOutline::Circle | SectionOutline::Ellipse => {
-                w * t / (w + t - (w * t).sqrt()) / 2.0
-            }
-            SectionOutline::Rectangle => w * t / (w + t),
+            ClosedOutline::Ellipse => w * t / (w + t - (w * t).sqrt()) / 2.0,
+            ClosedOutline::Rectangle => w * t / (w + t),
         };
         thin + self.torsion_interpolation(wall) * (full - thin)
     }
@@ -385,17 +408,17 @@ impl SectionDimensions {
 /// Terms of the series for the stress function of a rectangle, which falls off as exp(-n pi/2).
 const RECTANGLE_SERIES_TERMS: i32 = 12;
 
-impl SectionOutline {
+impl ClosedOutline {
     /// The largest slope of the stress function of the full outline per twist. Of a rectangle with
     /// the long side a and the short side b: b (1 - 8/pi^2 sum over odd n of 1/(n^2 cosh(n pi a/(2 b)))).
     fn stress_function_slope(self, width: f64, thickness: f64) -> f64 {
         let (long, short) = (width.max(thickness), width.min(thickness));
         match self {
-            SectionOutline::Circle | SectionOutline::Ellipse => {
+            ClosedOutline::Ellipse => {
                 let ratio = short / long;
                 short / (1.0 + ratio * ratio)
             }
-            SectionOutline::Rectangle => {
+            ClosedOutline::Rectangle => {
                 let odd = (0..RECTANGLE_SERIES_TERMS).map(|k| f64::from(2 * k + 1));
                 let terms = odd.map(|n| 1.0 / (n * n * (n * PI * long / (2.0 * short)).cosh()));
                 short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
@@ -423,7 +446,7 @@ mod tests {
             (10.0, 0.312_332_5),
         ] {
             for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
-                let found = SectionOutline::Rectangle.torsion_constant(width, thickness);
+                let found = ClosedOutline::Rectangle.torsion_constant(width, thickness);
                 close(found, constant * sides, 3e-5);
             }
         }
@@ -434,19 +457,19 @@ mod tests {
         };
         for long in [1.0, 1.3, 4.0, 50.0] {
             close(
-                SectionOutline::Rectangle.torsion_constant(long, 1.0),
+                ClosedOutline::Rectangle.torsion_constant(long, 1.0),
                 direct(long),
                 1e-13,
             );
         }
         close(
-            SectionOutline::Rectangle.torsion_constant(1e4, 1.0),
+            ClosedOutline::Rectangle.torsion_constant(1e4, 1.0),
             1e4 / 3.0,
             1e-4,
         );
     }
 
-    fn hollow(outline: SectionOutline, width: f64, thickness: f64, wall: f64) -> SectionDimensions {
+    fn hollow(outline: ClosedOutline, width: f64, thickness: f64, wall: f64) -> SectionDimensions {
         SectionDimensions {
             outline,
             width,
@@ -462,16 +485,14 @@ mod tests {
         for wall in [0.001, 0.1, 0.3, 0.5] {
             let inner = 1.0 - 2.0 * wall;
             let polar = PI / 32.0 * (1.0 - f64::powi(inner, 4));
-            for outline in [SectionOutline::Circle, SectionOutline::Ellipse] {
-                let tube = hollow(outline, 1.0, 1.0, wall);
-                close(tube.torsion_constant(), polar, 1e-13);
-                close(tube.area(), PI / 4.0 * (1.0 - inner * inner), 1e-13);
-                let [second, third] = tube.second_moments();
-                close(second, polar / 2.0, 1e-13);
-                close(third, polar / 2.0, 1e-13);
-            }
+            let tube = hollow(ClosedOutline::Ellipse, 1.0, 1.0, wall);
+            close(tube.torsion_constant(), polar, 1e-13);
+            close(tube.area(), PI / 4.0 * (1.0 - inner * inner), 1e-13);
+            let [second, third] = tube.second_moments();
+            close(second, polar / 2.0, 1e-13);
+            close(third, polar / 2.0, 1e-13);
         }
-        let [thin, full] = [1e-6, 0.5].map(|wall| hollow(SectionOutline::Circle, 1.0, 1.0, wall));
+        let [thin, full] = [1e-6, 0.5].map(|wall| hollow(ClosedOutline::Ellipse, 1.0, 1.0, wall));
         close(thin.shear_factors(0.3)[0], 2.6 / 4.9, 1e-5);
         close(full.shear_factors(0.3)[1], 7.8 / 8.8, 1e-14);
     }
@@ -481,7 +502,7 @@ mod tests {
     #[test]
     fn thin_walls() {
         let (w, t, wall) = (2.0, 1.0, 1e-7);
-        let tube = hollow(SectionOutline::Rectangle, w, t, wall);
+        let tube = hollow(ClosedOutline::Rectangle, w, t, wall);
         close(
             tube.torsion_constant(),
             4.0 * (w * t).powi(2) * wall / (2.0 * (w + t)),
@@ -491,7 +512,7 @@ mod tests {
         let [soft, stiff] = tube.second_moments();
         close(soft, wall * (t.powi(3) / 6.0 + w * t * t / 2.0), 1e-6);
         close(stiff, wall * (w.powi(3) / 6.0 + t * w * w / 2.0), 1e-6);
-        let square = hollow(SectionOutline::Rectangle, 1.0, 1.0, 1e-9);
+        let square = hollow(ClosedOutline::Rectangle, 1.0, 1.0, 1e-9);
         close(square.shear_factors(0.3)[0], 26.0 / 59.7, 1e-8);
     }
 
@@ -499,7 +520,7 @@ mod tests {
     /// the stress function on three grids, extrapolated.
     #[test]
     fn torsion_constants_of_hollow_sections() {
-        use SectionOutline::{Ellipse, Rectangle};
+        use ClosedOutline::{Ellipse, Rectangle};
         for (outline, width, thickness, wall, torsion, within) in [
             (Rectangle, 1.0, 1.0, 0.02, 0.018_998, 2e-3),
             (Rectangle, 1.0, 1.0, 0.1, 0.077_092, 3e-3),
@@ -525,7 +546,7 @@ mod tests {
         );
     }
 
-    fn moduli(outline: SectionOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
+    fn moduli(outline: ClosedOutline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
         let sides = SectionDimensions {
             outline,
             width,
@@ -548,9 +569,9 @@ mod tests {
             (10.0, 0.312),
         ] {
             for (width, thickness) in [(long, 1.0), (1.0, long)] {
-                let found = moduli(SectionOutline::Rectangle, width, thickness, None).torsion;
+                let found = moduli(ClosedOutline::Rectangle, width, thickness, None).torsion;
                 close(found, 1.0 / (k * long), 3e-3);
-                let found = moduli(SectionOutline::Ellipse, width, thickness, None).torsion;
+                let found = moduli(ClosedOutline::Ellipse, width, thickness, None).torsion;
                 close(found, 16.0 / (PI * long), 1e-14);
             }
         }
@@ -560,11 +581,11 @@ mod tests {
     /// differences for the stress function on two grids, over J.
     #[test]
     fn torsion_of_hollow_sections() {
-        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use ClosedOutline::{Ellipse, Rectangle};
         for wall in [0.01, 0.2, 0.5] {
             let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
             close(
-                moduli(Circle, 1.0, 1.0, Some(wall)).torsion,
+                moduli(Ellipse, 1.0, 1.0, Some(wall)).torsion,
                 0.5 / polar,
                 1e-13,
             );
@@ -592,13 +613,13 @@ mod tests {
     /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
     #[test]
     fn shear_by_forces() {
-        use crate::scenario::section::outline::SectionOutline::{Circle, Ellipse, Rectangle};
+        use ClosedOutline::{Ellipse, Rectangle};
         for (outline, width, thickness, wall, factor) in [
             (Rectangle, 3.0, 0.7, None, 1.5),
             (Rectangle, 3.0, 0.7, Some(0.35), 1.5),
             (Ellipse, 3.0, 0.7, None, 4.0 / 3.0),
-            (Circle, 1.0, 1.0, Some(1e-7), 2.0),
-            (Circle, 1.0, 1.0, Some(0.25), 4.0 / 3.0 * 1.75 / 1.25),
+            (Ellipse, 1.0, 1.0, Some(1e-7), 2.0),
+            (Ellipse, 1.0, 1.0, Some(0.25), 4.0 / 3.0 * 1.75 / 1.25),
         ] {
             let found = moduli(outline, width, thickness, wall);
             for shear in found.shear {
@@ -612,7 +633,7 @@ mod tests {
     fn bending_about_both_axes() {
         let (w, t, about) = (2.0, 0.5, [0.7, 1.9]);
         let around = (0..100_000).map(|k| f64::from(k) / 1e5 * 2.0 * PI);
-        let ellipse = moduli(SectionOutline::Ellipse, w, t, None);
+        let ellipse = moduli(ClosedOutline::Ellipse, w, t, None);
         let [second, third] = [w * t * t * t, t * w * w * w].map(|it| PI / 64.0 * it);
         let stress = around.map(|angle: f64| {
             let (y, z) = (0.5 * w * angle.cos(), 0.5 * t * angle.sin());
@@ -622,7 +643,7 @@ mod tests {
         let n = DVec3::new(-2.0, 0.0, 0.0);
         let m = DVec3::new(0.0, -about[0], about[1]);
         close(ellipse.stress(n, m).normal, most, 1e-8);
-        let rectangle = moduli(SectionOutline::Rectangle, w, t, None);
+        let rectangle = moduli(ClosedOutline::Rectangle, w, t, None);
         let most = 2.0 / (w * t) + 6.0 * (about[0] / (w * t * t) + about[1] / (t * w * w));
         close(rectangle.stress(n, m).normal, most, 1e-14);
     }

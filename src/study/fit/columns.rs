@@ -109,6 +109,9 @@ pub(super) const TRACED_POINT_COLUMNS: [&str; 9] = [
     EXPERIMENT_NAME_COLUMN,
 ];
 
+/// Components of a blade's normal, d3, at points of a posture.
+pub(in crate::study) const NORMAL_COLUMNS: [&str; 3] = ["normal_x", "normal_y", "normal_z"];
+
 /// Whether this is the name of a column that a fit uses.
 pub(super) fn is_known_column(name: &str) -> bool {
     let quantity = name.strip_prefix("sd_").unwrap_or(name);
@@ -191,7 +194,7 @@ impl FromStr for MeasuredColumn {
                 }
             },
         };
-        if !is_known_column(quantity) {
+        if !is_known_column(quantity) && !NORMAL_COLUMNS.contains(&quantity) {
             return refuse(&format!(
                 "{quantity} is no quantity: {}",
                 match quantity.parse::<ParameterKeys>() {

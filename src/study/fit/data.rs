@@ -4,11 +4,12 @@
 //! Experiments under the same conditions share a leaf: they are one [`ExperimentCase`].
 
 use crate::study::ParameterKeys;
+use crate::study::fit::cells::line_error;
 use crate::study::fit::columns::{
     COORDINATE_COLUMNS, DataFileOptions, EXPERIMENT_NAME_COLUMN, FIRST_PHOTO_COORDINATE, FitError,
     MeasuredColumn, MeasuredQuantity, ObservedCoordinates, TRACED_POINT_COLUMNS,
 };
-use crate::study::fit::table::{DataTable, line_error};
+use crate::study::fit::table::DataTable;
 use std::collections::{BTreeMap, HashMap};
 
 /// Origin of a number: a file and a line.

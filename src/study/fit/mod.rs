@@ -5,6 +5,7 @@
 //! derivatives from their linearized equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
 
+pub(super) mod cells;
 pub(super) mod columns;
 mod data;
 mod derivatives;

@@ -6,6 +6,8 @@
 mod many;
 mod request;
 mod result;
+mod shape_formats;
+mod sheet;
 mod solve;
 mod start;
 mod table;
@@ -16,6 +18,7 @@ pub use crate::study::unbend::result::{
     CriticalYoung, ModulusInterval, PostureIndex, RestCheck, SlowLoading, SmoothingReport,
     UnbendRemark, Unbending,
 };
+pub use crate::study::unbend::shape_formats::ShapeFormat;
 pub use crate::study::unbend::solve::{unbend, unbend_many};
 pub use crate::study::unbend::start::relax_from_points;
-pub use crate::study::unbend::table::{NamedPosture, read_postures};
+pub use crate::study::unbend::table::{NamedPosture, ShapeTableOptions, read_postures};

@@ -35,6 +35,12 @@ remarks! {
             /// Of the scenario.
             given: f64,
         } = "length",
+        /// Points that may run from tip to base.
+        #[error(
+            "the points begin away from leaf.base and lead back against the direction of the base: do they run from \
+             tip to base? Then turn their order around"
+        )]
+        PerhapsReversed = "perhaps-reversed",
         /// A posture that proves nothing.
         #[error("the loads only stretch the leaf: it would be stable at any modulus, and the posture proves no bound")]
         NoBound = "no-bound",
@@ -249,6 +255,10 @@ impl Unbending {
         }
         if (found / given - 1.0).abs() > LENGTH_TOLERANCE {
             self.remarks.push(UnbendRemark::Length { found, given });
+        }
+        let (base, rotation) = request.scenario.base(0);
+        if request.points.lead_backwards(base, rotation * DVec3::X) {
+            self.remarks.push(UnbendRemark::PerhapsReversed);
         }
         if self.critical_young.value == 0.0 {
             self.remarks.push(UnbendRemark::NoBound);

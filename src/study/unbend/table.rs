@@ -2,10 +2,13 @@
 
 use crate::posture::points::PosturePoints;
 use crate::scenario::Scenario;
+use crate::study::fit::cells::{DecodedText, decode, line_error};
 use crate::study::fit::columns::{
-    DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, MeasuredColumn,
+    DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, MeasuredColumn, NORMAL_COLUMNS,
 };
-use crate::study::fit::table::{DataTable, KnownColumns, line_error};
+use crate::study::fit::table::{DataTable, KnownColumns};
+use crate::study::unbend::shape_formats::{ShapeFormat, deeplabcut_points};
+use crate::study::unbend::sheet::read_field_sheet;
 use glam::DVec3;
 
 /// Coordinates of a point in space.
@@ -14,14 +17,14 @@ const COORDINATES: [&str; 3] = ["x", "y", "z"];
 /// Coordinates of a point in a photograph.
 const PIXELS: [&str; 2] = ["pixel_x", "pixel_y"];
 
-/// Components of the blade's normal, d3.
-const NORMALS: [&str; 3] = ["normal_x", "normal_y", "normal_z"];
-
 /// The standard deviation of a coordinate.
 const DEVIATION: &str = "sd";
 
+/// The number of a leaf in tables of ADEL.
+const ADEL_LEAF: &str = "inerv";
+
 fn is_posture_column(name: &str) -> bool {
-    let all = COORDINATES.iter().chain(&PIXELS).chain(&NORMALS);
+    let all = COORDINATES.iter().chain(&PIXELS).chain(&NORMAL_COLUMNS);
     name == DEVIATION || all.into_iter().any(|known| *known == name)
 }
 
@@ -33,7 +36,20 @@ pub struct NamedPosture {
     /// Its points.
     pub points: PosturePoints,
     /// What coordinates were taken for, where that is not what their names say.
-    pub taken: Option<&'static str>,
+    pub taken: Option<String>,
+    /// The scenario with the sections and the weight that the table has besides the points, if it has.
+    pub scenario: Option<Box<Scenario>>,
+}
+
+/// How a table of points is read.
+#[derive(Clone, Debug, Default)]
+pub struct ShapeTableOptions {
+    /// The column by which rows belong to one leaf or another.
+    pub group: Option<String>,
+    /// The program that wrote the table; `None`: its columns have the names of this one, or are given.
+    pub format: Option<ShapeFormat>,
+    /// Columns that have other names, or, without a header, numbers.
+    pub columns: Vec<MeasuredColumn>,
 }
 
 /// Where coordinates of a table lead.
@@ -44,17 +60,71 @@ enum Coordinates {
     Photo([usize; 2]),
 }
 
-/// Reads a table of points, from base to tip; `group` names the column by which rows belong to one leaf or another.
+/// Reads a table of points, from base to tip.
 ///
 /// # Errors
 /// What cannot be read, or not in one way only.
 pub fn read_postures(
     table: &[u8],
     file: &str,
-    group: Option<&str>,
+    options: &ShapeTableOptions,
     scenario: &Scenario,
 ) -> Result<Vec<NamedPosture>, FitError> {
-    let mut reading = DataFileOptions::default();
+    let decoded = decode(table, file)?;
+    if options.format == Some(ShapeFormat::Biomech) {
+        let sheet = read_field_sheet(&decoded.text, file)?;
+        if options.group.is_some() || !options.columns.is_empty() {
+            let why =
+                "a field sheet of biomech has one leaf and no columns to choose: leave them out";
+            return Err(line_error(file, 1, why));
+        }
+        return Ok(vec![NamedPosture {
+            name: String::new(),
+            points: sheet.points(file, scenario)?,
+            taken: Some(
+                "sections, weight and length are those of the field sheet, and the factor of the stiffnesses is Young's \
+                 modulus in GPa"
+                    .into(),
+            ),
+            scenario: Some(Box::new(sheet.scenario(file, scenario)?)),
+        }]);
+    }
+    let Some(video) = deeplabcut_points(&decoded.text, file)? else {
+        return read_points(&decoded, file, options, scenario);
+    };
+    if options.group.is_none() && video.frames > 1 {
+        let why = format!(
+            "has {} frames: tell them apart by the column frame, or keep one row",
+            video.frames
+        );
+        return Err(line_error(file, 4, why));
+    }
+    let decoded = DecodedText {
+        text: video.table,
+        encoding: None,
+    };
+    let mut found = read_points(&decoded, file, options, scenario)?;
+    for leaf in &mut found {
+        leaf.taken = Some(format!(
+            "the body parts of DeepLabCut were taken as points from base to tip, in their order in the file: {}",
+            video.parts.join(", ")
+        ));
+    }
+    Ok(found)
+}
+
+/// The points of all leaves of a table with a row a point.
+fn read_points(
+    decoded: &DecodedText,
+    file: &str,
+    options: &ShapeTableOptions,
+    scenario: &Scenario,
+) -> Result<Vec<NamedPosture>, FitError> {
+    let mut reading = DataFileOptions {
+        columns: options.columns.clone(),
+        ..DataFileOptions::default()
+    };
+    let group = options.group.as_deref();
     if let Some(group) = group {
         reading.columns.push(MeasuredColumn {
             name: group.into(),
@@ -63,11 +133,14 @@ pub fn read_postures(
             offset: 0.0,
         });
     }
+    let is_adel = options.format == Some(ShapeFormat::Adel);
+    let is_known =
+        |name: &str| is_posture_column(name) || is_adel && matches!(name, ADEL_LEAF | "s" | "r");
     let columns = KnownColumns {
-        is_known: &is_posture_column,
+        is_known: &is_known,
         leaves_out_others: true,
     };
-    let table = DataTable::parse_with_columns(table, file, &reading, &columns)?;
+    let table = DataTable::parse_text(decoded, file, &reading, &columns)?;
     let by = match group {
         Some(group) => Some(table.column_index(EXPERIMENT_NAME_COLUMN).ok_or_else(|| {
             let why = format!(
@@ -78,9 +151,23 @@ pub fn read_postures(
         })?),
         None => None,
     };
-    let coordinates = coordinates(&table, scenario)?;
+    // The unit of coordinates in that of the scenario.
+    let unit = match is_adel {
+        true => check_midribs(&table, group.is_some(), scenario)?,
+        false => 1.0,
+    };
+    let coordinates = match coordinates(&table, scenario)? {
+        Coordinates::Plane(columns, ..) if is_adel => {
+            Coordinates::Plane(columns, [unit * DVec3::X, unit * DVec3::Z], None)
+        }
+        Coordinates::Space(_) | Coordinates::Photo(_) if is_adel => {
+            let why = "midribs of ADEL have x and y alone: read other tables without a format";
+            return Err(line_error(file, table.header_line, why));
+        }
+        others => others,
+    };
     let deviation = table.column_index(DEVIATION);
-    let normals = NORMALS.map(|name| table.column_index(name));
+    let normals = NORMAL_COLUMNS.map(|name| table.column_index(name));
     let has_normals = normals.iter().any(Option::is_some);
     if has_normals && normals.iter().any(Option::is_none) {
         let why =
@@ -105,7 +192,7 @@ pub fn read_postures(
                 let [a, b] = columns.map(number);
                 (
                     a? * axes[0] + b? * axes[1],
-                    Some(axes[0].cross(axes[1])),
+                    Some(axes[0].cross(axes[1]).normalize()),
                     *taken,
                 )
             }
@@ -125,7 +212,7 @@ pub fn read_postures(
             }
         };
         let name = by.map_or("", |column| table.cell(row, column));
-        let at = found.iter().position(|leaf| leaf.name == name);
+        let at = found.iter().rposition(|leaf| leaf.name == name);
         let at = at.unwrap_or_else(|| {
             found.push(NamedPosture {
                 name: name.into(),
@@ -135,7 +222,8 @@ pub fn read_postures(
                     sd: deviation.map(|_| Vec::new()),
                     ..PosturePoints::default()
                 },
-                taken,
+                taken: taken.map(String::from),
+                scenario: None,
             });
             found.len() - 1
         });
@@ -146,7 +234,7 @@ pub fn read_postures(
         }
         if let (Some(all), Some(column)) = (&mut points.sd, deviation) {
             let sd = table.positive_number(row, column)?;
-            all.push(sd.ok_or_else(|| {
+            all.push(unit * sd.ok_or_else(|| {
                 let why = "sd is empty: give the standard deviation of every point, or leave the column out";
                 line_error(file, table.line_number(row), why)
             })?);
@@ -161,6 +249,41 @@ pub fn read_postures(
         }
     }
     Ok(found)
+}
+
+/// A centimeter, the unit of ADEL's midribs, in the scenario's unit of length; refuses outlines, and several leaves that
+/// nothing tells apart.
+fn check_midribs(table: &DataTable, has_group: bool, scenario: &Scenario) -> Result<f64, FitError> {
+    let refuse = |why: String| Err(line_error(table.file, table.header_line, why));
+    if table.column_index("x").is_none() && table.column_index("r").is_some() {
+        return refuse(
+            "has s and r: it is an outline, not a midrib; its widths belong to the scenario, as section.width = \
+             { at = [s ..], value = [r times the largest width ..] }"
+                .into(),
+        );
+    }
+    if let (Some(column), false) = (table.column_index(ADEL_LEAF), has_group) {
+        let mut leaves: Vec<&str> = Vec::new();
+        for row in 0..table.row_count() {
+            let leaf = table.cell(row, column);
+            if leaves.last() != Some(&leaf) {
+                leaves.push(leaf);
+            }
+        }
+        if leaves.len() > 1 {
+            return refuse(format!(
+                "has {} leaves: tell them apart by the column {ADEL_LEAF}, or keep the rows of one",
+                leaves.len()
+            ));
+        }
+    }
+    match scenario.units.meters() {
+        Some(meters) => Ok(0.01 / meters),
+        None => refuse(
+            "midribs of ADEL are in cm, and the scenario does not say its unit: give units.length as m, cm, mm, in or ft"
+                .into(),
+        ),
+    }
 }
 
 /// Which columns are coordinates, and of what.

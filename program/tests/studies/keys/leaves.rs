@@ -201,6 +201,39 @@ load = { tip_force = [0.1, 0.6, -3.0], g = [0.0, 5.0, -9.0] }
         boundary: None,
     },
     TestLeaf {
+        name: "prism",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+section = { shape = \"triangle\", width = 0.12, thickness = 0.1, young = 1e5, mass_density = 2.0 }
+load = { tip_force = [0.1, 0.2, -0.3], g = [0.0, 5.0, -9.0] }
+",
+        vary: ["load.tip_force[2]=-0.3..-0.33", "load.g[2]=-9.0..-9.2"],
+        free: ["section.young", "section.width"],
+        boundary: None,
+    },
+    TestLeaf {
+        name: "cane",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+section = { shape = \"hexagon\", width = 0.09, young = 1e5, mass_density = 2.0 }
+load = { tip_force = [0.1, 0.2, -0.3], g = [0.0, 5.0, -9.0] }
+",
+        vary: ["load.tip_force[2]=-0.3..-0.33", "load.g[2]=-9.0..-9.2"],
+        free: ["section.young", "section.width"],
+        boundary: None,
+    },
+    TestLeaf {
+        name: "gutter",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+section = { shape = \"u\", width = 0.14, thickness = 0.1, wall = 0.02, young = 1e5, mass_density = 2.0 }
+load = { tip_force = [0.1, 0.2, -0.3], g = [0.0, 5.0, -9.0] }
+",
+        vary: ["load.tip_force[2]=-0.3..-0.33", "load.g[2]=-9.0..-9.2"],
+        free: ["section.young", "section.width"],
+        boundary: None,
+    },
+    TestLeaf {
         name: "blade",
         text: "
 leaf = { rods = 3, elevation = 0.4 }

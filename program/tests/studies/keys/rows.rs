@@ -19,6 +19,7 @@ pub enum Acts {
 }
 
 /// A key and another value of it in a leaf.
+#[derive(Clone)]
 pub struct Row {
     pub key: Key,
     pub leaf: &'static str,
@@ -65,10 +66,25 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::Shear3 => smooth("veins", "stiffness.shear_3=100"),
         Key::SectionShape => always("oval", "section.shape=rectangle"),
         Key::Diameter => smooth("tube", "section.diameter=0.101"),
-        Key::Width => smooth("oval", "section.width=0.205"),
-        Key::Thickness => smooth("oval", "section.thickness=0.102"),
+        Key::Width => [
+            smooth("oval", "section.width=0.205"),
+            smooth("prism", "section.width=0.122"),
+            smooth("cane", "section.width=0.091"),
+            smooth("gutter", "section.width=0.142"),
+        ]
+        .concat(),
+        Key::Thickness => [
+            smooth("oval", "section.thickness=0.102"),
+            smooth("prism", "section.thickness=0.103"),
+            smooth("gutter", "section.thickness=0.104"),
+        ]
+        .concat(),
         Key::InnerDiameter => smooth("tube", "section.inner_diameter=0.055"),
-        Key::Wall => smooth("walled", "section.wall=0.021"),
+        Key::Wall => [
+            smooth("walled", "section.wall=0.021"),
+            smooth("gutter", "section.wall=0.0205"),
+        ]
+        .concat(),
         Key::Young => smooth("oval", "section.young=1.05e5"),
         Key::Poisson => smooth("oval", "section.poisson=0.35"),
         Key::SectionShearModulus => smooth("fibrous", "section.shear_modulus=5.5e3"),

@@ -46,6 +46,7 @@ verbs! {
     Chart = "chart",
     Check = "check",
     Fit = "fit",
+    Unbend = "unbend",
     SimulateExplicit = "simulate-explicit",
     SimulateSemiImplicit = "simulate-semi-implicit",
     Page = "page",
@@ -113,6 +114,7 @@ impl Verb {
             Map => "--vary solve.tolerance=1e-6..1e-6:1 --write csv".into(),
             Chart => "--methods semi-implicit,shooting-from-rest --seconds 0.01".into(),
             Check => String::new(),
+            Unbend => format!("--shape {}-shape.csv", leaf.name),
             Fit => format!("--data {}.csv --free {}", leaf.name, other(leaf.free)),
             SimulateExplicit => "--method explicit".into(),
             SimulateSemiImplicit => "--method semi-implicit".into(),
@@ -126,7 +128,7 @@ impl Verb {
     fn program(self) -> &'static str {
         match self {
             Trace | Boundary => "trace",
-            Map | Chart | Check | Fit => self.word(),
+            Map | Chart | Check | Fit | Unbend => self.word(),
             _ if self.moves() => "simulate",
             _ => "relax",
         }
@@ -274,6 +276,12 @@ impl Answer {
                     .extend(told["parameters"][0]["value"].as_f64());
                 answer.numbers.extend(told["chi_squared"].as_f64());
                 answer.error = 1e-4;
+            }
+            Unbend => {
+                let least = told["critical_young"]["value"].number();
+                answer.numbers = vec![least, told["length"].number()];
+                // The points, hence their smoothing, do not change with the key.
+                answer.error = 1e-6 * least;
             }
             SimulateExplicit | SimulateSemiImplicit => {
                 answer.tips = tips(&told);

@@ -1,0 +1,344 @@
+//! Tables of shapes as the field has them: without names, divided by blanks, of DeepLabCut, ADEL and biomech.
+
+use leafdyn::scenario::Scenario;
+use leafdyn_testing::root;
+use leafdyn_testing::workplace::Workplace;
+use serde_json::Value;
+use std::fs;
+
+fn example(path: &str) -> String {
+    fs::read_to_string(root().join("scenarios").join(path)).unwrap()
+}
+
+fn place() -> Workplace {
+    let place = Workplace::new();
+    place.write("leaf.toml", example("measured/posture.toml"));
+    place.write("points.csv", example("measured/posture.csv"));
+    place
+}
+
+/// The points of the example.
+fn points() -> Vec<[f64; 2]> {
+    let text = example("measured/posture.csv");
+    let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+    let rows = rows.map(|line| {
+        let (x, z) = line.split_once(',').unwrap();
+        [x.parse().unwrap(), z.parse().unwrap()]
+    });
+    rows.collect()
+}
+
+fn table(header: &str, row: impl Fn(usize, [f64; 2]) -> String) -> String {
+    let rows: Vec<String> = points()
+        .into_iter()
+        .enumerate()
+        .map(|(k, at)| row(k, at))
+        .collect();
+    format!("{header}{}\n", rows.join("\n"))
+}
+
+fn least(told: &Value) -> f64 {
+    told["critical_young"]["value"].as_f64().unwrap()
+}
+
+fn told(place: &Workplace, run: &str) -> Value {
+    place
+        .run(format!("unbend {run} --json --write none"))
+        .ends(0)
+        .json()
+}
+
+fn refused(place: &Workplace, run: &str, parts: &[&str]) {
+    let run = place.run(format!("{run} --write none")).ends(2);
+    for part in parts {
+        assert!(run.err.contains(part), "{part}: {}", run.err);
+    }
+}
+
+#[test]
+fn columns_without_names_are_given_by_number() {
+    let place = place();
+    let wanted = least(&told(&place, "leaf.toml --shape points.csv"));
+    let same = |name: &str, table: String, columns: &str| {
+        place.write(name, table);
+        let found = least(&told(
+            &place,
+            &format!("leaf.toml --shape {name} {columns}"),
+        ));
+        assert!(
+            (found / wanted - 1.0).abs() < 1e-4,
+            "{name}: {found} {wanted}"
+        );
+    };
+    same(
+        "commas.csv",
+        table("", |k, [x, z]| format!("{k},{x},{z}")),
+        "--column 2=x --column 3=z",
+    );
+    same(
+        "blanks.txt",
+        table("", |_, [x, z]| format!("  {x}   {z}")),
+        "--column 1=x --column 2=z",
+    );
+    same(
+        "tabs.txt",
+        table("# digitised\n", |_, [x, z]| format!("{x}\t{z}")),
+        "--column 1=x --column 2=z",
+    );
+    // In mm, with decimal commas.
+    same(
+        "mm.txt",
+        table("", |_, [x, z]| {
+            format!("{};{}", 10.0 * x, 10.0 * z).replace('.', ",")
+        }),
+        "--column 1=x:0.1 --column 2=z:0.1",
+    );
+    same(
+        "named.txt",
+        table("x z\n", |_, [x, z]| format!("{x} {z}")),
+        "",
+    );
+    same(
+        "others.csv",
+        table("along,up\n", |_, [x, z]| format!("{x},{z}")),
+        "--column along=x --column up=z",
+    );
+    place.write("bare.csv", table("", |_, [x, z]| format!("{x},{z}")));
+    refused(
+        &place,
+        "unbend leaf.toml --shape bare.csv",
+        &["bare.csv:1", "no header", "1=x"],
+    );
+    refused(
+        &place,
+        "unbend leaf.toml --shape bare.csv --column 1=wide",
+        &["wide is no quantity"],
+    );
+    place.write(
+        "hole.csv",
+        table("", |k, [x, z]| {
+            if k == 3 {
+                format!("{x},")
+            } else {
+                format!("{x},{z}")
+            }
+        }),
+    );
+    // The fourth line of a file without a header.
+    refused(
+        &place,
+        "unbend leaf.toml --shape hole.csv --column 1=x --column 2=z",
+        &["hole.csv:4", "z is empty"],
+    );
+    refused(&place, "relax leaf.toml --column 1=x", &["--start"]);
+}
+
+/// A table of DeepLabCut: pixels, with z down, of body parts in two frames.
+fn video(frames: usize, likelihood: &str) -> String {
+    let points = points();
+    let line = |name: &str, cells: &dyn Fn(usize) -> String| {
+        let cells: Vec<String> = (0..points.len()).map(cells).collect();
+        format!("{name},{}\n", cells.join(","))
+    };
+    let mut text = line("scorer", &|_| "net,net,net".into());
+    text += &line("bodyparts", &|k| format!("p{k},p{k},p{k}"));
+    text += &line("coords", &|_| "x,y,likelihood".into());
+    for frame in 0..frames {
+        text += &line(&frame.to_string(), &|k| {
+            let [x, z] = points[k];
+            // The fifth point is not seen.
+            match k {
+                5 => format!("{},{},{likelihood}", 1000.0, 0.0),
+                _ => format!("{},{},0.99", 300.0 + 100.0 * x, 2000.0 - 100.0 * z),
+            }
+        });
+    }
+    text
+}
+
+#[test]
+fn tables_of_deeplabcut_are_known_by_their_first_lines() {
+    let place = place();
+    let photo = "\n[photo]\nscale = 0.01\nx = 300.0\ny = 2000.0\n";
+    place.write("leaf.toml", example("measured/posture.toml") + photo);
+    place.write(
+        "without.csv",
+        table("x,z\n", |k, [x, z]| {
+            if k == 5 {
+                String::new()
+            } else {
+                format!("{x},{z}")
+            }
+        }),
+    );
+    let wanted = least(&told(&place, "leaf.toml --shape without.csv"));
+    place.write("one.csv", video(1, "0.2"));
+    let found = told(&place, "leaf.toml --shape one.csv");
+    assert!(
+        (least(&found) / wanted - 1.0).abs() < 1e-4,
+        "{wanted} {}",
+        least(&found)
+    );
+    assert!(
+        found["remarks"][0].as_str().unwrap().contains("p0, p1"),
+        "{}",
+        found["remarks"]
+    );
+    place.write("two.csv", video(2, "nan"));
+    refused(
+        &place,
+        "unbend leaf.toml --shape two.csv",
+        &["two.csv:4", "2 frames", "column frame"],
+    );
+    let rows = place.run("unbend leaf.toml --shape two.csv --group frame --json --write none");
+    assert_eq!(rows.ends(0).json()["postures"].as_array().unwrap().len(), 2);
+    place.write(
+        "herd.csv",
+        video(1, "0.2").replacen("bodyparts", "individuals", 1),
+    );
+    refused(
+        &place,
+        "unbend leaf.toml --shape herd.csv",
+        &["herd.csv:2", "individuals"],
+    );
+}
+
+#[test]
+fn midribs_of_adel_are_in_centimetres() {
+    let place = place();
+    let wanted = least(&told(&place, "leaf.toml --shape points.csv"));
+    let midribs = |leaves: usize| {
+        let rows = (1..=leaves).map(|leaf| {
+            table("", |_, [x, z]| {
+                format!("\"Soissons\",1,{leaf},{leaf},{x},{z},4.5")
+            })
+        });
+        format!(
+            "\"variety\",\"plant\",\"rank\",\"inerv\",\"x\",\"y\",\"hins\"\n{}",
+            rows.collect::<String>()
+        )
+    };
+    place.write("one.csv", midribs(1));
+    let found = told(&place, "leaf.toml --shape one.csv --format adel");
+    assert!((least(&found) / wanted - 1.0).abs() < 1e-4);
+    // In mm and N the modulus is a hundredth of that in N/cm2, and lengths are ten times those in cm.
+    let mm = "--set units.length=mm --set leaf.length=240 --set section.thickness=0.35 \
+              --set section.width={at=[0,0.4,1],value=[9,10,1]} --set section.mass_density=8e-10 --set load.g=[0,0,-9810]";
+    let found = told(
+        &place,
+        &format!("leaf.toml --shape one.csv --format adel {mm}"),
+    );
+    assert!(
+        (least(&found) / (0.01 * wanted) - 1.0).abs() < 1e-3,
+        "{}",
+        least(&found)
+    );
+    place.write("three.csv", midribs(3));
+    refused(
+        &place,
+        "unbend leaf.toml --shape three.csv --format adel",
+        &["3 leaves", "inerv"],
+    );
+    let rows = place
+        .run("unbend leaf.toml --shape three.csv --format adel --group inerv --json --write none");
+    assert_eq!(rows.ends(0).json()["postures"].as_array().unwrap().len(), 3);
+    place.write("outline.csv", "rankclass,s,r\n1,0,0.5\n1,1,0\n");
+    refused(
+        &place,
+        "unbend leaf.toml --shape outline.csv --format adel",
+        &["outline", "section.width"],
+    );
+    place.write(
+        "bare.toml",
+        example("measured/posture.toml").replace("length = \"cm\"\n", ""),
+    );
+    refused(
+        &place,
+        "unbend bare.toml --shape one.csv --format adel",
+        &["in cm", "units.length"],
+    );
+    refused(
+        &place,
+        "unbend leaf.toml --shape one.csv --format plant",
+        &["--format", "adel, biomech"],
+    );
+}
+
+/// The sections of a field sheet by hand: I2 of triangle, rectangle, triangle, ellipse and circle, and weights per length.
+#[test]
+fn a_field_sheet_of_biomech_has_sections_and_weights() {
+    let place = place();
+    place.write("palm.txt", example("field/palm.csv"));
+    let bare = "name = \"palm\"\nunits = { length = \"m\", force = \"N\" }\n\
+                leaf = { rods = 1, length = 1.0, fan = [0.0] }\n\
+                stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = inf, shear_2 = inf, shear_3 = inf }\n";
+    place.write("palm.toml", bare);
+    place
+        .run("unbend palm.toml --shape palm.txt --format biomech --out out")
+        .ends(0);
+    let rest = Scenario::from_toml(&place.read("out/rest.toml")).unwrap();
+    let young = 2e9 * least(&told(&place, "palm.toml --shape palm.txt --format biomech"));
+    let sigma = [0.0, 1.34 / 4.22, 2.68 / 4.22, 3.45 / 4.22, 1.0];
+    let second = [
+        0.0755 * 0.0411_f64.powi(3) / 36.0,
+        0.03291 * 0.0303_f64.powi(3) / 12.0,
+        0.0181 * 0.02982_f64.powi(3) / 36.0,
+        std::f64::consts::PI / 64.0 * 0.01144 * 0.01121_f64.powi(3),
+        std::f64::consts::PI / 64.0 * 0.001_f64.powi(4),
+    ];
+    for (k, second) in second.into_iter().enumerate() {
+        let found = rest.rods[0].couple_stiffness[1].at(sigma[k]) / young;
+        assert!((found / second - 1.0).abs() < 1e-3, "{k}: {found} {second}");
+    }
+    let weight = [
+        0.0,
+        1.6029 / 1.34,
+        1.5682 / 1.34,
+        0.6209 / 0.77,
+        0.2329 / 0.77,
+    ];
+    for (k, weight) in weight.into_iter().enumerate() {
+        let found = rest.distributed.as_ref().unwrap()[0][2].at(sigma[k]);
+        assert!(
+            (found + 9.80665 * weight).abs() < 1e-9,
+            "{k}: {found} {weight}"
+        );
+    }
+    place.write(
+        "short.txt",
+        example("field/palm.csv")
+            .lines()
+            .take(11)
+            .collect::<Vec<_>>()
+            .join("\n"),
+    );
+    refused(
+        &place,
+        "unbend palm.toml --shape short.txt --format biomech",
+        &["11 rows", "twelve", "mass_left"],
+    );
+    place.write(
+        "type.txt",
+        example("field/palm.csv").replacen("1\t2\t3", "1\t7\t3", 1),
+    );
+    refused(
+        &place,
+        "unbend palm.toml --shape type.txt --format biomech",
+        &["type.txt:2", "type = 7", "ellipse"],
+    );
+    refused(
+        &place,
+        "unbend palm.toml --shape palm.txt --format biomech --set load.gravity=[0,0,-1]",
+        &["load.gravity", "leave"],
+    );
+    place.write(
+        "bare.toml",
+        bare.replace("units", "#units")
+            .replace(", force = \"N\"", ""),
+    );
+    refused(
+        &place,
+        "unbend bare.toml --shape palm.txt --format biomech",
+        &["units.length"],
+    );
+}
