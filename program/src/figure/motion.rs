@@ -5,7 +5,7 @@ use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
 use crate::figure::drawing::labels::{Legend, LegendRows, new_page};
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, common_bounding_box,
+    BoxMargins, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, ViewAngles, common_bounding_box,
 };
 use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
@@ -221,18 +221,26 @@ pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> 
         .map(|still| DrawnVeins::from_motion(record, still, scenario))
         .collect();
     let bounds = common_bounding_box(shapes.iter());
+    let view = ViewAngles::oblique(shapes.iter().map(DrawnVeins::tip_from_base));
     let times: Vec<f64> = (shown.iter())
         .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
         .collect();
     let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
         .map_init(ColorPalette::new, |palette, (veins, time)| {
-            let text = format!("{}, t = {}", record.scenario, format_four_digits(*time));
+            let when = instant_text(*time, &scenario.units);
+            let text = format!("{}, {when}", record.scenario);
             palette.nearest_color_indices(&rasterize(&draw_picture(
-                veins, bounds, setting, &text, *time,
+                veins, bounds, view, setting, &text, *time,
             )))
         })
         .collect();
     encode_gif(&pictures, &picture_delays(&times), out).map_err(io::Error::other)
+}
+
+/// An instant as text.
+fn instant_text(time: f64, units: &Units) -> String {
+    let time = number_in_unit(format_four_digits(time), units, TIME);
+    format!("t = {time}")
 }
 
 /// At most `FILM.most_pictures` of the shapes, including the first and the last.
@@ -274,6 +282,7 @@ fn picture_delays(times: &[f64]) -> Vec<u16> {
 fn draw_picture(
     veins: &DrawnVeins,
     bounds: [DVec3; 2],
+    view: ViewAngles,
     setting: &FigureSetting,
     text: &str,
     time: f64,
@@ -284,7 +293,7 @@ fn draw_picture(
         DVec2::new(0.0, FILM.title_height),
         FILM.page - DVec2::new(0.0, FILM.title_height),
     );
-    let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, FILM.margins, None);
+    let scene = SpacePanel::new(bounds, setting, view, cell, FILM.margins, None);
     scene.draw_floor_and_walls(&mut page);
     scene.draw_axes(&mut page, 36.0);
     scene.draw_direction_arrows(&mut page, true, time);
@@ -456,16 +465,13 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
         since = still.moment;
         drawing.draw_group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let when = format!(
-                "t = {}",
-                number_in_unit(format_four_digits(time), &scenario.units, TIME)
-            );
+            let when = instant_text(time, &scenario.units);
             let caption = PanelCaption {
                 letter: &letter,
                 text: &when,
                 color: NOTE_COLOR,
             };
-            let scene = panels.draw_empty_panel(page, index, time, OBLIQUE_VIEW, caption);
+            let scene = panels.draw_empty_panel(page, index, time, panels.view, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path
                     .iter()
@@ -573,10 +579,13 @@ mod film_tests {
             .map(|it| DrawnVeins::from_motion(&record, it, &scenario))
             .collect();
         let bounds = common_bounding_box(shapes.iter());
+        let view = ViewAngles::oblique(shapes.iter().map(DrawnVeins::tip_from_base));
         for k in [0, 50, 100] {
             let time = record.moments[k].time;
             let text = format!("{}, t = {}", record.scenario, format_four_digits(time));
-            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, &text, time));
+            let painted = rasterize(&draw_picture(
+                &shapes[k], bounds, view, &setting, &text, time,
+            ));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =

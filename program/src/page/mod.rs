@@ -26,15 +26,17 @@ pub mod vtk;
 
 use crate::figure::FigureFunction;
 use crate::figure::drawing::formats::{escape_xml, hex_color, write_svg};
+use crate::figure::drawing::space::ViewAngles;
 use crate::figure::drawing::veins::is_vein_drawn;
 use crate::figure::drawing::{Drawing, color_of_vein};
+pub use crate::figure::scenario::QuantityLabel;
 use crate::figure::scenario::{FigureSetting, LoadMark, load_marks, support_marks};
 pub use crate::page::data::{PageData, PageLeaf};
 use crate::report;
 use crate::report::ReportedResult;
 use glam::DVec3;
 use leafdyn::scenario;
-use leafdyn::scenario::{Scenario, Units};
+use leafdyn::scenario::Scenario;
 use leafdyn::simulate::Record;
 use leafdyn::study::Trace;
 use std::io;
@@ -64,7 +66,7 @@ pub trait PageResult: ReportedResult {
 
     /// Fills in the data of the page.
     #[doc(hidden)]
-    fn fill_page_data(&self, view: &mut PageData, units: &Units);
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario);
 }
 
 /// A shape of the leaf among several.
@@ -121,13 +123,16 @@ pub fn html_page<R: PageResult>(result: &R, scenario: &Scenario) -> String {
 pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
     let mut view = page_data_without_result(scenario);
     view.summary = result.summary(&scenario.units);
-    result.fill_page_data(&mut view, &scenario.units);
+    result.fill_page_data(&mut view, scenario);
     for leaf in &mut view.leaves {
-        let loads = leaf
-            .time
-            .map(|time| loads_on_drawn_veins(scenario, Some(time)));
-        leaf.loads = loads.filter(|loads| *loads != view.loads);
+        if let Some(time) = leaf.time {
+            leaf.loads = Some(loads_on_drawn_veins(scenario, Some(time)));
+        }
+        leaf.loads.take_if(|loads| *loads == view.loads);
     }
+    let tips = view.leaves.iter().map(|leaf| leaf.tip_from_base);
+    let oblique = ViewAngles::oblique(tips).toward_viewer();
+    view.toward.get_or_insert(oblique);
     view
 }
 
@@ -155,6 +160,7 @@ pub fn page_data_without_result(scenario: &Scenario) -> PageData {
         holds: (support_marks(scenario).into_iter())
             .filter(|mark| is_vein_drawn(mark.vein - 1, count))
             .collect(),
+        toward: None,
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
         joined: scenario.joined,
@@ -168,7 +174,7 @@ pub fn page_data_without_result(scenario: &Scenario) -> PageData {
 }
 
 /// The loads on the veins that are drawn.
-fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
+pub(crate) fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let count = scenario.rods.len();
     let mut loads = load_marks(scenario, time);
     loads.retain(|mark| is_vein_drawn(mark.vein - 1, count));

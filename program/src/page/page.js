@@ -9,7 +9,9 @@ let diagram = null;
 function fillText() {
   const stable = find("verdict");
   stable.textContent = view.verdict;
-  stable.classList.toggle("bad", !view.success || /unstable|index/.test(view.verdict));
+  // Green is what is known to be stable, and nothing else.
+  const bad = !view.success || /unstable|index/.test(view.verdict);
+  stable.className = bad ? "bad" : /^stable/.test(view.verdict) ? "good" : "";
   const many = view.rods === 1 ? "1 vein" : `${view.rods} veins${view.joined ? " joined at the tip" : " with free tips"}`;
   const part = view.drawn.length < view.rods ? `, ${view.drawn.length} drawn` : "";
   find("what").textContent = many + part;

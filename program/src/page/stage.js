@@ -109,7 +109,7 @@ function redraw() {
 
 /// Looks from a direction, at all of the box.
 function look(name) {
-  const from = { free: [-0.55, -1, 0.75], above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
+  const from = { free: view.toward, above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
   const { camera, controls, box } = space;
   controls.target.fromArray(box.middle);
   const away = new THREE.Vector3(...from).normalize().multiplyScalar(10 * box.extent);

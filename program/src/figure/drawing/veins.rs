@@ -1,9 +1,9 @@
 //! The veins of a leaf as they are drawn, in units of the longest rod: smooth curves with their
-//! supports, grips, moments and markers, of a leaf at rest, in motion, or of any curves.
+//! supports, grips, loads and markers, of a leaf at rest, in motion, or of any curves.
 
 use crate::figure::drawing::markers::{
-    Marker, MomentArrow, draw_second_solution_dot, draw_support_marker, draw_tip_marker,
-    moment_arrows,
+    ForceArrow, Marker, MomentArrow, RodPoint, draw_clamp_bar, draw_second_solution_dot,
+    draw_support_marker, draw_tip_marker, force_arrows, moment_arrows,
 };
 use crate::figure::drawing::{
     Color, Drawing, DrawingPath, PathStep, Stroke, TEXT_COLOR, WHITE, circle_path, color_of_vein,
@@ -46,6 +46,9 @@ const SECOND_SOLUTION_DOT_LIMITS: DotLimits = DotLimits {
     fewest: 8,
 };
 
+/// Part of a vein over which its tangent at a force is taken.
+const TANGENT_REACH: f64 = 0.02;
+
 pub type BezierPiece = [DVec3; 4];
 
 pub struct DrawnVein {
@@ -86,6 +89,7 @@ pub struct DrawnVeins {
     pub base_support: SupportForm,
     pub tip_support: Option<SupportForm>,
     pub grips: Vec<GrippedStretch>,
+    pub forces: Vec<ForceArrow>,
     pub moments: Vec<MomentArrow>,
     /// Corners of the bounding box.
     pub low: DVec3,
@@ -123,6 +127,16 @@ impl DrawnVeins {
         self.veins.iter().map(first)
     }
 
+    /// From the base to the tip, or from the mean of all bases to that of all tips.
+    pub fn tip_from_base(&self) -> DVec3 {
+        let mean = |points: &mut dyn Iterator<Item = DVec3>| {
+            let points: Vec<DVec3> = points.collect();
+            points.iter().sum::<DVec3>() / points.len().max(1) as f64
+        };
+        let tips = self.tips.iter().map(|tip| tip.position);
+        mean(&mut { tips }) - mean(&mut self.bases())
+    }
+
     /// The veins of a moving leaf at one instant.
     pub fn from_motion(record: &Record, still: &ShapeSnapshot, scenario: &Scenario) -> Self {
         let tips = vein_tips(&still.curves, record.joined);
@@ -134,8 +148,8 @@ impl DrawnVeins {
             .with_loads(scenario, &loads, &record.stations, &still.curves)
     }
 
-    /// Adds what the grips of a scenario hold and where moments act, on curves through nodes at these
-    /// stations.
+    /// Adds what the grips of a scenario hold and where forces and moments act, on curves through nodes
+    /// at these stations.
     fn with_loads(
         mut self,
         scenario: &Scenario,
@@ -143,11 +157,28 @@ impl DrawnVeins {
         stations: &[f64],
         curves: &[Vec<DVec3>],
     ) -> Self {
-        self.moments = moment_arrows(loads, |sigma| {
-            let point =
-                curve_between_fractions(stations, curves.first()?, [sigma; 2]).pop()? / self.unit;
+        let point = |vein: usize, sigma: f64| {
+            let curve = curves.get(vein - 1)?;
+            let point = curve_between_fractions(stations, curve, [sigma; 2]).pop()? / self.unit;
             is_drawable(point).then_some(point)
-        });
+        };
+        self.moments = moment_arrows(loads, point);
+        self.forces = force_arrows(
+            loads,
+            &scenario.units,
+            self.largest_extent(),
+            |vein, sigma| {
+                let near = [(sigma - TANGENT_REACH).max(0.0), sigma.max(TANGENT_REACH)];
+                let [before, there] = near.map(|sigma| point(vein, sigma));
+                Some(RodPoint {
+                    position: point(vein, sigma)?,
+                    tangent: (there? - before?).normalize_or_zero(),
+                })
+            },
+        );
+        for end in self.forces.iter().flat_map(|force| force.ends) {
+            (self.low, self.high) = (self.low.min(end), self.high.max(end));
+        }
         let grips = support_marks(scenario).into_iter();
         for grip in
             grips.filter(|mark| [ParsedKey::Grip, ParsedKey::Foundation].contains(&mark.part))
@@ -213,6 +244,7 @@ impl DrawnVeins {
             base_support: SupportForm::Clamped,
             tip_support: None,
             grips: Vec::new(),
+            forces: Vec::new(),
             moments: Vec::new(),
             low,
             high,
@@ -248,9 +280,19 @@ impl DrawnVeins {
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
         }
+        let single: Vec<&ForceArrow> = (self.forces.iter())
+            .filter(|force| !force.label().is_empty())
+            .collect();
+        match single.as_slice() {
+            // On a rod every arrow has its label.
+            _ if self.count == 1 => (),
+            [] => (),
+            [one] => notes.push(format!("arrow: {}", one.label())),
+            _ => notes.push("arrows: forces".into()),
+        }
         match self.moments.as_slice() {
             [] => (),
-            [one] => notes.push(format!(
+            [one] if !one.is_per_length => notes.push(format!(
                 "curved arrow: moment {}",
                 setting.moment_text(one.size)
             )),
@@ -327,13 +369,22 @@ pub fn node_stride(nodes: usize, most: usize) -> usize {
 
 /// Draws the markers of a leaf: those along its veins, and of its bases and tips.
 pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
+    for force in &veins.forces {
+        force.draw(page, &place);
+    }
     draw_vein_markers(page, veins, &place);
     let mut bases: Vec<DVec3> = Vec::new();
     for base in veins.bases() {
         if !bases.contains(&base) {
-            draw_support_marker(page, place(base), veins.base_support);
             bases.push(base);
         }
+    }
+    let places: Vec<DVec2> = bases.into_iter().map(&place).collect();
+    match (veins.base_support, places.as_slice()) {
+        (SupportForm::Clamped, [_, _, ..]) => draw_clamp_bar(page, &places),
+        (held, places) => places
+            .iter()
+            .for_each(|&at| draw_support_marker(page, at, held)),
     }
     if let [tip] = veins.tips.as_slice() {
         return match veins.tip_support {
