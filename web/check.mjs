@@ -386,6 +386,49 @@ async function movesAreTold() {
   await page.done("moves-are-told");
 }
 
+/// Three questions: each opens its leaf with few sliders, says what a step of a slider did, and leads to all numbers of the same leaf.
+async function questions() {
+  const page = await open();
+  const said = () => page.textContent("#said");
+  const ask = async (name) => {
+    await press(page, `[data-question=${name}]`);
+    await page.waitForFunction(() => document.body.classList.contains("lesson") && document.querySelectorAll("#said span").length > 1, null, { timeout: 60000 });
+    await page.rest();
+    assert(!(await page.isVisible("#summary")) && (await page.isVisible("#lesson-measure")), name);
+    assert.equal(await page.evaluate(() => window.leafdyn.sliders.shown.length), { ripple: 3, snap: 2, arch: 3 }[name]);
+  };
+  await ask("ripple");
+  assert.match(await said(), /30 % longer.*ripple, 0.08/);
+  if (keep) await page.screenshot({ path: join(keep, "live-question-ripple.png") });
+  // A point of the plane is pulled to where the leaf is flat, and the leaf follows.
+  const box = await page.locator("#lesson-picture").boundingBox();
+  const at = (x, y) => [box.x + (box.width * x) / 340, box.y + (box.height * y) / 216];
+  await page.mouse.move(...at(60, 90));
+  await page.mouse.down();
+  await page.mouse.move(...at(320, 20), { steps: 4 });
+  await page.mouse.up();
+  await page.rest();
+  await page.waitForFunction(() => /waves vanished|no waves to count/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
+  await ask("snap");
+  const set = (key, value) => page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, value]);
+  await page.waitForFunction(() => document.querySelector("#lesson-picture circle"), null, { timeout: 60000 });
+  if (keep) await page.screenshot({ path: join(keep, "live-question-snap.png") });
+  await set("load.tip_force[2]", -0.3);
+  await page.waitForFunction(() => /It snapped/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
+  await ask("arch");
+  if (keep) await page.screenshot({ path: join(keep, "live-question-arch.png") });
+  // Greenhill's length of a heavy column of this section: (7.8373 E t^2/(12 rho g))^(1/3).
+  const most = Math.cbrt((7.8373 * 1.2e5 * 0.03 ** 2) / (12 * 1e-5 * 981));
+  assert.match(await said(), new RegExp(`stand up to ${Number(most.toPrecision(2))} cm`));
+  await set("leaf.length", 8);
+  await page.rest();
+  assert.match(await said(), /It stands/);
+  await press(page, "[data-question='']");
+  assert(await page.isVisible("#summary"));
+  assert.equal(await page.evaluate(() => window.leafdyn.sliders.value("leaf.length")), 8);
+  await page.done("questions");
+}
+
 /// On a telephone, in the dark.
 async function narrow() {
   const page = await open("", { viewport: { width: 400, height: 800 }, colorScheme: "dark" });
@@ -409,6 +452,7 @@ try {
   await gallery();
   await firstSliders();
   await movesAreTold();
+  await questions();
   await narrow();
   await named();
   if (keep) await picture();

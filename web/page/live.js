@@ -139,6 +139,7 @@ function tellLeaf(known) {
   const table = lines.map(([name, text]) => stage.row(name, text));
   if (now.pinned) table.unshift(...differences(now.pinned, known));
   find("summary").tBodies[0].replaceChildren(...table);
+  tellLesson(known);
   // They keep the focus where there is nothing to undo any more.
   find("undo").setAttribute("aria-disabled", past.length === 0);
   find("reset").setAttribute("aria-disabled", !sliders.moved());
@@ -356,6 +357,7 @@ async function wonder() {
       Object.assign(branch, { low, high, log, others: asked });
       sliders.foresee(key, branch);
       trail.foresee(branch);
+      tellLesson(now.known);
     }
   }
 }

@@ -18,12 +18,14 @@ use crate::figure::drawing::{
 };
 use crate::figure::rod;
 use crate::figure::scenario::FigureSetting;
-use crate::report::numbers::{format_error_bound, format_four_digits};
+use crate::report::numbers::{format_error_bound, format_four_digits, number_in_unit};
 use crate::report::{relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Mode};
-use leafdyn::scenario::Scenario;
+use leafdyn::scenario::units::RATE;
+use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::Equilibria;
+use std::f64::consts::TAU;
 
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -317,7 +319,7 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
-            let (number, text) = ((index + 1).to_string(), mode_text(mode));
+            let (number, text) = ((index + 1).to_string(), mode_text(mode, &scenario.units));
             let captions = [
                 PanelCaption {
                     letter: &number,
@@ -345,15 +347,18 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// The frequency of a mode or, if it is unstable, its growth rate.
-fn mode_text(mode: &Mode) -> String {
-    match (mode.is_neutral(), mode.growth()) {
-        (true, _) => "neutral: ω = 0".into(),
-        (_, None) => {
-            let frequency = format_four_digits(mode.frequency().unwrap_or_default());
-            format!("ω = {frequency}")
-        }
-        (_, Some(growth)) => format!("unstable: grows at {}", format_four_digits(growth)),
+/// The frequency of a mode or, if it is unstable, its growth rate: cycles per time where the scenario names
+/// its unit of time, and otherwise the angular frequency.
+pub fn mode_text(mode: &Mode, units: &Units) -> String {
+    let angular = mode.frequency().unwrap_or_default();
+    match (mode.is_neutral(), mode.growth(), units.frequency()) {
+        (true, ..) => "neutral: ω = 0".into(),
+        (_, None, None) => format!("ω = {}", format_four_digits(angular)),
+        (_, None, Some(unit)) => format!("{} {unit}", format_four_digits(angular / TAU)),
+        (_, Some(growth), _) => format!(
+            "unstable: grows at {}",
+            number_in_unit(format_four_digits(growth), units, RATE)
+        ),
     }
 }
 

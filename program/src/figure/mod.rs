@@ -10,7 +10,7 @@ pub(crate) mod drawing;
 mod fit;
 pub(crate) mod leaf;
 mod map;
-mod motion;
+pub(crate) mod motion;
 mod rod;
 pub(crate) mod scenario;
 mod sensitivity;

@@ -18,7 +18,7 @@ use crate::report::numbers::{format_four_digits, number_in_unit};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::units::TIME;
 use leafdyn::scenario::{Scenario, Units};
-use leafdyn::simulate::{Energy, Record, ShapeSnapshot};
+use leafdyn::simulate::{Energy, OutputSample, Record, ShapeSnapshot};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
@@ -104,6 +104,18 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     drawing
 }
 
+/// A tip that moves by a smaller part of its distance from the origin is drawn from where it began.
+const SMALL_MOTION: f64 = 0.2;
+
+/// Where the tip began, if its whole motion is small beside its coordinates, which would hide it.
+pub fn small_motion_origin(moments: &[OutputSample]) -> Option<DVec3> {
+    let start = moments.first()?.tip;
+    let tips = || moments.iter().map(|moment| moment.tip);
+    let moved = tips().fold(0.0, |most: f64, tip| most.max(tip.distance(start)));
+    let farthest = tips().fold(0.0, |most: f64, tip| most.max(tip.length()));
+    (moved > 0.0 && moved < SMALL_MOTION * farthest).then_some(start)
+}
+
 /// Draws the coordinates of the joint tip, or the means of free ones.
 fn draw_tip_coordinates(
     page: &mut Drawing,
@@ -112,11 +124,13 @@ fn draw_tip_coordinates(
     cell: PageRectangle,
     end: f64,
 ) {
+    let origin = small_motion_origin(&record.moments);
+    let start = origin.unwrap_or_default();
     let coordinate = |axis: usize| NamedCurve {
         name: COORDINATE_NAMES[axis],
         color: CURVE_COLORS[axis],
         points: (record.moments.iter())
-            .map(|moment| (moment.time, moment.tip[axis]))
+            .map(|moment| (moment.time, (moment.tip - start)[axis]))
             .collect(),
     };
     let curves = [0, 1, 2].map(coordinate);
@@ -130,9 +144,11 @@ fn draw_tip_coordinates(
         &name,
         curves.iter().flat_map(NamedCurve::ordinates).chain([0.0]),
     );
-    let what = match record.joined {
-        true => "where the tip is",
-        false => "where the tips are, in the mean",
+    let what = match (record.joined, origin) {
+        (true, None) => "where the tip is",
+        (true, Some(_)) => "how far the tip is from where it began",
+        (false, None) => "where the tips are, in the mean",
+        (false, Some(_)) => "how far the tips are from where they began, in the mean",
     };
     let axes = PanelAxes::draw_titled(page, cell, ["(c)", what], across, up);
     let mut key = Legend::right_of(cell);

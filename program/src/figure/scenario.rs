@@ -538,6 +538,7 @@ const MOST_KEYS_NAMED: usize = 3;
 /// A number of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct QuantityLabel {
+    /// What it is.
     pub words: String,
     /// The unit, if the scenario names those of which it consists.
     pub unit: Option<String>,

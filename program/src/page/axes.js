@@ -155,7 +155,7 @@ function drawScale(pen, quantity, limits, map, width, height) {
   if (byVein && veins < 2) return;
   for (let i = 0; i < wide; i++) {
     const t = i / (wide - 1);
-    const color = byVein ? rgb(view.colors[Math.min(veins - 1, Math.floor(t * veins))]) : colorOf(map, t);
+    const color = byVein ? visible(rgb(view.colors[Math.min(veins - 1, Math.floor(t * veins))])) : colorOf(map, t);
     pen.fillStyle = `rgb(${color.map((x) => Math.round(255 * x)).join(",")})`;
     pen.fillRect(left + i, top, 1.5, high);
   }

@@ -185,7 +185,10 @@ function choose(event) {
 }
 
 function listen() {
-  find("theme").addEventListener("click", () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"));
+  find("theme").addEventListener("click", () => {
+    setTheme(root.dataset.theme === "dark" ? "light" : "dark");
+    if (view.leaves.length) update(true);
+  });
   find("quantity").addEventListener("change", () => {
     shown.quantity = Number(find("quantity").value);
     update(true);

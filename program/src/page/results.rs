@@ -5,13 +5,17 @@ use crate::figure;
 use crate::figure::FigureFunction;
 use crate::figure::drawing::space::ViewAngles;
 use crate::figure::drawing::veins::DrawnVeins;
+use crate::figure::leaf::mode_text;
+use crate::figure::motion::small_motion_origin;
 use crate::figure::scenario::{LoadMark, name_with_unit, with_followers_as_dead};
 use crate::page::data::{ModeShape, PageChart, PageCurve, PageData, PageLeaf, encode_vectors};
 use crate::page::{PageResult, loads_on_drawn_veins};
 use crate::report::numbers::{
     count_in_words, format_five_digits, format_four_digits, format_ten_digits,
 };
-use crate::report::{ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict};
+use crate::report::{
+    ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict, stability_phrase,
+};
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::{Scenario, Units};
@@ -46,7 +50,7 @@ impl PageResult for Equilibrium {
         if self.stability.mode_shapes {
             let modes = self.stability.modes.iter().flatten().enumerate();
             view.modes = modes
-                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn))
+                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn, &scenario.units))
                 .collect();
         }
     }
@@ -57,21 +61,19 @@ fn loads_on_leaf(leaf: &Equilibrium, scenario: &Scenario) -> Vec<LoadMark> {
     loads_on_drawn_veins(&with_followers_as_dead(scenario, leaf), None)
 }
 
-fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -> ModeShape {
-    let what = match (mode.is_neutral(), mode.growth()) {
-        (true, _) => "neutral".into(),
-        (_, Some(growth)) => format!("unstable, grows at {}", format_four_digits(growth)),
-        (_, None) => format!(
-            "ω = {}",
-            format_four_digits(mode.frequency().unwrap_or_default())
-        ),
-    };
+fn mode_shape(
+    leaf: &Equilibrium,
+    number: usize,
+    mode: &Mode,
+    drawn: &[usize],
+    units: &Units,
+) -> ModeShape {
     let pick = |of: &[Vec<DVec3>]| {
         let chosen = drawn.iter().filter_map(|&number| of.get(number - 1));
         encode_vectors(chosen.flatten().copied())
     };
     ModeShape {
-        label: format!("mode {number}: {what}"),
+        label: format!("mode {number}: {}", mode_text(mode, units)),
         nodes: mode.displacement.first().map_or(0, Vec::len),
         rest: pick(&leaf.shape.curves),
         displacement: pick(&mode.displacement),
@@ -97,9 +99,10 @@ impl PageResult for Equilibria {
         view.toward = Some(ViewAngles::telling_apart(&shapes).toward_viewer());
         for (k, found) in self.found.iter().take(MOST_EQUILIBRIA_SHOWN).enumerate() {
             let leaf = &found.equilibrium;
-            let kind = equilibrium_kind(leaf.stability.negative_eigenvalues);
+            let kind = leaf.stability.negative_eigenvalues;
+            let kind = kind.map_or("stability unknown".into(), stability_phrase);
             let energy = format_four_digits(leaf.energy.unwrap_or(f64::NAN));
-            let label = format!("{}. {kind}, energy {energy}", k + 1);
+            let label = format!("{}. energy {energy}, {kind}", k + 1);
             view.leaves.push(PageLeaf {
                 summary: leaf.summary(units),
                 loads: Some(loads_on_leaf(leaf, scenario)),
@@ -168,13 +171,20 @@ fn motion_chart(moments: &[OutputSample], units: &Units) -> PageChart {
     // An energy that is always zero needs no curve.
     let energies = energies.filter(|curve| curve.y.iter().any(|&y| y != 0.0));
     let tip = ["tip x", "tip y", "tip z"].into_iter().enumerate();
-    let tip = tip.map(|(axis, name)| curve(1, axis, name, &|m: &OutputSample| m.tip[axis]));
+    let origin = small_motion_origin(moments);
+    let start = origin.unwrap_or_default();
+    let tip =
+        tip.map(|(axis, name)| curve(1, axis, name, &|m: &OutputSample| (m.tip - start)[axis]));
+    let way = match origin {
+        Some(_) => "tip, from where it began",
+        None => "tip",
+    };
     PageChart {
         across: "time".into(),
         log: false,
         choices: vec![
             name_with_unit("energy", units.energy().as_deref()),
-            name_with_unit("tip", units.length.as_deref()),
+            name_with_unit(way, units.length.as_deref()),
         ],
         curves: energies.chain(tip).collect(),
     }

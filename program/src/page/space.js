@@ -178,7 +178,7 @@ class LeafMesh {
     const { fine, sub, nodes } = this;
     const color = this.tubes.geometry.attributes.color;
     for (let j = 0; j < veins; j++) {
-      const own = linear(rgb(view.colors[j]));
+      const own = linear(visible(rgb(view.colors[j])));
       for (let i = 0; i < fine; i++) {
         let c = own;
         if (values) {

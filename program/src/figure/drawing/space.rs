@@ -114,8 +114,10 @@ impl BoxMargins {
 
 /// Distances of ticks and names along the edges of a box in space, in pixels.
 struct EdgeLabels {
-    /// Least distance between the ticks of an axis.
+    /// Least distance between the ticks of an axis that rises on the page, and of one that is rather level,
+    /// along which labels stand beside each other.
     ticks: f64,
+    level_ticks: f64,
     /// From a name to the right edge of the page, at least.
     page_edge: f64,
     /// From the edge to the name of its axis, at least, besides half of the widest label.
@@ -128,6 +130,7 @@ struct EdgeLabels {
 
 const EDGE_LABELS: EdgeLabels = EdgeLabels {
     ticks: 30.0,
+    level_ticks: 46.0,
     page_edge: 6.0,
     name: 25.0,
     small_panel_name: 14.0,
@@ -301,9 +304,12 @@ impl<'s> SpacePanel<'s> {
         let edge = |axis: usize, from: DVec3, outward: DVec3, walls: [DVec3; 2]| {
             let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
             let step = step.unwrap_or_else(|| {
-                round_step(
-                    unit * EDGE_LABELS.ticks / camera.project_direction(DVec3::AXES[axis]).length(),
-                )
+                let way = camera.project_direction(DVec3::AXES[axis]);
+                let apart = match way.x.abs() > way.y.abs() {
+                    true => EDGE_LABELS.level_ticks,
+                    false => EDGE_LABELS.ticks,
+                };
+                round_step(unit * apart / way.length())
             });
             let inset = 0.02 * (high - low)[axis];
             let ends = [low[axis] + inset, high[axis] - inset].map(|end| unit * end);

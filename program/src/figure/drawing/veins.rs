@@ -1,6 +1,7 @@
 //! The veins of a leaf as they are drawn, in units of the longest rod: smooth curves with their
 //! supports, grips, loads and markers, of a leaf at rest, in motion, or of any curves.
 
+use crate::figure::drawing::axes::round_step;
 use crate::figure::drawing::markers::{
     ForceArrow, Marker, MomentArrow, RodPoint, draw_clamp_bar, draw_second_solution_dot,
     draw_support_marker, draw_tip_marker, force_arrows, moment_arrows,
@@ -345,6 +346,25 @@ pub fn vein_tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
 pub fn longest_curve<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f64 {
     let length = |curve: &Vec<DVec3>| curve.windows(2).map(|w| w[0].distance(w[1])).sum();
     curves.into_iter().map(length).fold(0.0, f64::max)
+}
+
+/// Displacements of a buckled leaf below this fraction of its length are magnified.
+const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
+
+/// Magnifies the displacements of curves from others with as many nodes until they are visible; returns
+/// the factor, if there is one.
+pub fn magnify_displacements(curves: &mut [Vec<DVec3>], from: &[Vec<DVec3>]) -> Option<f64> {
+    let largest = curves.iter().flatten().zip(from.iter().flatten());
+    let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
+    let visible = LEAST_VISIBLE_DISPLACEMENT * longest_curve(&*curves);
+    if !(0.0 < largest && largest < visible) {
+        return None;
+    }
+    let factor = round_step(visible / largest);
+    for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
+        *x = *from + factor * (*x - *from);
+    }
+    Some(factor)
 }
 
 /// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
