@@ -10,9 +10,8 @@
 //! of them is a half-wave, and its height above their chord is its amplitude. So nothing has
 //! to be fitted, a vein that only droops is one half-wave, and the numbers depend neither on
 //! the position of the leaf nor on the order of its veins. Half-waves lower than
-//! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: one between two
-//! others is joined with them, and one at an end is left out, so that the heights of the
-//! others do not change when it becomes too low.
+//! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: they are joined
+//! with their neighbors.
 //!
 //! **Chirality.** The twist is the integral of u1 from base to tip, in radians, including
 //! the rest twist. It is positive where d2 turns about d1 like a right-handed screw seen
@@ -512,8 +511,7 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
     let mut waves: Vec<HalfWave> = (ends.windows(2))
         .map(|pair| curve.half_wave([pair[0], pair[1]]))
         .collect();
-    // The lowest is removed first; its neighbors bend to the same side and are joined. At an end there is
-    // only one, which keeps its own chord: with a longer one its height would jump.
+    // The lowest is removed first; its neighbors bend to the same side and are joined.
     while let Some(low) = (0..waves.len())
         .filter(|&i| waves[i].height < least)
         .min_by(|&a, &b| waves[a].height.total_cmp(&waves[b].height))
@@ -521,11 +519,7 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
         if waves.len() == 1 {
             return Vec::new();
         }
-        let (first, last) = (low.saturating_sub(1), low + 1);
-        if low == 0 || last == waves.len() {
-            waves.remove(low);
-            continue;
-        }
+        let (first, last) = (low.saturating_sub(1), (low + 1).min(waves.len() - 1));
         let joined = curve.half_wave([waves[first].ends[0], waves[last].ends[1]]);
         waves.splice(first..=last, [joined]);
     }

@@ -1,5 +1,5 @@
 // Opens the live page in a browser without a network, and uses it as a reader does:
-//   (cd program/src/page/three && npm ci) && node web/check.mjs
+//   (cd program/src/page/three && npm ci) && node web/check.mjs [CLAIM ...]
 // The browser is Chromium, CHROMIUM or /usr/bin/chromium; WebGL is drawn by swiftshader.
 import assert from "node:assert/strict";
 import { readFileSync, statSync } from "node:fs";
@@ -441,22 +441,11 @@ async function narrow() {
   await page.done("narrow");
 }
 
+const claims = { slides, snaps, moves, hostile, flattensByMouse: () => flattens(false), flattensByKeys: () => flattens(true), sharesOneOfSeveral, gallery, firstSliders, movesAreTold, questions, narrow, named, ...(keep ? { picture } : {}), fast };
+const wanted = process.argv.slice(2);
+
 try {
-  await slides();
-  await snaps();
-  await moves();
-  await hostile();
-  await flattens(false);
-  await flattens(true);
-  await sharesOneOfSeveral();
-  await gallery();
-  await firstSliders();
-  await movesAreTold();
-  await questions();
-  await narrow();
-  await named();
-  if (keep) await picture();
-  await fast();
+  for (const [name, claim] of Object.entries(claims)) if (!wanted.length || wanted.includes(name)) await claim();
   console.log("the live page is as it should be");
 } finally {
   await browser.close();

@@ -523,6 +523,20 @@ mod tests {
     use crate::report::sample;
 
     #[test]
+    fn a_tip_that_moves_little_is_drawn_from_where_it_began() {
+        let mut record = sample::sample_record(3, 4);
+        let start = record.moments[0].tip;
+        for (by, small) in [(1e-3, true), (0.1, true), (0.3, false), (0.0, false)] {
+            for (k, moment) in record.moments.iter_mut().enumerate() {
+                moment.tip = start + by * start.length() * (k % 2) as f64 * DVec3::Y;
+            }
+            let origin = small_motion_origin(&record.moments);
+            assert_eq!(origin, small.then_some(start), "{by}");
+        }
+        assert_eq!(small_motion_origin(&[]), None);
+    }
+
+    #[test]
     fn what_is_always_zero_is_not_drawn() {
         let mut record = sample::sample_record(3, 4);
         let names = |record: &Record| -> Vec<&str> {

@@ -49,7 +49,8 @@ function edges(box, place) {
   });
 }
 
-function drawAxes(pen, box, place, small) {
+/// Axes with ticks; in a small panel with names if it is the first: those of the others are the same.
+function drawAxes(pen, box, place, small, named) {
   const size = small ? 10 : 12;
   pen.lineWidth = 1;
   floor(pen, box, place);
@@ -78,7 +79,8 @@ function drawAxes(pen, box, place, small) {
     }
     pen.fillStyle = css("--ink");
     pen.font = font(size + 1);
-    const away = Math.abs(out[0]) > 0.5 ? 20 + widest : 32;
+    if (!named) continue;
+    const away = Math.abs(out[0]) > 0.5 ? 20 + widest : small ? 27 : 32;
     const name = withUnit(AXIS_NAMES[axis], lengthUnit);
     pen.fillText(name, (p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]);
   }

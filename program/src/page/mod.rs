@@ -292,7 +292,8 @@ mod tests {
         assert!(!names.contains(&"work put in"), "{names:?}");
         // In the unit of lengths; that of forces has no name.
         let choices = &data["chart"]["choices"];
-        assert_eq!(*choices, serde_json::json!(["energy", "tip / cm"]));
+        let tip = "tip, from where it began / cm";
+        assert_eq!(*choices, serde_json::json!(["energy", tip]));
     }
 
     #[test]

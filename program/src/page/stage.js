@@ -169,7 +169,7 @@ function frustum(width, height) {
   const { camera, fit } = space;
   const small = space.panels.length > 1;
   // A title stands above a small panel, names of axes below the box of a large one.
-  const [marginX, above, below] = small ? [34, 42, 30] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
+  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 56, 76] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
   const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - above - below) / fit[1]);
   camera.right = width / 2 / scale;
   camera.left = -camera.right;
@@ -232,7 +232,7 @@ function drawUnder(width, height, ratio) {
   const small = space.panels.length > 1;
   for (const panel of space.panels) {
     const place = placeIn(panel);
-    if (find("axes").checked) drawAxes(pen, space.box, place, small);
+    if (find("axes").checked) drawAxes(pen, space.box, place, small, !small || panel === space.panels[0]);
     if (panel === space.panels[0]) drawDirections(pen, space.box, place, [44, height - (small ? 46 : 64)], 76);
     if (panel.label) drawLabel(pen, panel, small);
   }

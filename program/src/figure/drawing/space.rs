@@ -746,6 +746,22 @@ mod tests {
     }
 
     #[test]
+    fn shapes_that_differ_across_are_seen_from_the_front() {
+        let shape = |[y, z]: [f64; 2]| {
+            let curve: Vec<DVec3> = (0..=8)
+                .map(|k| DVec3::new(f64::from(k) / 8.0, 0.0, 0.0))
+                .chain([DVec3::new(1.1, y, z)])
+                .collect();
+            DrawnVeins::from_curves(&[curve.clone()], &[curve[9]], 1.0)
+        };
+        let across = [[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1]].map(shape);
+        assert_eq!(ViewAngles::telling_apart(&across), FRONT_VIEW);
+        // A single shape has nothing from which it is to be told apart.
+        let one = ViewAngles::telling_apart(&across[..1]);
+        assert_eq!(one, VIEW_FROM_TIP);
+    }
+
+    #[test]
     fn walls_are_behind_the_leaf_and_its_axes_before_it() {
         let setting = FigureSetting::from_scenario(&sample::sample_scenario("fan", 3));
         let cell = PageRectangle::new(DVec2::ZERO, DVec2::splat(400.0));

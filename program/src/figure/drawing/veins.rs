@@ -542,6 +542,24 @@ mod tests {
     }
 
     #[test]
+    fn small_displacements_are_magnified_until_they_are_visible() {
+        let straight = vec![vec![DVec3::ZERO, DVec3::X]];
+        for (by, factor) in [
+            (1e-3, Some(100.0)),
+            (0.04, Some(2.0)),
+            (0.2, None),
+            (0.0, None),
+        ] {
+            let mut bent = straight.clone();
+            bent[0][1].y = by;
+            let found = magnify_displacements(&mut bent, &straight);
+            assert_eq!(found, factor, "{by}");
+            let drawn = by * factor.unwrap_or(1.0);
+            assert!((bent[0][1] - DVec3::new(1.0, drawn, 0.0)).length() < 1e-12);
+        }
+    }
+
+    #[test]
     fn curves_of_no_one_and_two_points() {
         assert!(smooth_vein(&[]).is_empty());
         assert!(smooth_vein(&[DVec3::X]).is_empty());
