@@ -7,7 +7,8 @@ use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::space::SmallPanels;
 use crate::figure::drawing::veins::{DrawnVeins, longest_curve, magnify_displacements, vein_tips};
 use crate::figure::drawing::{
-    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, panel_letters,
+    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, curve_between_fractions,
+    panel_letters,
 };
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
@@ -133,12 +134,19 @@ impl LeafOfTrace {
     fn new(trace: &Trace, [b, p]: [usize; 2]) -> Self {
         let (branch, point) = (&trace.branches[b], &trace.branches[b].points[p]);
         let mut curves = point.curves.clone();
-        let origin = branch
-            .from
-            .map(|[b, p]| &trace.branches[b].points[p].curves);
-        let magnified = origin
-            .filter(|from| have_as_many_nodes(from, &curves))
-            .and_then(|from| magnify_displacements(&mut curves, from));
+        let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
+        let magnified = origin.and_then(|origin| {
+            // Grids are nested: at the stations of the coarser one both have nodes.
+            let stations = match origin.stations.len() < point.stations.len() {
+                true => &origin.stations,
+                false => &point.stations,
+            };
+            let from = curves_at_stations(origin, stations);
+            let mut displaced = curves_at_stations(point, stations);
+            let factor = magnify_displacements(&mut displaced, &from)?;
+            curves = displaced;
+            Some(factor)
+        });
         LeafOfTrace {
             tips: match magnified {
                 Some(_) => vein_tips(&curves, point.tips.len() == 1),
@@ -150,8 +158,14 @@ impl LeafOfTrace {
     }
 }
 
-fn have_as_many_nodes(one: &[Vec<DVec3>], other: &[Vec<DVec3>]) -> bool {
-    one.iter().map(Vec::len).eq(other.iter().map(Vec::len))
+/// The curves of a point at these stations, which may be those of another grid.
+fn curves_at_stations(point: &TracePoint, stations: &[f64]) -> Vec<Vec<DVec3>> {
+    let at = |curve: &Vec<DVec3>| -> Vec<DVec3> {
+        let place =
+            |&sigma: &f64| curve_between_fractions(&point.stations, curve, [sigma; 2]).pop();
+        stations.iter().filter_map(place).collect()
+    };
+    point.curves.iter().map(at).collect()
 }
 
 fn header_notes(trace: &Trace) -> Vec<String> {
