@@ -20,6 +20,13 @@ LINK = re.compile(r"(?<=\]\()([^)#\s]+)((?:#[^)\s]*)?)(?=\))")
 # Scenarios of the gallery: what to look at, and the numbers with sliders. Each opens on the page in web/check.mjs.
 GALLERY = json.loads((ROOT / "site/gallery.json").read_text())
 
+# Questions with which the live page begins, by their names in its address.
+QUESTIONS = {
+    "ripple": "Why do leaf margins ripple?",
+    "snap": "Why does it snap?",
+    "arch": "Why does a grass leaf arch and not fall?",
+}
+
 
 def documents(to: Path) -> None:
     """Copies the documents with all they link to, below the same folders, so that links stay right."""
@@ -94,6 +101,9 @@ def gallery(to: Path, program: str | None) -> None:
     if live.exists():
         shutil.copy(live, to / "live.html")
         lines += ["Each opens [the live page](docs/live.md): one file with the solver in it. Move the slider, and the leaf follows.", ""]
+        lines += ["## Three questions", ""]
+        lines += [f'- <a href="../live.html#q={name}">{question}</a>' for name, question in QUESTIONS.items()]
+        lines += [""]
     else:
         lines += ["[The live page](docs/live.md) was not built with this site.", ""]
     for entry in GALLERY:

@@ -423,6 +423,9 @@ async function questions() {
   await set("leaf.length", 8);
   await page.rest();
   assert.match(await said(), /It stands/);
+  const direct = await open("#q=arch");
+  await direct.waitForFunction(() => document.getElementById("title").textContent === "arch");
+  await direct.done("question-by-address");
   await press(page, "[data-question='']");
   assert(await page.isVisible("#summary"));
   assert.equal(await page.evaluate(() => window.leafdyn.sliders.value("leaf.length")), 8);

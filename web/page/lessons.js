@@ -132,6 +132,9 @@ const LESSONS = {
   },
 };
 
+/// The question that an address names, `#q=snap`, if there is one.
+const questionOf = (hash) => Object.keys(LESSONS).find((name) => hash === `#q=${name}`);
+
 /// The question that is open, and the leaf before its last step.
 let lesson = null;
 let step = { known: null, last: null };
@@ -153,7 +156,8 @@ async function ask(name) {
   step = { known: null, last: null };
   const { text, name: file } = lesson.scenario();
   const asked = lesson;
-  await open({ text, name: file, sliders: lesson.sliders, last: lesson.sliders[0].key });
+  await open({ text, name: file, sliders: lesson.sliders, last: lesson.sliders[0].key, question: name });
+  history.replaceState(null, "", `#q=${name}`);
   if (lesson === asked) tellLesson(now.known);
 }
 

@@ -33,7 +33,7 @@ function tell(message) {
 const nextFrame = () => new Promise((next) => requestAnimationFrame(next));
 
 /// Opens a scenario; where it is refused, what was open stays.
-async function open({ text, name, values = [], sliders: wanted, last, view, looks = {}, at = null }) {
+async function open({ text, name, values = [], sliders: wanted, last, view, looks = {}, at = null, question = null }) {
   const wish = (now.wish = {});
   now.playing = false;
   while (now.busy) await nextFrame();
@@ -51,6 +51,8 @@ async function open({ text, name, values = [], sliders: wanted, last, view, look
   }
   tell(null);
   Object.assign(now, { text, name, pull: null, pinned: null });
+  // A leaf of one's own is no answer to the question that was open.
+  if (lesson && !question) ask("");
   past.length = 0;
   now.modesAt = null;
   now.before = new Map(values);

@@ -143,6 +143,7 @@ function listen() {
   window.addEventListener("hashchange", async () => {
     const shared = await unpacked(location.hash).catch(() => null);
     if (shared) open(shared);
+    else if (questionOf(location.hash)) ask(questionOf(location.hash));
   });
   new ResizeObserver(() => {
     stage.resize();
@@ -204,7 +205,9 @@ async function begin() {
   const given = JSON.parse(find("given").textContent);
   const shared = await unpacked(location.hash).catch(() => null);
   const opened = (shared && (await open(shared))) || (given && (await open(given)));
-  if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
+  const question = questionOf(location.hash);
+  if (question) await ask(question);
+  else if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
   listen();
   requestAnimationFrame(tick);
   /// For tests, and for whoever builds on the page.
